@@ -1,0 +1,67 @@
+# The front door: `make` lists the targets.
+
+# The Python that makes the environment: any 3.11 or newer, for example make PYTHON=python3.12.
+PYTHON ?= $(shell for name in python3.11 python3; do \
+	  if $$name -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; \
+	  then echo $$name; break; fi; done)
+BIN := .venv/bin
+STAMP := .venv/.installed
+
+# Exact versions for everything, also for the build backend, which pip fetches on its own.
+export PIP_CONSTRAINT := constraints.txt
+export PIP_BUILD_CONSTRAINT := constraints.txt
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.DEFAULT_GOAL := help
+.PHONY: help .venv demo test lint bench tools format clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[.a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
+
+.venv: $(STAMP) ## install the package and its tools into .venv
+
+$(STAMP): pyproject.toml constraints.txt
+	@test -n "$(PYTHON)" || \
+	  { echo "No Python 3.11 or newer found: install one, or say make PYTHON=/path/to/python."; exit 1; }
+	@echo "Installing into .venv (a minute or so, once) ..."
+	@test -x $(BIN)/pip || $(PYTHON) -m venv --clear .venv || \
+	  { echo "$(PYTHON) cannot make an environment: install its venv module (python3-venv)."; exit 1; }
+	@$(BIN)/pip install -qq -c constraints.txt -e '.[dev]'
+	@touch $@
+
+demo: $(STAMP) ## simulate the three drives, figures and tables into demo/
+	@$(BIN)/swashplate demo --out demo
+
+test: lint ## lint, then all tests: compiled, and a part of them interpreted
+	@echo; echo "== Tests, compiled"
+	@$(BIN)/pytest -n 2
+	@echo; echo "== Tests marked 'interpreted', without the JIT"
+	@NUMBA_DISABLE_JIT=1 $(BIN)/pytest -m interpreted
+
+lint: $(STAMP) ## style, format, types and the direction of imports
+	@echo "== Style";   $(BIN)/ruff check .
+	@echo; echo "== Format";  $(BIN)/ruff format --check .
+	@echo; echo "== Types";   $(BIN)/mypy
+	@echo; echo "== Imports"; $(BIN)/lint-imports --no-logo
+
+bench: $(STAMP) tools ## measure the speed against C (needs a C compiler)
+	@$(BIN)/python benchmarks/run.py
+
+tools: ## make sure that there is a C compiler, for bench
+	@if command -v cc >/dev/null; then :; \
+	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	  echo "No C compiler found: installing gcc."; \
+	  apt-get update -qq && apt-get install -qq -y gcc libc6-dev; \
+	else \
+	  echo "The bench needs a C compiler: install gcc and the C library's headers (libc6-dev)."; \
+	  exit 1; \
+	fi
+
+format: $(STAMP) ## sort the imports, mend what can be mended, format
+	@$(BIN)/ruff check --fix-only -q .
+	@$(BIN)/ruff format .
+
+clean: ## remove the environment, caches and everything made
+	rm -rf .venv demo benchmarks/build build dist htmlcov .coverage .coverage.* .hypothesis \
+	  .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find . -name .git -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +

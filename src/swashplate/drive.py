@@ -1,0 +1,340 @@
+"""A drive: a parameter set that can simulate itself, settle, be changed and be stored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.errors import InputError
+from swashplate.parameters.files import dump_set, load_preset, load_set
+from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
+from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.simulation.batch import Batch, SquaredError, simulate_many
+from swashplate.simulation.build import build
+from swashplate.simulation.gradients import (
+    Sensitivities,
+    drive_sensitivities,
+    pump_sensitivities,
+)
+from swashplate.simulation.record import (
+    SOURCE_RATE,
+    Interpolation,
+    Record,
+    check_voltage,
+    record_of,
+)
+from swashplate.simulation.result import Simulation
+from swashplate.simulation.run import Start, simulate_drive, simulate_pump
+from swashplate.simulation.steady import steady_states
+from swashplate.simulation.stepper import Stepper
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A hydrostatic drive from joystick voltage to shaft speed. Immutable.
+
+    Examples
+    --------
+    >>> hoist = Drive.preset("hoist")
+    >>> run = hoist.simulate(maneuvers.step(9.0).sample(512.0))
+    >>> run.shaft_speed.max()
+    """
+
+    parameters: ParameterSet
+    """Value, unit, bounds, source and status of every parameter, by symbol."""
+
+    @classmethod
+    def preset(cls, name: str) -> Drive:
+        """A packaged drive: ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``.
+
+        Raises
+        ------
+        ParameterError
+            For another name.
+        """
+        return cls(load_preset(name))
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Drive:
+        """A drive from a parameter file.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be read.
+        ParameterError
+            If an entry is wrong; the sentence names file, parameter and rule.
+        """
+        return cls(load_set(path))
+
+    def to_toml(self, path: str | Path) -> None:
+        """Store the parameters; `from_toml` gives an equal drive back.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be written; an older file of that name then stays as it was.
+        """
+        from swashplate.tables import write_text
+
+        write_text(dump_set(self.parameters), path)
+
+    @property
+    def name(self) -> str:
+        """Name of the parameter set."""
+        return self.parameters.name
+
+    def __getitem__(self, symbol: str) -> Parameter:
+        """A parameter by symbol, e.g. ``drive["Z16"].value.plus``."""
+        return self.parameters[symbol]
+
+    def replace(self, **changes: Change) -> Drive:
+        """A drive with other values.
+
+        Parameters
+        ----------
+        **changes : float or (float, float)
+            By symbol (``Z16=1.2e-4`` both ways, ``Z16=(1.2e-4, 1.5e-4)`` plus and minus) or by one
+            direction (``Z16_plus=1.2e-4``), in SI.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name or a value that breaks a rule.
+        """
+        return Drive(self.parameters.replace(changes))
+
+    def scale(self, **factors: Change) -> Drive:
+        """A drive with values multiplied, e.g. ``scale(Z16=1.5, Z10=1.5)``; as `replace`."""
+        return Drive(self.parameters.scale(factors))
+
+    def renamed(self, name: str, title: str | None = None) -> Drive:
+        """The same drive under another name."""
+        kept = self.parameters.title if title is None else title
+        return Drive(replace(self.parameters, name=name, title=kept))
+
+    def simulate(
+        self,
+        voltage: ArrayLike,
+        rate: float = SOURCE_RATE,
+        *,
+        time: ArrayLike | None = None,
+        interpolation: Interpolation | None = None,
+        start: Start = "rest",
+        clip: bool = False,
+        substeps: int | None = None,
+    ) -> Simulation:
+        """Simulate the whole drive over a command.
+
+        Parameters
+        ----------
+        voltage : (n,) array_like
+            Command. [V]
+        rate : float
+            Samples a second, 10 Hz to 100 kHz; with `time`, rate of the result's grid. [Hz]
+        time : (n,) array_like, optional
+            Increasing time stamps in any distances; `interpolation` must then be given. [s]
+        interpolation : {"linear", "previous"}, optional
+            What the command is between samples: a straight line (default) or held.
+        start : {"rest", "steady"}
+            From rest at 0 V, or settled at the first command.
+        clip : bool
+            Clip a command beyond ±10 V instead of refusing it.
+        substeps : int, optional
+            Steps of the march a sample; by default so many that h ≤ 1/512 s.
+
+        Returns
+        -------
+        Simulation
+            All signals of the chain.
+
+        Raises
+        ------
+        InputError
+            For a record or option that cannot be simulated.
+        DomainError
+            If the solenoid overpowers the feedback spring.
+        """
+        record = _voltage_record(voltage, rate, time, interpolation, clip, substeps)
+        return simulate_drive(self.parameters, record, start)
+
+    def simulate_current(
+        self,
+        current: ArrayLike,
+        rate: float = SOURCE_RATE,
+        *,
+        time: ArrayLike | None = None,
+        interpolation: Interpolation | None = None,
+        start: Start = "rest",
+        substeps: int | None = None,
+    ) -> Simulation:
+        """Simulate pump and motor alone over a signed current [A]; arguments as `simulate`."""
+        record = record_of(
+            current,
+            rate,
+            what="current",
+            time=time,
+            interpolation=interpolation,
+            substeps=substeps,
+        )
+        return simulate_pump(self.parameters, record, start)
+
+    def sensitivities(
+        self,
+        voltage: ArrayLike,
+        rate: float = SOURCE_RATE,
+        *,
+        parameters: Sequence[str] | None = None,
+        time: ArrayLike | None = None,
+        interpolation: Interpolation | None = None,
+        start: Start = "rest",
+        clip: bool = False,
+        substeps: int | None = None,
+    ) -> Sensitivities:
+        """Simulate with exact derivatives of currents, speed and position.
+
+        Parameters
+        ----------
+        parameters : sequence of str, optional
+            Symbols (``"Z16"`` stands for both directions) or columns (``"Z16_plus"``) to
+            differentiate by; by default all of card, pump and motor.
+        voltage, rate, time, interpolation, start, clip, substeps :
+            As in `simulate`.
+        """
+        record = _voltage_record(voltage, rate, time, interpolation, clip, substeps)
+        return drive_sensitivities(self.parameters, record, start, parameters)
+
+    def sensitivities_current(
+        self,
+        current: ArrayLike,
+        rate: float = SOURCE_RATE,
+        *,
+        parameters: Sequence[str] | None = None,
+        time: ArrayLike | None = None,
+        interpolation: Interpolation | None = None,
+        start: Start = "rest",
+        substeps: int | None = None,
+    ) -> Sensitivities:
+        """The same for pump and motor alone over a signed current. [A]"""
+        record = record_of(
+            current,
+            rate,
+            what="current",
+            time=time,
+            interpolation=interpolation,
+            substeps=substeps,
+        )
+        return pump_sensitivities(self.parameters, record, start, parameters)
+
+    def simulate_many(
+        self,
+        changes: Mapping[str, ArrayLike],
+        *,
+        voltage: ArrayLike | None = None,
+        current: ArrayLike | None = None,
+        rate: float = SOURCE_RATE,
+        interpolation: Interpolation | None = None,
+        cost: SquaredError | None = None,
+        output: str = "shaft_speed",
+        threads: int | None = None,
+    ) -> Batch:
+        """Simulate many parameter sets over one record, from rest, on all cores.
+
+        Parameters
+        ----------
+        changes : mapping
+            Symbol or column to (m,) values, one for each set; other parameters are this drive's.
+        voltage, current : (n,) array_like
+            The record, one of the two. [V or A]
+        rate, interpolation :
+            As in `simulate`.
+        cost : SquaredError, optional
+            Reduce each set to one number on the fly, so that memory does not grow with the record.
+        output : str
+            Without `cost`: the signal to return, ``"shaft_speed"``, ``"shaft_position"`` or
+            ``"current"``.
+        threads : int, optional
+            By default one a core. The numbers do not depend on it.
+        """
+        if (voltage is None) == (current is None):
+            raise InputError("A batch needs either a voltage or a current.")
+        if current is None:
+            assert voltage is not None
+            record = _voltage_record(voltage, rate, None, interpolation, False, None)
+        else:
+            record = record_of(current, rate, what="current", interpolation=interpolation)
+        return simulate_many(
+            self.parameters,
+            changes,
+            record,
+            by_voltage=current is None,
+            cost=cost,
+            output=output,
+            threads=threads,
+        )
+
+    def stepper(
+        self,
+        h: float = 1.0 / SOURCE_RATE,
+        *,
+        interpolation: Interpolation = "linear",
+        start: Start = "rest",
+    ) -> Stepper:
+        """The drive one sample at a time: command in, sample out, numbers as in `simulate`.
+
+        Parameters
+        ----------
+        h : float
+            Interval between samples. [s]
+        interpolation, start :
+            As in `simulate`.
+        """
+        return Stepper(self.parameters, h, interpolation, start)
+
+    @overload
+    def steady_speed(self, voltage: float) -> float: ...
+    @overload
+    def steady_speed(self, voltage: Sequence[float] | Array) -> Array: ...
+    def steady_speed(self, voltage: float | Sequence[float] | Array) -> float | Array:
+        """Speed that the drive settles at under constant commands [V → rad/s]."""
+        return self._steady(voltage)[1]
+
+    @overload
+    def steady_current(self, voltage: float) -> float: ...
+    @overload
+    def steady_current(self, voltage: Sequence[float] | Array) -> Array: ...
+    def steady_current(self, voltage: float | Sequence[float] | Array) -> float | Array:
+        """Signed current that the card settles at under constant commands [V → A]."""
+        return self._steady(voltage)[0]
+
+    def _steady(self, voltage: float | Sequence[float] | Array) -> tuple[float | Array, ...]:
+        volts = np.atleast_1d(np.array(voltage, dtype=np.float64))
+        if not (np.abs(volts) <= FULL_VOLTAGE).all():
+            raise InputError("A steady state needs finite commands within ±10 V.")
+        current, speed = np.empty(volts.size), np.empty(volts.size)
+        _, plus, minus, pump, _ = build(self.parameters, 1.0 / SOURCE_RATE)
+        steady_states(volts.reshape(-1), plus, minus, pump, current, speed)
+        if np.ndim(voltage) == 0:
+            return float(current[0]), float(speed[0])
+        return current.reshape(volts.shape), speed.reshape(volts.shape)
+
+
+def _voltage_record(
+    voltage: ArrayLike,
+    rate: float,
+    time: ArrayLike | None,
+    interpolation: Interpolation | None,
+    clip: bool,
+    substeps: int | None,
+) -> Record:
+    record = record_of(
+        voltage, rate, what="voltage", time=time, interpolation=interpolation, substeps=substeps
+    )
+    return check_voltage(record, clip)

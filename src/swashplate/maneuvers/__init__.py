@@ -1,0 +1,27 @@
+"""Manoeuvres: the voltage that a joystick commands over time, for tests of a drive.
+
+`step`, `ramp`, `sine`, `stairs`, `chirp`, `multisine`, `recorded` and `rest` make one; `+` puts one
+after another, a factor scales it, `superpose` adds voltages.
+
+Most take three keywords, all in seconds: `start`, the rest before the command; `settle`, how long
+the cubic return to (0 V, 0 V/s) lasts at the end, None or 0 for none; `length`, the whole. Every
+function raises InputError, one sentence, for a number that is not finite or out of its range. What
+goes beyond the ±10 V of a joystick is for the simulation to refuse.
+"""
+
+from swashplate.maneuvers.composition import SplineReturn as SplineReturn
+from swashplate.maneuvers.composition import spline_return as spline_return
+from swashplate.maneuvers.composition import superpose as superpose
+from swashplate.maneuvers.curves import Curve as Curve
+from swashplate.maneuvers.parsing import parse as parse
+from swashplate.maneuvers.pieces import Maneuver as Maneuver
+from swashplate.maneuvers.pieces import Piece as Piece
+from swashplate.maneuvers.records import recorded as recorded
+from swashplate.maneuvers.shapes import ramp as ramp
+from swashplate.maneuvers.shapes import rest as rest
+from swashplate.maneuvers.shapes import stairs as stairs
+from swashplate.maneuvers.shapes import step as step
+from swashplate.maneuvers.sines import chirp as chirp
+from swashplate.maneuvers.sines import multisine as multisine
+from swashplate.maneuvers.sines import sine as sine
+from swashplate.maneuvers.source import source_tests as source_tests

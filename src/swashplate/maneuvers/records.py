@@ -1,0 +1,81 @@
+"""Manoeuvres from logs: a voltage that was measured, to be commanded again."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from swashplate.errors import InputError
+from swashplate.maneuvers.checks import row
+from swashplate.maneuvers.curves import Array, interval
+from swashplate.maneuvers.pieces import Maneuver, Piece
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """Each of `volts` [V] from its one of `times` [s] until the next."""
+
+    times: Array
+    volts: Array
+
+    def __call__(self, time: Array) -> Array:
+        return self.volts[interval(self.times, time)]
+
+    def slope(self, time: Array) -> Array:
+        return np.zeros_like(time)
+
+
+@dataclass(frozen=True, eq=False)
+class _Joined:
+    """Straight lines through `volts` [V] at `times` [s]."""
+
+    times: Array
+    volts: Array
+
+    def __call__(self, time: Array) -> Array:
+        return np.interp(time, self.times, self.volts)
+
+    def slope(self, time: Array) -> Array:
+        # At the last row there is no line that follows: keep to the one before.
+        slopes: Array = np.diff(self.volts) / np.diff(self.times)
+        return slopes[interval(self.times[:-1], time)]
+
+
+_CURVES: dict[str, type[_Held | _Joined]] = {"previous": _Held, "linear": _Joined}
+
+
+def recorded(
+    time: npt.ArrayLike, voltage: npt.ArrayLike, *, interpolation: Literal["previous", "linear"]
+) -> Maneuver:
+    """Voltage from a log; its first row is at 0 s whatever its time says, its last at the end.
+
+    Parameters
+    ----------
+    time, voltage : array_like, shape (n,)
+        At least two rows; time increases from each to the next. [s], [V]
+    interpolation : {"previous", "linear"}
+        Between two rows: hold the earlier one, or go straight to the later one.
+
+    Raises
+    ------
+    InputError
+        If the rows are not such, or a number is not finite; it names the first row that is wrong.
+    """
+    if interpolation not in _CURVES:
+        raise InputError(f"interpolation must be 'previous' or 'linear', not {interpolation!r}")
+    stamps, volts = row("time", time), row("voltage", voltage)
+    if stamps.size != volts.size or stamps.size < 2:
+        raise InputError(
+            "time and voltage must have the same number of rows, at least two, "
+            f"not {stamps.size} and {volts.size}"
+        )
+    times = stamps - stamps[0]
+    late = np.flatnonzero(np.diff(times) <= 0.0) + 1
+    if late.size:
+        before, after = stamps[late[0] - 1 : late[0] + 1]
+        raise InputError(
+            f"time must increase, but row {late[0]} (the first is 0) has {after} s after {before} s"
+        )
+    curve = _CURVES[interpolation](times, volts)
+    return Maneuver(f"recorded {times.size} rows", float(times[-1]), (Piece(0.0, curve),))

@@ -1,0 +1,1 @@
+"""Parameter sets: what a parameter is, the published values, rules and files."""

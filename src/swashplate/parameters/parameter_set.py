@@ -1,0 +1,208 @@
+"""A parameter set: values with their origin, immutable, always valid."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from types import MappingProxyType
+from typing import Literal, NamedTuple
+
+from swashplate.errors import ParameterError
+from swashplate.parameters.catalogue import CATALOGUE, COLUMNS, Definition
+from swashplate.parameters.rules import check_bounds, check_rules
+
+PressureRoot = Literal["published", "symmetric"]
+CoulombSign = Literal["smooth", "literal"]
+Status = Literal["fitted", "assumed", "approximate", "inactive", "user"]
+
+
+class Pair(NamedTuple):
+    """Values of a directional parameter, both as magnitudes."""
+
+    plus: float
+    minus: float
+
+
+Value = float | Pair
+Change = float | tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a set."""
+
+    definition: Definition
+    value: Value
+    source: str = ""
+    status: Status = "user"
+    bounds: tuple[float, float] | None = None
+    """Range that the set's author gives, in place of the catalogue's."""
+
+    @property
+    def symbol(self) -> str:
+        """Symbol in the source, e.g. ``Z16``."""
+        return self.definition.symbol
+
+    @property
+    def name(self) -> str:
+        """What it is, in words."""
+        return self.definition.name
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the value."""
+        return self.definition.unit
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Its one or two numbers, in the order of ``definition.columns``."""
+        return tuple(self.value) if isinstance(self.value, Pair) else (self.value,)
+
+
+@dataclass(frozen=True)
+class ParameterSet(Mapping[str, Parameter]):
+    """All parameters of a drive, by symbol.
+
+    Raises
+    ------
+    ParameterError
+        On creation, if a parameter is missing or breaks a rule; the sentence names the parameter,
+        its value and the rule.
+    """
+
+    name: str
+    title: str
+    card: str
+    parameters: Mapping[str, Parameter]
+    pressure_root: PressureRoot = "published"
+    coulomb_sign: CoulombSign = "smooth"
+    numbers: Mapping[str, float] = field(init=False, repr=False, compare=False)
+    """Every single value by column, e.g. ``Z16_plus``."""
+
+    def __post_init__(self) -> None:
+        missing = [symbol for symbol in CATALOGUE if symbol not in self.parameters]
+        if missing:
+            raise ParameterError(f"{self.name}: no value for {', '.join(missing)}.")
+        ordered = {symbol: self.parameters[symbol] for symbol in CATALOGUE}
+        numbers = {}
+        for parameter in ordered.values():
+            for column, value in zip(parameter.definition.columns, parameter.values, strict=True):
+                numbers[column] = value
+                if parameter.bounds is not None:
+                    check_bounds(self.name, column, parameter.definition, value, parameter.bounds)
+        check_rules(self.name, numbers)
+        object.__setattr__(self, "parameters", MappingProxyType(ordered))
+        object.__setattr__(self, "numbers", MappingProxyType(numbers))
+
+    def __getitem__(self, symbol: str) -> Parameter:
+        try:
+            return self.parameters[symbol]
+        except KeyError:
+            raise unknown_parameter(symbol) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.parameters)
+
+    def __len__(self) -> int:
+        return len(self.parameters)
+
+    def __hash__(self) -> int:
+        return hash((self.name, *self.numbers.values()))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # read-only views cannot be pickled, so a copy in another process is built anew
+        return ParameterSet, (
+            self.name,
+            self.title,
+            self.card,
+            dict(self.parameters),
+            self.pressure_root,
+            self.coulomb_sign,
+        )
+
+    def replace(self, changes: Mapping[str, Change]) -> "ParameterSet":
+        """Copy with other values, marked as the user's.
+
+        Parameters
+        ----------
+        changes : mapping
+            Symbol (``Z16``, both directions or a pair) or column (``Z16_plus``) to value, SI.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name, a pair for a parameter without directions, or a broken rule.
+        """
+        parameters = dict(self.parameters)
+        for name, change in changes.items():
+            definition = find(name)
+            old = parameters[definition.symbol]
+            parameters[definition.symbol] = replace(
+                old, value=_changed(name, definition, old, change), source="", status="user"
+            )
+        return replace(self, parameters=parameters)
+
+    def scale(self, factors: Mapping[str, Change]) -> "ParameterSet":
+        """Copy with values multiplied by factors; names as in `replace`."""
+        changes: dict[str, Change] = {}
+        for name, factor in factors.items():
+            old = self.parameters[find(name).symbol]
+            if name in CATALOGUE and isinstance(old.value, Pair):
+                plus, minus = factor if isinstance(factor, tuple) else (factor, factor)
+                changes[name] = Pair(old.value.plus * plus, old.value.minus * minus)
+            elif isinstance(factor, tuple):
+                raise ParameterError(f"{name} has one value, so it takes one factor, not two.")
+            else:
+                changes[name] = self.numbers[name] * factor
+        return self.replace(changes)
+
+
+def _changed(name: str, definition: Definition, old: Parameter, change: Change) -> Value:
+    if isinstance(change, tuple) and (not definition.directional or name != definition.symbol):
+        raise ParameterError(f"{name} has one value, not a plus and a minus one.")
+    if isinstance(change, tuple) and len(change) != 2:
+        raise ParameterError(f"{name} takes one value or two (plus, minus), not {len(change)}.")
+    if isinstance(change, tuple):
+        return Pair(float(change[0]), float(change[1]))
+    number = float(change)
+    if not definition.directional:
+        return number
+    assert isinstance(old.value, Pair)
+    if name == definition.symbol:
+        return Pair(number, number)
+    side = name.removeprefix(definition.symbol + "_")
+    return old.value._replace(**{side: number})
+
+
+def find(name: str) -> Definition:
+    """Definition of a symbol (``Z16``) or column (``Z16_plus``).
+
+    Raises
+    ------
+    ParameterError
+        If there is none of that name; the sentence lists the right ones.
+    """
+    if name in CATALOGUE:
+        return CATALOGUE[name]
+    if name in COLUMNS:
+        return CATALOGUE[COLUMNS[name]]
+    raise unknown_parameter(name)
+
+
+def unknown_parameter(name: str) -> ParameterError:
+    """Error for a name that no parameter has."""
+    close = get_close_matches(name, [*CATALOGUE, *COLUMNS], n=1)
+    hint = f" (did you mean {close[0]}?)" if close else ""
+    return ParameterError(
+        f"There is no parameter '{name}'{hint}; the parameters are {', '.join(CATALOGUE)}, "
+        "those with two directions also as e.g. Z16_plus and Z16_minus."
+    )
+
+
+def columns_of(names: Mapping[str, object] | tuple[str, ...] | list[str]) -> list[str]:
+    """Columns that a list of symbols and columns stands for, in its order."""
+    columns: list[str] = []
+    for name in names:
+        definition = find(name)
+        wanted = definition.columns if name == definition.symbol else (name,)
+        columns.extend(column for column in wanted if column not in columns)
+    return columns

@@ -1,0 +1,1 @@
+"""Marching the equations through time: plain, with sensitivities, many sets at once."""

@@ -1,0 +1,124 @@
+"""From a parameter set to the tuples that the march takes."""
+
+from math import floor, tan
+from typing import NamedTuple
+
+from swashplate.errors import InputError
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.physics.component import uncompiled
+from swashplate.physics.control_card import decay_factor
+from swashplate.physics.stroker import pressure_limits
+from swashplate.physics.swash import TAN_22_5
+from swashplate.simulation.constants import (
+    CHANNEL_PARAMETERS,
+    PUMP_PARAMETERS,
+    Channel,
+    Delay,
+    Pump,
+)
+
+ALL_PARAMETERS = (
+    *PUMP_PARAMETERS,
+    *(f"{name}_plus" for name in CHANNEL_PARAMETERS),
+    *(f"{name}_minus" for name in CHANNEL_PARAMETERS),
+    "tau",
+)
+"""Columns of the sensitivities, in their order."""
+
+
+class Constants(NamedTuple):
+    """A drive, ready to be marched at one step."""
+
+    delay: Delay
+    plus: Channel
+    minus: Channel
+    pump: Pump
+    step: float
+
+
+def build(parameters: ParameterSet, step: float) -> Constants:
+    """Constants of the march.
+
+    Parameters
+    ----------
+    parameters : ParameterSet
+        The drive.
+    step : float
+        h. [s]
+
+    Raises
+    ------
+    InputError
+        If the card's explicit filter is unstable at this step.
+    """
+    numbers = parameters.numbers
+    literal = True if parameters.coulomb_sign == "literal" else None
+    channels = []
+    for side in ("plus", "minus"):
+        check_filter_stability(
+            parameters.name, numbers[f"zeta_{side}"], numbers[f"omega_{side}"], side, step
+        )
+        values = [numbers[f"{name}_{side}"] for name in CHANNEL_PARAMETERS]
+        decay = uncompiled(decay_factor)(numbers[f"a_{side}"], step)
+        channels.append(Channel._make([*values, decay, literal]))
+    return Constants(
+        build_delay(numbers["tau"], step), channels[0], channels[1], build_pump(parameters), step
+    )
+
+
+def build_pump(parameters: ParameterSet) -> Pump:
+    """Pump and motor, whatever the step."""
+    numbers = parameters.numbers
+    Z13 = (numbers["Z13_plus"], numbers["Z13_minus"])
+    limits = uncompiled(pressure_limits)(numbers["Z1"], numbers["Z2"], *Z13, numbers["Z15"])
+    options = (
+        numbers["Z7"] != 0.0,
+        numbers["Z12"] != 0.0,
+        tan(max(Z13)) >= TAN_22_5,
+        parameters.pressure_root == "symmetric",
+    )
+    return Pump._make(
+        [
+            *(numbers[name] for name in PUMP_PARAMETERS),
+            *limits,
+            *(True if option else None for option in options),
+        ]
+    )
+
+
+def build_delay(tau: float, step: float) -> Delay:
+    """Delay τ in samples. Within half a sample, the share's interval is kept from looking ahead."""
+    samples = tau / step
+    share_end = max(samples, 0.5) - 0.5
+    return Delay(
+        floor(samples),
+        samples - floor(samples),
+        floor(share_end),
+        share_end - floor(share_end),
+        1.0 if samples >= 0.5 else 0.0,
+    )
+
+
+def check_filter_stability(owner: str, zeta: float, omega: float, side: str, step: float) -> None:
+    """Refuse a step at which the explicit filter would settle on wrong values without a word.
+
+    Raises
+    ------
+    InputError
+        Unless ωh < 2 and ζωh < 1 + ω²h²/4; the sentence says how many steps a sample would do.
+    """
+    if _stable(zeta, omega, step):
+        return
+    substeps = 2
+    while not _stable(zeta, omega, step / substeps):
+        substeps += 1
+    raise InputError(
+        f"{owner}: the current filter of the {side} channel (zeta = {zeta:g}, omega = {omega:g} "
+        f"rad/s) is unstable at a step of 1/{1.0 / step:g} s; simulate with substeps={substeps} "
+        "or more, or lower zeta or omega."
+    )
+
+
+def _stable(zeta: float, omega: float, step: float) -> bool:
+    w = omega * step
+    return w < 2.0 and zeta * w < 1.0 + 0.25 * w * w

@@ -1,0 +1,189 @@
+"""Simulation with sensitivities: outputs and their exact derivatives by chosen parameters."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.errors import InputError
+from swashplate.parameters.parameter_set import ParameterSet, columns_of
+from swashplate.simulation.build import ALL_PARAMETERS, build, build_pump
+from swashplate.simulation.constants import CHANNEL_PARAMETERS, PUMP_PARAMETERS, Pump
+from swashplate.simulation.record import Record
+from swashplate.simulation.result import Simulation
+from swashplate.simulation.run import Start, check_domain, check_start, rest_pressure
+from swashplate.simulation.sensitivities import (
+    integrate_rows,
+    march_drive_sensitivities,
+    march_pump_sensitivities,
+    steady_pump_tangent,
+    steady_tangent,
+)
+from swashplate.simulation.steady import steady_pump_start, steady_start
+from swashplate.simulation.tangent import N_ALL, N_CHANNEL, N_PUMP, TAU, Z1, Z2
+
+Array = NDArray[np.float64]
+
+OUTPUTS = ("current", "current_positive", "current_negative", "shaft_speed", "shaft_position")
+"""Signals that have sensitivities."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """Derivatives of the outputs by parameters, one column for each of `names`.
+
+    The unit of a column is the output's over the parameter's, both SI. At a switch (the edge of a
+    dead zone, a limit just reached) they are the one-sided derivatives that the components declare.
+    """
+
+    simulation: Simulation
+    """The plain simulation, the same to the last bit as without sensitivities."""
+    names: tuple[str, ...]
+    """Columns such as ``Z16_plus``, in the order asked for."""
+    columns: tuple[Array, Array, Array]
+    """All columns of the channels' currents and of the speed, on the march's grid."""
+
+    @cached_property
+    def _chosen(self) -> list[int]:
+        return [ALL_PARAMETERS.index(name) for name in self.names]
+
+    def _channel(self, side: str, columns: Array) -> Array:
+        chosen = np.zeros((self.simulation.time.size, len(self.names)))
+        for j, name in enumerate(self.names):
+            symbol = name.removesuffix(f"_{side}")
+            if name == "tau":
+                chosen[:, j] = columns[:: self.simulation.record.substeps, TAU]
+            elif symbol != name and symbol in CHANNEL_PARAMETERS:
+                k = CHANNEL_PARAMETERS.index(symbol)
+                chosen[:, j] = columns[:: self.simulation.record.substeps, k]
+        return chosen
+
+    @cached_property
+    def current_positive(self) -> Array:
+        """(n, k) derivatives of the positive channel's current. [A/...]"""
+        return self._channel("plus", self.columns[0])
+
+    @cached_property
+    def current_negative(self) -> Array:
+        """(n, k) derivatives of the negative channel's current, a magnitude. [A/...]"""
+        return self._channel("minus", self.columns[1])
+
+    @cached_property
+    def current(self) -> Array:
+        """(n, k) derivatives of the signed current. [A/...]"""
+        return self.current_positive - self.current_negative
+
+    @cached_property
+    def shaft_speed(self) -> Array:
+        """(n, k) derivatives of the speed. [(rad/s)/...]"""
+        return self.columns[2][:: self.simulation.record.substeps, self._chosen]
+
+    @cached_property
+    def shaft_position(self) -> Array:
+        """(n, k) derivatives of the position. [rad/...]"""
+        rate = np.ascontiguousarray(self.columns[2][:, self._chosen])
+        integral = np.zeros_like(rate)
+        integrate_rows(rate, self.simulation.record.step, integral)
+        return integral[:: self.simulation.record.substeps]
+
+    def at(self, time: ArrayLike, output: str) -> Array:
+        """(m, k) derivatives of an output at other time stamps, by linear interpolation.
+
+        Parameters
+        ----------
+        time : (m,) array_like
+            Time stamps. [s]
+        output : str
+            One of `OUTPUTS`.
+        """
+        rows = getattr(self, output)
+        stamps = np.asarray(time, dtype=np.float64)
+        return np.column_stack(
+            [np.interp(stamps, self.simulation.time, column) for column in rows.T]
+        )
+
+
+def drive_sensitivities(
+    parameters: ParameterSet, record: Record, start: Start, names: Sequence[str] | None
+) -> Sensitivities:
+    """Card and pump with derivatives; see `Drive.sensitivities`."""
+    check_start(start)
+    chosen = tuple(ALL_PARAMETERS if names is None else columns_of(list(names)))
+    delay, plus, minus, pump, step = build(parameters, record.step)
+    command = record.values
+    d_plus, d_minus = np.zeros(N_CHANNEL + 1), np.zeros(N_CHANNEL + 1)
+    before, state, d_pressure = 0.0, (0.0, 0.0, rest_pressure(pump)), rest_tangent(pump, N_ALL)
+    if start == "steady":
+        before = float(command[0])
+        state = steady_start(before, plus, minus, pump)
+        steady_tangent(before, plus, minus, pump, step, state, d_plus, d_minus, d_pressure)
+    n = command.size
+    current_plus, current_minus, pressure, speed = (np.empty(n) for _ in range(4))
+    columns = (np.empty((n, N_CHANNEL + 1)), np.empty((n, N_CHANNEL + 1)), np.empty((n, N_ALL)))
+    flags = np.empty(n, dtype=np.uint8)
+    worst = march_drive_sensitivities(
+        command,
+        before,
+        delay,
+        plus,
+        minus,
+        pump,
+        step,
+        state,
+        d_plus,
+        d_minus,
+        d_pressure,
+        current_plus,
+        current_minus,
+        pressure,
+        speed,
+        flags,
+        *columns,
+    )
+    check_domain(parameters.name, worst, "voltage")
+    simulation = Simulation(
+        parameters.name, record, True, pump, (current_plus, current_minus, pressure, flags)
+    )
+    return Sensitivities(simulation, chosen, columns)
+
+
+def pump_sensitivities(
+    parameters: ParameterSet, record: Record, start: Start, names: Sequence[str] | None
+) -> Sensitivities:
+    """Pump alone with derivatives; see `Drive.sensitivities_current`."""
+    check_start(start)
+    chosen = tuple(PUMP_PARAMETERS if names is None else columns_of(list(names)))
+    foreign = [name for name in chosen if name not in PUMP_PARAMETERS]
+    if foreign:
+        raise InputError(
+            f"A current drives the pump alone, which does not depend on {', '.join(foreign)}."
+        )
+    pump = build_pump(parameters)
+    current = record.values
+    state, d_pressure = rest_pressure(pump), rest_tangent(pump, N_PUMP)
+    if start == "steady":
+        state = steady_pump_start(float(current[0]), pump)
+        steady_pump_tangent(float(current[0]), pump, record.step, state, d_pressure)
+    n = current.size
+    pressure, speed, columns = np.empty(n), np.empty(n), np.empty((n, N_PUMP))
+    worst = march_pump_sensitivities(
+        current, pump, record.step, state, d_pressure, pressure, speed, columns
+    )
+    check_domain(parameters.name, worst, "current")
+    positive, negative = np.maximum(current, 0.0), np.maximum(-current, 0.0)
+    flags = np.zeros(n, dtype=np.uint8)
+    simulation = Simulation(
+        parameters.name, record, False, pump, (positive, negative, pressure, flags)
+    )
+    nothing = np.zeros((n, N_CHANNEL + 1))
+    return Sensitivities(simulation, chosen, (nothing, nothing, columns))
+
+
+def rest_tangent(pump: Pump, size: int) -> Array:
+    """Derivatives of the pressure at rest, Z2/Z1."""
+    tangent = np.zeros(size)
+    tangent[Z1] = -pump.Z2 / (pump.Z1 * pump.Z1)
+    tangent[Z2] = 1.0 / pump.Z1
+    return tangent

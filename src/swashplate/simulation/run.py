@@ -1,0 +1,77 @@
+"""Plain simulation: from a parameter set and a record to a result."""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.errors import DomainError, InputError
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.simulation.build import build, build_pump
+from swashplate.simulation.constants import Pump
+from swashplate.simulation.march import march_drive, march_pump
+from swashplate.simulation.record import Record
+from swashplate.simulation.result import Simulation
+from swashplate.simulation.steady import steady_pump_start, steady_start
+
+Array = NDArray[np.float64]
+Start = Literal["rest", "steady"]
+
+
+def check_start(start: str) -> None:
+    """Refuse a start that is neither ``"rest"`` nor ``"steady"``."""
+    if start not in ("rest", "steady"):
+        raise InputError(f"start is '{start}'; it is 'rest' or 'steady'.")
+
+
+def rest_pressure(pump: Pump) -> float:
+    """δP at which the swash plate stands upright, Z2/Z1. [Pa]"""
+    return pump.Z2 / pump.Z1
+
+
+def check_domain(name: str, worst: float, drive: str) -> None:
+    """Refuse what was computed outside the model's equations.
+
+    Raises
+    ------
+    DomainError
+        If sin²φ reached 1: the solenoid overpowered the feedback spring.
+    """
+    if not worst < 1.0:
+        raise DomainError(
+            f"{name}: Z5·F/√Z4 reaches {np.sqrt(worst):.4g} under this {drive}, but must stay "
+            "below 1, where the solenoid overpowers the feedback spring; check Z19 to Z22, Z4, Z5 "
+            f"and the {drive}'s size."
+        )
+
+
+def simulate_drive(parameters: ParameterSet, record: Record, start: Start) -> Simulation:
+    """March card and pump over a voltage record; see `Drive.simulate`."""
+    check_start(start)
+    delay, plus, minus, pump, step = build(parameters, record.step)
+    command = record.values
+    before, state = 0.0, (0.0, 0.0, rest_pressure(pump))
+    if start == "steady":
+        before = float(command[0])
+        state = steady_start(before, plus, minus, pump)
+    arrays = (np.empty_like(command), np.empty_like(command), np.empty_like(command))
+    flags = np.empty(command.size, dtype=np.uint8)
+    worst = march_drive(command, before, delay, plus, minus, pump, step, state, *arrays, flags)
+    check_domain(parameters.name, worst, "voltage")
+    return Simulation(parameters.name, record, True, pump, (*arrays, flags))
+
+
+def simulate_pump(parameters: ParameterSet, record: Record, start: Start) -> Simulation:
+    """March the pump alone over a signed current; see `Drive.simulate_current`."""
+    check_start(start)
+    pump = build_pump(parameters)
+    current = record.values
+    pressure = np.empty_like(current)
+    state = rest_pressure(pump)
+    if start == "steady":
+        state = steady_pump_start(float(current[0]), pump)
+    worst = march_pump(current, pump, record.step, state, pressure)
+    check_domain(parameters.name, worst, "current")
+    positive, negative = np.maximum(current, 0.0), np.maximum(-current, 0.0)
+    flags = np.zeros(current.size, dtype=np.uint8)
+    return Simulation(parameters.name, record, False, pump, (positive, negative, pressure, flags))

@@ -1,0 +1,64 @@
+import math
+
+import pytest
+
+from swashplate import maneuvers
+from swashplate.errors import InputError
+
+LINEAR = {"interpolation": "linear"}
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: maneuvers.step(math.inf), "amplitude must be finite, not inf"),
+        (lambda: maneuvers.step("9 V"), "amplitude must be a number, not '9 V'"),
+        (lambda: maneuvers.step(9, start=-1), "a step needs 0 <= start < stop <= length"),
+        (lambda: maneuvers.step(9, stop=1), "not 1, 1, 10 s"),
+        (lambda: maneuvers.step(9, length=5), "not 1, 6, 5 s"),
+        (lambda: maneuvers.rest(-1), "duration must not be negative, not -1"),
+        (lambda: maneuvers.rest("long"), "duration must be a number"),
+        (lambda: maneuvers.spline_return(0), "duration must be positive, not 0"),
+        (lambda: maneuvers.ramp(math.nan), "slope must be finite"),
+        (lambda: maneuvers.ramp(1, limit=0), "limit must be positive"),
+        (lambda: maneuvers.ramp(1, length=3.5), "start 1 s and settle 2.5 s leave nothing of a"),
+        (lambda: maneuvers.ramp(1, length=-3), "length must not be negative"),
+        (lambda: maneuvers.sine(1, 0), "frequency must be positive"),
+        (lambda: maneuvers.sine(1, 1, start=-1), "start must not be negative"),
+        (lambda: maneuvers.sine(1, 1, settle=-1), "settle must not be negative"),
+        (lambda: maneuvers.sine(1, 1, settle=math.nan), "settle must be finite"),
+        (lambda: maneuvers.stairs([]), "levels must be one row of numbers, not of shape"),
+        (lambda: maneuvers.stairs([[1, 2]]), "levels must be one row of numbers"),
+        (lambda: maneuvers.stairs(["up"]), "levels must be numbers, not"),
+        (lambda: maneuvers.stairs([1, math.nan]), "levels must be finite, but row 1 .* is nan"),
+        (lambda: maneuvers.stairs([1], dwell=0), "dwell must be positive"),
+        (lambda: maneuvers.chirp(1, -0.1, 1), "first must not be negative"),
+        (lambda: maneuvers.chirp(1, 0.1, math.inf), "last must be finite"),
+        (lambda: maneuvers.multisine(1, [0.1, 0.0]), "lowest frequency must be positive, not 0"),
+        (lambda: maneuvers.multisine(1, []), "frequencies must be one row"),
+        (lambda: maneuvers.multisine(1, [1.0], seed=-1), "seed must be a whole number from 0 up"),
+        (lambda: maneuvers.multisine(1, (0.1, 0.2)), "a tuple of frequencies is"),
+        (lambda: maneuvers.multisine(1, (0.1, 0.2, 0.3)), "a tuple of frequencies is"),
+        (lambda: maneuvers.multisine(1, (0.1, 0.2, 0)), "a tuple of frequencies is"),
+        (lambda: maneuvers.multisine(1, (0.0, 0.2, 3)), "low must be positive"),
+        (lambda: maneuvers.multisine(1, (0.1, 0.2, 50)), "50 frequencies from 0.1 to 0.2 Hz"),
+        (lambda: maneuvers.multisine(1, (1e-3, 0.2, 3)), "cannot be told apart in 56.5 s"),
+        (lambda: maneuvers.recorded([0, 1], [0, 1], interpolation="cubic"), "'previous' or 'lin"),
+        (lambda: maneuvers.recorded([0, 1], [0], **LINEAR), "at least two, not 2 and 1"),
+        (lambda: maneuvers.recorded([0], [0], **LINEAR), "at least two, not 1 and 1"),
+        (lambda: maneuvers.recorded([0, 2, 2], [0, 1, 2], **LINEAR), "row 2 .* 2.0 s after 2.0 s"),
+        (lambda: maneuvers.recorded([0, 2, 1], [0, 1, 2], **LINEAR), "row 2 .* 1.0 s after 2.0 s"),
+        (lambda: maneuvers.recorded([0, math.nan], [0, 1], **LINEAR), "time .* row 1 .* is nan"),
+        (lambda: maneuvers.recorded([0, 1], [math.inf, 1], **LINEAR), "voltage .* row 0 .* is inf"),
+        (lambda: maneuvers.superpose(), "at least one manoeuvre"),
+        (lambda: maneuvers.rest(1) * math.nan, "factor must be finite"),
+        (lambda: "twice" * maneuvers.rest(1), "factor must be a number"),
+        (lambda: maneuvers.rest(1.3).sample(), "rest 1.3 s lasts 1.3 s, at 512 Hz 665.6 samples"),
+        (lambda: maneuvers.rest(1).time(0), "rate must be positive"),
+        (lambda: maneuvers.source_tests("boom"), "'boom': the source has hoist, slew, luff"),
+    ],
+)
+def test_errors_say_what_is_wrong(make, message):
+    with pytest.raises(InputError, match=message) as caught:
+        make()
+    assert "\n" not in str(caught.value)
