@@ -15,7 +15,7 @@ from swashplate.parameters.files import dump_set, load_preset, load_set
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.batch import Batch, SquaredError, simulate_many
-from swashplate.simulation.build import build
+from swashplate.simulation.build import build_channel, build_pump
 from swashplate.simulation.gradients import (
     Sensitivities,
     drive_sensitivities,
@@ -319,7 +319,10 @@ class Drive:
         if not (np.abs(volts) <= FULL_VOLTAGE).all():
             raise InputError("A steady state needs finite commands within ±10 V.")
         current, speed = np.empty(volts.size), np.empty(volts.size)
-        _, plus, minus, pump, _ = build(self.parameters, 1.0 / SOURCE_RATE)
+        plus, minus = (
+            build_channel(self.parameters, side, 1.0 / SOURCE_RATE) for side in ("plus", "minus")
+        )
+        pump = build_pump(self.parameters)
         steady_states(volts.reshape(-1), plus, minus, pump, current, speed)
         if np.ndim(voltage) == 0:
             return float(current[0]), float(speed[0])

@@ -89,7 +89,7 @@ def write_table(table: polars.DataFrame, path: str | Path) -> None:
 
 
 def read_table(path: str | Path) -> polars.DataFrame:
-    """Read a CSV or Parquet table.
+    """Read a CSV table, all columns as text, or a Parquet table.
 
     Raises
     ------
@@ -104,7 +104,9 @@ def read_table(path: str | Path) -> polars.DataFrame:
         raise FileError(f"{source} ends in '{suffix}'; a record is read from .csv or .parquet.")
     try:
         if suffix == ".csv":
-            return pl.read_csv(source, infer_schema_length=10_000)
+            # as text: a column that begins with whole numbers may well go on with others, and
+            # only the columns that are asked for need to be numbers
+            return pl.read_csv(source, infer_schema=False)
         return pl.read_parquet(source)
     except FileNotFoundError:
         raise FileError(f"There is no file {source}.") from None
@@ -145,11 +147,13 @@ def _column(table: polars.DataFrame, path: str | Path, wanted: str, si: str) -> 
     import polars as pl
 
     name, unit = _find(table.columns, wanted, si, path)
-    numbers = table[name].cast(pl.Float64, strict=False)
+    cells = table[name]
+    text = cells.dtype == pl.String
+    numbers = (cells.str.strip_chars() if text else cells).cast(pl.Float64, strict=False)
     missing = numbers.is_null()
     if missing.any():
         row = int(missing.arg_max() or 0)
-        cell = table[name][row]
+        cell = cells[row]
         said = "is empty" if cell is None else f"holds '{cell}', which is no number"
         raise FileError(f"{path}: column '{name}' {said} in data row {row + 1}.")
     factor = to_si(1.0, unit, si, f"{path}: column '{name}'")

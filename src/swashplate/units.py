@@ -1,6 +1,7 @@
 """Units at the edge: what comes in with a unit is turned into SI, or refused by name."""
 
 from functools import cache
+from tokenize import TokenError
 from typing import Any
 
 from swashplate.errors import InputError
@@ -52,5 +53,13 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
             f"{what} is given in '{unit}', which does not measure the same as {si}; "
             f"give it in {si}."
         ) from None
-    except (DefinitionSyntaxError, AttributeError, TypeError, ValueError):
+    except (
+        DefinitionSyntaxError,
+        AssertionError,
+        AttributeError,
+        TokenError,
+        TypeError,
+        ValueError,
+    ):
+        # pint's parser meets unreadable text with any of these
         raise InputError(f"{what} has the unreadable unit '{unit}'; give it in {si}.") from None

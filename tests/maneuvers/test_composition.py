@@ -67,8 +67,8 @@ def test_lengths_are_exact_where_durations_round(length):
 
 @pytest.mark.parametrize(("before", "settle"), [(0.1, 0.2), (0.4, 0.7), (0.2, 7.9), (5.9, 6.2)])
 def test_lengths_are_exact_where_the_return_is_longer_than_what_precedes_it(before, settle):
-    # The return begins at a rounded instant: (0.1 + 0.2) − 0.1 > 0.2. It must end at rest all the
-    # same, and the whole keep the length that was asked for.
+    # The length is a rounded sum, (0.1 + 0.2) − 0.1 > 0.2, and its last stamp may lie before it,
+    # 0.3 < 0.1 + 0.2: at both the return is over, to the last bit.
     hold = maneuvers.stairs([5.0], dwell=before, start=0.0, settle=None)
     sine = maneuvers.sine(3.0, 0.2, start=0.0, settle=settle, length=before + settle)
     for m in (hold + maneuvers.spline_return(settle), sine):

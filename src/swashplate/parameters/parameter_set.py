@@ -99,6 +99,9 @@ class ParameterSet(Mapping[str, Parameter]):
         except KeyError:
             raise unknown_parameter(symbol) from None
 
+    def __contains__(self, symbol: object) -> bool:
+        return symbol in self.parameters
+
     def __iter__(self) -> Iterator[str]:
         return iter(self.parameters)
 

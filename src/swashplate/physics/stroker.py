@@ -163,24 +163,32 @@ def tight_step_partials(
     Z9: float,
     step: float,
     symmetric: bool | None,
-) -> tuple[float, float, float, float, float, float]:
-    """Next δP with its derivatives by pressure, opening, Z6, Z8, Z9."""
+) -> tuple[float, float, float, float, float, float, float]:
+    """Next δP with its derivatives by pressure, opening, Z6, Z7, Z8, Z9.
+
+    That by Z7 is the one at Z7 = 0: the leakage's rate along the parabola, carried to the end of
+    the step and integrated by the trapezoidal rule.
+    """
     value = tight_step(pressure, opening, Z6, Z8, Z9, step, symmetric)
     head, sign = flow_head(pressure, opening, Z9, symmetric)
     r = sqrt(head)
+    inverse = 1.0 / (1.0 + Z6)
     gain = 0.25 * Z8 * step / (1.0 + Z6)
     if sign * gain * opening > r:
-        return value, 0.0, 0.0, 0.0, 0.0, sign
+        return value, 0.0, 0.0, 0.0, 0.0, 0.0, sign
+    half_inverse = 0.5 / r if head > 0.0 else 0.0
+    r_end = r - sign * gain * opening
+    d_gain = 4.0 * opening * r_end
     d_r = 4.0 * gain * opening
-    d_gain = 4.0 * opening * (r - sign * gain * opening)
-    r_head = 0.5 * (0.5 / r if head > 0.0 else 0.0)
+    leaked = pressure * (r_end * (2.0 * half_inverse)) + value
     return (
         value,
-        1.0 - sign * d_r * r_head,
-        4.0 * gain * (r - sign * gain * opening),
-        -d_gain * (0.25 * Z8 * step / ((1.0 + Z6) * (1.0 + Z6))),
-        d_gain * (0.25 * step / (1.0 + Z6)),
-        d_r * r_head,
+        1.0 - sign * d_r * (0.5 * half_inverse),
+        4.0 * gain * r_end,
+        -d_gain * (0.25 * Z8 * step * (inverse * inverse)),
+        -0.5 * step * inverse * leaked,
+        d_gain * (0.25 * step * inverse),
+        d_r * (0.5 * half_inverse),
     )
 
 

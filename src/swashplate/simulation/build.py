@@ -52,18 +52,21 @@ def build(parameters: ParameterSet, step: float) -> Constants:
         If the card's explicit filter is unstable at this step.
     """
     numbers = parameters.numbers
-    literal = True if parameters.coulomb_sign == "literal" else None
-    channels = []
     for side in ("plus", "minus"):
         check_filter_stability(
             parameters.name, numbers[f"zeta_{side}"], numbers[f"omega_{side}"], side, step
         )
-        values = [numbers[f"{name}_{side}"] for name in CHANNEL_PARAMETERS]
-        decay = uncompiled(decay_factor)(numbers[f"a_{side}"], step)
-        channels.append(Channel._make([*values, decay, literal]))
-    return Constants(
-        build_delay(numbers["tau"], step), channels[0], channels[1], build_pump(parameters), step
-    )
+    plus, minus = (build_channel(parameters, side, step) for side in ("plus", "minus"))
+    return Constants(build_delay(numbers["tau"], step), plus, minus, build_pump(parameters), step)
+
+
+def build_channel(parameters: ParameterSet, side: str, step: float) -> Channel:
+    """One channel of the card, ``"plus"`` or ``"minus"``."""
+    numbers = parameters.numbers
+    values = [numbers[f"{name}_{side}"] for name in CHANNEL_PARAMETERS]
+    decay = uncompiled(decay_factor)(numbers[f"a_{side}"], step)
+    literal = True if parameters.coulomb_sign == "literal" else None
+    return Channel._make([*values, decay, literal])
 
 
 def build_pump(parameters: ParameterSet) -> Pump:

@@ -228,9 +228,8 @@ def pump_tangent(
         write_direct(1.0, force_by, arm_by, spool_by, orifice_by, opening_by)
 
     motion = plate_motion(pressure, pump)
-    q_7 = 0.0
     if pump.leaky is None:
-        free, q_p, q_y, q_6, q_8, q_9 = tight_step_partials(
+        free, q_p, q_y, q_6, q_7, q_8, q_9 = tight_step_partials(
             pressure, opening, motion, pump.Z8, pump.Z9, step, pump.symmetric
         )
     else:

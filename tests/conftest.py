@@ -1,0 +1,61 @@
+"""What many tests need: derivatives by differences, the drives, the source's numbers."""
+
+import tomllib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+from swashplate import Drive
+
+settings.register_profile(
+    "swashplate",
+    derandomize=True,
+    deadline=None,  # the first example of a component compiles it
+    max_examples=150,
+    suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow],
+)
+settings.load_profile("swashplate")
+
+
+def richardson(function: Callable[..., float], at: Sequence[float], index: int, h: float) -> float:
+    """Central difference by one argument, extrapolated once: error O(h⁴)."""
+
+    def slope(step: float) -> float:
+        above, below = list(at), list(at)
+        above[index] += step
+        below[index] -= step
+        return (function(*above) - function(*below)) / (above[index] - below[index])
+
+    return (4.0 * slope(0.5 * h) - slope(h)) / 3.0
+
+
+@pytest.fixture(scope="session")
+def derivative() -> Callable[..., float]:
+    """Richardson-extrapolated central difference of a function by one of its arguments."""
+    return richardson
+
+
+@pytest.fixture(params=["hoist", "slew", "luff"])
+def axis(request: pytest.FixtureRequest) -> Drive:
+    """Each of the source's drives in turn."""
+    return Drive.preset(request.param)
+
+
+@pytest.fixture(scope="session")
+def hoist() -> Drive:
+    """The hoist drive."""
+    return Drive.preset("hoist")
+
+
+SHARED = Path(__file__).parents[2] / "shared"
+
+
+@pytest.fixture(scope="session")
+def source_parameters() -> dict:
+    """The source's tables as facts apart from the package, where they are at hand."""
+    path = SHARED / "spec" / "parameters.toml"
+    if not path.exists():
+        pytest.skip("the source's tables are not beside this checkout")
+    return tomllib.loads(path.read_text("utf-8"))

@@ -1,0 +1,198 @@
+"""Parameter sets: change, rules, files."""
+
+import copy
+import pickle
+from math import inf, nan
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swashplate import Drive, FileError, Pair, ParameterError
+from swashplate.parameters.catalogue import CATALOGUE
+from swashplate.parameters.files import preset_names
+
+
+def test_presets() -> None:
+    assert preset_names() == ("hoist", "slew", "luff", "neutral")
+    with pytest.raises(ParameterError, match="hoist, slew, luff, neutral"):
+        Drive.preset("crane")
+
+
+def test_a_parameter_knows_where_it_comes_from(hoist: Drive) -> None:
+    Z16 = hoist["Z16"]
+    assert Z16.value == Pair(plus=1.1634e-4, minus=1.5126e-4)
+    assert (Z16.unit, Z16.source, Z16.status) == ("m", "table 7.2", "fitted")
+    assert Z16.name == "opening at which the orifice limits the flow"
+    assert Z16.definition.range == "above 0, or inf for none"
+
+
+def test_replace_and_scale(hoist: Drive) -> None:
+    changed = hoist.replace(Z16=1.2e-4, Z13_minus=0.2, V_dz=(0.1, 0.2), Z10=13.0)
+    assert changed["Z16"].value == Pair(1.2e-4, 1.2e-4)
+    assert changed["Z13"].value == Pair(0.27596, 0.2)
+    assert changed["V_dz"].value == Pair(0.1, 0.2)
+    assert changed["Z10"].value == 13.0
+    assert changed["Z16"].status == "user"
+    assert changed["Z1"].status == "fitted"
+    assert hoist["Z10"].value == 12.396  # the drive itself never changes
+    scaled = hoist.scale(Z16=1.5, Z10=2.0, J=(1.0, 0.5), Z19_plus=1.1)
+    assert scaled["Z16"].value == Pair(1.5 * 1.1634e-4, 1.5 * 1.5126e-4)
+    assert scaled["Z10"].value == 24.792
+    assert scaled["J"].value == Pair(0.27473, 0.5 * 0.2951)
+    assert scaled["Z19"].value == Pair(1.1 * 12.349, 10.019)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"Z99": 1.0}, r"no parameter 'Z99' .*Z22"),
+        ({"Z_16": 1.0}, r"did you mean Z16"),
+        ({"Z10": (1.0, 2.0)}, "Z10 has one value, not a plus and a minus"),
+        ({"Z16_plus": (1.0, 2.0)}, "Z16_plus has one value"),
+        ({"Z16": (1.0, 2.0, 3.0)}, "one value or two"),
+        ({"Z13_minus": -0.26}, r"Z13_minus .* is -0.26 rad, .* above 0 .*magnitudes"),
+        ({"Z13": 1.6}, "below 1.5708"),
+        ({"Z13_plus": 1.2}, r"Z3·tan Z13_plus is 1.609, but must be below 1"),
+        ({"Z19_plus": 120.0}, r"Z5·F/√Z4 reaches .* within 10 V \(plus\), but must be below 1"),
+        ({"Z4": 1e-4}, r"Z5·F/√Z4"),
+        ({"I_t2_minus": 0.5}, r"I_t2_minus is 0.5 A, but must be below I_t1_minus = 0.34863 A"),
+        ({"G3_plus": -0.01}, "steady current of the plus channel falls to"),
+        ({"Z2": 10.0}, "pressure at rest Z2/Z1"),
+        ({"Z1": 0.0}, "Z1 .* is 0 1/Pa, but must be above 0"),
+        ({"Z1": nan}, "must be above 0"),
+        ({"Z1": inf}, "must be above 0"),
+        ({"Z14": -inf}, "or inf for none"),
+        ({"tau": -0.01}, "at least 0"),
+        ({"tau": 11.0}, "below 10"),
+    ],
+)
+def test_broken_rules_are_sentences(hoist: Drive, changes: dict, sentence: str) -> None:
+    with pytest.raises(ParameterError, match=sentence) as caught:
+        hoist.replace(**changes)
+    assert "\n" not in str(caught.value)
+
+
+def test_limits_can_be_off(hoist: Drive) -> None:
+    off = hoist.replace(lim1=inf, lim2=inf, I_t1=inf, I_t2=0.0, Z14=inf, Z15=inf, Z16=inf, a=inf)
+    assert off.simulate([0.0, 5.0, 5.0]).shaft_speed.shape == (3,)
+
+
+@pytest.mark.parametrize("name", ["hoist", "slew", "luff", "neutral"])
+def test_toml_gives_an_equal_drive_back(name: str, tmp_path: Path) -> None:
+    drive = Drive.preset(name)
+    drive.to_toml(tmp_path / "set.toml")
+    assert Drive.from_toml(tmp_path / "set.toml") == drive
+
+
+@given(st.floats(1e-12, 1e3), st.floats(1e-12, 1e3))
+def test_toml_keeps_every_bit(plus: float, minus: float) -> None:
+    from swashplate.parameters.files import dump_set, read_set
+
+    drive = Drive.preset("hoist").replace(Z16=(plus, minus))
+    assert read_set(dump_set(drive.parameters), "text")["Z16"].value == Pair(plus, minus)
+
+
+def test_drives_can_be_copied_compared_and_hashed(hoist: Drive) -> None:
+    for same in (pickle.loads(pickle.dumps(hoist)), copy.deepcopy(hoist), Drive.preset("hoist")):
+        assert same == hoist
+        assert hash(same) == hash(hoist)
+    assert hoist.replace(Z10=13.0) != hoist
+    with pytest.raises(TypeError):
+        hoist.parameters.numbers["Z1"] = 1.0
+
+
+HOIST = """
+format = 1
+name = "mine"
+control_card = "rexroth_mdsd_1k_2x_2"
+
+[pump_motor]
+"""
+
+
+@pytest.fixture
+def lines() -> dict[str, str]:
+    """The hoist's pump and motor, a line a parameter."""
+    from swashplate.parameters.files import dump_set
+
+    text = dump_set(Drive.preset("hoist").parameters).split("[pump_motor]\n")[1]
+    return {line.split(" = ")[0]: line for line in text.strip().splitlines()}
+
+
+def load(lines: dict[str, str], tmp_path: Path, head: str = HOIST) -> Drive:
+    path = tmp_path / "mine.toml"
+    path.write_text(head + "\n".join(lines.values()), "utf-8")
+    return Drive.from_toml(path)
+
+
+def test_users_units_are_converted(lines: dict[str, str], tmp_path: Path) -> None:
+    lines["Z13"] = 'Z13 = { value = [15.0, 14.0], unit = "deg" }'
+    lines["Z9"] = 'Z9 = { value = 107.43, unit = "bar", bounds = [50.0, 200.0] }'
+    lines["Z16"] = 'Z16 = { value = 0.12, unit = "mm" }'
+    drive = load(lines, tmp_path)
+    assert drive["Z13"].value.plus == pytest.approx(0.2617993877991494, rel=1e-15)
+    assert drive["Z9"].value == pytest.approx(1.0743e7, rel=1e-15)
+    assert drive["Z9"].bounds == pytest.approx((5e6, 2e7))
+    assert drive["Z16"].value == pytest.approx((1.2e-4, 1.2e-4))
+
+
+@pytest.mark.parametrize(
+    ("symbol", "line", "sentence"),
+    [
+        ("Z13", 'Z13 = { value = 1.0, unit = "m" }', r"mine.toml: Z13 .* 'm', .* same as rad"),
+        ("Z13", 'Z13 = { value = 1.0, unit = "wheel" }', "unknown unit 'wheel'"),
+        ("Z13", 'Z13 = { value = 1.0, unit = "3 **" }', "unreadable unit"),
+        ("Z13", "Z13 = { value = 0.2 }", r"pump_motor.Z13.unit: field required"),
+        ("Z13", 'Z13 = { value = "x", unit = "rad" }', r"pump_motor.Z13.value"),
+        ("Z13", 'Z13 = { value = [0.2, 0.2, 0.2], unit = "rad" }', r"pump_motor.Z13.value"),
+        ("Z1", 'Z1 = { value = [1e-7, 1e-7], unit = "1/Pa" }', "Z1 .* has one value"),
+        ("Z13", "", "no value for Z13"),
+        ("Z23", 'Z23 = { value = 1.0, unit = "1" }', "no parameter 'Z23'"),
+        ("tau", 'tau = { value = 1.0, unit = "s" }', r"\[pump_motor\] has no parameter 'tau'"),
+        ("Z1", 'Z1 = { value = 1e-7, unit = "1/Pa", sauce = "" }', "pump_motor.Z1.sauce"),
+        ("Z1", 'Z1 = { value = 1e-7, unit = "1/Pa", status = "good" }', "pump_motor.Z1.status"),
+        ("Z9", 'Z9 = { value = 1e7, unit = "Pa", bounds = [1e6, 2e6] }', "outside its bounds"),
+        ("Z1", "Z1 = = 3", "is not TOML"),
+    ],
+)
+def test_files_with_errors(
+    lines: dict[str, str], tmp_path: Path, symbol: str, line: str, sentence: str
+) -> None:
+    lines[symbol] = line
+    with pytest.raises((ParameterError, FileError), match=sentence) as caught:
+        load(lines, tmp_path)
+    assert "mine" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_file_and_card(lines: dict[str, str], tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="There is no file"):
+        Drive.from_toml(tmp_path / "nothing.toml")
+    with pytest.raises(FileError, match="cannot be read"):
+        Drive.from_toml(tmp_path)
+    with pytest.raises(ParameterError, match="rexroth_mdsd_1k_2x_4"):
+        load(lines, tmp_path, HOIST.replace("2x_2", "9x_9"))
+
+
+def test_catalogue_has_the_models_parameters() -> None:
+    card = [d for d in CATALOGUE.values() if d.block == "control_card"]
+    pump = [d for d in CATALOGUE.values() if d.block == "pump_motor"]
+    assert len(card) == 14
+    assert [d.symbol for d in pump] == [f"Z{k}" for k in range(1, 23)]
+
+
+def test_neutral_set_is_a_straight_line_with_one_lag() -> None:
+    """Unit gain each way; the step answer is 1 - exp(-t/T), T = 1/Z8."""
+    import numpy as np
+
+    neutral = Drive.preset("neutral").replace(Z8=1 / 0.3)
+    np.testing.assert_allclose(
+        neutral.steady_speed([-10.0, 0.0, 0.1, 7.0]), [-10, 0, 0.1, 7], rtol=1e-6
+    )
+    voltage = np.full(1024, 2.0)
+    t = np.arange(1024) / 512.0
+    ideal = 2.0 * (1.0 - np.exp(-t / 0.3))
+    speed = neutral.simulate(voltage).shaft_speed
+    assert np.abs(speed - ideal).max() < 0.04  # two samples of the current filter

@@ -1,0 +1,180 @@
+"""March, stepper, sensitivities and side-by-side march give the same bits."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate import Drive, SquaredError, maneuvers
+
+VARIANTS = {
+    "published": {},
+    "leaky": {"Z7": 0.8},
+    "loaded": {"Z12": 0.2, "Z11": 0.05},
+    "offset": {"Z2": 0.01},
+    "steep": {"Z13": 0.6},
+    "rough card": {"C": 5.0, "tau": 0.0},
+    "short delay": {"tau": 0.0007},
+}
+
+SIGNALS = (
+    "current_positive",
+    "current_negative",
+    "current",
+    "solenoid_force",
+    "spool_position",
+    "orifice_opening",
+    "stroker_pressure",
+    "swash_angle",
+    "shaft_speed",
+    "shaft_position",
+)
+
+
+def command(rate: float = 512.0) -> np.ndarray:
+    """Four seconds that meet every limit of the hoist drive."""
+    whole = maneuvers.step(9.0, start=0.1, stop=1.6, length=2.0) + maneuvers.sine(
+        8.0, 0.6, start=0.0, length=2.0, settle=0.3
+    )
+    return whole.sample(rate)
+
+
+@pytest.fixture(params=VARIANTS.values(), ids=VARIANTS.keys())
+def drive(request: pytest.FixtureRequest, hoist: Drive) -> Drive:
+    return hoist.replace(**request.param)
+
+
+def variant(drive: Drive, root: str) -> Drive:
+    return Drive(replace(drive.parameters, pressure_root=root))
+
+
+def stepped(drive: Drive, voltage: np.ndarray, rate: float, **options: str) -> dict:
+    stepper = drive.stepper(1.0 / rate, **options)
+    samples = [stepper.step(v) for v in voltage]
+    return {name: np.array([getattr(s, name) for s in samples]) for name in SIGNALS}
+
+
+@pytest.mark.interpreted
+@pytest.mark.parametrize("root", ["published", "symmetric"])
+def test_stepper_gives_the_same_bits(drive: Drive, root: str) -> None:
+    drive = variant(drive, root)
+    voltage = command()[:700]
+    run = drive.simulate(voltage)
+    samples = stepped(drive, voltage, 512.0)
+    for name in SIGNALS:
+        assert np.array_equal(samples[name], getattr(run, name)), name
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "previous"])
+@pytest.mark.parametrize("rate", [49.0, 100.0, 512.0, 1000.0])
+def test_stepper_sub_steps_alike(hoist: Drive, rate: float, interpolation: str) -> None:
+    voltage = 4.0 * np.sin(np.arange(200) * 2.0 / rate) + 1.0
+    run = hoist.simulate(voltage, rate, interpolation=interpolation)
+    samples = stepped(hoist, voltage, rate, interpolation=interpolation)
+    for name in SIGNALS:
+        assert np.array_equal(samples[name], getattr(run, name)), name
+
+
+@pytest.mark.parametrize("root", ["published", "symmetric"])
+@pytest.mark.parametrize("start", ["rest", "steady"])
+def test_sensitivities_carry_the_same_bits(drive: Drive, root: str, start: str) -> None:
+    drive = variant(drive, root)
+    voltage = 1.0 + 0.8 * command()
+    run = drive.simulate(voltage, start=start)
+    same = drive.sensitivities(voltage, start=start).simulation
+    pump = drive.sensitivities_current(run.current, start=start).simulation
+    for name in SIGNALS:
+        assert np.array_equal(getattr(same, name), getattr(run, name)), name
+        if not name.startswith("current_"):
+            assert np.array_equal(getattr(pump, name), getattr(run, name)), name
+    assert np.array_equal(same.limits, run.limits)
+
+
+@pytest.mark.parametrize("root", ["published", "symmetric"])
+def test_side_by_side_gives_the_same_bits(drive: Drive, root: str) -> None:
+    drive = variant(drive, root)
+    voltage = command()
+    factors = np.linspace(0.8, 1.2, 21)  # more than one block, the last one not full
+    changes = {"Z16_plus": 1.2e-4 * factors, "G1": 0.05 * factors, "tau": 0.014 * factors}
+    batch = drive.simulate_many(changes, voltage=voltage)
+    assert not batch.failures
+    for i in (0, 7, 16, 20):
+        one = drive.replace(**{name: float(values[i]) for name, values in changes.items()})
+        run = one.simulate(voltage)
+        assert np.array_equal(batch.output[i], run.shaft_speed)
+    positions = drive.simulate_many(changes, voltage=voltage, output="shaft_position").output
+    assert np.array_equal(positions[20], run.shaft_position)
+    current = run.current
+    pumps = drive.simulate_many({"Z16_plus": [1.44e-4, 1e-4]}, current=current).output
+    assert np.array_equal(
+        pumps[0], drive.replace(Z16_plus=1.44e-4).simulate_current(current).shaft_speed
+    )
+
+
+def test_cost_is_the_weighted_sum_of_squares(hoist: Drive) -> None:
+    voltage = command(256.0)
+    measured = hoist.simulate(voltage, 256.0).shaft_speed + 0.1
+    weight = np.linspace(0.0, 2.0, measured.size)
+    batch = hoist.simulate_many(
+        {"Z10": [12.396, 13.0]}, voltage=voltage, rate=256.0, cost=SquaredError(measured, weight)
+    )
+    assert batch.output is None
+    for cost, drive in zip(batch.cost, (hoist, hoist.replace(Z10=13.0)), strict=True):
+        error = drive.simulate(voltage, 256.0).shaft_speed - measured
+        assert cost == pytest.approx(np.sum(weight * error**2), rel=1e-12)
+
+
+def test_batch_does_not_depend_on_threads(hoist: Drive) -> None:
+    rng = np.random.default_rng(5)
+    changes = {"Z8": 1.65e6 * rng.uniform(0.8, 1.2, 70)}
+    one = hoist.simulate_many(changes, voltage=command(), threads=1)
+    four = hoist.simulate_many(changes, voltage=command(), threads=4)
+    assert np.array_equal(one.output, four.output)
+
+
+def test_state_of_a_stepper_can_be_kept_and_restored(hoist: Drive) -> None:
+    stepper = hoist.stepper()
+    voltage = command()
+    for v in voltage[:300]:
+        stepper.step(v)
+    kept = stepper.state
+    first = [stepper.step(v) for v in voltage[300:400]]
+    stepper.state = kept
+    assert [stepper.step(v) for v in voltage[300:400]] == first
+
+
+INTERPRETED = """
+import sys
+import numpy as np
+from swashplate import Drive
+voltage = np.load(sys.argv[1])
+drive = Drive.preset("slew").replace(Z7=0.3, Z12=0.1)
+run = drive.simulate(voltage)
+by = drive.sensitivities(voltage, parameters=["Z16", "Z1", "tau", "omega"])
+np.savez(sys.argv[2], **{name: getattr(run, name) for name in sys.argv[3:]}, by=by.shaft_speed)
+"""
+
+
+def test_interpreted_run_agrees(tmp_path: Path) -> None:
+    """The same sources without the JIT, in a process of their own, within 1e-12."""
+    voltage = command()[:1100]
+    np.save(tmp_path / "voltage.npy", voltage)
+    arguments = [str(tmp_path / "voltage.npy"), str(tmp_path / "out.npz"), *SIGNALS]
+    subprocess.run(
+        [sys.executable, "-c", INTERPRETED, *arguments],
+        check=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+    )
+    interpreted = np.load(tmp_path / "out.npz")
+    drive = Drive.preset("slew").replace(Z7=0.3, Z12=0.1)
+    run = drive.simulate(voltage)
+    for name in SIGNALS:
+        compiled = getattr(run, name)
+        scale = np.abs(compiled).max()
+        np.testing.assert_allclose(interpreted[name], compiled, rtol=1e-12, atol=1e-12 * scale)
+    by = drive.sensitivities(voltage, parameters=["Z16", "Z1", "tau", "omega"]).shaft_speed
+    np.testing.assert_allclose(interpreted["by"], by, rtol=1e-10, atol=1e-12 * np.abs(by).max())

@@ -1,0 +1,72 @@
+"""Many sets at once: what is refused, and what a bad set does to its neighbours."""
+
+import numpy as np
+import pytest
+
+from swashplate import Drive, InputError, ParameterError, SquaredError
+
+
+def test_bad_sets_do_not_stop_the_others(hoist: Drive) -> None:
+    voltage = np.full(300, 5.0)
+    changes = {"Z16_plus": [1.2e-4, -1.0, 1.3e-4], "Z19_plus": [12.0, 12.0, 1200.0]}
+    batch = hoist.simulate_many(changes, voltage=voltage, cost=SquaredError(np.zeros(300)))
+    assert np.isfinite(batch.cost[0])
+    assert list(np.isinf(batch.cost)) == [False, True, True]
+    assert "Z16_plus" in batch.failures[1]
+    assert "above 0" in batch.failures[1]
+    assert "Z5·F/√Z4" in batch.failures[2]
+    outputs = hoist.simulate_many(changes, voltage=voltage).output
+    assert np.isfinite(outputs[0]).all()
+    assert np.isnan(outputs[1:]).all()
+
+
+def test_a_current_beyond_the_domain_fails_only_its_set(hoist: Drive) -> None:
+    batch = hoist.simulate_many({"Z4": [0.0536, 0.02]}, current=np.full(50, 1.8))
+    assert list(batch.failures) == [1]
+    assert "overpowers" in batch.failures[1]
+    assert np.isfinite(batch.output[0]).all()
+
+
+def test_an_unstable_filter_fails_only_its_set(hoist: Drive) -> None:
+    batch = hoist.simulate_many({"omega": [56.0, 1100.0]}, voltage=np.ones(50))
+    assert list(batch.failures) == [1]
+    assert "unstable" in batch.failures[1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "options", "sentence"),
+    [
+        ({"Z16": [1e-4], "Z10": [1.0, 2.0]}, {"voltage": [0.0]}, "same number of sets"),
+        ({}, {"voltage": [0.0]}, "at least one"),
+        ({"Z10": 3.0}, {"voltage": [0.0]}, "one number a set"),
+        ({"Z16": [1e-4], "Z16_plus": [1e-4]}, {"voltage": [0.0]}, "Z16_plus is given twice"),
+        ({"Z10": [3.0]}, {}, "either a voltage or a current"),
+        ({"Z10": [3.0]}, {"voltage": [0.0], "current": [0.0]}, "either a voltage or a current"),
+        ({"Z10": [3.0]}, {"voltage": [0.0], "output": "swash_angle"}, "no output 'swash_angle'"),
+        (
+            {"Z10": [3.0]},
+            {"voltage": [0.0, 1.0], "cost": SquaredError([0.0])},
+            "2 samples, but 1 were measured",
+        ),
+        (
+            {"Z10": [3.0]},
+            {"voltage": [0.0, 1.0], "cost": SquaredError([0.0, np.nan])},
+            "not finite, or the weight negative, at sample 1",
+        ),
+    ],
+)
+def test_bad_batches_are_refused(hoist: Drive, changes, options, sentence) -> None:
+    with pytest.raises(InputError, match=sentence):
+        hoist.simulate_many(changes, **options)
+
+
+def test_samples_without_weight_may_be_missing(hoist: Drive) -> None:
+    cost = SquaredError([0.0, np.nan, 1.0], [1.0, 0.0, 1.0])
+    batch = hoist.simulate_many({"Z10": [12.396]}, voltage=[0.0, 0.0, 0.0], cost=cost)
+    speed = hoist.simulate([0.0, 0.0, 0.0]).shaft_speed
+    assert batch.cost[0] == pytest.approx(speed[0] ** 2 + (speed[2] - 1.0) ** 2, rel=1e-14)
+
+
+def test_unknown_parameter(hoist: Drive) -> None:
+    with pytest.raises(ParameterError, match="did you mean Z16"):
+        hoist.simulate_many({"Z_16": [1.0]}, voltage=[0.0])

@@ -1,0 +1,66 @@
+"""Steps and rates: first order in h, and the same answer from any sampling of one manoeuvre."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from swashplate import Drive, InputError, maneuvers
+
+FULL_SPEED = {"hoist": np.deg2rad(196.0), "slew": np.deg2rad(4.242), "luff": np.deg2rad(155.9)}
+
+
+def test_halving_the_step_halves_the_error(axis: Drive) -> None:
+    smooth = maneuvers.sine(4.0, 0.2, start=0.1, length=6.0)
+    voltage = smooth.sample(512.0)
+    runs = [axis.simulate(voltage, substeps=m).shaft_speed for m in (1, 2, 4, 8)]
+    # where the error is largest it falls by two each time, as a method of first order does
+    errors = [np.abs(a - b).max() for a, b in itertools.pairwise(runs)]
+    ratios = [a / b for a, b in itertools.pairwise(errors)]
+    assert all(1.7 < ratio < 2.3 for ratio in ratios), ratios
+
+
+@pytest.mark.parametrize(
+    ("maneuver", "interpolation"),
+    [
+        (maneuvers.step(9.0), "previous"),
+        (maneuvers.step(-4.0), "previous"),
+        (maneuvers.sine(6.5, 0.1, length=20.0), "linear"),
+        (maneuvers.ramp(1.0), "linear"),
+    ],
+    ids=lambda value: getattr(value, "name", value),
+)
+def test_every_rate_gives_the_same_answer(
+    axis: Drive, maneuver: maneuvers.Maneuver, interpolation: str
+) -> None:
+    """Within 0.5 % of full speed, compared at the samples that all rates share: each 0.25 s."""
+    shared = []
+    for rate in (100.0, 512.0, 1000.0, 10_000.0):
+        run = axis.simulate(maneuver.sample(rate), rate, interpolation=interpolation)
+        shared.append(run.shaft_speed[:: int(rate) // 4])
+    spread = np.ptp(np.stack(shared), axis=0).max()
+    assert spread < 0.005 * FULL_SPEED[axis.name]
+
+
+@pytest.mark.parametrize("rate", [10.0, 33.3, 512.0, 100_000.0])
+def test_no_step_is_longer_than_the_sources(hoist: Drive, rate: float) -> None:
+    run = hoist.simulate(np.linspace(0.0, 5.0, 40), rate)
+    assert run.record.step <= 1.0 / 512.0
+    assert run.time.size == run.shaft_speed.size == 40
+    assert run.time[-1] == pytest.approx(39.0 / rate, rel=1e-12)
+
+
+@pytest.mark.parametrize("rate", [9.99, 100_001.0, float("nan"), 0.0, -512.0])
+def test_rates_out_of_range_are_refused(hoist: Drive, rate: float) -> None:
+    with pytest.raises(InputError, match="between 10 and 100000 Hz"):
+        hoist.simulate([0.0, 1.0], rate)
+
+
+def test_unstable_filter_is_refused_with_advice() -> None:
+    slew = Drive.preset("slew").scale(zeta=2.0, omega=2.0)
+    voltage = maneuvers.step(2.0).sample(512.0)
+    with pytest.raises(InputError, match=r"slew: the current filter .* substeps=2"):
+        slew.simulate(voltage)
+    settled = slew.simulate(voltage, substeps=2).current[5 * 512]
+    # the Coulomb term may hold the filter within C/ω² of its level
+    assert settled == pytest.approx(slew.steady_current(2.0), abs=4.8368 / 196.754**2 + 1e-6)

@@ -1,0 +1,182 @@
+"""Whole trajectories' sensitivities against extrapolated differences, each limit active in turn."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from swashplate import Drive, InputError, Limit, Simulation, maneuvers
+from swashplate.simulation.build import ALL_PARAMETERS
+from swashplate.simulation.constants import PUMP_PARAMETERS
+
+RATE = 512.0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A drive and a command under which one limit acts."""
+
+    voltage: np.ndarray
+    changes: dict = field(default_factory=dict)
+    preset: str = "hoist"
+    limit: Limit | None = None
+    root: str = "published"
+    start: str = "rest"
+
+    def drive(self) -> Drive:
+        drive = Drive.preset(self.preset).replace(**self.changes)
+        return Drive(replace(drive.parameters, pressure_root=self.root))
+
+
+def steps(*levels: float) -> np.ndarray:
+    """Half a second at each level, both signs and back to zero, between slow flanks."""
+    t = np.arange(int(0.6 * len(levels) * RATE)) / RATE
+    corners = np.concatenate([[0.6 * k, 0.6 * k + 0.1] for k in range(len(levels))])
+    values = np.repeat([0.0, *levels], 2)[1:-1]
+    return np.interp(t, corners, values)
+
+
+SWING = maneuvers.sine(3.0, 0.8, start=0.05, length=3.0, settle=0.4).sample(RATE)
+HARD = steps(9.0, 9.0, 0.0, -9.0, -9.0, 0.0, 3.0)
+
+SCENES = {
+    "nothing but the dead zone": Scene(0.4 * SWING, limit=Limit.DEAD_ZONE),
+    "current rate": Scene(HARD, limit=Limit.CURRENT_RATE),
+    "orifice": Scene(2.5 * SWING, limit=Limit.ORIFICE),
+    "spool stop": Scene(2.5 * SWING, {"Z14": 1.05e-4}, limit=Limit.SPOOL),
+    "swash stop": Scene(HARD, {"Z16": 3e-4}, limit=Limit.SWASH_STOP),
+    "relief valve": Scene(HARD, {"Z15": 3e5}, limit=Limit.RELIEF),
+    "leakage": Scene(2.0 * SWING, {"Z7": 0.6, "Z2": 0.01}),
+    "load": Scene(HARD, {"Z12": 0.3, "Z11": 0.02, "Z2": 0.005, "Z7": 0.2}),
+    "physical root": Scene(HARD, {"Z2": 0.003}, root="symmetric"),
+    "physical root, leaking": Scene(2.0 * SWING, {"Z7": 0.5}, root="symmetric"),
+    "steep": Scene(HARD, {"Z13": 0.6, "Z16": 6e-4}),
+    "slew with its Coulomb term": Scene(2.5 * SWING, preset="slew"),
+    "luff": Scene(HARD, preset="luff", limit=Limit.ORIFICE),
+    "no delay": Scene(2.0 * SWING, {"tau": 0.0003}),
+    "steady start": Scene(3.0 + SWING, start="steady"),
+    "steady start, leaking": Scene(-3.0 + SWING, {"Z7": 0.5}, start="steady"),
+}
+
+# zero by the model's own equations: the filter's sign has no slope at C = 0 but the one-sided, and
+# a negative value is not a valid parameter
+ONE_SIDED = {"C_plus", "C_minus", "Z7", "I_t2_plus", "I_t2_minus", "Z6"}
+
+
+def outputs(run: Simulation) -> np.ndarray:
+    return np.stack(
+        [run.current_positive, run.current_negative, run.shaft_speed, run.shaft_position]
+    )
+
+
+def differences(scene: Scene, drive: Drive, name: str) -> list[np.ndarray]:
+    """Derivatives of all outputs by one parameter, extrapolated, with several steps.
+
+    No one step suits all samples: rounding spoils short ones, switches crossing a sample long ones.
+    """
+    value = drive.parameters.numbers[name]
+    size = abs(value) or {"Z2": 1e-3, "Z18": 1e-5}.get(name, 1e-2)
+
+    def at(offset: float) -> np.ndarray:
+        changed = drive.replace(**{name: value + offset})
+        return outputs(changed.simulate(scene.voltage, start=scene.start))
+
+    found = []
+    for h in (2e-6 * size, 5e-5 * size, 1e-3 * size):
+        if value == 0.0 and name in ONE_SIDED:
+            found.append((-3.0 * at(0.0) + 4.0 * at(h) - at(2.0 * h)) / (2.0 * h))
+        else:
+            coarse = (at(h) - at(-h)) / (2.0 * h)
+            fine = (at(0.5 * h) - at(-0.5 * h)) / h
+            found.append((4.0 * fine - coarse) / 3.0)
+    return found
+
+
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
+def test_every_parameter(scene: Scene) -> None:
+    drive = scene.drive()
+    by = drive.sensitivities(scene.voltage, start=scene.start)
+    if scene.limit is not None:
+        assert by.simulation.active(scene.limit).sum() > 20
+    base = outputs(by.simulation)
+    moved = 0
+    for j, name in enumerate(by.names):
+        exact = np.stack(
+            [
+                by.current_positive[:, j],
+                by.current_negative[:, j],
+                by.shaft_speed[:, j],
+                by.shaft_position[:, j],
+            ]
+        )
+        number = drive.parameters.numbers[name]
+        if np.isinf(number) or (name.startswith("C_") and number == 0.0):
+            continue
+        found = differences(scene, drive, name)
+        for signal in range(4):
+            scale = np.abs(exact[signal]).max()
+            noise = 1e-11 * np.abs(base[signal]).max() / abs(number or 1e-2)
+            error = np.min([np.abs(each[signal] - exact[signal]) for each in found], axis=0)
+            spoiled = error > 1e-5 * scale + noise
+            assert spoiled.mean() < 0.005, (name, signal, error.max(), scale)
+        moved += bool(np.abs(exact).max() > 0.0)
+    assert moved > 25
+
+
+def test_coulomb_term_has_a_one_sided_derivative_at_zero(hoist: Drive) -> None:
+    voltage = 2.0 * SWING
+    by = hoist.sensitivities(voltage, parameters=["C"])
+    e = 1e-4
+    run, one = hoist.simulate(voltage), hoist.replace(C=(e, 0.0)).simulate(voltage)
+    difference = (one.current_positive - run.current_positive) / e
+    np.testing.assert_allclose(
+        by.current_positive[:, 0], difference, atol=2e-3 * np.abs(difference).max()
+    )
+
+
+def test_columns_are_those_asked_for(hoist: Drive) -> None:
+    voltage = 2.0 * SWING
+    everything = hoist.sensitivities(voltage)
+    assert everything.names == ALL_PARAMETERS
+    some = hoist.sensitivities(voltage, parameters=["tau", "Z16", "G1_minus"])
+    assert some.names == ("tau", "Z16_plus", "Z16_minus", "G1_minus")
+    for j, name in enumerate(some.names):
+        k = everything.names.index(name)
+        assert np.array_equal(some.shaft_speed[:, j], everything.shaft_speed[:, k])
+        assert np.array_equal(some.shaft_position[:, j], everything.shaft_position[:, k])
+        assert np.array_equal(some.current[:, j], everything.current[:, k])
+
+
+def test_pump_alone_has_the_same_columns(hoist: Drive) -> None:
+    whole = hoist.sensitivities(2.0 * SWING, parameters=list(PUMP_PARAMETERS))
+    pump = hoist.sensitivities_current(whole.simulation.current)
+    assert pump.names == tuple(PUMP_PARAMETERS)
+    assert np.array_equal(pump.shaft_speed, whole.shaft_speed)
+    with pytest.raises(InputError, match="does not depend on tau"):
+        hoist.sensitivities_current([0.1, 0.2], parameters=["tau"])
+
+
+def test_other_rates_have_sensitivities_at_their_own_samples(
+    hoist: Drive, derivative: Callable[..., float]
+) -> None:
+    voltage = maneuvers.sine(3.0, 0.8, start=0.1, length=3.0, settle=0.4).sample(100.0)
+    by = hoist.sensitivities(voltage, 100.0, parameters=["Z10", "omega_plus"])
+    assert by.shaft_position.shape == (voltage.size, 2)
+
+    def last(omega: float) -> float:
+        return float(hoist.replace(omega_plus=omega).simulate(voltage, 100.0).shaft_position[-1])
+
+    omega = hoist["omega"].value.plus
+    assert by.shaft_position[-1, 1] == pytest.approx(derivative(last, [omega], 0, 1e-3), rel=1e-5)
+    run = hoist.simulate(voltage, 100.0)
+    assert by.shaft_speed[:, 0] == pytest.approx(run.swash_angle, rel=1e-12, abs=1e-15)
+
+
+def test_sensitivities_at_other_stamps(hoist: Drive) -> None:
+    by = hoist.sensitivities(SWING, parameters=["Z10", "Z8"])
+    stamps = np.array([0.5, 1.0, 1.0009765625])
+    there = by.at(stamps, "shaft_speed")
+    assert there.shape == (3, 2)
+    assert np.array_equal(there[:2], by.shaft_speed[[256, 512]])
+    np.testing.assert_allclose(there[2], by.shaft_speed[512:514].mean(axis=0), rtol=1e-12)
