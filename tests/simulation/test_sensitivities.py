@@ -135,6 +135,12 @@ def test_coulomb_term_has_a_one_sided_derivative_at_zero(hoist: Drive) -> None:
     )
 
 
+@pytest.mark.parametrize("names", [[], "Z16"])
+def test_a_list_of_names_is_needed(hoist: Drive, names) -> None:
+    with pytest.raises(InputError, match="at least one parameter"):
+        hoist.sensitivities([0.0], parameters=names)
+
+
 def test_columns_are_those_asked_for(hoist: Drive) -> None:
     voltage = 2.0 * SWING
     everything = hoist.sensitivities(voltage)

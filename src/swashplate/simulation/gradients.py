@@ -12,7 +12,7 @@ from swashplate.parameters.parameter_set import ParameterSet, columns_of
 from swashplate.simulation.build import ALL_PARAMETERS, build, build_pump
 from swashplate.simulation.constants import CHANNEL_PARAMETERS, PUMP_PARAMETERS, Pump
 from swashplate.simulation.record import Record
-from swashplate.simulation.result import Simulation
+from swashplate.simulation.result import CardSignals, Simulation
 from swashplate.simulation.run import Start, check_domain, check_start, rest_pressure
 from swashplate.simulation.sensitivities import (
     integrate_rows,
@@ -42,15 +42,23 @@ class Sensitivities:
     """The plain simulation, the same to the last bit as without sensitivities."""
     names: tuple[str, ...]
     """Columns such as ``Z16_plus``, in the order asked for."""
-    columns: tuple[Array, Array, Array]
-    """All columns of the channels' currents and of the speed, on the march's grid."""
+    by_speed: Array
+    """Columns of the speed, on the march's grid."""
+    by_currents: tuple[Array, Array] | None = None
+    """Columns of the channels' currents, on the march's grid; None where a current was given."""
 
-    @cached_property
-    def _chosen(self) -> list[int]:
-        return [ALL_PARAMETERS.index(name) for name in self.names]
+    def _wanted(self, columns: Array) -> Array:
+        """The columns asked for, without a copy where they are neighbours."""
+        chosen = [ALL_PARAMETERS.index(name) for name in self.names]
+        if chosen == list(range(chosen[0], chosen[0] + len(chosen))):
+            return columns[:, chosen[0] : chosen[0] + len(chosen)]
+        return np.take(columns, chosen, axis=1)
 
-    def _channel(self, side: str, columns: Array) -> Array:
+    def _channel(self, side: str) -> Array:
         chosen = np.zeros((self.simulation.time.size, len(self.names)))
+        if self.by_currents is None:
+            return chosen
+        columns = self.by_currents[0 if side == "plus" else 1]
         for j, name in enumerate(self.names):
             symbol = name.removesuffix(f"_{side}")
             if name == "tau":
@@ -63,12 +71,12 @@ class Sensitivities:
     @cached_property
     def current_positive(self) -> Array:
         """(n, k) derivatives of the positive channel's current. [A/...]"""
-        return self._channel("plus", self.columns[0])
+        return self._channel("plus")
 
     @cached_property
     def current_negative(self) -> Array:
         """(n, k) derivatives of the negative channel's current, a magnitude. [A/...]"""
-        return self._channel("minus", self.columns[1])
+        return self._channel("minus")
 
     @cached_property
     def current(self) -> Array:
@@ -78,12 +86,12 @@ class Sensitivities:
     @cached_property
     def shaft_speed(self) -> Array:
         """(n, k) derivatives of the speed. [(rad/s)/...]"""
-        return self.columns[2][:: self.simulation.record.substeps, self._chosen]
+        return self._wanted(self.by_speed[:: self.simulation.record.substeps])
 
     @cached_property
     def shaft_position(self) -> Array:
         """(n, k) derivatives of the position. [rad/...]"""
-        rate = np.ascontiguousarray(self.columns[2][:, self._chosen])
+        rate = np.ascontiguousarray(self._wanted(self.by_speed))
         integral = np.zeros_like(rate)
         integrate_rows(rate, self.simulation.record.step, integral)
         return integral[:: self.simulation.record.substeps]
@@ -110,7 +118,7 @@ def drive_sensitivities(
 ) -> Sensitivities:
     """Card and pump with derivatives; see `Drive.sensitivities`."""
     check_start(start)
-    chosen = tuple(ALL_PARAMETERS if names is None else columns_of(list(names)))
+    chosen = _chosen(names, ALL_PARAMETERS)
     delay, plus, minus, pump, step = build(parameters, record.step)
     command = record.values
     d_plus, d_minus = np.zeros(N_CHANNEL + 1), np.zeros(N_CHANNEL + 1)
@@ -121,7 +129,8 @@ def drive_sensitivities(
         steady_tangent(before, plus, minus, pump, step, state, d_plus, d_minus, d_pressure)
     n = command.size
     current_plus, current_minus, pressure, speed = (np.empty(n) for _ in range(4))
-    columns = (np.empty((n, N_CHANNEL + 1)), np.empty((n, N_CHANNEL + 1)), np.empty((n, N_ALL)))
+    by_currents = (np.empty((n, N_CHANNEL + 1)), np.empty((n, N_CHANNEL + 1)))
+    by_speed = np.empty((n, N_ALL))
     flags = np.empty(n, dtype=np.uint8)
     worst = march_drive_sensitivities(
         command,
@@ -140,13 +149,13 @@ def drive_sensitivities(
         pressure,
         speed,
         flags,
-        *columns,
+        *by_currents,
+        by_speed,
     )
     check_domain(parameters.name, worst, "voltage")
-    simulation = Simulation(
-        parameters.name, record, True, pump, (current_plus, current_minus, pressure, flags)
-    )
-    return Sensitivities(simulation, chosen, columns)
+    card = CardSignals(current_plus, current_minus, flags)
+    simulation = Simulation(parameters.name, record, pump, pressure, card)
+    return Sensitivities(simulation, chosen, by_speed, by_currents)
 
 
 def pump_sensitivities(
@@ -154,7 +163,7 @@ def pump_sensitivities(
 ) -> Sensitivities:
     """Pump alone with derivatives; see `Drive.sensitivities_current`."""
     check_start(start)
-    chosen = tuple(PUMP_PARAMETERS if names is None else columns_of(list(names)))
+    chosen = _chosen(names, PUMP_PARAMETERS)
     foreign = [name for name in chosen if name not in PUMP_PARAMETERS]
     if foreign:
         raise InputError(
@@ -166,19 +175,22 @@ def pump_sensitivities(
     if start == "steady":
         state = steady_pump_start(float(current[0]), pump)
         steady_pump_tangent(float(current[0]), pump, record.step, state, d_pressure)
-    n = current.size
-    pressure, speed, columns = np.empty(n), np.empty(n), np.empty((n, N_PUMP))
+    pressure, speed = np.empty_like(current), np.empty_like(current)
+    by_speed = np.empty((current.size, N_PUMP))
     worst = march_pump_sensitivities(
-        current, pump, record.step, state, d_pressure, pressure, speed, columns
+        current, pump, record.step, state, d_pressure, pressure, speed, by_speed
     )
     check_domain(parameters.name, worst, "current")
-    positive, negative = np.maximum(current, 0.0), np.maximum(-current, 0.0)
-    flags = np.zeros(n, dtype=np.uint8)
-    simulation = Simulation(
-        parameters.name, record, False, pump, (positive, negative, pressure, flags)
-    )
-    nothing = np.zeros((n, N_CHANNEL + 1))
-    return Sensitivities(simulation, chosen, (nothing, nothing, columns))
+    simulation = Simulation(parameters.name, record, pump, pressure)
+    return Sensitivities(simulation, chosen, by_speed)
+
+
+def _chosen(names: Sequence[str] | None, everything: tuple[str, ...]) -> tuple[str, ...]:
+    if names is None:
+        return everything
+    if isinstance(names, str) or not names:
+        raise InputError("Name at least one parameter to differentiate by, in a list.")
+    return tuple(columns_of(list(names)))
 
 
 def rest_tangent(pump: Pump, size: int) -> Array:

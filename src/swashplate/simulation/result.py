@@ -51,6 +51,14 @@ def read_only(array: NDArray[T]) -> NDArray[T]:
     return view
 
 
+class CardSignals(NamedTuple):
+    """What the card's march leaves on its grid."""
+
+    current_positive: Array
+    current_negative: Array
+    rate_limited: Flags
+
+
 class Inside(NamedTuple):
     """Signals inside the pump, one pass computes all of them."""
 
@@ -71,14 +79,21 @@ class Simulation:
     name: str
     """Name of the parameter set."""
     record: Record
-    driven_by_voltage: bool
+    """The input on the march's grid: a voltage, or without a card a signed current."""
     pump: Pump
-    states: tuple[Array, Array, Array, Flags]
-    """Channel currents, pressure and rate-limit flags on the march's grid."""
+    pressure: Array
+    """δP on the march's grid. [Pa]"""
+    card: CardSignals | None = None
+    """The card's signals on the march's grid, None where a current was given."""
 
     def _sampled(self, fine: NDArray[T]) -> NDArray[T]:
         """Samples of the record out of the march's grid."""
         return np.ascontiguousarray(fine[:: self.record.substeps])
+
+    @property
+    def driven_by_voltage(self) -> bool:
+        """Whether the record is a voltage that went through the card."""
+        return self.card is not None
 
     @cached_property
     def time(self) -> Array:
@@ -93,16 +108,22 @@ class Simulation:
     @cached_property
     def current_positive(self) -> Array:
         """Current of the solenoid towards positive speed, never negative. [A]"""
-        return read_only(self._sampled(self.states[0]))
+        if self.card is None:
+            return read_only(np.maximum(self.current, 0.0))
+        return read_only(self._sampled(self.card.current_positive))
 
     @cached_property
     def current_negative(self) -> Array:
         """Current of the other solenoid, never negative. [A]"""
-        return read_only(self._sampled(self.states[1]))
+        if self.card is None:
+            return read_only(np.maximum(-self.current, 0.0))
+        return read_only(self._sampled(self.card.current_negative))
 
     @cached_property
     def _fine_current(self) -> Array:
-        return self.states[0] - self.states[1]
+        if self.card is None:
+            return self.record.values
+        return self.card.current_positive - self.card.current_negative
 
     @cached_property
     def current(self) -> Array:
@@ -112,12 +133,12 @@ class Simulation:
     @cached_property
     def stroker_pressure(self) -> Array:
         """Stroking pressure δP about its equilibrium. [Pa]"""
-        return read_only(self._sampled(self.states[2]))
+        return read_only(self._sampled(self.pressure))
 
     @cached_property
     def _fine_speed(self) -> Array:
-        speed = np.empty_like(self.states[2])
-        observe_speed(self._fine_current, self.states[2], self.pump, speed)
+        speed = np.empty_like(self.pressure)
+        observe_speed(self._fine_current, self.pressure, self.pump, speed)
         return speed
 
     @cached_property
@@ -134,7 +155,7 @@ class Simulation:
 
     @cached_property
     def _inside(self) -> Inside:
-        current, pressure = self._sampled(self._fine_current), self._sampled(self.states[2])
+        current, pressure = self._sampled(self._fine_current), self._sampled(self.pressure)
         signals = Inside(*(np.empty_like(pressure) for _ in Inside._fields))
         observe_inside(current, pressure, self.pump, *signals)
         return Inside(*(read_only(signal) for signal in signals))
@@ -162,9 +183,11 @@ class Simulation:
     @cached_property
     def limits(self) -> Flags:
         """Limits that act at each sample, bits of `Limit`."""
-        current, pressure = self._sampled(self._fine_current), self._sampled(self.states[2])
-        flags = np.empty(pressure.size, dtype=np.uint8)
-        observe_limits(current, pressure, self._sampled(self.states[3]), self.pump, flags)
+        current, pressure = self._sampled(self._fine_current), self._sampled(self.pressure)
+        flags, rate_limited = (np.zeros(pressure.size, dtype=np.uint8) for _ in range(2))
+        if self.card is not None:
+            rate_limited = self._sampled(self.card.rate_limited)
+        observe_limits(current, pressure, rate_limited, self.pump, flags)
         return read_only(flags)
 
     def active(self, limit: Limit) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ from swashplate.simulation.build import build, build_pump
 from swashplate.simulation.constants import Pump
 from swashplate.simulation.march import march_drive, march_pump
 from swashplate.simulation.record import Record
-from swashplate.simulation.result import Simulation
+from swashplate.simulation.result import CardSignals, Simulation
 from swashplate.simulation.steady import steady_pump_start, steady_start
 
 Array = NDArray[np.float64]
@@ -54,11 +54,25 @@ def simulate_drive(parameters: ParameterSet, record: Record, start: Start) -> Si
     if start == "steady":
         before = float(command[0])
         state = steady_start(before, plus, minus, pump)
-    arrays = (np.empty_like(command), np.empty_like(command), np.empty_like(command))
+    current_plus, current_minus, pressure = (np.empty_like(command) for _ in range(3))
     flags = np.empty(command.size, dtype=np.uint8)
-    worst = march_drive(command, before, delay, plus, minus, pump, step, state, *arrays, flags)
+    worst = march_drive(
+        command,
+        before,
+        delay,
+        plus,
+        minus,
+        pump,
+        step,
+        state,
+        current_plus,
+        current_minus,
+        pressure,
+        flags,
+    )
     check_domain(parameters.name, worst, "voltage")
-    return Simulation(parameters.name, record, True, pump, (*arrays, flags))
+    card = CardSignals(current_plus, current_minus, flags)
+    return Simulation(parameters.name, record, pump, pressure, card)
 
 
 def simulate_pump(parameters: ParameterSet, record: Record, start: Start) -> Simulation:
@@ -72,6 +86,4 @@ def simulate_pump(parameters: ParameterSet, record: Record, start: Start) -> Sim
         state = steady_pump_start(float(current[0]), pump)
     worst = march_pump(current, pump, record.step, state, pressure)
     check_domain(parameters.name, worst, "current")
-    positive, negative = np.maximum(current, 0.0), np.maximum(-current, 0.0)
-    flags = np.zeros(current.size, dtype=np.uint8)
-    return Simulation(parameters.name, record, False, pump, (positive, negative, pressure, flags))
+    return Simulation(parameters.name, record, pump, pressure)
