@@ -68,7 +68,7 @@ def stroker_arguments(draw: st.DrawFn, leaky: bool, stepped: bool) -> tuple:
 def limiter_arguments(draw: st.DrawFn) -> tuple:
     I_t2 = draw(real(0.0, 0.3))
     I_t1 = I_t2 + draw(real(0.01, 0.5))
-    target, previous = draw(real(-0.2, 1.2)), draw(real(0.0, 1.2))
+    target, previous = draw(real(-0.2, 1.2)), draw(real(1e-3, 1.2))
     steady = draw(st.one_of(st.just(0.0), real(0.05, 1.0)))
     lim1, lim2, decay = draw(real(0.5, 50.0)), draw(real(0.5, 50.0)), draw(real(0.5, 1.0))
     return target, previous, steady, lim1, lim2, I_t1, I_t2, decay, STEP

@@ -138,7 +138,9 @@ class Simulation:
     @cached_property
     def _fine_speed(self) -> Array:
         speed = np.empty_like(self.pressure)
-        observe_speed(self._fine_current, self.pressure, self.pump, speed)
+        # without Z12 the speed does not depend on the current, which then need not be made
+        current = self._fine_current if self.pump.loaded else self.pressure
+        observe_speed(current, self.pressure, self.pump, speed)
         return speed
 
     @cached_property

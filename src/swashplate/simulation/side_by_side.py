@@ -28,7 +28,7 @@ from swashplate.simulation.constants import (
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-LANES = 8
+LANES = 16
 """Sets marched side by side: two vectors of eight where the processor has them, else four of 4."""
 
 # Rows of a block, the flat array that holds all there is to know of LANES drives: row r of lane l
