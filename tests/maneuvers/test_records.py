@@ -35,3 +35,19 @@ def test_recorded_keeps_a_copy():
 def test_recorded_wants_to_be_told_how_to_interpolate():
     with pytest.raises(TypeError, match="interpolation"):
         maneuvers.recorded([0, 1], [0, 1])
+
+
+def test_recorded_can_end_at_a_whole_sample():
+    m = maneuvers.recorded([0.0, 1.0, 1.37], [1.0, 2.0, 3.0], interpolation="previous", length=1.5)
+    assert m.sample(10.0).tolist() == [1.0] * 10 + [2.0] * 4 + [3.0] * 2
+    cut = maneuvers.recorded([0.0, 1.37], [1.0, 3.0], interpolation="previous", length=1.0)
+    assert cut.sample(10.0).tolist() == [1.0] * 11
+
+
+def test_recorded_file(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("t [ms],stick [mV]\n0,0\n500,4000\n2000,-1500\n", "utf-8")
+    m = maneuvers.recorded_file(path, interpolation="linear", column="stick", time_column="t")
+    assert m.name == "log.csv"
+    assert m.length == 2.0
+    assert m([0.25, 2.0]).tolist() == [2.0, -1.5]

@@ -1,6 +1,7 @@
 """Manoeuvres: the voltage that a joystick commands over time, for tests of a drive.
 
-`step`, `ramp`, `sine`, `stairs`, `chirp`, `multisine`, `recorded` and `rest` make one; `+` puts one
+`step`, `ramp`, `sine`, `stairs`, `chirp`, `multisine`, `recorded`, `recorded_file` and `rest`
+make one; `+` puts one
 after another, a factor scales it, `superpose` adds voltages.
 
 Most take three keywords, all in seconds: `start`, the rest before the command; `settle`, how long
@@ -17,6 +18,7 @@ from swashplate.maneuvers.parsing import parse as parse
 from swashplate.maneuvers.pieces import Maneuver as Maneuver
 from swashplate.maneuvers.pieces import Piece as Piece
 from swashplate.maneuvers.records import recorded as recorded
+from swashplate.maneuvers.records import recorded_file as recorded_file
 from swashplate.maneuvers.shapes import ramp as ramp
 from swashplate.maneuvers.shapes import rest as rest
 from swashplate.maneuvers.shapes import stairs as stairs

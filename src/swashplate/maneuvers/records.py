@@ -1,15 +1,17 @@
 """Manoeuvres from logs: a voltage that was measured, to be commanded again."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import row
+from swashplate.maneuvers.checks import positive, row
 from swashplate.maneuvers.curves import Array, interval
 from swashplate.maneuvers.pieces import Maneuver, Piece
+from swashplate.tables import read_series
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,11 @@ _CURVES: dict[str, type[_Held | _Joined]] = {"previous": _Held, "linear": _Joine
 
 
 def recorded(
-    time: npt.ArrayLike, voltage: npt.ArrayLike, *, interpolation: Literal["previous", "linear"]
+    time: npt.ArrayLike,
+    voltage: npt.ArrayLike,
+    *,
+    interpolation: Literal["previous", "linear"],
+    length: float | None = None,
 ) -> Maneuver:
     """Voltage from a log; its first row is at 0 s whatever its time says, its last at the end.
 
@@ -56,6 +62,9 @@ def recorded(
         At least two rows; time increases from each to the next. [s], [V]
     interpolation : {"previous", "linear"}
         Between two rows: hold the earlier one, or go straight to the later one.
+    length : float, optional
+        Where to end instead of at the last row: earlier, or later with its voltage held. A log
+        seldom lasts a whole number of samples, which `Maneuver.sample` asks for. [s]
 
     Raises
     ------
@@ -78,4 +87,36 @@ def recorded(
             f"time must increase, but row {late[0]} (the first is 0) has {after} s after {before} s"
         )
     curve = _CURVES[interpolation](times, volts)
-    return Maneuver(f"recorded {times.size} rows", float(times[-1]), (Piece(0.0, curve),))
+    end = float(times[-1]) if length is None else positive("length", length)
+    return Maneuver(f"recorded {times.size} rows", end, (Piece(0.0, curve),))
+
+
+def recorded_file(
+    path: str | Path,
+    *,
+    interpolation: Literal["previous", "linear"],
+    length: float | None = None,
+    column: str = "voltage",
+    time_column: str = "time",
+) -> Maneuver:
+    """Voltage from a log's file, CSV or Parquet; see `recorded` and `tables.read_series`.
+
+    Parameters
+    ----------
+    path : path
+        A table with a header; a unit may stand in it, as in ``voltage [mV]``.
+    column, time_column : str
+        Names of the columns.
+    interpolation, length :
+        As in `recorded`.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read; it names file and row.
+    InputError
+        If a column is missing or its unit wrong, or as in `recorded`.
+    """
+    time, voltage = read_series(path, column, "V", time_column=time_column)
+    recording = recorded(time, voltage, interpolation=interpolation, length=length)
+    return replace(recording, name=Path(path).name)
