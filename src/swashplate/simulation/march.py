@@ -37,6 +37,22 @@ def sample_at(command: Array, index: int, before: float) -> float:
     return command[index] if index >= 0 else before
 
 
+@component
+def samples_around(
+    command: Array, n: int, delay: Delay, before: float
+) -> tuple[float, float, float, float, float]:
+    """Samples that a card looks at: two around t - τ, three around the share's interval. [V]"""
+    at = n - delay.whole
+    end = n - delay.share_whole
+    return (
+        sample_at(command, at, before),
+        sample_at(command, at - 1, before),
+        sample_at(command, end, before),
+        sample_at(command, end - 1, before),
+        sample_at(command, end - 2, before),
+    )
+
+
 @kernel
 def march_drive(
     command: Array,
@@ -79,14 +95,8 @@ def march_drive(
     p = start[2]
     worst = 0.0
     for n in range(command.size):
-        at = n - delay.whole
-        newer = sample_at(command, at, before)
-        older = sample_at(command, at - 1, before)
+        newer, older, newest, middle, oldest = samples_around(command, n, delay, before)
         delayed = interpolated(newer, older, delay.fraction)
-        at = n - delay.share_whole
-        newest = sample_at(command, at, before)
-        middle = sample_at(command, at - 1, before)
-        oldest = sample_at(command, at - 2, before)
         f = delay.share_fraction
         steady_p = channel_steady(1.0, delayed, newest, middle, oldest, f, plus)
         steady_m = channel_steady(-1.0, delayed, newest, middle, oldest, f, minus)

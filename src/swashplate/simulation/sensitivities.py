@@ -8,7 +8,7 @@ from swashplate.physics.control_card import interpolated_partials, steady_partia
 from swashplate.simulation.chain import moment_squared
 from swashplate.simulation.compilation import kernel
 from swashplate.simulation.constants import Channel, Delay, Pump
-from swashplate.simulation.march import sample_at
+from swashplate.simulation.march import samples_around
 from swashplate.simulation.tangent import (
     N_CHANNEL,
     N_PUMP,
@@ -87,14 +87,8 @@ def march_drive_sensitivities(
     p = start[2]
     worst = 0.0
     for n in range(command.size):
-        at = n - delay.whole
-        newer = sample_at(command, at, before)
-        older = sample_at(command, at - 1, before)
+        newer, older, newest, middle, oldest = samples_around(command, n, delay, before)
         delayed, _, _, slope = interpolated_partials(newer, older, delay.fraction)
-        at = n - delay.share_whole
-        newest = sample_at(command, at, before)
-        middle = sample_at(command, at - 1, before)
-        oldest = sample_at(command, at - 2, before)
         output_p, following, limited_p = channel_tangent(
             1.0,
             delayed,
