@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import swashplate
+from swashplate.simulation import compilation
 
 SCRIPT = """
 import numpy as np
@@ -40,6 +41,17 @@ def run(package: Path) -> tuple[float, int, int]:
     )
     speed, hits, misses = done.stdout.split()
     return float(speed), int(hits), int(misses)
+
+
+def test_without_a_place_for_the_cache_kernels_still_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compilation._KernelCacheImpl, "_locator_classes", [])
+    with pytest.warns(RuntimeWarning, match="set NUMBA_CACHE_DIR to a folder"):
+
+        @compilation.kernel
+        def double(x: float) -> float:
+            return 2.0 * x
+
+    assert double(1.5) == 3.0
 
 
 def test_a_changed_component_is_never_answered_from_the_cache(package: Path) -> None:

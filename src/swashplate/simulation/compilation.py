@@ -10,6 +10,7 @@ from functools import cache
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
+from warnings import warn
 
 from numba import config, njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
@@ -19,6 +20,10 @@ R = TypeVar("R")
 
 PACKAGE = Path(__file__).parent.parent
 KERNEL_SOURCES = ("physics", "simulation")
+UNCACHED = (
+    "swashplate's compiled kernels cannot be kept, so that every session compiles them anew; set "
+    "NUMBA_CACHE_DIR to a folder that can be written."
+)
 
 
 @cache
@@ -61,8 +66,16 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     -------
     callable
         The compiled function, or the plain one under ``NUMBA_DISABLE_JIT=1``.
+
+    Warns
+    -----
+    RuntimeWarning
+        If there is no place for the cache; the function works all the same.
     """
     compiled: Any = njit(nogil=True, error_model="numpy")(function)
     if not config.DISABLE_JIT:  # type: ignore[attr-defined]
-        compiled._cache = _KernelCache(function)  # type: ignore[no-untyped-call]
+        try:
+            compiled._cache = _KernelCache(function)  # type: ignore[no-untyped-call]
+        except RuntimeError:  # no folder to cache in can be written
+            warn(UNCACHED, RuntimeWarning, stacklevel=2)
     return compiled  # type: ignore[no-any-return]

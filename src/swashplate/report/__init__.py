@@ -1,0 +1,1 @@
+"""Figures of simulations and drives: the only package that imports plotting."""
