@@ -113,7 +113,7 @@ def read_table(path: str | Path) -> polars.DataFrame:
     except pl.exceptions.NoDataError:
         raise FileError(f"{source} is empty.") from None
     except (OSError, pl.exceptions.PolarsError) as error:
-        first = str(error).splitlines()[0]
+        first = str(error).splitlines()[0].rstrip(".")
         raise FileError(f"{source} cannot be read as a table: {first}.") from None
 
 

@@ -90,10 +90,8 @@ def simulate_many(
         compare = (observed, measured, weight, kept)
         flat = block.reshape(-1)
         if by_voltage:
-            padding = int(whole.max()) + 3
-            command = np.concatenate([np.zeros(padding), record.values])
             lanes.march_drives(
-                command, padding, whole, share_whole, literal, *options, record.step, flat, *compare
+                record.values, whole, share_whole, literal, *options, record.step, flat, *compare
             )
         else:
             lanes.march_pumps(record.values, *options, record.step, flat, *compare)

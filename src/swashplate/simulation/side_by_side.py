@@ -24,6 +24,7 @@ from swashplate.simulation.constants import (
     Channel,
     Pump,
 )
+from swashplate.simulation.march import sample_at
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -36,8 +37,8 @@ LANES = 16
 # prove at run time that rows do not overlap, and vectorises.
 (PRESSURE, STATE_P, PREVIOUS_P, OUTPUT_P, STATE_M, PREVIOUS_M, OUTPUT_M) = range(7)
 (SPEED, POSITION, CURRENT, OBSERVED, COST, WORST) = range(7, 13)
-(DELAYED, NEWEST, MIDDLE, OLDEST, FRACTION, SHARE_FRACTION) = range(13, 19)
-PLUS = 19
+(NEWER, OLDER, NEWEST, MIDDLE, OLDEST, FRACTION, SHARE_FRACTION) = range(13, 20)
+PLUS = 20
 MINUS = PLUS + N_CHANNEL_NUMBERS
 PUMP = MINUS + N_CHANNEL_NUMBERS
 N_ROWS = PUMP + N_PUMP_NUMBERS
@@ -126,20 +127,19 @@ def pump_of(
 def read_commands(
     n: int, command: Array, whole: Indices, share_whole: Indices, block: Array
 ) -> None:
-    """What each lane's card sees at one sample: delayed command and the three around the share.
+    """What each lane's card sees at one sample: two samples around t - τ, three of the share.
 
-    Apart from `advance_cards`, because a loop that reads at computed places is not vectorised.
-    `command` is padded, so that no index is negative.
+    All but the newest of them move up from the sample before. Before the record begins the command
+    is zero, as the rows are at the start.
     """
     for lane in range(LANES):
-        at = n - whole[lane]
-        block[DELAYED * LANES + lane] = interpolated(
-            command[at], command[at - 1], row(block, FRACTION, lane)
-        )
-        at = n - share_whole[lane]
-        block[NEWEST * LANES + lane] = command[at]
-        block[MIDDLE * LANES + lane] = command[at - 1]
-        block[OLDEST * LANES + lane] = command[at - 2]
+        block[OLDER * LANES + lane] = row(block, NEWER, lane)
+        block[OLDEST * LANES + lane] = row(block, MIDDLE, lane)
+        block[MIDDLE * LANES + lane] = row(block, NEWEST, lane)
+    # apart, because a loop that reads at computed places is not vectorised
+    for lane in range(LANES):
+        block[NEWER * LANES + lane] = sample_at(command, n - whole[lane], 0.0)
+        block[NEWEST * LANES + lane] = sample_at(command, n - share_whole[lane], 0.0)
 
 
 @component
@@ -149,7 +149,7 @@ def advance_channel(
     """One sample of one channel of one lane; its states lie in three rows from `first` on."""
     steady = channel_steady(
         direction,
-        row(block, DELAYED, lane),
+        interpolated(row(block, NEWER, lane), row(block, OLDER, lane), row(block, FRACTION, lane)),
         row(block, NEWEST, lane),
         row(block, MIDDLE, lane),
         row(block, OLDEST, lane),
@@ -213,7 +213,6 @@ def advance_pump(
 @kernel
 def march_drives(
     command: Array,
-    padding: int,
     whole: Indices,
     share_whole: Indices,
     literal: bool | None,
@@ -232,8 +231,8 @@ def march_drives(
 
     Parameters
     ----------
-    command : (padding + n,) array
-        Command, preceded by its value before the record began. [V]
+    command : (n,) array
+        Command at the samples, zero before. [V]
     whole, share_whole : (LANES,) arrays of int
         Whole samples of the delays, see `Delay`.
     literal, leaky, loaded, steep, symmetric : None or True
@@ -248,9 +247,9 @@ def march_drives(
     outputs : (n, LANES) or (0, LANES) array
         Observed quantity at each sample; empty where only the cost is wanted.
     """
-    for n in range(command.size - padding):
+    for n in range(command.size):
         half_step = 0.5 * step if n > 0 else 0.0
-        read_commands(n + padding, command, whole, share_whole, block)
+        read_commands(n, command, whole, share_whole, block)
         advance_cards(literal, step, block)
         for lane in range(LANES):
             advance_pump(

@@ -1,0 +1,177 @@
+"""Rows of the table that are measured in this process: the march, its derivatives, batches."""
+
+from collections.abc import Iterator
+from functools import partial
+
+import adaptive
+import numpy as np
+from cases import CARD_SPREAD, PUMP_SPREAD, RATE, SETS, STEP, changes
+from numpy.typing import NDArray
+from reference import Reference
+from table import Row, duration, times
+from timing import Timing, cores_used, in_turns, one_core
+
+from swashplate import Drive, SquaredError, maneuvers
+from swashplate.simulation.build import build
+from swashplate.simulation.gradients import rest_tangent
+from swashplate.simulation.march import march_drive, march_pump, observe_speed
+from swashplate.simulation.sensitivities import march_pump_sensitivities
+from swashplate.simulation.tangent import N_PUMP
+
+Array = NDArray[np.float64]
+
+ROUNDS = 300
+
+
+class Marches:
+    """The hoist and its record, with everything that a kernel writes to made beforehand."""
+
+    def __init__(self) -> None:
+        self.drive = Drive.preset("hoist")
+        self.reference = Reference(self.drive.parameters.numbers)
+        self.voltage = maneuvers.sine(6.5, 0.1).sample(RATE)
+        self.current = np.array(self.drive.simulate(self.voltage).current)
+        self.delay, self.plus, self.minus, self.pump, _ = build(self.drive.parameters, STEP)
+        n = self.voltage.size
+        self.plus_out, self.minus_out, self.signed = np.empty(n), np.empty(n), np.empty(n)
+        self.pressure, self.speed = np.empty(n), np.empty(n)
+        self.flags = np.empty(n, dtype=np.uint8)
+        self.columns = np.empty((n, N_PUMP))
+        self.at_rest = rest_tangent(self.pump, N_PUMP)
+        self.tangent = np.empty(N_PUMP)
+
+    def c_pump(self) -> None:
+        """Pump and motor in C."""
+        self.reference.speed(self.current, STEP, self.speed)
+
+    def c_drive(self) -> None:
+        """Card, pump and motor in C."""
+        self.reference.current(self.voltage, STEP, self.signed)
+        self.reference.speed(self.signed, STEP, self.speed)
+
+    def pump_kernel(self) -> None:
+        """Pump and motor, arrays made beforehand."""
+        march_pump(self.current, self.pump, STEP, self.at_rest_pressure, self.pressure)
+        observe_speed(self.current, self.pressure, self.pump, self.speed)
+
+    def drive_kernel(self) -> None:
+        """Card, pump and motor, arrays made beforehand."""
+        march_drive(
+            self.voltage,
+            0.0,
+            self.delay,
+            self.plus,
+            self.minus,
+            self.pump,
+            STEP,
+            (0.0, 0.0, self.at_rest_pressure),
+            self.plus_out,
+            self.minus_out,
+            self.pressure,
+            self.flags,
+        )
+        np.subtract(self.plus_out, self.minus_out, out=self.signed)
+        observe_speed(self.signed, self.pressure, self.pump, self.speed)
+
+    def sensitivities_kernel(self) -> None:
+        """Pump and motor with all derivatives, arrays made beforehand."""
+        self.tangent[:] = self.at_rest
+        march_pump_sensitivities(
+            self.current,
+            self.pump,
+            STEP,
+            self.at_rest_pressure,
+            self.tangent,
+            self.pressure,
+            self.speed,
+            self.columns,
+        )
+
+    @property
+    def at_rest_pressure(self) -> float:
+        """Z2/Z1. [Pa]"""
+        return self.pump.Z2 / self.pump.Z1
+
+    def pump_call(self) -> Array:
+        """Pump and motor as a user calls them."""
+        return self.drive.simulate_current(self.current).shaft_speed
+
+    def drive_call(self) -> Array:
+        """Card, pump and motor as a user calls them."""
+        return self.drive.simulate(self.voltage).shaft_speed
+
+    def sensitivities_call(self) -> Array:
+        """All derivatives as a user calls them."""
+        return self.drive.sensitivities_current(self.current).shaft_speed
+
+
+def _against_c(what: str, timing: Timing, target: float | None = None) -> Row:
+    met = None if target is None else timing.ratio >= target
+    said = "" if target is None else f"≥ {target:g}×"
+    return Row(what, duration(timing.seconds), times(timing.ratio), said, met)
+
+
+def march_rows(m: Marches) -> Iterator[Row]:
+    """One simulation: in C, by SciPy, by the kernels, by the public calls."""
+    pump = partial(in_turns, m.c_pump, rounds=ROUNDS)
+    with one_core():
+        yield Row("C, pump: what the ratios refer to", duration(pump(m.c_pump).seconds), "1×")
+        yield _against_c("C, card and pump", pump(m.c_drive))
+        for what, longest in (("steps up to 1/512 s", STEP), ("steps of any length", np.inf)):
+            run = partial(adaptive.integrate, m.current, STEP, m.pump, longest)
+            timing = in_turns(m.c_pump, run, 5, base_calls=9)
+            yield _against_c(f"SciPy `solve_ivp`, pump, {what}", timing)
+        yield _against_c("pump, kernels", pump(m.pump_kernel), 4.5)
+        yield _against_c("pump, `simulate_current`", pump(m.pump_call), 4.5)
+        yield _against_c("card and pump, kernels", pump(m.drive_kernel), 3.0)
+        yield _against_c("card and pump, `simulate`", pump(m.drive_call), 3.0)
+
+
+def sensitivity_rows(m: Marches) -> Iterator[Row]:
+    """Derivatives by all of the pump's parameters, as multiples of a plain run."""
+    for kind, base, run in (
+        ("kernels", m.pump_kernel, m.sensitivities_kernel),
+        ("`sensitivities_current`", m.pump_call, m.sensitivities_call),
+    ):
+        with one_core():
+            timing = in_turns(base, run, ROUNDS)
+        cost = 1.0 / timing.ratio
+        yield Row(
+            f"pump with {N_PUMP} sensitivities, {kind}",
+            duration(timing.seconds),
+            f"{times(cost)} plain",
+            "≤ 3× plain",
+            cost <= 3.0,
+        )
+
+
+def batch_rows(m: Marches) -> Iterator[Row]:
+    """Many parameter sets, only the cost of each."""
+    numbers = m.drive.parameters.numbers
+    cost = SquaredError(m.drive_call())
+    for what, symbols, record in (
+        ("pump", PUMP_SPREAD, {"current": m.current}),
+        ("card and pump", PUMP_SPREAD + CARD_SPREAD, {"voltage": m.voltage}),
+    ):
+        values = changes(numbers, symbols)
+        run = partial(m.drive.simulate_many, values, cost=cost, **record)
+        with one_core():
+            timing = in_turns(m.c_pump, partial(run, threads=1), 7, base_calls=25)
+        each = Timing(timing.seconds / SETS, timing.base, timing.ratio * SETS)
+        yield _against_c(f"{what}, each of {SETS:,} sets, one core", each, 10.0)
+        timing = in_turns(m.c_pump, run, 15, base_calls=25)
+        each = Timing(timing.seconds / SETS, timing.base, timing.ratio * SETS)
+        used = cores_used(run, 15)
+        yield _against_c(f"{what}, each of {SETS:,} sets, all cores ({used:.1f} given)", each)
+
+
+def check(m: Marches) -> Row:
+    """How far the C reference is from the package: they must compute the same."""
+    m.c_pump()
+    of_pump = np.rad2deg(np.abs(m.speed - m.pump_call()).max())
+    m.c_drive()
+    of_drive = np.rad2deg(np.abs(m.speed - m.drive_call()).max())
+    worst = max(of_pump, of_drive)
+    if not worst < 0.02:
+        raise RuntimeError(f"The C reference is {worst:g} deg/s off: it computes something else.")
+    return Row("largest difference to C", f"{worst:.1g} deg/s", "", "< 0.02 deg/s", True)
