@@ -162,6 +162,7 @@ def _observed(output: str) -> int:
 
 def _comparison(cost: SquaredError | None, samples: int, record: Record) -> tuple[Array, Array]:
     """Measured values and weights on the march's grid, zero weight between the samples."""
+    # zeros that nobody writes to take no memory
     measured, weight = np.zeros(record.values.size), np.zeros(record.values.size)
     if cost is None:
         return measured, weight
@@ -178,7 +179,13 @@ def _comparison(cost: SquaredError | None, samples: int, record: Record) -> tupl
             f"Measured value or weight is not finite, or the weight negative, at sample "
             f"{int(np.argmax(bad))}; give weight 0 to samples that are not to count."
         )
-    measured[:: record.substeps] = np.where(weights > 0.0, given, 0.0)
+    counted = np.where(weights > 0.0, given, 0.0) if (weights == 0.0).any() else given
+    if record.substeps == 1:
+        # the kernels are compiled for arrays that can be written to
+        return np.require(counted, requirements=["C", "W"]), np.require(
+            weights, requirements=["C", "W"]
+        )
+    measured[:: record.substeps] = counted
     weight[:: record.substeps] = weights
     return measured, weight
 
