@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import re
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from secrets import token_hex
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -44,22 +43,21 @@ def write_whole(path: str | Path, write: Callable[[Path], None]) -> None:
         If it cannot be written; nothing is left behind and an older file stays.
     """
     target = Path(path)
+    beside = target.parent / f".{target.stem}-{token_hex(4)}{target.suffix}"
     try:
-        handle, name = tempfile.mkstemp(
-            prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent
-        )
-    except OSError as error:
-        raise FileError(f"{target} cannot be written: {error.strerror}.") from None
-    os.close(handle)
-    beside = Path(name)
-    try:
-        write(beside)
-        beside.chmod(0o666 & ~_umask())
-        beside.replace(target)
+        try:
+            beside.touch(exist_ok=False)
+            write(beside)
+            beside.replace(target)
+        finally:
+            try:
+                beside.unlink(missing_ok=True)
+            except KeyboardInterrupt:
+                # on Ctrl-C Polars raises one of its own and leaves Python's to come: it comes here
+                beside.unlink(missing_ok=True)
+                raise
     except OSError as error:
         raise FileError(f"{target} cannot be written: {error.strerror or error}.") from None
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def write_text(text: str, path: str | Path) -> None:
@@ -102,6 +100,8 @@ def read_table(path: str | Path) -> polars.DataFrame:
     suffix = source.suffix.lower()
     if suffix not in (".csv", ".parquet", ".pq"):
         raise FileError(f"{source} ends in '{suffix}'; a record is read from .csv or .parquet.")
+    if source.is_dir():
+        raise FileError(f"{source} is a folder, not a table.")
     try:
         if suffix == ".csv":
             # as text: a column that begins with whole numbers may well go on with others, and
@@ -173,9 +173,3 @@ def _find(columns: list[str], wanted: str, si: str, path: str | Path) -> tuple[s
     raise InputError(
         f"{path} has no column '{wanted}'; it has {', '.join(repr(each) for each in columns)}."
     )
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -2,7 +2,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swashplate import maneuvers
+from swashplate import InputError, maneuvers
 
 
 def test_recorded_holds_the_previous_row():
@@ -51,3 +51,8 @@ def test_recorded_file(tmp_path):
     assert m.name == "log.csv"
     assert m.length == 2.0
     assert m([0.25, 2.0]).tolist() == [2.0, -1.5]
+
+
+def test_a_manoeuvre_of_months_is_refused():
+    with pytest.raises(InputError, match=r"5\.12e\+09 samples, more than 1e\+08"):
+        maneuvers.rest(1e7).sample(512.0)

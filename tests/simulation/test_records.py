@@ -86,3 +86,8 @@ def test_solenoid_overpowering_the_spring_is_an_error() -> None:
 
     with pytest.raises(DomainError, match="Z5·F/√Z4 reaches .* below 1"):
         hoist.simulate_current(np.full(10, 4.0))
+
+
+def test_stamps_in_the_wrong_unit_are_not_marched_for_ever(hoist: Drive) -> None:
+    with pytest.raises(InputError, match="is the time in seconds"):
+        hoist.simulate([0.0, 1.0], time=[0.0, 3.6e6], interpolation="linear")

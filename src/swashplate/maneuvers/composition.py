@@ -20,7 +20,7 @@ def superpose(*maneuvers: Maneuver) -> Maneuver:
         If there is none.
     """
     if not maneuvers:
-        raise InputError("superpose needs at least one manoeuvre")
+        raise InputError("superpose needs at least one manoeuvre.")
     length = max(each.length for each in maneuvers)
     name = " with ".join(each.name for each in maneuvers)
     together = Sum(tuple(_padded(each, length) for each in maneuvers))

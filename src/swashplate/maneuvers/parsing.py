@@ -29,18 +29,18 @@ def parse(text: str) -> Maneuver:
     """
     name, _, arguments = text.partition(":")
     if name not in _COMMANDS:
-        raise InputError(f"{name!r} is no manoeuvre: choose one of {', '.join(_COMMANDS)}")
+        raise InputError(f"{name!r} is no manoeuvre: choose one of {', '.join(_COMMANDS)}.")
     items = [item.rpartition("=") for item in arguments.split(",")] if arguments else []
     positional = [_value(value) for _, equals, value in items if not equals]
     keywords = {key.strip(): _value(value) for key, equals, value in items if equals}
     if len(positional) + len(keywords) < len(items):
-        raise InputError(f"{text!r} gives a keyword twice: give it once")
+        raise InputError(f"{text!r} gives a keyword twice: give it once.")
     signature = inspect.signature(_COMMANDS[name])
     try:
         signature.bind(*positional, **keywords)
     except TypeError as error:
         known = ", ".join(signature.parameters)
-        raise InputError(f"{text!r}: {error}; {name} takes {known}") from None
+        raise InputError(f"{text!r}: {error}; {name} takes {known}.") from None
     return _COMMANDS[name](*positional, **keywords)
 
 
@@ -57,5 +57,5 @@ def _number(text: str) -> int | float:
         return int(text) if text.strip().isdecimal() else float(text)
     except ValueError:
         raise InputError(
-            f"{text!r} is not a number: write one as 6.5, a list as 2/4/0, a band as 0.1:2:8"
+            f"{text!r} is not a number: write one as 6.5, a list as 2/4/0, a band as 0.1:2:8."
         ) from None

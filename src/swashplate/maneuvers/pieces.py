@@ -12,6 +12,9 @@ from swashplate.errors import InputError
 from swashplate.maneuvers.checks import finite, positive
 from swashplate.maneuvers.curves import NEAR, Array, Curve, Scaled, interval
 
+LONGEST = 100_000_000
+"""Samples that a manoeuvre may have; more is a mistake and would not fit into memory."""
+
 
 @dataclass(frozen=True, eq=False)
 class Piece:
@@ -64,10 +67,15 @@ class Maneuver:
             If `rate` [Hz] is not positive or the length is not a whole number of samples.
         """
         samples = positive("rate", rate) * self.length
+        if samples > LONGEST:
+            raise InputError(
+                f"{self.name} lasts {self.length:g} s, at {rate:g} Hz {samples:.3g} samples, more "
+                f"than {LONGEST:.0e}."
+            )
         if abs(samples - round(samples)) > 1e-6:
             raise InputError(
                 f"{self.name} lasts {self.length} s, at {rate:g} Hz {samples:.10g} samples instead "
-                "of a whole number: change its length or the rate"
+                "of a whole number: change its length or the rate."
             )
         return np.arange(round(samples) + 1) / rate
 

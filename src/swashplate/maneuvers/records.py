@@ -72,19 +72,19 @@ def recorded(
         If the rows are not such, or a number is not finite; it names the first row that is wrong.
     """
     if interpolation not in _CURVES:
-        raise InputError(f"interpolation must be 'previous' or 'linear', not {interpolation!r}")
+        raise InputError(f"interpolation must be 'previous' or 'linear', not {interpolation!r}.")
     stamps, volts = row("time", time), row("voltage", voltage)
     if stamps.size != volts.size or stamps.size < 2:
         raise InputError(
             "time and voltage must have the same number of rows, at least two, "
-            f"not {stamps.size} and {volts.size}"
+            f"not {stamps.size} and {volts.size}."
         )
     times = stamps - stamps[0]
     late = np.flatnonzero(np.diff(times) <= 0.0) + 1
     if late.size:
         before, after = stamps[late[0] - 1 : late[0] + 1]
         raise InputError(
-            f"time must increase, but row {late[0]} (the first is 0) has {after} s after {before} s"
+            f"time must increase, but row {late[0]} (first is 0) has {after} s after {before} s."
         )
     curve = _CURVES[interpolation](times, volts)
     end = float(times[-1]) if length is None else positive("length", length)

@@ -33,7 +33,7 @@ def step(
     start, stop = finite("start", start), finite("stop", stop)
     if not 0.0 <= start < stop <= length:
         raise InputError(
-            f"a step needs 0 <= start < stop <= length, not {start:g}, {stop:g}, {length:g} s"
+            f"a step needs 0 <= start < stop <= length, not {start:g}, {stop:g}, {length:g} s."
         )
     pieces = [Piece(start, Line(amplitude)), Piece(stop, Line())]
     return settled(f"step {amplitude:g} V", pieces, length, length)

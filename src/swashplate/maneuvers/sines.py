@@ -125,13 +125,13 @@ def _band(band: Sequence[float], period: float) -> Array:
     if len(band) != 3 or not isinstance(band[2], int | np.integer) or band[2] < 1:
         raise InputError(
             f"a tuple of frequencies is (low, high, count), not {band}: "
-            "give a list for the frequencies themselves"
+            "give a list for the frequencies themselves."
         )
     low, high = positive("low", band[0]), positive("high", band[1])
     periods = np.unique(np.floor(np.linspace(low, high, band[2]) * period + 0.5))
     if periods[0] < 1.0 or periods.size < band[2]:
         raise InputError(
             f"{band[2]} frequencies from {low:g} to {high:g} Hz cannot be told apart in "
-            f"{period:g} s: take fewer, a wider band or a longer time"
+            f"{period:g} s: take fewer, a wider band or a longer time."
         )
     return np.asarray(periods / period)

@@ -53,7 +53,7 @@ def source_tests(axis: str) -> dict[str, Maneuver]:
         If there is no such axis.
     """
     if axis not in _AXES:
-        raise InputError(f"no tests of axis {axis!r}: the source has {', '.join(_AXES)}")
+        raise InputError(f"no tests of axis {axis!r}: the source has {', '.join(_AXES)}.")
     settle, ramps, steps, sines = _AXES[axis]
     runs = [replace(ramp(slope, settle=settle), name=f"ramp {slope:+g} V/s") for slope in ramps]
     runs += [replace(step(volts), name=f"step {volts:+g} V") for volts in steps]

@@ -118,7 +118,7 @@ def check_filter_stability(owner: str, zeta: float, omega: float, side: str, ste
     raise InputError(
         f"{owner}: the current filter of the {side} channel (zeta = {zeta:g}, omega = {omega:g} "
         f"rad/s) is unstable at a step of 1/{1.0 / step:g} s; simulate with substeps={substeps} "
-        "or more, or lower zeta or omega."
+        "or more or at a higher rate, or lower zeta or omega."
     )
 
 

@@ -15,6 +15,8 @@ Interpolation = Literal["linear", "previous"]
 
 SOURCE_RATE = 512.0
 """Rate of the source's logs; no step is longer than one of its samples. [Hz]"""
+LONGEST = 100_000_000
+"""Steps that a record may take: 54 hours at 512 Hz. More is a mistake, in a unit perhaps."""
 SLOWEST, FASTEST = 10.0, 100_000.0
 """Range of record rates. [Hz]"""
 
@@ -187,6 +189,12 @@ def _stamped(
 ) -> Record:
     """A record with stamps, on a grid that starts at the first one."""
     start = float(stamps[0])
+    steps = (stamps[-1] - start) * rate * substeps
+    if steps > LONGEST:
+        raise InputError(
+            f"The stamps go from {start:g} s to {stamps[-1]:g} s, which is {steps:.3g} steps, more "
+            f"than the {LONGEST:.0e} that a record may take; is the time in seconds?"
+        )
     samples = int((stamps[-1] - start) * rate + 1e-9) + 1
     fine = start + np.arange((samples - 1) * substeps + 1) / (rate * substeps)
     if interpolation == "linear":

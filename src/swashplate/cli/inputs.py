@@ -1,0 +1,169 @@
+"""From the words of a command line to drives, changes and simulations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+from swashplate.errors import InputError
+
+if TYPE_CHECKING:
+    from swashplate.drive import Drive
+    from swashplate.maneuvers import Maneuver
+    from swashplate.parameters.parameter_set import Change, ParameterSet
+    from swashplate.simulation.result import Simulation
+
+Interpolation = Literal["linear", "previous"]
+Start = Literal["rest", "steady"]
+
+MOST_SAMPLES = 1e8
+"""Longest command: 54 hours at 512 Hz, some 10 GB."""
+
+_NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
+_VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
+_ENDING = re.compile(r"\.[A-Za-z]\w*$")
+
+
+def parameters_of(word: str) -> ParameterSet:
+    """The packaged set of a name, or the set in a TOML file."""
+    from swashplate.parameters.files import load_preset, load_set
+
+    is_file = word.lower().endswith(".toml") or len(Path(word).parts) > 1
+    return load_set(word) if is_file else load_preset(word)
+
+
+def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:
+    """The drive of a name or file, with values set and then scaled."""
+    from swashplate.drive import Drive
+
+    drive = Drive(parameters_of(word))
+    return drive.replace(**_changes("--set", values)).scale(**_changes("--scale", factors))
+
+
+def _changes(option: str, words: Sequence[str]) -> dict[str, Change]:
+    changes: dict[str, Change] = {}
+    for word in words:
+        name, change = _change(option, word)
+        if name in changes:
+            raise InputError(f"{option} gives {name} twice; give it once.")
+        changes[name] = change
+    return changes
+
+
+def _change(option: str, word: str) -> tuple[str, Change]:
+    from swashplate.parameters.parameter_set import find
+    from swashplate.units import to_si
+
+    scaled = option == "--scale"
+    name, equals, given = (part.strip() for part in word.partition("="))
+    match = _VALUE.fullmatch(given) if equals else None
+    if match is None or (scaled and match[3]):
+        examples = (
+            "Z16=1.5 or Z16=1.5/1.2 (plus/minus)"
+            if scaled
+            else "Z16=1.2e-4, Z16=1.2e-4/1.5e-4 (plus/minus) or Z16_plus=0.12mm"
+        )
+        raise InputError(f"{option} cannot read '{word}'; write it as {examples}.")
+    definition = find(name)
+    numbers = [float(number) for number in match.group(1, 2) if number]
+    if match[3]:
+        what = f"{name} ({definition.name})"
+        numbers = [to_si(number, match[3].strip(), definition.unit, what) for number in numbers]
+    return name, numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
+
+
+def maneuver_of(word: str, *drives: Drive) -> Maneuver:
+    """A manoeuvre such as ``step:9``, or the source's test of that name for these drives."""
+    from swashplate.maneuvers import parse, source_tests
+    from swashplate.parameters.files import AXES
+
+    axes = [drive.name for drive in drives if drive.name in AXES]
+    tests = {name: test for axis in reversed(axes) for name, test in source_tests(axis).items()}
+    if word in tests:
+        return tests[word]
+    try:
+        return parse(word)
+    except InputError as error:
+        if ":" in word or not tests:
+            raise
+        known = ", ".join(tests)
+        raise InputError(f"{error}; or one of the tests of {axes[0]}: {known}.") from None
+
+
+class Options(NamedTuple):
+    """How a command is to be read and simulated."""
+
+    rate: float
+    interpolation: Interpolation | None
+    start: Start
+    clip: bool
+    time_column: str
+    column: str
+
+
+def check_length(seconds: float, rate: float) -> None:
+    """Refuse what no memory holds, which is likelier a wrong unit than meant.
+
+    Raises
+    ------
+    InputError
+        For more than `MOST_SAMPLES`, steps of the march included.
+    """
+    samples = seconds * max(rate, 512.0)
+    if samples > MOST_SAMPLES:
+        raise InputError(
+            f"{seconds:g} s at {rate:g} Hz is {samples:.2g} steps, more than the "
+            f"{MOST_SAMPLES:.0e} that are simulated at once; check the unit of the time, or split "
+            "the command."
+        )
+
+
+def simulated(drive: Drive, command: str, options: Options) -> tuple[str, Simulation]:
+    """Name of a command, a manoeuvre or a file, and the drive's simulation over it."""
+    from swashplate.simulation.record import least_substeps
+
+    least_substeps(options.rate)  # a rate out of range is refused before anything is sampled
+    if _is_file(command, drive):
+        return Path(command).name, _simulated_file(drive, command, options)
+    maneuver = maneuver_of(command, drive)
+    check_length(maneuver.length, options.rate)
+    return maneuver.name, drive.simulate(
+        maneuver.sample(options.rate),
+        options.rate,
+        interpolation=options.interpolation,
+        start=options.start,
+        clip=options.clip,
+    )
+
+
+def _is_file(word: str, drive: Drive) -> bool:
+    if word.lower().endswith((".csv", ".parquet", ".pq")):
+        return True
+    head = word.partition(":")[0]  # stairs:2/4/0 is no path
+    return "/" in head or _ENDING.search(head) is not None or Path(word).is_file()
+
+
+def _simulated_file(drive: Drive, path: str, options: Options) -> Simulation:
+    from swashplate.tables import read_series
+
+    series = read_series(path, options.column, "V", time_column=options.time_column)
+    if options.interpolation is None:
+        raise InputError(
+            f"{path} needs --interpolation linear (a straight line from row to row) or "
+            "--interpolation previous (each row held until the next)."
+        )
+    try:
+        if series.time.size:
+            check_length(float(series.time[-1] - series.time[0]), options.rate)
+        return drive.simulate(
+            series.values,
+            options.rate,
+            time=series.time,
+            interpolation=options.interpolation,
+            start=options.start,
+            clip=options.clip,
+        )
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None

@@ -1,0 +1,88 @@
+"""What reaches the terminal: tables and notes, and a sign of life while a person waits."""
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+# names of files and manoeuvres are printed as they are, whatever brackets and colons they hold
+output = Console(markup=False, highlight=False, emoji=False)
+side = Console(stderr=True, markup=False, highlight=False, emoji=False)
+"""Standard error: what a pipe must not carry."""
+
+
+def table(title: str | None, *columns: str, wrap: str = "") -> Table:
+    """An empty table for 80 columns and more.
+
+    Parameters
+    ----------
+    title : str or None
+        A line above it.
+    *columns : str
+        Headers; one that begins with ``>`` is right-aligned.
+    wrap : str
+        The column that is broken into lines where the terminal is narrow.
+    """
+    made = Table(
+        title=title,
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+        collapse_padding=True,
+    )
+    for column in columns:
+        right, header = column.startswith(">"), column.removeprefix(">")
+        made.add_column(header, justify="right" if right else "left", no_wrap=header != wrap)
+    return made
+
+
+def show(*tables: Table) -> None:
+    """Print tables, empty lines around them."""
+    for each in tables:
+        output.print()
+        output.print(each)
+    output.print()
+
+
+def say(text: str) -> None:
+    """Print text, broken into lines where the terminal is narrow."""
+    output.print(text)
+
+
+def note(text: str) -> None:
+    """Print a line, never broken, so that a path in it can be copied."""
+    output.print(text, soft_wrap=True)
+
+
+def say_error(error: Exception) -> None:
+    """Print what went wrong as one line on standard error."""
+    sentence = " ".join(str(error).split()).rstrip(".")
+    side.print(f"Error: {sentence}.", soft_wrap=True)
+
+
+def working(text: str) -> AbstractContextManager[object]:
+    """A spinner while something may take longer than a second; nothing in a pipe."""
+    return side.status(f"{text} ...")
+
+
+@contextmanager
+def progress(steps: int) -> Iterator[Callable[[str], None]]:
+    """A bar of so many steps; what it yields begins the next one, by its name."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}", markup=False))
+    bar = Progress(*columns, console=side, transient=True, disable=not side.is_terminal)
+    with bar:
+        task = bar.add_task("", total=steps)
+        begun = 0
+
+        def begin(what: str) -> None:
+            nonlocal begun
+            bar.update(task, completed=begun, description=what, refresh=True)
+            begun += 1
+
+        yield begin

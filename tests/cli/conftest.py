@@ -1,0 +1,61 @@
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from swashplate.cli import app
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+    """Run the command line in an empty folder; what it is called with are its words."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+
+    def call(*words: str) -> Result:
+        return CliRunner().invoke(app, list(words), prog_name="swashplate")
+
+    return call
+
+
+@pytest.fixture
+def done(run: Callable[..., Result]) -> Callable[..., str]:
+    """Run what must succeed and return what it printed."""
+
+    def call(*words: str) -> str:
+        result = run(*words)
+        assert result.exit_code == 0, result.output
+        assert result.stderr == ""
+        return result.stdout
+
+    return call
+
+
+@pytest.fixture
+def refused(run: Callable[..., Result], tmp_path: Path) -> Callable[..., str]:
+    """Run what must be refused, in one sentence and without a trace on disk; return it."""
+
+    def call(*words: str) -> str:
+        before = sorted(tmp_path.rglob("*"))
+        result = run(*words)
+        assert isinstance(result.exception, SystemExit), result.exception
+        assert result.exit_code == 2
+        assert result.stdout == ""
+        assert re.fullmatch(r"Error: [^\n]+[^.\n]\.\n", result.stderr), result.stderr
+        assert sorted(tmp_path.rglob("*")) == before
+        return result.stderr
+
+    return call
+
+
+@pytest.fixture
+def number() -> Callable[..., float]:
+    """Find the number in a table's row, by the row's first words and the number's place."""
+
+    def find(text: str, row: str, place: int = 0) -> float:
+        (line,) = re.findall(rf"^ *{re.escape(row)}  +(.*)$", text, re.MULTILINE)
+        return float(line.split()[place])
+
+    return find

@@ -1,0 +1,124 @@
+"""Commands from files, right ones and wrong ones."""
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swashplate import Drive
+
+TIME = np.arange(1025) / 512.0
+VOLTAGE = 9.0 * np.sin(TIME)
+
+
+def simulated(done, *words):
+    done("simulate", "hoist", *words, "--out", "run.parquet")
+    return pl.read_parquet("run.parquet")
+
+
+@pytest.mark.parametrize("name", ["log.csv", "log.parquet"])
+def test_a_record_is_simulated(done, tmp_path, name):
+    table = pl.DataFrame({"time": TIME, "voltage": VOLTAGE, "note": "x"})
+    table.write_csv(tmp_path / name) if name.endswith("csv") else table.write_parquet(
+        tmp_path / name
+    )
+    written = simulated(done, name, "--interpolation", "linear")
+    expected = Drive.preset("hoist").simulate(VOLTAGE)
+    np.testing.assert_allclose(written["shaft_speed"], expected.shaft_speed, atol=1e-12)
+
+
+def test_units_in_the_header(done, tmp_path):
+    table = pl.DataFrame({"time [ms]": 1e3 * TIME, "voltage_mV": 1e3 * VOLTAGE})
+    table.write_csv(tmp_path / "log.csv")
+    written = simulated(done, "log.csv", "--interpolation", "linear")
+    expected = Drive.preset("hoist").simulate(VOLTAGE)
+    np.testing.assert_allclose(written["shaft_speed"], expected.shaft_speed, atol=1e-9)
+
+
+def test_other_columns(done, tmp_path):
+    table = pl.DataFrame({"t": TIME, "time": 0.0, "voltage": 0.0, "joystick": VOLTAGE})
+    table.write_csv(tmp_path / "log.csv")
+    words = ("--interpolation", "linear", "--time-column", "t", "--column", "joystick")
+    written = simulated(done, "log.csv", *words)
+    np.testing.assert_allclose(written["voltage"], VOLTAGE, atol=1e-12)
+
+
+def test_interpolation(done, tmp_path):
+    (tmp_path / "log.csv").write_text("time,voltage\n0,0\n1,8\n2,8\n")
+    held = simulated(done, "log.csv", "--interpolation", "previous", "--rate", "100")
+    line = simulated(done, "log.csv", "--interpolation", "linear", "--rate", "100")
+    assert held["voltage"][50] == 0.0
+    assert line["voltage"][50] == 4.0
+
+
+def test_clip(done, refused, tmp_path):
+    (tmp_path / "log.csv").write_text("time,voltage\n0,0\n1,12\n2,-15\n")
+    words = ("simulate", "hoist", "log.csv", "--interpolation", "previous")
+    sentence = refused(*words)
+    assert "log.csv: The voltage is 12 V at 1 s, but the card takes ±10 V" in sentence
+    written = simulated(done, "log.csv", "--interpolation", "previous", "--clip")
+    assert written["voltage"].unique().sort().to_list() == [-10.0, 0.0, 10.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time,voltage\n0,1\n1,nan\n2,1\n", "not finite, the first nan at sample 1"),
+        ("time,voltage\n0,1\n1,inf\n2,1\n", "not finite, the first inf at sample 1"),
+        ("time,voltage\n0,1\nnan,1\n2,1\n", "time has 1 sample(s) that are not finite"),
+        ("time,voltage\n0,1\n1,\n2,1\n", "'voltage' is empty in data row 2"),
+        ("time,voltage\n0,1\n1,x\n2,1\n", "'voltage' holds 'x', which is no number in data row 2"),
+        ("", "log.csv is empty"),
+        ("time,voltage\n", "log.csv: The voltage is empty"),
+        ("time,voltage\n0,1\n2,1\n1,1\n", "must increase, but goes from 2 s at sample 1 to 1 s"),
+        ("time,voltage\n0,1\n1,1\n1,1\n", "must increase, but goes from 1 s at sample 1 to 1 s"),
+        ("time,voltage\n0,1\n1,-10.5\n", "-10.5 V at 1 s, but the card takes ±10 V"),
+        ("time,voltage\n0,1\n4e9,1\n", "check the unit of the time"),
+        ("t,u\n0,1\n1,1\n", "no column 'time'; it has 't', 'u'"),
+        ("time,u\n0,1\n1,1\n", "no column 'voltage'; it has 'time', 'u'"),
+        ("time,voltage [bar]\n0,1\n1,1\n", "'bar', which does not measure the same as V"),
+        ("time,voltage_furlongs\n0,1\n1,1\n", "'furlongs', which does not measure the same as V"),
+        ("time [blinks],voltage\n0,1\n1,1\n", "unknown unit 'blinks'; give it in s"),
+        ("time,voltage\n0,1\n1\n2,3,4\n", "log.csv"),
+    ],
+)
+def test_a_bad_record_is_refused(refused, tmp_path, text, said):
+    (tmp_path / "log.csv").write_text(text)
+    words = ("--interpolation", "previous", "--out", "run.csv", "--plot", "run.png")
+    sentence = refused("simulate", "hoist", "log.csv", *words)
+    assert "log.csv" in sentence
+    assert said in sentence
+
+
+def test_a_broken_parquet_is_refused(refused, tmp_path):
+    (tmp_path / "log.parquet").write_text("not parquet")
+    sentence = refused("simulate", "hoist", "log.parquet", "--interpolation", "linear")
+    assert "log.parquet cannot be read as a table" in sentence
+
+
+def test_interpolation_must_be_chosen(refused, tmp_path):
+    (tmp_path / "log.csv").write_text("time,voltage\n0,1\n1,1\n")
+    sentence = refused("simulate", "hoist", "log.csv", "--out", "run.csv")
+    assert "log.csv needs --interpolation linear" in sentence
+    assert "or --interpolation previous" in sentence
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("none.csv", "There is no file none.csv"),
+        ("sub/none.parquet", "There is no file sub/none.parquet"),
+        ("log.txt", "log.txt ends in '.txt'; a record is read from .csv or .parquet"),
+        ("log.xlsx", "log.xlsx ends in '.xlsx'"),
+        ("sub/log", "sub/log ends in ''"),
+        ("log", "log ends in ''"),
+    ],
+)
+def test_a_file_that_is_none(refused, tmp_path, name, said):
+    (tmp_path / "log").write_text("time,voltage\n0,1\n1,1\n")
+    assert said in refused("simulate", "hoist", name, "--interpolation", "linear")
+
+
+def test_a_folder_is_no_record(refused, tmp_path):
+    (tmp_path / "log.csv").mkdir()
+    sentence = refused("simulate", "hoist", "log.csv", "--interpolation", "linear")
+    assert "log.csv is a folder, not a table." in sentence
