@@ -26,6 +26,8 @@ def test_a_parameter_knows_where_it_comes_from(hoist: Drive) -> None:
     assert (Z16.unit, Z16.source, Z16.status) == ("m", "table 7.2", "fitted")
     assert Z16.name == "opening at which the orifice limits the flow"
     assert Z16.definition.range == "above 0, or inf for none"
+    assert Z16.bounds == (0.0, inf)
+    assert hoist["tau"].bounds == (0.0, 10.0)
 
 
 def test_replace_and_scale(hoist: Drive) -> None:

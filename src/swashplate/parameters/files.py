@@ -111,8 +111,8 @@ def dump_set(parameters: ParameterSet) -> str:
             if parameter.source:
                 entry.append("source", parameter.source)
             entry.append("status", parameter.status)
-            if parameter.bounds is not None:
-                entry.append("bounds", list(parameter.bounds))
+            if parameter.own_bounds is not None:
+                entry.append("bounds", list(parameter.own_bounds))
             entries.add(parameter.symbol, entry)
         text.add(block, entries)
     return dumps(text)

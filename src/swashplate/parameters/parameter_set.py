@@ -34,8 +34,15 @@ class Parameter:
     value: Value
     source: str = ""
     status: Status = "user"
-    bounds: tuple[float, float] | None = None
-    """Range that the set's author gives, in place of the catalogue's."""
+    own_bounds: tuple[float, float] | None = None
+    """Bounds that the set's author gives, within the catalogue's; both ends allowed."""
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Lowest and highest value: the set's own bounds, or else the catalogue's range."""
+        if self.own_bounds is not None:
+            return self.own_bounds
+        return self.definition.lower, self.definition.upper
 
     @property
     def symbol(self) -> str:
@@ -87,8 +94,10 @@ class ParameterSet(Mapping[str, Parameter]):
         for parameter in ordered.values():
             for column, value in zip(parameter.definition.columns, parameter.values, strict=True):
                 numbers[column] = value
-                if parameter.bounds is not None:
-                    check_bounds(self.name, column, parameter.definition, value, parameter.bounds)
+                if parameter.own_bounds is not None:
+                    check_bounds(
+                        self.name, column, parameter.definition, value, parameter.own_bounds
+                    )
         check_rules(self.name, numbers)
         object.__setattr__(self, "parameters", MappingProxyType(ordered))
         object.__setattr__(self, "numbers", MappingProxyType(numbers))
