@@ -1,6 +1,6 @@
 """From an operator's log to a model that predicts another operator: a hydraulic excavator's boom.
 
-    python examples/excavator.py DATA [--figure boom.png]
+    .venv/bin/python examples/excavator.py DATA [--figure boom.png]
 
 DATA is a folder with the trials of github.com/mitchallain/BeagleBone-excavator, tests/data: the
 command is the duty cycle of a servo valve in %, the output the position of the cylinder in cm, and

@@ -86,6 +86,9 @@ class Drive:
 
         write_text(dump_set(self.parameters), path)
 
+    def __repr__(self) -> str:
+        return f"Drive({self.name!r}, card {self.parameters.card!r})"
+
     @property
     def name(self) -> str:
         """Name of the parameter set."""

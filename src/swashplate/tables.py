@@ -106,7 +106,10 @@ def read_table(path: str | Path) -> polars.DataFrame:
         if suffix == ".csv":
             # as text: a column that begins with whole numbers may well go on with others, and
             # only the columns that are asked for need to be numbers
-            return pl.read_csv(source, infer_schema=False)
+            table = pl.read_csv(source, infer_schema=False)
+            if table.width == 1 and ";" in table.columns[0]:
+                raise FileError(f"{source} is separated by semicolons; separate by commas.")
+            return table
         return pl.read_parquet(source)
     except FileNotFoundError:
         raise FileError(f"There is no file {source}.") from None
@@ -114,6 +117,8 @@ def read_table(path: str | Path) -> polars.DataFrame:
         raise FileError(f"{source} is empty.") from None
     except (OSError, pl.exceptions.PolarsError) as error:
         first = str(error).splitlines()[0].rstrip(".")
+        if "more fields than defined" in first:
+            first = "a row has more fields than the header, or decimals are written with commas"
         raise FileError(f"{source} cannot be read as a table: {first}.") from None
 
 
@@ -171,5 +176,6 @@ def _find(columns: list[str], wanted: str, si: str, path: str | Path) -> tuple[s
         if match:
             return name, (match.group(1) or match.group(2)).strip()
     raise InputError(
-        f"{path} has no column '{wanted}'; it has {', '.join(repr(each) for each in columns)}."
+        f"{path} has no column '{wanted}'; it has {', '.join(repr(each) for each in columns)}. "
+        "Name the one to take."
     )

@@ -19,7 +19,7 @@ def test_the_table_says_what_the_simulation_says(done, number):
     run = Drive.preset("hoist").simulate(maneuvers.sine(9.0, 0.1).sample())
     travelled = np.degrees(run.shaft_position[-1])
     assert number(text, "peak speed, negative") == pytest.approx(-185.00, abs=0.01)
-    assert number(text, "travelled in all") == pytest.approx(travelled, abs=0.05)
+    assert number(text, "position at the end") == pytest.approx(travelled, abs=0.05)
     assert number(text, "peak current, positive") == pytest.approx(run.current.max(), abs=5e-5)
     assert number(text, "peak current, negative") == pytest.approx(run.current.min(), abs=5e-5)
     stopped = 100.0 * np.mean(run.active(Limit.SWASH_STOP))
@@ -114,7 +114,15 @@ def test_an_own_set(done, number, tmp_path):
 
 def test_a_start_of_own_axis_keeps_the_tests_of_the_source(done, tmp_path):
     (tmp_path / "mine.toml").write_text(done("show", "hoist", "--toml"), "utf-8")
-    assert "hoist, step +9 V" in done("simulate", "mine.toml", "step +9 V")
+    assert "mine.toml (hoist), step +9 V" in done("simulate", "mine.toml", "step +9 V")
+
+
+def test_changes_are_said(done):
+    text = done("simulate", "hoist", "step:9", "--set", "Z16=0.18mm", "--scale", "Z10=1.5")
+    said = "Z16 (opening at which the orifice limits the flow): 0.00011634/0.00015126 -> "
+    assert f"{said}0.00018/0.00018 m" in " ".join(text.split())
+    assert "Z10 (swash plate angle to shaft speed): 12.396 -> 18.594 1/s" in " ".join(text.split())
+    assert "Z17" not in text
 
 
 def test_clip(done, number):

@@ -54,6 +54,7 @@ def test_replace_and_scale(hoist: Drive) -> None:
         ({"Z10": (1.0, 2.0)}, "Z10 has one value, not a plus and a minus"),
         ({"Z16_plus": (1.0, 2.0)}, "Z16_plus has one value"),
         ({"Z16": (1.0, 2.0, 3.0)}, "one value or two"),
+        ({"Z16": "0.18mm"}, "Z16 must be a number in m, or a pair of them, not '0.18mm'"),
         ({"Z13_minus": -0.26}, r"Z13_minus .* is -0.26 rad, .* above 0 .*magnitudes"),
         ({"Z13": 1.6}, "below 1.5708"),
         ({"Z13_plus": 1.2}, r"Z3·tan Z13_plus is 1.609, but must be below 1"),

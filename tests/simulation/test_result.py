@@ -32,6 +32,8 @@ def test_limits_of_a_hard_step(hoist: Drive) -> None:
     assert run.active(Limit.SWASH_STOP)[(t > 3.0) & (t < 6.0)].all()
     assert not run.active(Limit.SWASH_STOP)[t > 6.2].any()
     assert not run.active(Limit.SPOOL | Limit.RELIEF).any()
+    # while the plate rests on its stop the orifice limits nothing
+    assert not (run.active(Limit.ORIFICE) & run.active(Limit.SWASH_STOP) & (t < 6.0)).any()
     np.testing.assert_array_equal(
         run.active(Limit.SWASH_STOP), np.isclose(run.swash_angle, 0.27596, rtol=1e-14)
     )

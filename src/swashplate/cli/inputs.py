@@ -42,6 +42,22 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
     return drive.replace(**_changes("--set", values)).scale(**_changes("--scale", factors))
 
 
+def title_of(word: str, drive: Drive) -> str:
+    """A drive's name for a heading; one from a file of another name goes by that, too."""
+    return drive.name if Path(word).stem == drive.name else f"{Path(word).name} ({drive.name})"
+
+
+def changes_said(word: str, drive: Drive) -> list[str]:
+    """A line for each parameter that is not as its set has it."""
+    lines = []
+    for old in parameters_of(word).values():
+        new = drive[old.symbol]
+        if new.value != old.value:
+            before, after = ("/".join(f"{v:g}" for v in each.values) for each in (old, new))
+            lines.append(f"{old.symbol} ({old.name}): {before} -> {after} {old.unit}")
+    return lines
+
+
 def _changes(option: str, words: Sequence[str]) -> dict[str, Change]:
     changes: dict[str, Change] = {}
     for word in words:

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swashplate.cli.inputs import Interpolation, Options, Start, drive_of, simulated
+from swashplate.cli.inputs import (
+    Interpolation,
+    Options,
+    Start,
+    changes_said,
+    drive_of,
+    simulated,
+    title_of,
+)
 from swashplate.cli.terminal import note, show, table, working
 
 if TYPE_CHECKING:
@@ -101,7 +109,7 @@ def simulate(
         chosen = drive_of(drive, values or (), factors or ())
         name, run = simulated(chosen, command, options)
         tables = (_what_it_did(run), _limits(run))
-    title = f"{chosen.name}, {name}"
+    title = f"{title_of(drive, chosen)}, {name}"
     if out is not None:
         with working(f"Writing {out}"):
             run.write(out)
@@ -111,6 +119,8 @@ def simulate(
 
             save_figure(plot_simulation(run, title=title), plot)
     note(f"{title}: {run.time.size} samples at {rate:g} Hz, {run.time[-1] - run.time[0]:.6g} s")
+    for line in changes_said(drive, chosen):
+        note(line)
     show(*tables)
     if out is not None:
         note(f"All signals, in SI: {out}")
@@ -129,7 +139,7 @@ def _what_it_did(run: Simulation) -> Table:
     made.add_row("peak speed, positive", f"{speed.positive:z.2f}", "deg/s")
     made.add_row("peak speed, negative", f"{speed.negative:z.2f}", "deg/s")
     made.add_row("speed at the end", f"{np.degrees(run.shaft_speed[-1]):z.2f}", "deg/s")
-    made.add_row("travelled in all", f"{travel_deg:z.1f}", "deg")
+    made.add_row("position at the end", f"{travel_deg:z.1f}", "deg")
     made.add_row("", f"{travel_deg / 360.0:z.3f}", "turns")
     made.add_section()
     made.add_row("peak current, positive", f"{current.positive:z.4f}", "A")

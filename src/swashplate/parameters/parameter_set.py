@@ -102,6 +102,9 @@ class ParameterSet(Mapping[str, Parameter]):
         object.__setattr__(self, "parameters", MappingProxyType(ordered))
         object.__setattr__(self, "numbers", MappingProxyType(numbers))
 
+    def __repr__(self) -> str:
+        return f"ParameterSet({self.name!r}, {len(self)} parameters)"
+
     def __getitem__(self, symbol: str) -> Parameter:
         try:
             return self.parameters[symbol]
@@ -173,9 +176,15 @@ def _changed(name: str, definition: Definition, old: Parameter, change: Change) 
         raise ParameterError(f"{name} has one value, not a plus and a minus one.")
     if isinstance(change, tuple) and len(change) != 2:
         raise ParameterError(f"{name} takes one value or two (plus, minus), not {len(change)}.")
-    if isinstance(change, tuple):
-        return Pair(float(change[0]), float(change[1]))
-    number = float(change)
+    try:
+        numbers = [float(each) for each in (change if isinstance(change, tuple) else (change,))]
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"{name} must be a number in {definition.unit}, or a pair of them, not {change!r}."
+        ) from None
+    if len(numbers) == 2:
+        return Pair(*numbers)
+    (number,) = numbers
     if not definition.directional:
         return number
     assert isinstance(old.value, Pair)

@@ -47,6 +47,9 @@ class Sensitivities:
     by_currents: tuple[Array, Array] | None = None
     """Columns of the channels' currents, on the march's grid; None where a current was given."""
 
+    def __repr__(self) -> str:
+        return f"Sensitivities({self.simulation!r}, by {', '.join(self.names)})"
+
     def _wanted(self, columns: Array) -> Array:
         """The columns asked for, without a copy where they are neighbours."""
         chosen = [ALL_PARAMETERS.index(name) for name in self.names]

@@ -11,7 +11,8 @@ class Limit(IntFlag):
     CURRENT_RATE = 2
     """A rate limit of the card sets the current."""
     ORIFICE = 4
-    """The in-line orifice, not the spool, limits the flow: the acceleration limit."""
+    """The in-line orifice, not the spool, limits the flow, and the plate moves: the acceleration
+    limit."""
     SPOOL = 8
     """The spool is at its stop."""
     SWASH_STOP = 16

@@ -166,9 +166,11 @@ def observe_limits(
         p = pressure[n]
         free = pump_spool(pump_force(current[n], pump), p, pump)
         orifice = pump.Z16_plus if free > 0.0 else pump.Z16_minus
+        # against a stop nothing accelerates, however wide the spool is open
+        held = (p >= pump.upper and free > 0.0) or (p <= pump.lower and free < 0.0)
         bits = CURRENT_RATE if rate_limited[n] else 0
         bits |= DEAD_ZONE if abs(current[n]) <= pump.Z17 else 0
-        bits |= ORIFICE if min(abs(free), pump.Z14) > orifice else 0
+        bits |= ORIFICE if min(abs(free), pump.Z14) > orifice and not held else 0
         bits |= SPOOL if abs(free) > pump.Z14 else 0
         bits |= SWASH_STOP if p >= pump.upper_stop or p <= pump.lower_stop else 0
         bits |= (

@@ -90,6 +90,10 @@ class Simulation:
         """Samples of the record out of the march's grid."""
         return np.ascontiguousarray(fine[:: self.record.substeps])
 
+    def __repr__(self) -> str:
+        samples = (self.record.values.size - 1) // self.record.substeps + 1
+        return f"Simulation({self.name!r}, {samples} samples at {self.record.rate:g} Hz)"
+
     @property
     def driven_by_voltage(self) -> bool:
         """Whether the record is a voltage that went through the card."""
