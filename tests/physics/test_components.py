@@ -8,6 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from swashplate.physics import card_dynamics as dynamics
 from swashplate.physics import control_card as card
 from swashplate.physics.solenoid import effective_current, solenoid_force
 from swashplate.physics.spool import orifice_opening, spool_position
@@ -144,14 +145,14 @@ def test_filter_is_the_printed_difference_equation() -> None:
     # 2(1 - 0.5) 0.3 + (2·0.5 - 1 - 1) 0.2 - 2 h² sign + 1·0.7
     plain = 0.3 - 0.2 + 0.7
     friction = 2.0 / 64.0**2
-    assert card.filtered_current(0.3, 0.2, 0.7, 0.5, 64.0, 2.0, h, None) == pytest.approx(
+    assert dynamics.filtered_current(0.3, 0.2, 0.7, 0.5, 64.0, 2.0, h, None) == pytest.approx(
         plain - friction, rel=1e-15
     )
-    assert card.filtered_current(0.2, 0.2, 0.7, 0.5, 64.0, 2.0, h, None) == pytest.approx(0.7)
-    assert card.coulomb_sign(0.005 * h, h, None) == pytest.approx(0.5)
-    assert card.coulomb_sign(0.005 * h, h, True) == 1.0
-    assert card.coulomb_sign(-0.005 * h, h, True) == -1.0
-    assert card.coulomb_sign(0.0, h, True) == 0.0
+    assert dynamics.filtered_current(0.2, 0.2, 0.7, 0.5, 64.0, 2.0, h, None) == pytest.approx(0.7)
+    assert dynamics.coulomb_sign(0.005 * h, h, None) == pytest.approx(0.5)
+    assert dynamics.coulomb_sign(0.005 * h, h, True) == 1.0
+    assert dynamics.coulomb_sign(-0.005 * h, h, True) == -1.0
+    assert dynamics.coulomb_sign(0.0, h, True) == 0.0
 
 
 LIMITS = {"lim1": 2.0, "lim2": 3.0, "I_t1": 0.3, "I_t2": 0.1, "decay": 0.9, "step": 0.01}
@@ -174,15 +175,15 @@ LIMITS = {"lim1": 2.0, "lim2": 3.0, "I_t1": 0.3, "I_t2": 0.1, "decay": 0.9, "ste
 def test_limiter_branches(
     target: float, previous: float, steady: float, output: float, limited: bool
 ) -> None:
-    assert card.limited_current(target, previous, steady, **LIMITS) == pytest.approx(output)
-    assert card.rate_limit_active(output, target, previous, LIMITS["I_t2"]) is limited
+    assert dynamics.limited_current(target, previous, steady, **LIMITS) == pytest.approx(output)
+    assert dynamics.rate_limit_active(output, target, previous, LIMITS["I_t2"]) is limited
 
 
 def test_limits_can_be_off() -> None:
     off = {"lim1": inf, "lim2": inf, "I_t1": inf, "I_t2": 0.0, "decay": exp(-inf), "step": H}
-    assert card.limited_current(1.3, 0.2, 1.0, **off) == 1.3
-    assert card.limited_current(0.1, 0.9, 0.0, **off) == 0.1
-    assert card.limited_current(-0.1, 0.9, 0.0, **off) == 0.0
+    assert dynamics.limited_current(1.3, 0.2, 1.0, **off) == 1.3
+    assert dynamics.limited_current(0.1, 0.9, 0.0, **off) == 0.1
+    assert dynamics.limited_current(-0.1, 0.9, 0.0, **off) == 0.0
 
 
 def test_the_other_form_of_the_spool_takes_over_where_angles_are_large() -> None:

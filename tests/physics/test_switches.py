@@ -2,6 +2,7 @@
 
 import pytest
 
+from swashplate.physics import card_dynamics as dynamics
 from swashplate.physics import control_card as card
 from swashplate.physics.solenoid import solenoid_partials
 from swashplate.physics.spool import opening_partials
@@ -67,16 +68,16 @@ def test_where_stop_and_relief_coincide_the_stop_counts() -> None:
 def test_at_the_limiters_switches_the_unlimited_side_counts() -> None:
     args = {"lim1": 2.0, "lim2": 2.0, "I_t1": 0.25, "I_t2": 0.125, "decay": 0.5, "step": 0.125}
     # target exactly at I_t1, exactly at what the rate limit allows, and exactly at the decay
-    assert card.limiter_partials(0.25, 0.1, 1.0, **args)[1:3] == (1.0, 0.0)
-    assert card.limiter_partials(0.75, 0.5, 1.0, **args)[1:3] == (1.0, 0.0)
-    assert card.limiter_partials(0.25, 0.5, 1.0, **args)[1:3] == (1.0, 0.0)
-    assert card.limiter_partials(0.0625, 0.125, 1.0, **args)[1:3] == (1.0, 0.0)
+    assert dynamics.limiter_partials(0.25, 0.1, 1.0, **args)[1:3] == (1.0, 0.0)
+    assert dynamics.limiter_partials(0.75, 0.5, 1.0, **args)[1:3] == (1.0, 0.0)
+    assert dynamics.limiter_partials(0.25, 0.5, 1.0, **args)[1:3] == (1.0, 0.0)
+    assert dynamics.limiter_partials(0.0625, 0.125, 1.0, **args)[1:3] == (1.0, 0.0)
 
 
 def test_ends_of_the_smooth_sign_are_saturated() -> None:
     h = 0.125
-    width = card.COULOMB_WIDTH * h
-    within = card.filter_partials(0.5 * width, 0.0, 0.0, 0.5, 1.0, 2.0, h, None)
-    at_end = card.filter_partials(width, 0.0, 0.0, 0.5, 1.0, 2.0, h, None)
-    assert within[1] - at_end[1] == pytest.approx(-2.0 * h / card.COULOMB_WIDTH)
+    width = dynamics.COULOMB_WIDTH * h
+    within = dynamics.filter_partials(0.5 * width, 0.0, 0.0, 0.5, 1.0, 2.0, h, None)
+    at_end = dynamics.filter_partials(width, 0.0, 0.0, 0.5, 1.0, 2.0, h, None)
+    assert within[1] - at_end[1] == pytest.approx(-2.0 * h / dynamics.COULOMB_WIDTH)
     assert at_end[6] == pytest.approx(-h * h)

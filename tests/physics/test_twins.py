@@ -12,6 +12,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from swashplate.physics import card_dynamics as dynamics
 from swashplate.physics import control_card, motor, solenoid, spool, stroker, swash
 
 pytestmark = pytest.mark.interpreted
@@ -97,8 +98,8 @@ TWINS = [
         (1.0, 0.1, 0.1, 0.1, 0.1, 0.01, 0.001),
     ),
     Twin(
-        control_card.filtered_current,
-        control_card.filter_partials,
+        dynamics.filtered_current,
+        dynamics.filter_partials,
         st.one_of(
             st.tuples(
                 amperes,
@@ -126,15 +127,15 @@ TWINS = [
         (1e-5, 1e-5, 1e-2, 1.0, 10.0, 1.0),
     ),
     Twin(
-        control_card.limited_current,
-        control_card.limiter_partials,
+        dynamics.limited_current,
+        dynamics.limiter_partials,
         limiter_arguments(),
         (0, 1, 3, 4, 5, 6, 7),
         (0.1, 0.1, 1.0, 1.0, 0.1, 0.1, 0.1),
     ),
     Twin(
-        control_card.decay_factor,
-        control_card.decay_partials,
+        dynamics.decay_factor,
+        dynamics.decay_partials,
         st.tuples(real(0.0, 50.0), st.just(STEP)),
         (0,),
         (1.0,),

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.errors import InputError
 from swashplate.parameters.parameter_set import ParameterSet, columns_of
 from swashplate.parameters.rules import broken_rules
+from swashplate.physics.card_dynamics import decay_factor
 from swashplate.physics.component import uncompiled
-from swashplate.physics.control_card import decay_factor
 from swashplate.physics.stroker import pressure_limits
 from swashplate.physics.swash import TAN_22_5
 from swashplate.simulation import side_by_side as lanes

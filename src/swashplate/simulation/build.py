@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 from swashplate.errors import InputError
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.physics.card_dynamics import decay_factor
 from swashplate.physics.component import uncompiled
-from swashplate.physics.control_card import decay_factor
 from swashplate.physics.stroker import pressure_limits
 from swashplate.physics.swash import TAN_22_5
 from swashplate.simulation.constants import (

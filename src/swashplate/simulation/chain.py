@@ -4,14 +4,9 @@ A new component is one file in `swashplate.physics` and one entry here (and in `
 carries the derivatives along the same chain).
 """
 
+from swashplate.physics.card_dynamics import filtered_current, limited_current, rate_limit_active
 from swashplate.physics.component import component
-from swashplate.physics.control_card import (
-    filtered_current,
-    jump_share,
-    limited_current,
-    rate_limit_active,
-    steady_current,
-)
+from swashplate.physics.control_card import jump_share, steady_current
 from swashplate.physics.motor import load_leakage, shaft_speed
 from swashplate.physics.solenoid import solenoid_force
 from swashplate.physics.spool import arm_sine, moment_sine, orifice_opening, spool_position

@@ -8,15 +8,14 @@ channel's, and the delay τ last.
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.physics.component import component
-from swashplate.physics.control_card import (
+from swashplate.physics.card_dynamics import (
     decay_partials,
     filter_partials,
-    jump_share_partials,
     limiter_partials,
     rate_limit_active,
-    steady_partials,
 )
+from swashplate.physics.component import component
+from swashplate.physics.control_card import jump_share_partials, steady_partials
 from swashplate.physics.motor import load_leakage_partials, shaft_speed_partials
 from swashplate.physics.solenoid import solenoid_partials
 from swashplate.physics.spool import arm_sine_partials, opening_partials, spool_partials
