@@ -169,6 +169,13 @@ TWINS = [
         (1e-4, 1e-4, 1e-4, 1e-4),
     ),
     Twin(
+        swash.swash_tangent,
+        swash.swash_tangent_partials,
+        st.tuples(real(-1e6, 1e6), real(1e-8, 1e-6), real(-0.1, 0.1)),
+        (0, 1, 2),
+        (1e5, 1e-8, 0.1),
+    ),
+    Twin(
         swash.swash_angle,
         swash.swash_angle_partials,
         st.tuples(real(-3.0, 3.0), real(0.05, 1.2), real(0.05, 1.2), st.just(True)),

@@ -45,6 +45,14 @@ def swash_tangent(pressure: float, Z1: float, Z2: float) -> float:
 
 
 @component
+def swash_tangent_partials(
+    pressure: float, Z1: float, Z2: float
+) -> tuple[float, float, float, float]:
+    """tan α_sw with its derivatives by pressure, Z1, Z2."""
+    return swash_tangent(pressure, Z1, Z2), Z1, pressure, -1.0
+
+
+@component
 def swash_angle(tangent: float, Z13_plus: float, Z13_minus: float, steep: bool | None) -> float:
     """Swash plate angle between its stops.
 

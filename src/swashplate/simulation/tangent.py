@@ -28,7 +28,7 @@ from swashplate.physics.stroker import (
 from swashplate.physics.swash import (
     swash_angle_partials,
     swash_rate_partials,
-    swash_tangent,
+    swash_tangent_partials,
 )
 from swashplate.simulation.chain import plate_motion
 from swashplate.simulation.constants import (
@@ -285,7 +285,7 @@ def speed_tangent(
     d_speed : (N_PUMP + m,) array
         Filled with the derivatives of the speed.
     """
-    tangent = swash_tangent(pressure, pump.Z1, pump.Z2)
+    tangent, t_p, t_1, t_2 = swash_tangent_partials(pressure, pump.Z1, pump.Z2)
     angle, a_t, a_13p, a_13m = swash_angle_partials(
         tangent, pump.Z13_plus, pump.Z13_minus, pump.steep
     )
@@ -305,7 +305,7 @@ def speed_tangent(
     if pump.loaded is not None:
         by_tangent += w_l * (l_t + moves * l_o * o_t)
         by_rate = moves * w_l * l_o * o_r
-    by_pressure = by_tangent * pump.Z1 + by_rate * (r_p + r_y * opening_by_pressure)
+    by_pressure = by_tangent * t_p + by_rate * (r_p + r_y * opening_by_pressure)
     for k in range(d_speed.size):
         d_speed[k] = by_pressure * d_pressure[k]
     if pump.loaded is not None:
@@ -318,8 +318,8 @@ def speed_tangent(
         d_speed[Z7] += by_rate * r_7
         d_speed[Z8] += by_rate * r_8
         d_speed[Z9] += by_rate * r_9
-    d_speed[Z1] += by_tangent * pressure
-    d_speed[Z2] -= by_tangent
+    d_speed[Z1] += by_tangent * t_1
+    d_speed[Z2] += by_tangent * t_2
     d_speed[Z10] += w_10
     d_speed[Z11] += w_11
     d_speed[Z12] += w_l * l_12
