@@ -54,5 +54,5 @@ def test_recorded_file(tmp_path):
 
 
 def test_a_manoeuvre_of_months_is_refused():
-    with pytest.raises(InputError, match=r"5\.12e\+09 samples, more than 1e\+08"):
+    with pytest.raises(InputError, match=r"5\.12e\+09 samples, more than the 1e\+08"):
         maneuvers.rest(1e7).sample(512.0)

@@ -89,5 +89,5 @@ def test_solenoid_overpowering_the_spring_is_an_error() -> None:
 
 
 def test_stamps_in_the_wrong_unit_are_not_marched_for_ever(hoist: Drive) -> None:
-    with pytest.raises(InputError, match="is the time in seconds"):
+    with pytest.raises(InputError, match="check the unit of the time"):
         hoist.simulate([0.0, 1.0], time=[0.0, 3.6e6], interpolation="linear")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swashplate.cli.inputs import check_length, drive_of, maneuver_of
+from swashplate.cli.inputs import drive_of, maneuver_of
 from swashplate.cli.terminal import note, show, table, working
 
 if TYPE_CHECKING:
@@ -63,7 +63,6 @@ def compare(
     with working("Simulating"):
         drives = _labelled(first, second)
         command = maneuver_of(maneuver, *drives.values())
-        check_length(command.length, rate)
         voltage = command.sample(rate)
         runs = {label: drive.simulate(voltage, rate) for label, drive in drives.items()}
         made = _side_by_side(drives, runs)

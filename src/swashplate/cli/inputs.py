@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 Interpolation = Literal["linear", "previous"]
 Start = Literal["rest", "steady"]
 
-MOST_SAMPLES = 1e8
-"""Longest command: 54 hours at 512 Hz, some 10 GB."""
-
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
 _ENDING = re.compile(r"\.[A-Za-z]\w*$")
@@ -119,23 +116,6 @@ class Options(NamedTuple):
     column: str
 
 
-def check_length(seconds: float, rate: float) -> None:
-    """Refuse what no memory holds, which is likelier a wrong unit than meant.
-
-    Raises
-    ------
-    InputError
-        For more than `MOST_SAMPLES`, steps of the march included.
-    """
-    samples = seconds * max(rate, 512.0)
-    if samples > MOST_SAMPLES:
-        raise InputError(
-            f"{seconds:g} s at {rate:g} Hz is {samples:.2g} steps, more than the "
-            f"{MOST_SAMPLES:.0e} that are simulated at once; check the unit of the time, or split "
-            "the command."
-        )
-
-
 def simulated(drive: Drive, command: str, options: Options) -> tuple[str, Simulation]:
     """Name of a command, a manoeuvre or a file, and the drive's simulation over it."""
     from swashplate.simulation.record import least_substeps
@@ -144,7 +124,6 @@ def simulated(drive: Drive, command: str, options: Options) -> tuple[str, Simula
     if _is_file(command, drive):
         return Path(command).name, _simulated_file(drive, command, options)
     maneuver = maneuver_of(command, drive)
-    check_length(maneuver.length, options.rate)
     return maneuver.name, drive.simulate(
         maneuver.sample(options.rate),
         options.rate,
@@ -171,8 +150,6 @@ def _simulated_file(drive: Drive, path: str, options: Options) -> Simulation:
             "--interpolation previous (each row held until the next)."
         )
     try:
-        if series.time.size:
-            check_length(float(series.time[-1] - series.time[0]), options.rate)
         return drive.simulate(
             series.values,
             options.rate,

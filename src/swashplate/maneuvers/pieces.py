@@ -70,7 +70,7 @@ class Maneuver:
         if samples > LONGEST:
             raise InputError(
                 f"{self.name} lasts {self.length:g} s, at {rate:g} Hz {samples:.3g} samples, more "
-                f"than {LONGEST:.0e}."
+                f"than the {LONGEST:.0e} that are simulated at once."
             )
         if abs(samples - round(samples)) > 1e-6:
             raise InputError(

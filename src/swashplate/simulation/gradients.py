@@ -13,7 +13,7 @@ from swashplate.simulation.build import ALL_PARAMETERS, build, build_pump
 from swashplate.simulation.constants import CHANNEL_PARAMETERS, PUMP_PARAMETERS, Pump
 from swashplate.simulation.record import Record
 from swashplate.simulation.result import CardSignals, Simulation
-from swashplate.simulation.run import Start, check_domain, check_start, rest_pressure
+from swashplate.simulation.run import Start, check_domain, drive_start, pump_start
 from swashplate.simulation.sensitivities import (
     integrate_rows,
     march_drive_sensitivities,
@@ -21,7 +21,6 @@ from swashplate.simulation.sensitivities import (
     steady_pump_tangent,
     steady_tangent,
 )
-from swashplate.simulation.steady import steady_pump_start, steady_start
 from swashplate.simulation.tangent import N_ALL, N_CHANNEL, N_PUMP, TAU, Z1, Z2
 
 Array = NDArray[np.float64]
@@ -120,15 +119,13 @@ def drive_sensitivities(
     parameters: ParameterSet, record: Record, start: Start, names: Sequence[str] | None
 ) -> Sensitivities:
     """Card and pump with derivatives; see `Drive.sensitivities`."""
-    check_start(start)
     chosen = _chosen(names, ALL_PARAMETERS)
     delay, plus, minus, pump, step = build(parameters, record.step)
     command = record.values
     d_plus, d_minus = np.zeros(N_CHANNEL + 1), np.zeros(N_CHANNEL + 1)
-    before, state, d_pressure = 0.0, (0.0, 0.0, rest_pressure(pump)), rest_tangent(pump, N_ALL)
+    before, state = drive_start(command, plus, minus, pump, start)
+    d_pressure = rest_tangent(pump, N_ALL)
     if start == "steady":
-        before = float(command[0])
-        state = steady_start(before, plus, minus, pump)
         steady_tangent(before, plus, minus, pump, step, state, d_plus, d_minus, d_pressure)
     n = command.size
     current_plus, current_minus, pressure, speed = (np.empty(n) for _ in range(4))
@@ -165,7 +162,6 @@ def pump_sensitivities(
     parameters: ParameterSet, record: Record, start: Start, names: Sequence[str] | None
 ) -> Sensitivities:
     """Pump alone with derivatives; see `Drive.sensitivities_current`."""
-    check_start(start)
     chosen = _chosen(names, PUMP_PARAMETERS)
     foreign = [name for name in chosen if name not in PUMP_PARAMETERS]
     if foreign:
@@ -174,9 +170,8 @@ def pump_sensitivities(
         )
     pump = build_pump(parameters)
     current = record.values
-    state, d_pressure = rest_pressure(pump), rest_tangent(pump, N_PUMP)
+    state, d_pressure = pump_start(current, pump, start), rest_tangent(pump, N_PUMP)
     if start == "steady":
-        state = steady_pump_start(float(current[0]), pump)
         steady_pump_tangent(float(current[0]), pump, record.step, state, d_pressure)
     pressure, speed = np.empty_like(current), np.empty_like(current)
     by_speed = np.empty((current.size, N_PUMP))

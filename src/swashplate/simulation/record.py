@@ -97,6 +97,7 @@ def record_of(
             )
         stamps = _checked_stamps(time, data.size, what)
         return _stamped(data, stamps, rate, interpolation, substeps)
+    _check_length(data.size * substeps, f"{data.size} samples at {rate:g} Hz")
     return Record(_refined(data, interpolation, substeps), 0.0, float(rate), substeps)
 
 
@@ -184,17 +185,21 @@ def _refined(data: Array, interpolation: Interpolation | None, substeps: int) ->
     return fine
 
 
+def _check_length(steps: float, what: str) -> None:
+    if steps > LONGEST:
+        raise InputError(
+            f"The record with {what} takes {steps:.3g} steps, more than the {LONGEST:.0e} that are "
+            "simulated at once; check the unit of the time."
+        )
+
+
 def _stamped(
     data: Array, stamps: Array, rate: float, interpolation: Interpolation, substeps: int
 ) -> Record:
     """A record with stamps, on a grid that starts at the first one."""
     start = float(stamps[0])
-    steps = (stamps[-1] - start) * rate * substeps
-    if steps > LONGEST:
-        raise InputError(
-            f"The stamps go from {start:g} s to {stamps[-1]:g} s, which is {steps:.3g} steps, more "
-            f"than the {LONGEST:.0e} that a record may take; is the time in seconds?"
-        )
+    span = float(stamps[-1]) - start
+    _check_length(span * rate * substeps, f"stamps from {start:g} s to {stamps[-1]:g} s")
     samples = int((stamps[-1] - start) * rate + 1e-9) + 1
     fine = start + np.arange((samples - 1) * substeps + 1) / (rate * substeps)
     if interpolation == "linear":

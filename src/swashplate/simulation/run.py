@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.build import build, build_pump
-from swashplate.simulation.constants import Pump
+from swashplate.simulation.constants import Channel, Pump
 from swashplate.simulation.march import march_drive, march_pump
 from swashplate.simulation.record import Record
 from swashplate.simulation.result import CardSignals, Simulation
@@ -29,6 +29,23 @@ def rest_pressure(pump: Pump) -> float:
     return pump.Z2 / pump.Z1
 
 
+def drive_start(
+    command: Array, plus: Channel, minus: Channel, pump: Pump, start: Start
+) -> tuple[float, tuple[float, float, float]]:
+    """Command before the record [V]; currents of both channels [A] and δP [Pa] at its start."""
+    check_start(start)
+    if start == "rest":
+        return 0.0, (0.0, 0.0, rest_pressure(pump))
+    before = float(command[0])
+    return before, steady_start(before, plus, minus, pump)
+
+
+def pump_start(current: Array, pump: Pump, start: Start) -> float:
+    """δP at the start of a current record. [Pa]"""
+    check_start(start)
+    return rest_pressure(pump) if start == "rest" else steady_pump_start(float(current[0]), pump)
+
+
 def check_domain(name: str, worst: float, drive: str) -> None:
     """Refuse what was computed outside the model's equations.
 
@@ -47,13 +64,9 @@ def check_domain(name: str, worst: float, drive: str) -> None:
 
 def simulate_drive(parameters: ParameterSet, record: Record, start: Start) -> Simulation:
     """March card and pump over a voltage record; see `Drive.simulate`."""
-    check_start(start)
     delay, plus, minus, pump, step = build(parameters, record.step)
     command = record.values
-    before, state = 0.0, (0.0, 0.0, rest_pressure(pump))
-    if start == "steady":
-        before = float(command[0])
-        state = steady_start(before, plus, minus, pump)
+    before, state = drive_start(command, plus, minus, pump, start)
     current_plus, current_minus, pressure = (np.empty_like(command) for _ in range(3))
     flags = np.empty(command.size, dtype=np.uint8)
     worst = march_drive(
@@ -77,13 +90,10 @@ def simulate_drive(parameters: ParameterSet, record: Record, start: Start) -> Si
 
 def simulate_pump(parameters: ParameterSet, record: Record, start: Start) -> Simulation:
     """March the pump alone over a signed current; see `Drive.simulate_current`."""
-    check_start(start)
     pump = build_pump(parameters)
     current = record.values
     pressure = np.empty_like(current)
-    state = rest_pressure(pump)
-    if start == "steady":
-        state = steady_pump_start(float(current[0]), pump)
+    state = pump_start(current, pump, start)
     worst = march_pump(current, pump, record.step, state, pressure)
     check_domain(parameters.name, worst, "current")
     return Simulation(parameters.name, record, pump, pressure)
