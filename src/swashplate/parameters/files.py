@@ -1,15 +1,12 @@
 """Parameter sets as TOML files: the packaged ones and the user's."""
 
-import tomllib
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import TypeVar
 
-from pydantic import BaseModel, ValidationError
-
-from swashplate.errors import FileError, InputError, ParameterError
+from swashplate.documents import parse_toml, read_text, validated
+from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.catalogue import CATALOGUE, Block
 from swashplate.parameters.parameter_set import Pair, Parameter, ParameterSet, find
 from swashplate.parameters.schema import CardFile, Entry, SetFile
@@ -17,8 +14,6 @@ from swashplate.units import to_si
 
 AXES = ("hoist", "slew", "luff")
 """The source's three axes."""
-
-Model = TypeVar("Model", bound=BaseModel)
 
 
 def preset_names() -> tuple[str, ...]:
@@ -53,19 +48,12 @@ def load_set(path: str | Path) -> ParameterSet:
     ParameterError
         If an entry is missing, unknown, malformed or breaks a rule.
     """
-    path = Path(path)
-    try:
-        text = path.read_text("utf-8")
-    except FileNotFoundError:
-        raise FileError(f"There is no file {path}.") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"{path} cannot be read as UTF-8 text: {error}.") from None
-    return read_set(text, str(path))
+    return read_set(read_text(path), str(path))
 
 
 def read_set(text: str, origin: str) -> ParameterSet:
     """A parameter set from TOML text; `origin` names it in errors."""
-    contents = _parsed(text, origin, SetFile)
+    contents = validated(parse_toml(text, origin), SetFile, origin)
     if isinstance(contents.control_card, str):
         card = _load_card(contents.control_card, origin)
         card_name, entries = card.name, card.control_card
@@ -82,6 +70,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
         parameters,
         contents.model.pressure_root,
         contents.model.coulomb_sign,
+        contents.model.decay_switch,
     )
 
 
@@ -98,6 +87,7 @@ def dump_set(parameters: ParameterSet) -> str:
     options = table()
     options.add("pressure_root", parameters.pressure_root)
     options.add("coulomb_sign", parameters.coulomb_sign)
+    options.add("decay_switch", parameters.decay_switch)
     text.add("model", options)
     for block in ("control_card", "pump_motor"):
         entries = table()
@@ -131,19 +121,8 @@ def _load_card(name: str, origin: str) -> CardFile:
             f"{origin}: there is no packaged control card '{name}'; there are "
             f"{', '.join(names)}, or give the card's own [control_card] table."
         )
-    return _parsed((cards / f"{name}.toml").read_text("utf-8"), f"{name}.toml", CardFile)
-
-
-def _parsed(text: str, origin: str, model: type[Model]) -> Model:
-    try:
-        return model.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise FileError(f"{origin} is not TOML: {error}.") from None
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"] if part not in ("str", "float"))
-        message = first["msg"][0].lower() + first["msg"][1:]
-        raise ParameterError(f"{origin}: {where}: {message}.") from None
+    text = (cards / f"{name}.toml").read_text("utf-8")
+    return validated(parse_toml(text, f"{name}.toml"), CardFile, f"{name}.toml")
 
 
 def _parameters(entries: Mapping[str, Entry], block: Block, origin: str) -> dict[str, Parameter]:

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from swashplate.parameters.parameter_set import CoulombSign, PressureRoot, Status
+from swashplate.parameters.parameter_set import CoulombSign, DecaySwitch, PressureRoot, Status
 
 TwoNumbers = Annotated[list[float], Field(min_length=2, max_length=2)]
 
@@ -28,6 +28,7 @@ class ModelOptions(BaseModel):
 
     pressure_root: PressureRoot = "published"
     coulomb_sign: CoulombSign = "smooth"
+    decay_switch: DecaySwitch = "sampled"
 
 
 class CardFile(BaseModel):

@@ -1,0 +1,114 @@
+"""TOML documents in: read, checked against a schema, refused in one sentence."""
+
+from __future__ import annotations
+
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from swashplate.errors import FileError, ParameterError
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+    from pydantic_core import ErrorDetails
+
+    Model = TypeVar("Model", bound=BaseModel)
+
+
+def read_text(path: str | Path) -> str:
+    """The text of a UTF-8 file.
+
+    Raises
+    ------
+    FileError
+        If there is none or it cannot be read.
+    """
+    try:
+        return Path(path).read_text("utf-8")
+    except FileNotFoundError:
+        raise FileError(f"There is no file {path}.") from None
+    except UnicodeDecodeError as error:
+        raise FileError(
+            f"{path} is not UTF-8 text: byte {error.start} is {error.object[error.start]:#04x}."
+        ) from None
+    except OSError as error:
+        raise FileError(f"{path} cannot be read: {error.strerror or error}.") from None
+
+
+def parse_toml(text: str, origin: str) -> dict[str, Any]:
+    """The tables of a TOML text; `origin` names it in errors.
+
+    Raises
+    ------
+    FileError
+        If it is not TOML, with line and column.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FileError(f"{origin} is not TOML: {error}.") from None
+
+
+def validated(content: Any, model: type[Model], origin: str) -> Model:
+    """Content checked against a schema.
+
+    Raises
+    ------
+    ParameterError
+        For the first entry that is wrong; the sentence names it and says what would be right.
+    """
+    from pydantic import ValidationError
+
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        raise ParameterError(f"{origin}: {_sentence(error.errors()[0], model)}.") from None
+
+
+def _sentence(error: ErrorDetails, model: type[BaseModel]) -> str:
+    where = [str(part) for part in error["loc"] if part not in _BRANCHES]
+    path, kind = ".".join(where), error["type"]
+    parent, key = ".".join(where[:-1]), where[-1] if where else ""
+    table = f"[{parent}]" if parent else "the file"
+    if kind == "missing":
+        return f"{table} needs an entry '{key}'"
+    if kind == "extra_forbidden":
+        known = _known_keys(model, where[:-1])
+        close = get_close_matches(key, known, 1)
+        hint = f"perhaps '{close[0]}' is meant" if close else f"it has {', '.join(known)}"
+        return f"{table} has no entry '{key}': {hint}" if known else f"{table} has no entry '{key}'"
+    message = error["msg"].removeprefix("Value error, ").rstrip(".")
+    if kind == "value_error":
+        return f"{path}: {message}" if path else message
+    return f"{path} is {error['input']!r}, but {message[0].lower()}{message[1:]}"
+
+
+_BRANCHES = ("str", "float", "list[float]", "constrained-list")
+"""Parts of a location that name a branch of a union, not an entry."""
+
+
+def _known_keys(model: type[BaseModel], where: list[str]) -> list[str]:
+    """Keys of the table at a place, found in the JSON schema, which resolves nested models."""
+    schema = model.model_json_schema(by_alias=True)
+    definitions = schema.get("$defs", {})
+
+    def resolved(node: dict[str, Any]) -> dict[str, Any]:
+        for option in (node, *node.get("anyOf", ())):
+            if "$ref" in option:
+                found: dict[str, Any] = definitions[option["$ref"].rpartition("/")[2]]
+                return found
+            if "properties" in option or "items" in option or "additionalProperties" in option:
+                return option
+        return node
+
+    node = schema
+    for part in where:
+        node = resolved(node)
+        child = node.get("properties", {}).get(part) or (
+            node.get("items") if part.isdecimal() else node.get("additionalProperties")
+        )
+        if not isinstance(child, dict):
+            return []
+        node = child
+    return sorted(resolved(node).get("properties", {}))
