@@ -13,7 +13,7 @@ export PIP_BUILD_CONSTRAINT := constraints.txt
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test lint bench tools format clean
+.PHONY: help .venv demo test lint bench fuzz tools format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[.a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
@@ -46,6 +46,11 @@ lint: $(STAMP) ## style, format, types and the direction of imports
 
 bench: $(STAMP) tools ## measure the speed against C (needs a C compiler)
 	@$(BIN)/python benchmarks/run.py
+
+MINUTES ?= 3
+
+fuzz: $(STAMP) ## read damaged files for MINUTES=3: each must end in a sentence
+	@$(BIN)/python tests/fuzz/run.py --minutes $(MINUTES)
 
 tools: ## make sure that there is a C compiler, for bench
 	@if command -v cc >/dev/null; then :; \

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from scipy.optimize import least_squares
 
 from swashplate import Drive
-from swashplate.tables import read_series
+from swashplate.logs import read_series
 
 TRAIN = ["manual_1021_mitch.csv", "manual_mitch_1101_2333.csv"]
 PREDICT = "manual_shyam_1102_1824.csv"

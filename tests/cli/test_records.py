@@ -1,8 +1,10 @@
 """Commands from files, right ones and wrong ones."""
 
+import h5py
 import numpy as np
 import polars as pl
 import pytest
+import scipy.io
 
 from swashplate import Drive
 
@@ -15,12 +17,37 @@ def simulated(done, *words):
     return pl.read_parquet("run.parquet")
 
 
-@pytest.mark.parametrize("name", ["log.csv", "log.parquet"])
-def test_a_record_is_simulated(done, tmp_path, name):
+def as_matlab(path):
+    scipy.io.savemat(path, {"time": TIME, "voltage": VOLTAGE})
+
+
+def as_hdf5(path):
+    with h5py.File(path, "w") as file:
+        file["run/time"], file["run/voltage"] = TIME, VOLTAGE
+
+
+def as_text(path):
     table = pl.DataFrame({"time": TIME, "voltage": VOLTAGE, "note": "x"})
-    table.write_csv(tmp_path / name) if name.endswith("csv") else table.write_parquet(
-        tmp_path / name
-    )
+    comma = path.suffix == ".txt"
+    table.write_csv(path, separator=";" if comma else ",", decimal_comma=comma)
+
+
+def as_parquet(path):
+    pl.DataFrame({"time": TIME, "voltage": VOLTAGE, "note": "x"}).write_parquet(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("log.csv", as_text),
+        ("log.txt", as_text),
+        ("log.parquet", as_parquet),
+        ("log.mat", as_matlab),
+        ("log.h5", as_hdf5),
+    ],
+)
+def test_a_record_is_simulated(done, tmp_path, name, write):
+    write(tmp_path / name)
     written = simulated(done, name, "--interpolation", "linear")
     expected = Drive.preset("hoist").simulate(VOLTAGE)
     np.testing.assert_allclose(written["shaft_speed"], expected.shaft_speed, atol=1e-12)
@@ -62,15 +89,15 @@ def test_clip(done, refused, tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("time,voltage\n0,1\n1,nan\n2,1\n", "not finite, the first nan at sample 1"),
-        ("time,voltage\n0,1\n1,inf\n2,1\n", "not finite, the first inf at sample 1"),
-        ("time,voltage\n0,1\nnan,1\n2,1\n", "time has 1 sample(s) that are not finite"),
-        ("time,voltage\n0,1\n1,\n2,1\n", "'voltage' is empty in data row 2"),
-        ("time,voltage\n0,1\n1,x\n2,1\n", "'voltage' holds 'x', which is no number in data row 2"),
+        ("time,voltage\n0,1\n1,nan\n2,1\n", "'voltage' is empty or NaN in data row 2"),
+        ("time,voltage\n0,1\n1,inf\n2,1\n", "'voltage' holds inf in data row 2"),
+        ("time,voltage\n0,1\nnan,1\n2,1\n", "'time' is empty or NaN in data row 2"),
+        ("time,voltage\n0,1\n1,\n2,1\n", "'voltage' is empty or NaN in data row 2"),
+        ("time,voltage\n0,1\n1,x\n2,1\n", "'voltage' holds 'x', which is no number, in data row 2"),
         ("", "log.csv is empty"),
-        ("time,voltage\n", "log.csv: The voltage is empty"),
-        ("time,voltage\n0,1\n2,1\n1,1\n", "must increase, but goes from 2 s at sample 1 to 1 s"),
-        ("time,voltage\n0,1\n1,1\n1,1\n", "must increase, but goes from 1 s at sample 1 to 1 s"),
+        ("time,voltage\n", "log.csv has no rows of numbers"),
+        ("time,voltage\n0,1\n2,1\n1,1\n", "'time' goes back from 2.0 to 1.0 in data row 3"),
+        ("time,voltage\n0,1\n1,1\n1,1\n", "'time' has 1.0 twice, in data rows 2 and 3"),
         ("time,voltage\n0,1\n1,-10.5\n", "-10.5 V at 1 s, but the card takes ±10 V"),
         ("time,voltage\n0,1\n4e9,1\n", "check the unit of the time"),
         ("t,u\n0,1\n1,1\n", "no column 'time'; it has 't', 'u'"),
@@ -78,7 +105,7 @@ def test_clip(done, refused, tmp_path):
         ("time,voltage [bar]\n0,1\n1,1\n", "'bar', which does not measure the same as V"),
         ("time,voltage_furlongs\n0,1\n1,1\n", "'furlongs', which does not measure the same as V"),
         ("time [blinks],voltage\n0,1\n1,1\n", "unknown unit 'blinks'; give it in s"),
-        ("time,voltage\n0,1\n1\n2,3,4\n", "log.csv"),
+        ("time,voltage\n0,1\n1\n2,3,4\n", "data row 2 (line 3) has 1 field instead of 2"),
     ],
 )
 def test_a_bad_record_is_refused(refused, tmp_path, text, said):
@@ -92,7 +119,7 @@ def test_a_bad_record_is_refused(refused, tmp_path, text, said):
 def test_a_broken_parquet_is_refused(refused, tmp_path):
     (tmp_path / "log.parquet").write_text("not parquet")
     sentence = refused("simulate", "hoist", "log.parquet", "--interpolation", "linear")
-    assert "log.parquet cannot be read as a table" in sentence
+    assert "log.parquet is no Parquet file" in sentence
 
 
 def test_interpolation_must_be_chosen(refused, tmp_path):
@@ -107,8 +134,8 @@ def test_interpolation_must_be_chosen(refused, tmp_path):
     [
         ("none.csv", "There is no file none.csv"),
         ("sub/none.parquet", "There is no file sub/none.parquet"),
-        ("log.txt", "log.txt ends in '.txt'; a record is read from .csv or .parquet"),
-        ("log.xlsx", "log.xlsx ends in '.xlsx'"),
+        ("none.txt", "There is no file none.txt"),
+        ("log.xlsx", "log.xlsx ends in '.xlsx'; a log is read from .csv, .tsv, .txt"),
         ("sub/log", "sub/log ends in ''"),
         ("log", "log ends in ''"),
     ],
@@ -121,4 +148,4 @@ def test_a_file_that_is_none(refused, tmp_path, name, said):
 def test_a_folder_is_no_record(refused, tmp_path):
     (tmp_path / "log.csv").mkdir()
     sentence = refused("simulate", "hoist", "log.csv", "--interpolation", "linear")
-    assert "log.csv is a folder, not a table." in sentence
+    assert "log.csv is a folder, not a log." in sentence

@@ -3,6 +3,7 @@ import polars as pl
 import pytest
 
 from swashplate import InputError, maneuvers
+from swashplate.logs import TextOptions
 
 
 def test_recorded_holds_the_previous_row():
@@ -51,6 +52,14 @@ def test_recorded_file(tmp_path):
     assert m.name == "log.csv"
     assert m.length == 2.0
     assert m([0.25, 2.0]).tolist() == [2.0, -1.5]
+
+
+def test_recorded_file_with_options(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time;voltage\n0;1,250\n1;2,500\n", "utf-8")
+    options = TextOptions(decimal=",")
+    m = maneuvers.recorded_file(path, interpolation="previous", options=options)
+    assert m([0.0, 1.0]).tolist() == [1.25, 2.5]
 
 
 def test_a_manoeuvre_of_months_is_refused():

@@ -134,14 +134,16 @@ def simulated(drive: Drive, command: str, options: Options) -> tuple[str, Simula
 
 
 def _is_file(word: str, drive: Drive) -> bool:
-    if word.lower().endswith((".csv", ".parquet", ".pq")):
+    from swashplate.logs import SUFFIXES
+
+    if word.lower().endswith(SUFFIXES):
         return True
     head = word.partition(":")[0]  # stairs:2/4/0 is no path
     return "/" in head or _ENDING.search(head) is not None or Path(word).is_file()
 
 
 def _simulated_file(drive: Drive, path: str, options: Options) -> Simulation:
-    from swashplate.tables import read_series
+    from swashplate.logs import read_series
 
     series = read_series(path, options.column, "V", time_column=options.time_column)
     if options.interpolation is None:

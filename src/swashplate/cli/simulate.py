@@ -45,8 +45,9 @@ def simulate(
         str,
         typer.Argument(
             metavar="MANEUVER|FILE",
-            help='A manoeuvre such as step:9 or "step +9 V", or a .csv or .parquet file with a '
-            "header and columns of time and voltage; a column may carry its unit: 'time \\[ms]'.",
+            help='A manoeuvre such as step:9 or "step +9 V", or a log with columns of time and '
+            "voltage: text such as .csv, .parquet, .mat, .h5, .tdms or .mf4; a column may carry "
+            "its unit: 'time \\[ms]'.",
             show_default=False,
         ),
     ],

@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from swashplate.errors import InputError
+from swashplate.logs import TextOptions, read_series
 from swashplate.maneuvers.checks import positive, row
 from swashplate.maneuvers.curves import Array, interval
 from swashplate.maneuvers.pieces import Maneuver, Piece
-from swashplate.tables import read_series
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,25 +98,29 @@ def recorded_file(
     length: float | None = None,
     column: str = "voltage",
     time_column: str = "time",
+    options: TextOptions | None = None,
 ) -> Maneuver:
-    """Voltage from a log's file, CSV or Parquet; see `recorded` and `tables.read_series`.
+    """Voltage from a log's file, of any format that `logs.open_log` reads; see `recorded`.
 
     Parameters
     ----------
     path : path
-        A table with a header; a unit may stand in it, as in ``voltage [mV]``.
+        A log; a unit may stand in its header, as in ``voltage [mV]``.
     column, time_column : str
         Names of the columns.
     interpolation, length :
         As in `recorded`.
+    options : TextOptions, optional
+        How a text file is written, where that cannot be told from it.
 
     Raises
     ------
     FileError
-        If the file cannot be read; it names file and row.
+        If the file cannot be read, a number is missing or time stamps do not increase; it names
+        file, column and row.
     InputError
         If a column is missing or its unit wrong, or as in `recorded`.
     """
-    time, voltage = read_series(path, column, "V", time_column=time_column)
+    time, voltage = read_series(path, column, "V", time_column=time_column, options=options)
     recording = recorded(time, voltage, interpolation=interpolation, length=length)
     return replace(recording, name=Path(path).name)

@@ -1,0 +1,17 @@
+"""Reading log files: one format a module, columns by name, nothing read that is not asked for.
+
+`open_log` looks into a file, `Log.read` reads columns of it, `read_series` a signal over time in
+SI. A file that is damaged or hostile ends in one sentence, and nothing half-read is returned.
+"""
+
+from swashplate.logs.log import Column as Column
+from swashplate.logs.log import Log as Log
+from swashplate.logs.log import Reader as Reader
+from swashplate.logs.lookup import unit_of as unit_of
+from swashplate.logs.opening import SUFFIXES as SUFFIXES
+from swashplate.logs.opening import open_log as open_log
+from swashplate.logs.series import Series as Series
+from swashplate.logs.series import read_series as read_series
+from swashplate.logs.stamps import check_finite as check_finite
+from swashplate.logs.stamps import check_stamps as check_stamps
+from swashplate.logs.text.options import TextOptions as TextOptions

@@ -1,0 +1,142 @@
+"""Damaged and hostile files: whatever a library meets in one becomes one sentence."""
+
+from __future__ import annotations
+
+import csv
+import re
+import struct
+import warnings
+import zlib
+from pathlib import Path
+from types import TracebackType
+
+from swashplate.errors import FileError, SwashplateError
+
+DAMAGE = (
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    BufferError,
+    EOFError,
+    LookupError,
+    MemoryError,
+    OSError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+    csv.Error,
+    struct.error,
+    zlib.error,
+)
+"""What libraries raise at files that break their format's rules; it depends on the broken byte."""
+
+INFLATION = 1032
+"""No more bytes than this come out of one byte of zlib's; Parquet's codecs are no better."""
+
+
+class Reading:
+    """Context in which a file is read: errors of its format become one FileError.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    kind : str
+        What it is read as: ``MATLAB``.
+    more : tuple of exception types
+        What the library raises besides `DAMAGE`.
+    """
+
+    def __init__(self, path: Path, kind: str, more: tuple[type[BaseException], ...] = ()) -> None:
+        self.path = path
+        self.kind = kind
+        self.expected: tuple[type[BaseException], ...] = (*DAMAGE, *more)
+        self._warnings = warnings.catch_warnings()
+
+    def __enter__(self) -> None:
+        """Begin; what a library warns of is either refused here or of no concern."""
+        self._warnings.__enter__()
+        warnings.simplefilter("ignore")
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Turn an expected error into a FileError; let others pass."""
+        self._warnings.__exit__(kind, error, trace)
+        if error is None or isinstance(error, SwashplateError):
+            return
+        # some libraries raise the bare Exception, which has no name to be expected by
+        if isinstance(error, self.expected) or type(error) is Exception:
+            raise FileError(
+                f"{self.path} cannot be read as {self.kind}, it is damaged or of another kind: "
+                f"{said(error)}."
+            ) from None
+
+
+def said(error: BaseException) -> str:
+    """The first sentence of an error's message, or what it is."""
+    if isinstance(error, MemoryError):
+        return "it asks for more memory than there is"
+    lines = str(error).strip().splitlines()
+    first = printable(lines[0]) if lines else ""
+    sentence = re.split(r"[.!?;](?:\s|$)", first, maxsplit=1)[0].strip()[:200]
+    return sentence or type(error).__name__
+
+
+def printable(text: str) -> str:
+    """A text for a sentence: what cannot be printed is replaced."""
+    return "".join(each if each.isprintable() else "�" for each in text)
+
+
+def check_file(path: Path) -> int:
+    """Size in bytes of a file that can be read.
+
+    Raises
+    ------
+    FileError
+        If it is missing, a folder, not readable or empty.
+    """
+    try:
+        if path.is_dir():
+            reason = "is a folder, not a log"
+        elif path.exists() and not path.is_file():
+            reason = "is no ordinary file"
+        else:
+            with path.open("rb") as file:
+                size = file.seek(0, 2)
+            reason = "" if size else "is empty"
+    except FileNotFoundError:
+        raise FileError(f"There is no file {path}.") from None
+    except (OSError, ValueError) as error:
+        reason = f"cannot be read: {getattr(error, 'strerror', None) or said(error)}"
+    if reason:
+        raise FileError(f"{path} {reason}.")
+    return size
+
+
+def check_claim(path: Path, what: str, claimed: int, stored: int) -> None:
+    """Refuse what claims to hold more than its stored bytes can be unpacked to.
+
+    Parameters
+    ----------
+    what : str
+        What makes the claim, for the sentence.
+    claimed, stored : int
+        Bytes that it would take in memory, and that the file has for it.
+    """
+    if claimed > INFLATION * stored + 4096:
+        raise FileError(
+            f"{path}: {what} claims {claimed} bytes, more than the {stored} bytes stored for it "
+            "can hold; the file is damaged."
+        )
+
+
+def missing_extra(path: Path, library: str, extra: str) -> FileError:
+    """What to say where a library is not installed that this format needs."""
+    return FileError(
+        f"{path} needs the library {library}, which is not installed: "
+        f"pip install 'swashplate[{extra}]'."
+    )

@@ -1,0 +1,372 @@
+"""Damaged and hostile files: each ends in one sentence that names the file and the place."""
+
+import pickle
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import polars as pl
+import pytest
+import scipy.io
+from asammdf import MDF, Signal
+from nptdms import ChannelObject, TdmsWriter
+
+from swashplate import SwashplateError
+from swashplate.logs import open_log
+
+TIME = np.arange(100) / 8.0
+VOLTS = np.sin(TIME)
+
+
+def text(content: str | bytes) -> Callable[[Path], None]:
+    return lambda path: (
+        path.write_bytes(content if isinstance(content, bytes) else content.encode()) and None
+    )
+
+
+def rows(*more: str) -> Callable[[Path], None]:
+    """A plain table of a hundred rows, these lines in place of the rows from the third on."""
+    lines = ["time,voltage", *(f"{t},{u}" for t, u in zip(TIME, VOLTS, strict=True))]
+    lines[3 : 3 + len(more)] = more
+    return text("\n".join(lines) + "\n")
+
+
+def parquet(path: Path) -> None:
+    table = {"time": TIME, "voltage": VOLTS, "note": ["1"] * 99 + ["x"], "list": [[1.0]] * 100}
+    pl.DataFrame(table).write_parquet(path)
+
+
+def matlab4(path: Path) -> None:
+    scipy.io.savemat(path, {"time": TIME, "voltage": VOLTS}, format="4")
+
+
+def matlab5(path: Path, packed: bool = False) -> None:
+    contents = {
+        "time": TIME,
+        "voltage": VOLTS,
+        "z": TIME * 1j,
+        "cell": np.array(["a"], dtype=object),
+    }
+    scipy.io.savemat(path, contents, do_compression=packed)
+
+
+def matlab5_packed(path: Path) -> None:
+    matlab5(path, packed=True)
+
+
+def hdf5(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        file["time"] = TIME
+        file.create_dataset(
+            "voltage", data=VOLTS, chunks=(30,), compression="gzip", fletcher32=True
+        )
+
+
+def hdf5_of(**datasets: object) -> Callable[[Path], None]:
+    def write(path: Path) -> None:
+        with h5py.File(path, "w") as file:
+            for name, options in datasets.items():
+                file.create_dataset(name, **options)
+
+    return write
+
+
+def tdms(path: Path) -> None:
+    with TdmsWriter(path) as writer:
+        for _ in range(2):
+            channels = {"time": TIME, "voltage": VOLTS, "note": ["a"]}
+            writer.write_segment([ChannelObject("run", *each) for each in channels.items()])
+
+
+def mdf(path: Path) -> None:
+    with MDF(version="4.10") as file:
+        file.append([Signal(VOLTS, TIME, name="voltage"), Signal(VOLTS, TIME, name="current")])
+        file.save(path, overwrite=True)
+
+
+def cut(write: Callable[[Path], None], share: float) -> Callable[[Path], None]:
+    def damage(path: Path) -> None:
+        write(path)
+        content = path.read_bytes()
+        path.write_bytes(content[: int(share * len(content))])
+
+    return damage
+
+
+def changed(
+    write: Callable[[Path], None], place: int | bytes, new: bytes
+) -> Callable[[Path], None]:
+    """Bytes overwritten, at a place or behind a mark."""
+
+    def damage(path: Path) -> None:
+        write(path)
+        content = bytearray(path.read_bytes())
+        at = place if isinstance(place, int) else content.index(place) + len(place)
+        at = at if at >= 0 else len(content) + at
+        content[at : at + len(new)] = new
+        path.write_bytes(content)
+
+    return damage
+
+
+def bomb(path: Path) -> None:
+    """A compressed variable that claims a million times what is stored."""
+    inner = struct.pack("<II", 14, 1 << 31)
+    inner += struct.pack("<IIIIII", 6, 8, 6, 0, 5, 8) + struct.pack("<ii", 1, 1 << 28)
+    packed = zlib.compress(inner + bytes(1000))
+    header = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+    path.write_bytes(header + struct.pack("<II", 15, len(packed)) + packed)
+
+
+def impostor(path: Path) -> None:
+    path.write_bytes(pickle.dumps({"time": [0.0, 1.0], "voltage": [1.0, 2.0]}))
+
+
+def table_of(suffix: str) -> Callable[[Path], None]:
+    def write(path: Path) -> None:
+        other = path.with_name(f"other{suffix}")
+        {".parquet": parquet, ".h5": hdf5, ".tdms": tdms, ".mf4": mdf, ".mat": matlab5}[suffix](
+            other
+        )
+        other.rename(path)
+
+    return write
+
+
+def external(path: Path) -> None:
+    """Numbers that are said to be in another file."""
+    secret = path.with_name("secret.bin")
+    secret.write_bytes(bytes(800))
+    with h5py.File(path, "w") as file:
+        file["time"] = TIME
+        file.create_dataset("voltage", (100,), "f8", external=[(str(secret), 0, 800)])
+
+
+def linked(path: Path) -> None:
+    with h5py.File(path.with_name("secret.h5"), "w") as file:
+        file["voltage"] = VOLTS
+    with h5py.File(path, "w") as file:
+        file["time"] = TIME
+        file["voltage"] = h5py.ExternalLink("secret.h5", "voltage")
+
+
+def unwritten(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        file["time"] = TIME
+        file.create_dataset("voltage", (100,), "f8", chunks=(30,))[:30] = 1.0
+
+
+# name of the file, how it is made, what the sentence says
+DAMAGED = [
+    # text
+    ("empty.csv", text(""), "empty.csv is empty"),
+    ("blank.csv", text("\n\n \n"), "no rows of numbers, only comments and empty lines"),
+    ("comments.csv", text("# a\n% b\n"), "no rows of numbers, only comments and empty lines"),
+    ("header.csv", text("time,voltage\n"), "no rows of numbers, only 1 line of text"),
+    (
+        "prose.txt",
+        text("It was a dark\nand stormy night\n"),
+        "no rows of numbers, only 2 lines of text",
+    ),
+    (
+        "word.csv",
+        rows("0.25,x"),
+        "column 'voltage' holds 'x', which is no number, in data row 3 (line 4)",
+    ),
+    (
+        "first.csv",
+        text("time,voltage\nx,1\n1,2\n2,3\n"),
+        "'time' holds 'x', ... in data row 1 (line 2)",
+    ),
+    (
+        "firsts.csv",
+        text("time,voltage\nx,1\ny,1\n" + "1,2\n" * 30),
+        "'time' holds 'x', ... in data row 1",
+    ),
+    ("unit.csv", rows("0.25,1.5 V"), "'voltage' holds '1.5 V', ... in data row 3"),
+    ("hex.csv", rows("0.25,0x1F"), "'voltage' holds '0x1F', ... in data row 3"),
+    ("two.csv", rows("0.25,1.5.2"), "'voltage' holds '1.5.2', ... in data row 3"),
+    ("date.csv", rows("2024-01-01,1"), "'time' holds '2024-01-01', ... in data row 3"),
+    (
+        "long_cell.csv",
+        rows("0.25," + "9x" * 500),
+        "'voltage' holds '9x9x9x9x9x9x9x9x9x9x9x9x9x9x9x9x9x9x9... data row 3",
+    ),
+    ("control.csv", rows("0.25,\x1b[2J"), "control.csv has the byte 0x1b in line 4"),
+    ("short.csv", rows("0.25"), "data row 3 (line 4) has 1 field instead of 2"),
+    ("long.csv", rows("0.25,1,2"), "data row 3 (line 4) has 3 fields instead of 2"),
+    ("after.csv", rows("", "# on", "0.25"), "data row 3 (line 6) has 1 field instead of 2"),
+    ("gap.txt", text("a b c\n1 2 3\n1   3\n"), "data row 2 (line 3) has 2 fields instead of 3"),
+    (
+        "names.csv",
+        text("time,a,b\n0,1\n1,2\n2,3\n"),
+        "3 names in line 1, but 2 fields in the rows below",
+    ),
+    ("cut.csv", text("time,voltage\n0,1\n1,2\n2"), "data row 3 (line 4) has 1 field instead of 2"),
+    ("nul.csv", rows("\0\0\0\0"), "nul.csv has a NUL byte in line 4"),
+    (
+        "nuls.csv",
+        text("time,u\n" + "0,1\n" * 20000 + "\0" * 50 + "\n"),
+        "NUL byte in data row 20001 (line 20002)",
+    ),
+    (
+        "dots.csv",
+        text("a;b\n0,5;1,5\n1.5;2,5\n"),
+        "column 'a' holds '1.5', ... in data row 2 (line 3)",
+    ),
+    (
+        "thousands.csv",
+        text("a;b\n1,234;5\n2,345;6\n"),
+        "'1,234', where the comma may be a decimal sign",
+    ),
+    (
+        "grouped.csv",
+        text("a;b\n0,5;1,234,567\n0,6;1,234,568\n"),
+        "'b' holds '1,234,567', which is no number",
+    ),
+    (
+        "mixed.csv",
+        text("a;b\n1.5;0,5\n1.6;0,6\n"),
+        "decimal points in some columns and decimal commas",
+    ),
+    ("either.csv", text("voltage\n0,5\n1,5\n"), "can be read in more than one way, '0,5' as"),
+    ("open.csv", text('a,b\n1,"2\n3,4\n'), "a quote without its partner in data row 1 (line 2)"),
+    ("quotes.csv", text('a,b\n1,2\n3,"4"5\n'), "misplaced quotes in data row 2 (line 3)"),
+    ("over.csv", text('a,b\n1,2\n3,"4\n"\n'), "a quote without its partner in data row 2 (line 3)"),
+    ("tab.csv", text('a\tb\n1\t2\n3\t"4"5\n'), "misplaced quotes in data row 2 (line 3): '�'"),
+    ("name.csv", text("a\x1a,b\n1,2\nx,3\n"), "column 'a�' holds 'x', which is no number"),
+    ("wide.csv", text("time,u\n0,1\n".encode("utf-16")[:-1]), "is no text in utf-16-le"),
+    ("gzip.csv", text(b"\x1f\x8b\x08\x00" + bytes(50)), "ends in '.csv' but holds gzip"),
+    ("excel.csv", text(b"PK\x03\x04" + bytes(50)), "ends in '.csv' but holds Excel or zip"),
+    ("pickle.csv", impostor, "ends in '.csv' but holds Python pickle"),
+    ("parquet.csv", table_of(".parquet"), "ends in '.csv' but holds Parquet"),
+    ("random.csv", text(bytes(range(256)) * 4), "random.csv has a NUL byte in line 1"),
+    # Parquet
+    ("text.parquet", text("time,voltage\n0,1\n"), "text.parquet is no Parquet file"),
+    ("pickle.parquet", impostor, "ends in '.parquet' but holds Python pickle"),
+    ("hdf5.parquet", table_of(".h5"), "ends in '.parquet' but holds HDF5"),
+    ("cut.parquet", cut(parquet, 0.6), "cut.parquet has no end; it was cut off"),
+    ("foot.parquet", changed(parquet, -8, b"\xff\xff\xff\x7f"), "foot.parquet has no end"),
+    ("meta.parquet", changed(parquet, -60, b"\xff" * 40), "meta.parquet"),
+    (
+        "list.parquet",
+        lambda path: pl.DataFrame({"a": [[1.0]]}).write_parquet(path),
+        "no columns of numbers",
+    ),
+    ("note.parquet", parquet, "column 'note' holds 'x', which is no number, in data row 100"),
+    # MATLAB
+    ("pickle.mat", impostor, "ends in '.mat' but holds Python pickle"),
+    ("text.mat", text("time,voltage\n0,1\n"), "text.mat is no MATLAB file"),
+    ("tiny.mat", text(b"\0"), "tiny.mat is no MATLAB file"),
+    ("head.mat", text(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"), "no vectors of numbers"),
+    (
+        "version.mat",
+        text(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x09IM"),
+        "unknown version 0x0900",
+    ),
+    ("four.mat", cut(matlab4, 0.7), "'voltage' claims 800 bytes, but only ... are left"),
+    (
+        "four_size.mat",
+        changed(matlab4, 4, b"\xff\xff\xff\x7f"),
+        "'time' claims 1717986917600 bytes, but",
+    ),
+    ("four_type.mat", changed(matlab4, 0, b"\x63\x00\x00\x00"), "four_type.mat is no MATLAB file"),
+    (
+        "five.mat",
+        cut(matlab5, 0.5),
+        "the variable at byte ... claims ... bytes, but only ... are left",
+    ),
+    (
+        "five_size.mat",
+        changed(matlab5, 132, b"\xff\xff\xff\x7f"),
+        "at byte 128 claims 2147483647 bytes",
+    ),
+    ("five_shape.mat", changed(matlab5, 160, b"\xff\xff\xff\x7f"), "'time' has 800 bytes for"),
+    ("five_tag.mat", changed(matlab5, 128, b"\x63"), "has no variable at byte 128"),
+    ("packed.mat", cut(matlab5_packed, 0.8), "bytes, but only ... are left"),
+    ("zlib.mat", changed(matlab5_packed, 400, b"\xff" * 9), "cannot be read as MATLAB"),
+    ("bomb.mat", bomb, "the variable at byte 128 claims 2147483648 bytes, more than"),
+    ("cell.mat", matlab5, "'cell' cannot be read as numbers: it is a MATLAB cell"),
+    ("complex.mat", matlab5, "'z' cannot be read as numbers: it holds complex numbers"),
+    (
+        "seven.mat",
+        text(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"),
+        "but no HDF5; it is damaged",
+    ),
+    ("seven_cut.mat", cut(hdf5, 0.5), "seven_cut.mat cannot be read as HDF5, it is damaged"),
+    # HDF5
+    ("text.h5", text("time,voltage\n0,1\n"), "text.h5 is no HDF5 file"),
+    ("pickle.h5", impostor, "ends in '.h5' but holds Python pickle"),
+    ("cut.h5", cut(hdf5, 0.7), "cut.h5 cannot be read as HDF5, it is damaged ...truncated"),
+    ("block.h5", changed(hdf5, b"x^", b"\xff" * 20), "block.h5 cannot be read as HDF5"),
+    (
+        "huge.h5",
+        hdf5_of(voltage={"shape": (10**12,), "dtype": "f8", "chunks": (1000,)}),
+        "'/voltage' claims 1000000000000 numbers, but none is stored",
+    ),
+    ("unwritten.h5", unwritten, "'/voltage' has only 1 of its 4 blocks"),
+    (
+        "external.h5",
+        external,
+        "'/voltage' cannot be read as numbers: its numbers are in other files",
+    ),
+    ("linked.h5", linked, "linked.h5 has no column 'voltage'; it has '/time'"),
+    (
+        "words.h5",
+        hdf5_of(voltage={"data": ["a", "b"]}),
+        "no columns of numbers; '/voltage': it holds text",
+    ),
+    ("complex.h5", hdf5_of(voltage={"data": TIME * 1j}), "'/voltage': it holds complex numbers"),
+    ("empty.h5", hdf5_of(voltage={"shape": (0,), "dtype": "f8"}), "'/voltage': it is empty"),
+    ("cube.h5", hdf5_of(voltage={"data": np.ones((3, 3, 3))}), "'/voltage': it has 3 dimensions"),
+    # TDMS
+    ("text.tdms", text("time,voltage\n0,1\n"), "text.tdms is no TDMS file"),
+    ("pickle.tdms", impostor, "ends in '.tdms' but holds Python pickle"),
+    ("cut.tdms", cut(tdms, 0.9), "cut.tdms was cut off: the segment at byte ... is not complete"),
+    ("head.tdms", text(b"TDSm" + bytes(9)), "head.tdms was cut off at byte 13"),
+    ("next.tdms", changed(tdms, 12, b"\x40"), "next.tdms is damaged at byte"),
+    ("open.tdms", changed(tdms, 12, b"\xff" * 8), "open.tdms was cut off"),
+    (
+        "count.tdms",
+        changed(tdms, b"\x14\x00\x00\x00\x0a\x00\x00\x00\x01\x00\x00\x00", b"\x50"),
+        "count.tdms cannot be read as TDMS",
+    ),
+    ("name.tdms", changed(tdms, 32, b"\xff\xff\xff\x7f"), "claims 2147483647 bytes"),
+    ("note.tdms", tdms, "'note' cannot be read as numbers: it holds text"),
+    # MDF
+    ("text.mf4", text("time,voltage\n0,1\n"), "text.mf4 is no MDF file"),
+    ("pickle.mf4", impostor, "ends in '.mf4' but holds Python pickle"),
+    ("three.mf4", text(b"MDF     3.30    ".ljust(64, b"\0")), "is MDF '3.30'; convert it to MDF 4"),
+    (
+        "unfinished.mf4",
+        text(b"UnFinMF 4.10    ".ljust(64, b"\0")),
+        "was not finished by its logger",
+    ),
+    ("cut.mf4", cut(mdf, 0.5), "cut.mf4"),
+    ("cut_data.mf4", cut(mdf, 0.05), "cut_data.mf4"),
+    ("rows.mf4", changed(mdf, b"##CG", b"\xff" * 90), "rows.mf4"),
+]
+
+
+def read(path: Path, wanted: list[str]) -> None:
+    """All columns of a file and those that it may have left out."""
+    log = open_log(path)
+    log.read([column.name for column in log.columns] + wanted)
+
+
+@pytest.mark.parametrize(("name", "write", "said"), DAMAGED, ids=[each[0] for each in DAMAGED])
+def test_a_damaged_file_ends_in_one_sentence(tmp_path, name, write, said):
+    path = tmp_path / name
+    write(path)
+    with pytest.raises(SwashplateError) as caught:
+        read(path, [each for each in ("voltage", "note", "cell", "z") if each in said])
+    sentence = str(caught.value)
+    assert name in sentence
+    for part in said.split("..."):
+        assert part in sentence
+    assert sentence.isprintable()
+    assert sentence.endswith(".")
+    assert ". " not in sentence, "more than one sentence"

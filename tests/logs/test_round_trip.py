@@ -1,0 +1,334 @@
+"""What was written is what is read, to the last bit."""
+
+import datetime
+
+import h5py
+import numpy as np
+import polars as pl
+import pytest
+import scipy.io
+from asammdf import MDF, Signal
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
+
+from swashplate.logs import Column, TextOptions, open_log
+
+TIME = np.arange(60) / 7.0
+NOISE = np.random.default_rng(3).normal(size=(60, 3))
+MISSING = st.just(float("nan"))
+tables = st.integers(2, 4).flatmap(
+    lambda width: st.lists(
+        st.tuples(*[st.one_of(st.floats(), MISSING)] * width), min_size=1, max_size=20
+    )
+)
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return tmp_path_factory.mktemp("logs") / "log.csv"
+
+
+def same(read, written):
+    """Equal to the last bit, signs of zeros included; any NaN for any NaN."""
+    read, written = np.asarray(read), np.asarray(written, np.float64)
+    assert read.dtype == np.float64
+    assert read.shape == written.shape
+    missing = np.isnan(written)
+    assert np.array_equal(np.isnan(read), missing)
+    assert np.array_equal(read[~missing].view(np.int64), written[~missing].view(np.int64))
+
+
+@settings(max_examples=150)
+@given(
+    rows=tables,
+    layout=st.sampled_from(
+        [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (" ", "."), ("|", ",")]
+    ),
+    end=st.sampled_from(["\n", "\r\n"]),
+    encoding=st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "latin-1"]),
+    empty=st.booleans(),
+    quoted=st.booleans(),
+)
+def test_text(path, rows, layout, end, encoding, empty, quoted):
+    delimiter, decimal = layout
+    quote = '"' if quoted else ""
+    assume(not np.isnan(rows).all())
+    blank = empty and delimiter != " "  # between spaces nothing cannot be told from nothing at all
+
+    def cell(number: float) -> str:
+        word = "" if blank and np.isnan(number) else repr(number).replace(".", decimal)
+        return f"{quote}{word}{quote}"
+
+    names = [f"c{i} [µs]" if delimiter != " " else f"c{i}" for i in range(len(rows[0]))]
+    lines = [delimiter.join(names), *(delimiter.join(map(cell, row)) for row in rows)]
+    path.write_bytes((end.join(lines) + end).encode(encoding))
+    options = TextOptions(delimiter=delimiter, decimal=decimal, header_row=1)
+    read = open_log(path, options=options).read(names)
+    for name, column in zip(names, zip(*rows, strict=True), strict=True):
+        same(read[name], column)
+
+
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=3, max_size=30))
+def test_text_whose_layout_is_told(path, numbers):
+    for delimiter, decimal in ((",", "."), (";", ","), ("\t", "."), (" ", ".")):
+        rows = [(f"{0.5 + i}", repr(number)) for i, number in enumerate(numbers)]
+        lines = [delimiter.join(row).replace(".", decimal) for row in (("time", "voltage"), *rows)]
+        path.write_text("\n".join(lines) + "\n", "utf-8")
+        same(open_log(path).read(["voltage"])["voltage"], numbers)
+
+
+@given(st.lists(st.decimals(-(10**9), 10**9, places=9), min_size=2, max_size=30))
+def test_decimal_fractions_are_the_nearest_doubles(path, numbers):
+    path.write_text("time,u\n" + "".join(f"0.5,{n:f}\n" for n in numbers), "utf-8")
+    same(open_log(path).read(["u"])["u"], [float(n) for n in numbers])
+
+
+KINDS = [np.float64, np.float32, np.int8, np.int16, np.int32, np.uint8, np.uint16, np.uint32, bool]
+
+
+@settings(max_examples=60)
+@given(
+    arrays=st.integers(1, 20).flatmap(
+        lambda size: st.lists(
+            st.sampled_from(KINDS).flatmap(lambda kind: hnp.arrays(kind, size)),
+            min_size=1,
+            max_size=3,
+        )
+    ),
+    compression=st.sampled_from(["uncompressed", "zstd", "snappy", "lz4", "gzip"]),
+)
+def test_parquet(path, arrays, compression):
+    log = path.with_suffix(".parquet")
+    table = {f"c{i}": array for i, array in enumerate(arrays)}
+    pl.DataFrame(table).write_parquet(log, compression=compression)
+    for name, read in open_log(log).read(list(table)).items():
+        same(read, table[name])
+
+
+def test_parquet_of_dates_and_texts(tmp_path):
+    begin = datetime.datetime(2024, 1, 1)
+    table = {
+        "date [s]": [begin, None, begin + datetime.timedelta(seconds=1, microseconds=5)],
+        "lasted": [datetime.timedelta(milliseconds=1500), None, datetime.timedelta(0)],
+        "text": ["1.5", " 2e3 ", None],
+    }
+    pl.DataFrame(table).write_parquet(tmp_path / "log.parquet")
+    log = open_log(tmp_path / "log.parquet")
+    assert log.columns == (Column("date [s]", "s"), Column("lasted", "s"), Column("text", None))
+    assert log.notes == ("'date [s]' holds dates, read as seconds since the first.",)
+    read = log.read(list(table))
+    same(read["date [s]"], [0.0, np.nan, 1.000005])
+    same(read["lasted"], [1.5, np.nan, 0.0])
+    same(read["text"], [1.5, 2000.0, np.nan])
+
+
+STRUCTURE = {
+    "t": TIME,
+    "column": TIME[:, None],
+    "x": NOISE,
+    "y": NOISE.T,
+    "one": 2.5,
+    "whole": np.arange(60, dtype=np.int16) - 7,
+    "single": NOISE[:, 0].astype(np.float32),
+    "on": NOISE[:, 0] > 0.0,
+}
+
+
+@pytest.mark.parametrize("form", ["4", "5", "5 packed"])
+def test_matlab(tmp_path, form):
+    contents = dict(STRUCTURE)
+    if form != "4":
+        contents["s"] = {"t": TIME, "deep": {"x": NOISE}}
+    file = tmp_path / "log.mat"
+    scipy.io.savemat(file, contents, format=form[0], do_compression="packed" in form, oned_as="row")
+    log = open_log(file)
+    assert log.format == f"MATLAB {form[0]}"
+    expected = {
+        **{
+            name: np.ravel(STRUCTURE[name])
+            for name in ("t", "column", "one", "whole", "single", "on")
+        },
+        **{f"x(:,{i + 1})": NOISE[:, i] for i in range(3)},
+        **{f"y({i + 1},:)": NOISE[:, i] for i in range(3)},
+    }
+    if form != "4":
+        expected |= {"s.t": TIME, **{f"s.deep.x(:,{i + 1})": NOISE[:, i] for i in range(3)}}
+    read = log.read([column.name for column in log.columns])
+    assert read.keys() == expected.keys()
+    for name, array in expected.items():
+        same(read[name], array)
+
+
+def test_matlab_keeps_its_largest_integers_as_near_as_doubles_go(tmp_path):
+    numbers = np.array([2**53, 2**62 + 1, -(2**63)], dtype=np.int64)
+    scipy.io.savemat(tmp_path / "log.mat", {"i": numbers})
+    same(open_log(tmp_path / "log.mat").read(["i"])["i"], [2.0**53, 2.0**62, -(2.0**63)])
+
+
+def test_matlab_73(tmp_path):
+    """As MATLAB writes it: HDF5 behind a header of 512 bytes, dimensions in reverse."""
+    file = tmp_path / "log.mat"
+    with h5py.File(file, "w", userblock_size=512) as written:
+        for name, array in {
+            "t": TIME[:, None],
+            "x": NOISE.T,
+            "y": NOISE,
+            "s/u": TIME[None],
+        }.items():
+            written.create_dataset(name, data=array, chunks=True, compression="gzip")
+            written[name].attrs["MATLAB_class"] = np.bytes_("double")
+        written["s"].attrs["MATLAB_class"] = np.bytes_("struct")
+        written["n"] = np.frombuffer(b"a\0b\0", np.uint16)[:, None]
+        written["n"].attrs["MATLAB_class"] = np.bytes_("char")
+        written["e"] = np.array([0, 0], np.uint64)
+        written["e"].attrs["MATLAB_class"] = np.bytes_("double")
+        written["e"].attrs["MATLAB_empty"] = np.uint8(1)
+        written["#refs#/a"] = TIME
+    content = bytearray(file.read_bytes())
+    content[:128] = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
+    file.write_bytes(content)
+    log = open_log(file)
+    assert log.format == "MATLAB 7.3"
+    assert log.left_out == {"n": "it is a MATLAB char", "e": "it is empty"}
+    expected = {
+        "t": TIME,
+        "s.u": TIME,
+        **{f"x(:,{i + 1})": NOISE[:, i] for i in range(3)},
+        **{f"y({i + 1},:)": NOISE[:, i] for i in range(3)},
+    }
+    read = log.read([column.name for column in log.columns])
+    assert read.keys() == expected.keys()
+    for name, array in expected.items():
+        same(read[name], array)
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"chunks": (3, 2), "compression": "gzip", "shuffle": True}]
+)
+def test_hdf5(tmp_path, options):
+    file = tmp_path / "log.h5"
+    with h5py.File(file, "w") as written:
+        written.attrs["operator"] = "me"
+        written["run/time [ms]"] = TIME
+        written["run/counts"] = np.arange(60, dtype=np.uint16)
+        written["run/counts"].attrs["unit"] = "1"
+        written.create_dataset("run/x", data=NOISE, **options).attrs["units"] = ["V", "A", "bar"]
+        written.create_dataset("y", data=np.ascontiguousarray(NOISE.T), **options)
+        written["table"] = np.rec.fromarrays([TIME, NOISE[:, 0]], names="t,u")
+        written["on"] = NOISE[:, 0] > 0.0
+    log = open_log(file)
+    assert log.comments == ("operator: me",)
+    units = {column.name: column.unit for column in log.columns}
+    assert units["/run/time [ms]"] == "ms"
+    assert [units[f"/run/x[:,{i}]"] for i in range(3)] == ["V", "A", "bar"]
+    expected = {
+        "/run/time [ms]": TIME,
+        "/run/counts": np.arange(60),
+        "/on": NOISE[:, 0] > 0.0,
+        "/table.t": TIME,
+        "/table.u": NOISE[:, 0],
+        **{f"/run/x[:,{i}]": NOISE[:, i] for i in range(3)},
+        **{f"/y[{i},:]": NOISE[:, i] for i in range(3)},
+    }
+    read = log.read(list(units))
+    assert read.keys() == expected.keys()
+    for name, array in expected.items():
+        same(read[name], array)
+
+
+def test_tdms(tmp_path):
+    file = tmp_path / "log.tdms"
+    waveform = {"unit_string": "V", "wf_increment": 0.125, "wf_start_offset": 2.0}
+    with TdmsWriter(file) as writer:
+        for part in (slice(0, 25), slice(25, 60)):
+            writer.write_segment(
+                [
+                    RootObject({"operator": "me"}),
+                    GroupObject("run"),
+                    ChannelObject("run", "voltage", NOISE[part, 0], waveform),
+                    ChannelObject("run", "counts", np.arange(60, dtype=np.int16)[part]),
+                    ChannelObject("run", "single", NOISE[part, 1].astype(np.float32)),
+                    ChannelObject("run", "note", ["a"]),
+                ]
+            )
+    log = open_log(file)
+    assert log.comments == ("operator: me",)
+    assert log.left_out == {"note": "it holds text"}
+    assert log.columns == (
+        Column("voltage", "V"),
+        Column("counts", None),
+        Column("single", None),
+        Column("time", "s"),
+    )
+    read = log.read(["voltage", "counts", "single", "time"])
+    same(read["voltage"], NOISE[:, 0])
+    same(read["counts"], np.arange(60))
+    same(read["single"], NOISE[:, 1].astype(np.float32))
+    same(read["time"], 2.0 + 0.125 * np.arange(60))
+
+
+def test_tdms_of_several_groups_and_dates(tmp_path):
+    file = tmp_path / "log.tdms"
+    dates = np.datetime64("2024-01-01") + np.arange(60) * np.timedelta64(125, "ms")
+    with TdmsWriter(file) as writer:
+        writer.write_segment(
+            [
+                ChannelObject("fast", "voltage", NOISE[:, 0]),
+                ChannelObject("fast", "stamp", dates.astype("M8[us]")),
+                ChannelObject("slow", "voltage", NOISE[:9, 1]),
+            ]
+        )
+    log = open_log(file)
+    names = ["fast/voltage", "fast/stamp", "slow/voltage"]
+    assert [column.name for column in log.columns] == names
+    read = log.read(names)
+    same(read["fast/voltage"], NOISE[:, 0])
+    same(read["fast/stamp"], np.arange(60) / 8.0)
+    same(read["slow/voltage"], NOISE[:9, 1])
+
+
+@pytest.mark.parametrize("compression", [0, 2])
+def test_mdf(tmp_path, compression):
+    file = tmp_path / "log.mf4"
+    invalid = np.arange(60) % 7 == 0
+    with MDF(version="4.10") as written:
+        written.append(
+            [
+                Signal(NOISE[:, 0], TIME, name="voltage", unit="V"),
+                Signal(np.arange(60, dtype=np.uint16), TIME, name="counts"),
+                Signal(
+                    np.arange(60, dtype=np.uint8),
+                    TIME,
+                    name="scaled",
+                    conversion={"a": 0.5, "b": 1.0},
+                ),
+                Signal(NOISE[:, 2], TIME, name="gaps", invalidation_bits=invalid),
+                Signal(np.array([b"on"] * 60), TIME, name="note", encoding="utf-8"),
+            ]
+        )
+        written.save(file, overwrite=True, compression=compression)
+    log = open_log(file)
+    assert log.left_out == {"note": "it holds text or bytes"}
+    units = {column.name: column.unit for column in log.columns}
+    assert units == {"time": "s", "voltage": "V", "counts": None, "scaled": None, "gaps": None}
+    read = log.read(list(units))
+    same(read["time"], TIME)
+    same(read["voltage"], NOISE[:, 0])
+    same(read["counts"], np.arange(60))
+    same(read["scaled"], 0.5 * np.arange(60) + 1.0)
+    same(read["gaps"], np.where(invalid, np.nan, NOISE[:, 2]))
+
+
+def test_mdf_of_several_groups(tmp_path):
+    file = tmp_path / "log.mf4"
+    with MDF(version="4.10") as written:
+        written.append([Signal(NOISE[:, 0], TIME, name="voltage")])
+        written.append([Signal(NOISE[:9, 1], TIME[:9], name="pressure")])
+        written.save(file, overwrite=True)
+    read = open_log(file).read(["group 0/time", "voltage", "group 1/time", "group 1/pressure"])
+    same(read["group 0/time"], TIME)
+    same(read["voltage"], NOISE[:, 0])
+    same(read["group 1/time"], TIME[:9])
+    same(read["group 1/pressure"], NOISE[:9, 1])

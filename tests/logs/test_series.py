@@ -1,0 +1,235 @@
+"""Columns by name, their units, and time series that can be computed with."""
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swashplate import FileError, InputError
+from swashplate.logs import (
+    Column,
+    Log,
+    TextOptions,
+    check_finite,
+    check_stamps,
+    read_series,
+    unit_of,
+)
+from swashplate.tables import write_table
+
+
+def log_of(*columns: Column, **left_out: str) -> Log:
+    def load(positions):
+        return [np.full(3, float(position)) for position in positions]
+
+    return Log(Path("log.xyz"), "test", columns, load, left_out=left_out)
+
+
+COLUMNS = [
+    Column("time [ms]", "ms"),
+    Column("speed (1/min)", "1/min"),
+    Column("voltage_mV"),
+    Column("x(1,:)"),
+    Column("fast/pressure [bar]", "bar"),
+    Column("fast/count"),
+    Column("slow/count"),
+    Column("u #1"),
+    Column("u #2"),
+]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "name"),
+    [
+        ("time [ms]", "time [ms]"),
+        ("time", "time [ms]"),
+        ("speed", "speed (1/min)"),
+        ("voltage", "voltage_mV"),
+        ("x(1,:)", "x(1,:)"),
+        ("pressure", "fast/pressure [bar]"),
+        ("pressure [bar]", "fast/pressure [bar]"),
+        ("slow/count", "slow/count"),
+    ],
+)
+def test_find(wanted, name):
+    log = log_of(*COLUMNS)
+    assert log.find(wanted).name == name
+    assert log.read([wanted])[wanted].tolist() == [COLUMNS.index(log.find(wanted))] * 3
+
+
+@pytest.mark.parametrize(
+    ("wanted", "said"),
+    [
+        ("x", r"log.xyz has no column 'x'; it has 'time \[ms\]', .*: name the one to take"),
+        ("Time", "no column 'Time'"),
+        ("count", "more than one 'count': 'fast/count', 'slow/count'; name the one"),
+        ("u", "no column 'u'"),
+    ],
+)
+def test_find_nothing_or_too_much(wanted, said):
+    with pytest.raises(InputError, match=said):
+        log_of(*COLUMNS).find(wanted)
+
+
+def test_names_that_occur_twice_are_refused():
+    log = log_of(Column("u"), Column("u"))
+    with pytest.raises(InputError, match="more than one 'u'"):
+        log.read(["u"])
+
+
+def test_what_was_left_out_says_why():
+    log = log_of(Column("a"), note="it holds text")
+    with pytest.raises(FileError, match="'note' cannot be read as numbers: it holds text"):
+        log.read(["a", "note"])
+
+
+def test_a_column_is_loaded_once():
+    asked = []
+
+    def load(positions):
+        asked.append(list(positions))
+        return [np.zeros(1) for _ in positions]
+
+    log = Log(Path("log.xyz"), "test", (Column("a [V]", "V"), Column("b")), load)
+    assert log.read(["b", "a", "a [V]", "b"]).keys() == {"a", "a [V]", "b"}
+    assert log.read([]) == {}
+    assert asked == [[1, 0]]
+
+
+def test_a_log_is_printable():
+    log = log_of(Column("a\0\n", "\x1b"), **{"b\0": "c\r"})
+    assert log.columns == (Column("a��", "�"),)
+    assert log.left_out == {"b�": "c�"}
+
+
+@pytest.mark.parametrize(
+    ("column", "wanted", "si", "unit"),
+    [
+        (Column("time [ms]", "ms"), "time", "s", "ms"),
+        (Column("n", "-"), "n", "1", "1"),
+        (Column("time_ms"), "time", "s", "ms"),
+        (Column("time_ms"), "time_ms", "s", "ms"),
+        (Column("time_start"), "time_start", "s", "s"),
+        (Column("voltage_A"), "voltage_A", "V", "V"),  # phase A: amperes measure no voltage
+        (Column("time"), "time", "s", "s"),
+    ],
+)
+def test_units(column, wanted, si, unit):
+    assert unit_of(column, wanted, si) == unit
+
+
+def written(path: Path, text: str) -> Path:
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_plain_columns_are_si(tmp_path):
+    path = written(tmp_path / "log.csv", "time,voltage,note\n0,1.5,a\n0.1,2,b\n")
+    series = read_series(path, "voltage", "V")
+    assert list(series.time) == [0.0, 0.1]
+    assert list(series.values) == [1.5, 2.0]
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "time [ms],voltage [mV]",
+        "time (ms),voltage (mV)",
+        "time_ms,voltage_mV",
+        "time,voltage\nms,mV",
+    ],
+)
+def test_units_are_converted(tmp_path, header):
+    path = written(tmp_path / "log.csv", f"{header}\n0,1500\n100,2000\n")
+    series = read_series(path, "voltage", "V")
+    np.testing.assert_allclose(series.time, [0.0, 0.1])
+    np.testing.assert_allclose(series.values, [1.5, 2.0])
+
+
+def test_units_with_another_zero(tmp_path):
+    path = written(tmp_path / "log.csv", "time,oil [degC]\n0,0\n1,20.5\n")
+    np.testing.assert_allclose(read_series(path, "oil", "K").values, [273.15, 293.65])
+
+
+def test_columns_by_their_full_name(tmp_path):
+    path = written(tmp_path / "log.csv", "t,u [mV]\n0,1500\n1,1\n")
+    series = read_series(path, "u [mV]", "V", time_column="t")
+    np.testing.assert_allclose(series.values, [1.5, 0.001])
+
+
+def test_options_of_text(tmp_path):
+    path = written(tmp_path / "log.csv", "t;u\n0;1,500\n1;2,500\n")
+    series = read_series(path, "u", "V", time_column="t", options=TextOptions(decimal=","))
+    assert list(series.values) == [1.5, 2.5]
+
+
+def test_parquet(tmp_path):
+    table = pl.DataFrame({"time": [0.0, 0.5], "voltage": [1, 2]})
+    write_table(table, tmp_path / "log.parquet")
+    assert list(read_series(tmp_path / "log.parquet", "voltage", "V").values) == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "sentence"),
+    [
+        ("", FileError, "log.csv is empty"),
+        ("time,volts\n0,1\n", InputError, "no column 'voltage'; it has 'time', 'volts'"),
+        ("t,voltage\n0,1\n", InputError, "no column 'time'"),
+        ("time,voltage [m]\n0,1\n", InputError, "'m', which does not measure the same as V"),
+        ("time,voltage\n0,1\n1,x\n", FileError, "'voltage' holds 'x', .* in data row 2"),
+        ("time,voltage\n0,1\n1,\n", FileError, "'voltage' is empty or NaN in data row 2;"),
+        (
+            "time,voltage\n0,1\n1,2,3\n",
+            FileError,
+            r"data row 2 \(line 3\) has 3 fields instead of 2",
+        ),
+        ("time,voltage\n0,1\n,2\n2,2\n", FileError, "'time' is empty or NaN in data row 2;"),
+        ("time,voltage\n0,1\n1,inf\n", FileError, "'voltage' holds inf in data row 2"),
+        (
+            "time,voltage\n0,1\n2,1\n1,1\n",
+            FileError,
+            "'time' goes back from 2.0 to 1.0 in data row 3",
+        ),
+        ("time,voltage\n0,1\n1,1\n1,1\n", FileError, "'time' has 1.0 twice, in data rows 2 and 3"),
+    ],
+)
+def test_bad_files_are_refused_in_a_sentence(tmp_path, text, error, sentence):
+    with pytest.raises(error, match=sentence) as caught:
+        read_series(written(tmp_path / "log.csv", text), "voltage", "V")
+    assert "\n" not in str(caught.value)
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [
+        ([0.0, NAN, NAN, NAN, 4.0], "'time' is empty or NaN in data rows 2 to 4; a number"),
+        ([NAN, 1.0, NAN, NAN, 4.0], "'time' is empty or NaN in data row 1 and 2 more; a number"),
+        ([0.0, 1.0, 2.0, 3.0, NAN], "'time' is empty or NaN in data row 5; a number"),
+        ([0.0, 1.0, -np.inf, 3.0, 4.0], "'time' holds -inf in data row 3; numbers must be finite"),
+        ([0.0, 1.0, 1.0, 1.0, 4.0], "1.0 twice, in data rows 2 and 3, the first of 2 such rows"),
+        ([4.0, 3.0, 2.0, 1.0, 0.0], "back from 4.0 to 3.0 in data row 2, the first of 4 such rows"),
+        ([], "'time' has no rows"),
+    ],
+)
+def test_stamps(numbers, said):
+    with pytest.raises(FileError, match=f"log.xyz: column .*{said}"):
+        check_stamps(log_of(), "time", np.array(numbers))
+
+
+def test_good_stamps_and_values():
+    check_stamps(log_of(), "time", np.array([0.0, 1e-300, 1.0]))
+    check_finite(log_of(), "u", np.array([1.0, 1.0, -1.0]))
+
+
+def test_columns_of_unequal_length(tmp_path):
+    import scipy.io
+
+    scipy.io.savemat(tmp_path / "log.mat", {"time": np.arange(5.0), "voltage": np.arange(4.0)})
+    with pytest.raises(
+        FileError, match="'time' has 5 rows and 'voltage' has 4; they must have as many"
+    ):
+        read_series(tmp_path / "log.mat", "voltage", "V")

@@ -1,0 +1,260 @@
+"""How text is written: delimiters, decimal signs, headers, units, comments, encodings."""
+
+import math
+
+import pytest
+
+from swashplate import FileError, InputError
+from swashplate.logs import Column, TextOptions, open_log
+
+ROWS = {"time": [0.0, 0.5], "voltage": [1.5, 2.5]}
+
+
+@pytest.mark.parametrize(
+    ("content", "form"),
+    [
+        ("time,voltage\n0,1.5\n0.5,2.5\n", "CSV, commas, decimal point"),
+        ("time,voltage\r\n0,1.5\r\n0.5,2.5\r\n", "CSV, commas, decimal point"),
+        ("time,voltage\r0,1.5\r0.5,2.5\r", "CSV, commas, decimal point"),
+        ("time,voltage\n0,1.5\n0.5,2.5", "CSV, commas, decimal point"),
+        ("time , voltage\n 0 , 1.5 \n 0.5 , 2.5 \n", "CSV, commas, decimal point"),
+        ("time;voltage\n0;1.5\n0.5;2.5\n", "CSV, semicolons, decimal point"),
+        ("time;voltage\n0;1,5\n0,5;2,5\n", "CSV, semicolons, decimal comma"),
+        ("time\tvoltage\n0\t1.5\n0.5\t2.5\n", "CSV, tabs, decimal point"),
+        ("time\tvoltage\n0\t1,5\n0,5\t2,5\n", "CSV, tabs, decimal comma"),
+        ("time voltage\n0 1.5\n0.5 2.5\n", "CSV, spaces, decimal point"),
+        ("  time  \t voltage\n  0    1.5  \n  0.5\t2.5\n", "CSV, spaces, decimal point"),
+        ("time voltage\n0,0 1,5\n0,5 2,5\n", "CSV, spaces, decimal comma"),
+        ("time|voltage\n0|1.5\n0.5|2.5\n", "CSV, bars, decimal point"),
+        ('"time","voltage"\n"0","1.5"\n"0.5","2.5"\n', "CSV, commas, decimal point"),
+        ('"time","voltage"\n"0,0","1,5"\n"0,5","2,5"\n', "CSV, commas, decimal comma"),
+        ("time,voltage\n+0e0,.15e1\n5.E-1,2.5e+00\n", "CSV, commas, decimal point"),
+        ("# time,voltage\n0,1.5\n0.5,2.5\n", "CSV, commas, decimal point"),
+        (
+            "% by hand\n\ntime,voltage\n\n0,1.5\n// a pause\n\n0.5,2.5\n\n",
+            "CSV, commas, decimal point",
+        ),
+        (
+            "Hoist, harbour\nRate\t512\n\ntime\tvoltage\n0\t1.5\n0.5\t2.5\n",
+            "CSV, tabs, decimal point",
+        ),
+        ("time;voltage;\n0;1,5;\n0,5;2,5;\n", "CSV, semicolons, decimal comma"),
+        ("time;voltage\n0;1,5;\n0,5;2,5;\n", "CSV, semicolons, decimal comma"),
+        ("time,voltage\n0,1.5\n0.5,2.5\n\x1a", "CSV, commas, decimal point"),
+    ],
+)
+def test_layout_is_told_from_the_rows(text, all_of, content, form):
+    log = text(content)
+    assert log.format == form
+    read = all_of(log)
+    assert {name: read[name] for name in ROWS} == ROWS
+
+
+@pytest.mark.parametrize(
+    ("encoding", "said"),
+    [
+        ("utf-8", ""),
+        ("utf-8-sig", ""),
+        ("utf-16", ", UTF-16"),
+        ("utf-16-le", ", UTF-16"),
+        ("utf-16-be", ", UTF-16-BE"),
+        ("latin-1", ", Latin-1"),
+    ],
+)
+def test_encodings(text, all_of, encoding, said):
+    log = text("time [µs];α\n0;1,5\n0,5;2,5\n".replace("α", "é"), encoding=encoding)
+    assert log.columns == (Column("time [µs]", "µs"), Column("é"))
+    assert log.format == f"CSV, semicolons, decimal comma{said}"
+    assert all_of(log) == {"time [µs]": [0.0, 0.5], "é": [1.5, 2.5]}
+
+
+def test_an_encoding_that_must_be_given(text, all_of):
+    log = text("α,β\n0,1.5\n", encoding="iso8859-7")
+    assert [column.name for column in log.columns] == ["á", "â"]  # as Latin-1, for want of better
+    log = open_log(log.path, options=TextOptions(encoding="iso8859-7"))
+    assert all_of(log) == {"α": [0.0], "β": [1.5]}
+    log = text("あ,い\n0,1.5\n", encoding="cp932")
+    log = open_log(log.path, options=TextOptions(encoding="cp932"))
+    assert all_of(log) == {"あ": [0.0], "い": [1.5]}
+
+
+@pytest.mark.parametrize(
+    ("content", "units"),
+    [
+        ("time [s],voltage (mV),n\n0,1.5,2\n", ["s", "mV", None]),
+        ("time,voltage,n\ns,mV,-\n0,1.5,2\n", ["s", "mV", "-"]),
+        ("time,voltage,n\n[s],[mV],\n0,1.5,2\n", ["s", "mV", None]),
+        ("time,voltage,n\ns,mV,1\n0,1.5,2\n", ["s", "mV", "1"]),
+        ("time,speed,pressure\nms,1/min,N/mm²\n0,1.5,2\n", ["ms", "1/min", "N/mm²"]),
+        ("time [s] voltage [mV]\n0 1.5\n", ["s", "mV"]),
+        ("# time,voltage\n# s,mV\n0,1.5\n", ["s", "mV"]),
+        ("time_ms,voltage_mV\n0,1.5\n", [None, None]),
+    ],
+)
+def test_units_of_the_header(text, content, units):
+    assert [column.unit for column in text(content).columns] == units
+
+
+def test_a_second_row_of_names_is_no_row_of_units(text):
+    log = text("Motor,Motor,Pump\nspeed,torque,pressure\n0,1,2\n3,4,5\n")
+    assert [column.name for column in log.columns] == ["speed", "torque", "pressure"]
+    assert log.comments == ("Motor,Motor,Pump",)
+    assert log.notes == ("Taken as text above the table: line 1.",)
+
+
+def test_no_header(text, all_of):
+    log = text("0,1.5\n0.5,2.5\n")
+    assert all_of(log) == {"column 1": [0.0, 0.5], "column 2": [1.5, 2.5]}
+    assert log.notes == ("There is no header; the columns are called by their positions.",)
+
+
+def test_names_that_are_numbers(text):
+    log = text("time,1,2,3\n0,1,2,3\n1,2,3,4\n")
+    assert [column.name for column in log.columns] == ["time", "1", "2", "3"]
+
+
+def test_names_without_text_and_names_twice(text):
+    log = text("time,,v,v\n0,1,2,3\n1,2,3,4\n")
+    assert [column.name for column in log.columns] == ["time", "column 2", "v #1", "v #2"]
+    assert log.notes == ("Columns of the same name are numbered: 'name #1', 'name #2'.",)
+
+
+def test_comments_and_notes(text):
+    log = text("# hoist\nRun 3\ntime,voltage\n# on\n0,1\n# off\n1,2")
+    assert log.comments == ("# hoist", "Run 3", "# on")
+    assert log.notes == (
+        "Taken as text above the table: line 2.",
+        "The last line has no end; if the file was cut off, the last number may be short.",
+    )
+
+
+def test_names_in_a_comment(text):
+    log = text("# by NumPy\n# time voltage\n0.0 1.0\n1.0 2.0\n")
+    assert [column.name for column in log.columns] == ["time", "voltage"]
+    assert log.notes == ("The names of the columns are from the comment in line 2.",)
+
+
+LABVIEW = (
+    "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\n"
+    "Decimal_Separator\t,\nMulti_Headings\tNo\nX_Columns\tOne\nTime_Pref\tAbsolute\n"
+    "Operator\tme\nDate\t2008/10/06\nTime\t15:56:00,0\n***End_of_Header***\t\n\t\n"
+    "Channels\t2\t\t\nSamples\t3\t3\t\nDate\t2008/10/06\t2008/10/06\t\nTime\t15:56\t15:56\t\n"
+    "Y_Unit_Label\tVolts\tmA\t\nX_Dimension\tTime\tTime\t\nX0\t0,0E+0\t0,0E+0\t\n"
+    "Delta_X\t0,1\t0,1\t\n***End_of_Header***\t\t\t\nX_Value\tVoltage\tCurrent\tComment\n"
+    "0,000000\t-1,0\t2,0\n0,100000\t-1,5\t2,5\n0,200000\t-2,5\t1E-3\n"
+)
+
+
+def test_labview(text, all_of):
+    log = text(LABVIEW, "log.lvm")
+    assert log.format == "CSV, tabs, decimal comma"
+    assert log.columns == (
+        Column("X_Value", "s"),
+        Column("Voltage", "Volts"),
+        Column("Current", "mA"),
+    )
+    assert all_of(log) == {
+        "X_Value": [0.0, 0.1, 0.2],
+        "Voltage": [-1.0, -1.5, -2.5],
+        "Current": [2.0, 2.5, 0.001],
+    }
+    assert "Operator\tme".replace("\t", "�") in log.comments
+
+
+def test_missing_and_infinite_numbers(text):
+    words = [
+        "",
+        " ",
+        "NaN",
+        "nan",
+        "-NAN",
+        "n/a",
+        "#N/A",
+        "null",
+        "1.#QNAN",
+        "-1.#IND",
+        "-nan(ind)",
+    ]
+    log = text("time,u\n" + "".join(f"{i},{word}\n" for i, word in enumerate(words)) + "11,1\n")
+    numbers = log.read(["u"])["u"]
+    assert [math.isnan(number) for number in numbers] == [True] * len(words) + [False]
+    log = text("time,u\n0,inf\n1,-Infinity\n2,1.#INF\n3,-1.#INF\n4,1\n")
+    assert log.read(["u"])["u"].tolist() == [math.inf, -math.inf, math.inf, -math.inf, 1.0]
+
+
+def test_an_empty_line_in_a_single_column_is_an_empty_cell(text):
+    numbers = text("voltage\n0.5\n\n1.5\n\n\n").read(["voltage"])["voltage"]
+    assert numbers.size == 3
+    assert math.isnan(numbers[1])
+
+
+def test_only_what_is_asked_for_must_be_numbers(text):
+    log = text("time,note,voltage\n0,on,1\n1,,2\n")
+    assert {name: array.tolist() for name, array in log.read(["voltage", "time"]).items()} == {
+        "voltage": [1.0, 2.0],
+        "time": [0.0, 1.0],
+    }
+    with pytest.raises(
+        FileError, match="column 'note' holds 'on', which is no number, in data row 1"
+    ):
+        log.read(["note"])
+
+
+def test_a_cell_in_quotes_may_hold_the_delimiter(text):
+    log = text('time,"note, left",voltage\n0,"a, b",1\n1,"c",2\n')
+    assert log.columns[1].name == "note, left"
+    assert log.read(["voltage"])["voltage"].tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "expected"),
+    [
+        ("0,1\n1,2\n", {"delimiter": ","}, {"column 1": [0.0, 1.0], "column 2": [1.0, 2.0]}),
+        ("0,1\n1,2\n", {"decimal": ",", "delimiter": "none"}, {"column 1": [0.1, 1.2]}),
+        ("0,1\n1,2\n", {"decimal": ","}, {"column 1": [0.1, 1.2]}),
+        ("a;b\n1,234;5\n", {"decimal": ","}, {"a": [1.234], "b": [5.0]}),
+        ("a~b\n1~2\n", {"delimiter": "~"}, {"a": [1.0], "b": [2.0]}),
+        ("a\tb\n1\t2\n", {"delimiter": "tab"}, {"a": [1.0], "b": [2.0]}),
+        ("a b\n1 2\n", {"delimiter": "space"}, {"a": [1.0], "b": [2.0]}),
+        ("! a,b\na,b\n1,2\n! x\n3,4\n", {"comment": "!"}, {"a": [1.0, 3.0], "b": [2.0, 4.0]}),
+        ("#a,%b\n1,2\n", {"comment": ""}, {"#a": [1.0], "%b": [2.0]}),
+        ("1;2\n3;4\n5;6\n", {"header_row": 1}, {"1": [3.0, 5.0], "2": [4.0, 6.0]}),
+        ("# 1;2\n3;4\n", {"header_row": 1}, {"1": [3.0], "2": [4.0]}),
+        ("a,b\ns,V\n3,4\n", {"header_row": 1}, {"a": [3.0], "b": [4.0]}),
+        ("a,b\n1,2\n", {"header_row": 0}, {"column 1": [1.0], "column 2": [2.0]}),
+    ],
+)
+def test_options(text, all_of, content, options, expected):
+    assert all_of(text(content, **options)) == expected
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"delimiter": ",,"}, "delimiter must be one character"),
+        ({"delimiter": "1"}, "delimiter '1' is a part of numbers"),
+        ({"decimal": ";"}, "decimal must be '.' or ','"),
+        ({"header_row": -1}, "header_row must be the line of the header, or 0, not -1"),
+        ({"encoding": "utf-99"}, "encoding 'utf-99' is unknown"),
+        ({"encoding": "zlib"}, "encoding 'zlib' is unknown"),
+    ],
+)
+def test_options_that_make_no_sense(options, said):
+    with pytest.raises(InputError, match=said):
+        TextOptions(**options)
+
+
+def test_a_large_file_is_read_in_pieces(tmp_path, text, all_of, monkeypatch):
+    monkeypatch.setattr("swashplate.logs.text.encoding.PIECE", 64)
+    rows = "".join(f"{i},{i}.5\r\n" for i in range(200))
+    expected = {"time": [float(i) for i in range(200)], "u": [i + 0.5 for i in range(200)]}
+    assert all_of(text("time,u\r\n" + rows)) == expected
+    assert all_of(text("time,u\r\n" + rows, encoding="utf-16")) == expected
+    ended = "time,u\r\n" + rows.rstrip()
+    for spare in range(64):  # the mark of the end is in a block of its own, once
+        content = ended + " " * spare + "\x1a"
+        assert all_of(text(content)) == expected
+    paused = rows.replace("\r\n7,", "\r\n\r\n# pause, here\r\n7,")
+    assert all_of(text("time,u\r\n" + paused)) == expected
+    with pytest.raises(FileError, match=r"'u' holds 'x', .* in data row 151 \(line 152\)"):
+        all_of(text("time,u\r\n" + rows.replace("150.5", "x")))
