@@ -1,5 +1,8 @@
 from . import maneuvers as maneuvers
 from .__about__ import __version__ as __version__
+from .campaign.campaign import Campaign as Campaign
+from .campaign.experiment import Channel as Channel
+from .campaign.experiment import Experiment as Experiment
 from .drive import Drive as Drive
 from .errors import DomainError as DomainError
 from .errors import FileError as FileError

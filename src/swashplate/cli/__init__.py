@@ -12,7 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from swashplate.__about__ import __version__
-from swashplate.cli import compare, demo, parameters, simulate
+from swashplate.cli import campaign, compare, demo, parameters, rig, simulate
 from swashplate.cli.terminal import say_error
 from swashplate.errors import SwashplateError
 
@@ -41,6 +41,8 @@ Examples:
   swashplate simulate hoist log.csv --interpolation previous --out run.csv
   swashplate show hoist --toml > mine.toml            a drive of your own
   swashplate compare hoist mine.toml                  what that changes
+  swashplate campaign init logs/*.csv                 tests of your machine
+  swashplate rig hoist --out virtual                  tests of a virtual one
   swashplate demo                                     everything at once
 
 Files are written in SI, whole or not at all. What is wrong is said in one
@@ -95,6 +97,8 @@ app.command("simulate", epilog=simulate.EXAMPLES)(simulate.simulate)
 app.command("compare", epilog=compare.EXAMPLES)(compare.compare)
 app.command("axes", epilog=parameters.AXES_EXAMPLES)(parameters.axes)
 app.command("show", epilog=parameters.SHOW_EXAMPLES)(parameters.show_parameters)
+app.add_typer(campaign.app, name="campaign")
+app.command("rig", epilog=rig.EXAMPLES)(rig.rig)
 app.command("demo", epilog=demo.EXAMPLES)(demo.demo)
 
 

@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager, contextmanager
 
 from rich import box
 from rich.console import Console
+from rich.status import Status
 from rich.table import Table
 
 # names of files and manoeuvres are printed as they are, whatever brackets and colons they hold
@@ -64,7 +65,7 @@ def say_error(error: Exception) -> None:
     side.print(f"Error: {sentence}.", soft_wrap=True)
 
 
-def working(text: str) -> AbstractContextManager[object]:
+def working(text: str) -> AbstractContextManager[Status]:
     """A spinner while something may take longer than a second; nothing in a pipe."""
     return side.status(f"{text} ...")
 

@@ -37,13 +37,20 @@ def kernel_sources_hash() -> str:
     return digest.hexdigest()
 
 
+@cache
+def _file_hash(path: str) -> str:
+    return blake2b(Path(path).read_bytes(), digest_size=16).hexdigest()
+
+
+def _stamp(locator: Any) -> str:
+    """Hash of all components, and of the kernel's own file where that is another."""
+    own = getattr(locator, "_py_file", None)  # a kernel typed in at a prompt has none
+    return kernel_sources_hash() + (_file_hash(own) if own is not None else "")
+
+
 def _stamped(locator: type[Any]) -> type[Any]:
     """A cache locator of Numba's whose stamp is the hash, not one file's time and size."""
-    return type(
-        f"Stamped{locator.__name__}",
-        (locator,),
-        {"get_source_stamp": lambda self: kernel_sources_hash()},
-    )
+    return type(f"Stamped{locator.__name__}", (locator,), {"get_source_stamp": _stamp})
 
 
 class _KernelCacheImpl(CompileResultCacheImpl):

@@ -1,0 +1,1 @@
+"""Measured tests: logs in, clean signals out."""

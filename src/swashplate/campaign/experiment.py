@@ -1,0 +1,160 @@
+"""An experiment: one run of one axis, its input and what was measured, all in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.campaign.kinds import ChannelKind, InputKind
+from swashplate.campaign.recognition import Recognised
+from swashplate.campaign.schema import InitialState, Role
+from swashplate.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+class Source(NamedTuple):
+    """Where a signal comes from."""
+
+    file: Path
+    column: str
+
+    def __str__(self) -> str:
+        return f"{self.file.name}: column '{self.column}'"
+
+
+class Encoder(NamedTuple):
+    """Scale of an encoder's counts."""
+
+    counts_per_turn: float
+    """Counts for one turn of the encoder's shaft, quadrature included."""
+    gear_ratio: float
+    """Turns of the encoder for one turn of the axis's shaft."""
+    sign: Literal[1, -1]
+    """-1 where it counts down at positive speed."""
+    rolls_over_at: int | None
+    """Counts after which the counter begins anew."""
+
+    @property
+    def angle_per_count(self) -> float:
+        """Angle of the axis's shaft for one count, signed. [rad]"""
+        return self.sign * 2.0 * np.pi / (self.counts_per_turn * self.gear_ratio)
+
+
+@dataclass(frozen=True, eq=False)
+class InputSignal:
+    """What drove the axis."""
+
+    kind: InputKind
+    unit: str
+    """SI, or as written for the kind ``"other"``."""
+    time: Array
+    """(n,) stamps. [s]"""
+    values: Array
+    """(n,) samples, in `unit`."""
+    interpolation: Literal["previous", "linear"]
+    """What it is between two stamps."""
+    source: Source
+    limits: tuple[float, float] | None = None
+    """Range of the instrument, in `unit`."""
+    dropped: int = 0
+    """Samples left out because they were missing."""
+
+    def at(self, time: Array) -> Array:
+        """The input at other instants [s]; before the first stamp the first sample holds."""
+        if self.interpolation == "linear":
+            return np.interp(time, self.time, self.values)
+        held = np.searchsorted(self.time, time, side="right") - 1
+        return self.values[np.maximum(held, 0)]
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One measured signal on its own time stamps."""
+
+    name: str
+    kind: ChannelKind
+    unit: str
+    """SI, or as written for the kind ``"other"``."""
+    time: Array
+    """(m,) stamps. [s]"""
+    values: Array
+    """(m,) samples, in `unit`; of an encoder the angle of the shaft."""
+    weight: Array
+    """(m,) factors on the squared error; 0 is ignored."""
+    source: Source
+    noise: float | None = None
+    """Standard deviation of the noise, in `unit`."""
+    limits: tuple[float, float] | None = None
+    """Range of the instrument, in `unit`."""
+    dropped: int = 0
+    """Samples left out because they were missing."""
+    encoder: Encoder | None = None
+    counts: Array | None = None
+    """(m,) counts of an encoder, unwrapped; before the sign."""
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """(m,) whether a sample counts."""
+        return self.weight > 0.0
+
+    @property
+    def is_position(self) -> bool:
+        """Whether it is an integral of the speed, with a free zero."""
+        return self.kind in ("position", "encoder_counts")
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """One run of one axis."""
+
+    name: str
+    """The run's name, with the axis where a campaign has several: ``"trial1 boom"``."""
+    axis: str
+    run: str
+    role: Role
+    start: InitialState
+    start_pressure: float | None
+    """Stroking pressure at the first sample, where it is given. [Pa]"""
+    input: InputSignal
+    channels: Mapping[str, Channel]
+    stated_maneuver: str | None = None
+    """Name that the campaign file gives to the manoeuvre."""
+    recognised: Recognised | None = None
+    ignored: tuple[tuple[float, float, str], ...] = ()
+    """Windows left out of every channel: first and last instant [s], and why."""
+
+    def __getitem__(self, channel: str) -> Channel:
+        """A channel by its name.
+
+        Raises
+        ------
+        InputError
+            If there is none of that name.
+        """
+        if channel not in self.channels:
+            known = ", ".join(self.channels)
+            raise InputError(f"{self.name} has no channel '{channel}'; it has {known}.")
+        return self.channels[channel]
+
+    def of_kind(self, *kinds: ChannelKind) -> tuple[Channel, ...]:
+        """Its channels of some kinds."""
+        return tuple(each for each in self.channels.values() if each.kind in kinds)
+
+    @property
+    def maneuver(self) -> str:
+        """The manoeuvre, as stated or as recognised: ``"step +4 V"``, ``"free"``."""
+        if self.stated_maneuver is not None:
+            return self.stated_maneuver
+        return self.recognised.name if self.recognised is not None else "free"
+
+    @cached_property
+    def duration(self) -> float:
+        """From the first sample of the input to the last. [s]"""
+        return float(self.input.time[-1] - self.input.time[0])

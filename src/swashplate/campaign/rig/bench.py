@@ -1,0 +1,228 @@
+"""The test bench: manoeuvres in, logs out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.campaign.kinds import CHANNEL_KINDS, ChannelKind
+from swashplate.campaign.rig.chance import perturbed
+from swashplate.campaign.rig.instruments import SEVERITIES, Instruments, Severity
+from swashplate.campaign.rig.logger import logged
+from swashplate.campaign.rig.plant import RATE, Effects, Truth, simulate_plant
+from swashplate.campaign.rig.readings import put_out
+from swashplate.drive import Drive
+from swashplate.errors import InputError
+from swashplate.maneuvers import Maneuver, source_tests
+from swashplate.maneuvers.checks import positive, whole
+
+Array = NDArray[np.float64]
+
+COUNTS_PER_TURN = {"hoist": 400.0 * 120.0 / 19.0, "luff": 635.0 * 4.0, "slew": 81_000.0 * 7.0}
+"""Counts in a turn of the output: 2526.3, 2540 and 567,000 in the source's tables."""
+HELD_BACK = {
+    "hoist": ("step +6.5 V", "step -6.5 V", "sine 6.5 V 0.1 Hz"),
+    "slew": ("sine 4 V 0.1 Hz",),
+    "luff": ("step +6.5 V", "sine 6.5 V 0.1 Hz"),
+}
+"""Tests of the source kept for validation: those of middle size, within what the others excite."""
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualRun:
+    """One simulated test."""
+
+    name: str
+    """Of the manoeuvre."""
+    stem: str
+    """Of its file: axis and manoeuvre."""
+    role: Literal["fit", "validate"]
+    columns: Mapping[str, Array]
+    """What was logged, SI: ``"time"`` [s], ``"voltage"`` [V] and the channels; NaN is an empty
+    cell. Arrays of one length; rows that were lost are missing in all of them."""
+    truth: Truth
+    """What really happened."""
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualTests:
+    """A simulated campaign: its logs and its truth."""
+
+    axis: str
+    nominal: Drive
+    """What a fit starts from."""
+    preset: str | None
+    """Name of the packaged drive that `nominal` is, if it is one."""
+    drive: Drive
+    """What was simulated."""
+    instruments: Instruments
+    severity: str
+    """``"clean"``, ``"realistic"``, ``"harsh"`` or ``"custom"``."""
+    effects: Effects
+    seed: int
+    channels: tuple[ChannelKind, ...]
+    counts_per_turn: float
+    runs: Mapping[str, VirtualRun]
+    """By the names of the manoeuvres, in their order."""
+
+    def __repr__(self) -> str:
+        return (
+            f"VirtualTests({self.axis!r}, {len(self.runs)} runs, {self.severity}, seed {self.seed})"
+        )
+
+
+def run(
+    drive: str | Drive,
+    maneuvers: Mapping[str, Maneuver] | Iterable[Maneuver] | None = None,
+    *,
+    seed: int = 1,
+    severity: Severity = "realistic",
+    instruments: Instruments | None = None,
+    effects: Effects | None = None,
+    truth: Drive | None = None,
+    perturb: float = 0.0,
+    axis: str | None = None,
+    channels: Sequence[ChannelKind] = ("rectified_current", "encoder_counts"),
+    counts_per_turn: float | None = None,
+    validate: Collection[str] | None = None,
+) -> VirtualTests:
+    """Simulate the tests of a campaign and log them.
+
+    Parameters
+    ----------
+    drive : str or Drive
+        Name of a packaged drive, or a drive: the one that a fit starts from.
+    maneuvers : mapping or iterable of Maneuver, optional
+        By default the source's tests of the axis.
+    seed : int
+        Not negative. The same seed gives the same logs, each of them whatever runs beside it.
+    severity : {"clean", "realistic", "harsh"}
+        How bad the instruments are, see `SEVERITIES`.
+    instruments : Instruments, optional
+        One's own instead.
+    effects : Effects, optional
+        What the plant has beyond the model; by default nothing.
+    truth : Drive, optional
+        What is simulated instead of `drive`.
+    perturb : float
+        Or: draw what is simulated about `drive`, values within so much of its own, see `perturbed`.
+        0 leaves them. [1]
+    axis : {"hoist", "slew", "luff"}, optional
+        Whose tests and encoder they are; by default the one that the drive is called after.
+    channels : sequence of str
+        Kinds of channel to log, as in a campaign file. Those other than current and counts are the
+        simulated signals with white noise.
+    counts_per_turn : float, optional
+        Of the encoder, for one turn of the shaft; by default the axis's.
+    validate : collection of str, optional
+        Names of the runs that are kept for validation; by default, of the source's tests, those of
+        middle size (`HELD_BACK`), and none of others.
+
+    Returns
+    -------
+    VirtualTests
+        Logs and truth in memory; `write` makes files of them.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, a number out of range, two manoeuvres of one name, or a manoeuvre that
+        cannot be simulated at 512 Hz.
+    """
+    nominal = Drive.preset(drive) if isinstance(drive, str) else drive
+    seed = whole("seed", seed)
+    if severity not in SEVERITIES:
+        raise InputError(f"severity is {severity!r}; it is one of {', '.join(SEVERITIES)}.")
+    if truth is not None and perturb:
+        raise InputError("Give either the truth or how far to perturb the drive, not both.")
+    simulated = truth if truth is not None else nominal
+    if perturb:
+        simulated = perturbed(nominal, perturb, seed)
+    axis = axis or nominal.name
+    tests = _named(maneuvers, axis)
+    kinds = _checked(channels)
+    turn = _counts_per_turn(axis, counts_per_turn, kinds)
+    held_back = _held_back(validate, axis, tests, default=maneuvers is None)
+    tools = SEVERITIES[severity] if instruments is None else instruments
+    plant = effects or Effects()
+    runs = {}
+    for name, maneuver in tests.items():
+        happened = simulate_plant(simulated, put_out(maneuver.sample(RATE), tools), plant)
+        columns = logged(happened, kinds, tools, turn, seed, name)
+        role: Literal["fit", "validate"] = "validate" if name in held_back else "fit"
+        runs[name] = VirtualRun(name, _stem(axis, name), role, columns, happened)
+    stems = [each.stem.lower() for each in runs.values()]
+    if len(set(stems)) < len(stems):
+        raise InputError("Two manoeuvres would have the same file; give them other names.")
+    return VirtualTests(
+        axis,
+        nominal,
+        drive if isinstance(drive, str) else None,
+        simulated,
+        tools,
+        severity if instruments is None else "custom",
+        plant,
+        seed,
+        kinds,
+        turn,
+        runs,
+    )
+
+
+def _named(
+    maneuvers: Mapping[str, Maneuver] | Iterable[Maneuver] | None, axis: str
+) -> dict[str, Maneuver]:
+    if maneuvers is None:
+        return source_tests(axis)
+    if isinstance(maneuvers, Mapping):
+        tests = dict(maneuvers)
+    else:
+        listed = list(maneuvers)
+        tests = {each.name: each for each in listed}
+        if len(tests) < len(listed):
+            raise InputError("Two manoeuvres have the same name; give them in a mapping by name.")
+    if not tests:
+        raise InputError("A campaign needs at least one manoeuvre.")
+    return tests
+
+
+def _checked(channels: Sequence[ChannelKind]) -> tuple[ChannelKind, ...]:
+    possible = [kind for kind in CHANNEL_KINDS if kind != "other"]
+    for kind in channels:
+        if kind not in possible:
+            raise InputError(f"There is no channel {kind!r}; there are {', '.join(possible)}.")
+    if not channels or len(set(channels)) < len(channels):
+        raise InputError("channels must be one or more kinds, each once.")
+    return tuple(channels)
+
+
+def _counts_per_turn(axis: str, given: float | None, kinds: tuple[ChannelKind, ...]) -> float:
+    if given is not None:
+        return positive("counts_per_turn", given)
+    if axis not in COUNTS_PER_TURN and "encoder_counts" in kinds:
+        raise InputError(
+            f"The encoder of '{axis}' is not known: give counts_per_turn, or as axis one of "
+            f"{', '.join(COUNTS_PER_TURN)}."
+        )
+    return COUNTS_PER_TURN.get(axis, 1.0)
+
+
+def _held_back(
+    given: Collection[str] | None, axis: str, tests: Mapping[str, Maneuver], *, default: bool
+) -> Collection[str]:
+    if given is None:
+        return HELD_BACK[axis] if default else ()
+    for name in given:
+        if name not in tests:
+            raise InputError(f"There is no run '{name}' to validate; there are {', '.join(tests)}.")
+    return given
+
+
+def _stem(axis: str, name: str) -> str:
+    """Axis and manoeuvre as a file's name: ``hoist_step_+4_V``, ``hoist_ramp_+1_V-s``."""
+    return re.sub(r"[^\w.+-]+", "_", f"{axis} {name}".replace("/", "-"))

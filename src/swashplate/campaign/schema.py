@@ -1,0 +1,187 @@
+"""Schema of a campaign's TOML file: what a user may write, and what each entry means."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, model_validator
+
+from swashplate.campaign.kinds import ChannelKind, InputKind
+from swashplate.logs import TextOptions
+
+Role = Literal["fit", "validate", "ignore"]
+InitialState = Literal["rest", "steady", "given", "estimated"]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+
+
+class Entry(BaseModel):
+    """A table of the file; a key that it does not know is refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class Window(Entry):
+    """A part of a run, on the log's clock after `time.offset`."""
+
+    start: Finite | None = Field(None, alias="from", description="First instant [s].")
+    stop: Finite | None = Field(None, alias="to", description="Last instant [s].")
+    maneuver: str | None = Field(
+        None,
+        description="Only in runs of this manoeuvre, as recognised: 'step +4 V' or, with a "
+        "pattern, 'step *' or 'sine * 0.1 Hz'.",
+    )
+    why: str = Field("", description="The reason; it stands in the report.")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Window:
+        if self.start is not None and self.stop is not None and self.stop <= self.start:
+            raise ValueError(f"a window goes from {self.start} s to {self.stop} s; swap them")
+        return self
+
+
+class Weight(Window):
+    """A part of a run that counts more or less."""
+
+    factor: NotNegative = Field(description="Factor on the squared error; windows multiply.")
+
+
+class Clock(Entry):
+    """The time stamps of a signal: a column, or a rate where the log has none."""
+
+    column: str | None = Field(None, description="Column of the stamps.")
+    unit: str | None = Field(None, description="Its unit; the header's, or s.")
+    rate: Positive | None = Field(None, description="Samples a second, instead of a column [Hz].")
+    offset: Finite = Field(0.0, description="Added to the stamps [s].")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Clock:
+        if (self.column is None) == (self.rate is None):
+            raise ValueError("give either the column of the time or a rate in Hz")
+        if self.rate is not None and self.unit is not None:
+            raise ValueError("a clock with a rate has no unit: leave it out")
+        return self
+
+
+class Signal(Entry):
+    """Where a signal is and how its numbers become physical: sign * (scale * number + offset)."""
+
+    column: str = Field(description="Column of the log, with or without the unit in its header.")
+    unit: str | None = Field(None, description="Unit after scaling; the header's, or SI.")
+    scale: Finite = Field(1.0, description="Factor on the log's numbers.")
+    offset: Finite = Field(0.0, description="Added after scaling, in `unit`.")
+    sign: Literal[1, -1] = Field(1, description="-1 turns the signal round.")
+    time: Clock | None = Field(None, description="Its own clock, instead of the axis's.")
+    missing: Literal["refuse", "drop"] = Field(
+        "refuse",
+        description="An empty or NaN cell: refuse the log, or leave those samples out (counted "
+        "in the check).",
+    )
+    limits: tuple[Finite, Finite] | None = Field(
+        None, description="Range of the instrument in `unit`, to tell clipping."
+    )
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Signal:
+        if self.scale == 0.0:
+            raise ValueError("a scale of 0 leaves nothing of the signal")
+        if self.limits is not None and self.limits[0] >= self.limits[1]:
+            raise ValueError("the first of the limits must be below the second")
+        return self
+
+
+class Input(Signal):
+    """The signal that drives the axis."""
+
+    kind: InputKind = Field("voltage", description="voltage, current (signed, no card) or other.")
+    interpolation: Literal["previous", "linear"] = Field(
+        "previous", description="Between two samples: hold the earlier one, or a straight line."
+    )
+
+
+class Channel(Signal):
+    """A signal that was measured."""
+
+    kind: ChannelKind = Field(description="What it measures.")
+    counts_per_turn: Positive | None = Field(
+        None, description="Counts for one turn of the encoder's shaft, quadrature included."
+    )
+    gear_ratio: Positive = Field(
+        1.0, description="Turns of the encoder for one turn of the axis's shaft."
+    )
+    rolls_over_at: PositiveInt | None = Field(
+        None, description="Counts after which the counter begins anew: 65536 for 16 bits."
+    )
+    noise: Positive | None = Field(
+        None, description="Standard deviation of its noise in `unit`: the weight among channels."
+    )
+    weight: NotNegative = Field(1.0, description="Factor on its squared errors.")
+    weights: tuple[Weight, ...] = Field((), description="Windows that count more or less.")
+    weight_by_input: tuple[tuple[NotNegative, NotNegative], ...] = Field(
+        (), description="[|input|, factor] pairs, a polyline: [[3, 1], [10, 0.5]]."
+    )
+    ignore: tuple[Window, ...] = Field((), description="Windows that are left out.")
+
+    @model_validator(mode="after")
+    def _encoder(self) -> Channel:
+        if self.kind == "encoder_counts" and self.counts_per_turn is None:
+            raise ValueError("encoder_counts need counts_per_turn")
+        if self.kind != "encoder_counts" and (self.counts_per_turn or self.rolls_over_at):
+            raise ValueError("counts_per_turn and rolls_over_at belong to encoder_counts alone")
+        levels = [level for level, _ in self.weight_by_input]
+        if levels != sorted(set(levels)):
+            raise ValueError("the inputs of weight_by_input must increase")
+        return self
+
+
+class Axis(Entry):
+    """One drive of the machine: its model, its input and what is measured of it."""
+
+    drive: str | None = Field(
+        None, description="A packaged drive, or a parameter file beside this one."
+    )
+    time: Clock = Field(description="Clock of all its signals that have none of their own.")
+    input: Input
+    channels: dict[str, Channel] = Field(min_length=1)
+    start: InitialState = Field("rest", description="State at the first sample.")
+    ignore: tuple[Window, ...] = Field((), description="Windows left out of every channel.")
+
+
+class Run(Entry):
+    """One log: a run of the machine."""
+
+    file: str = Field(description="The log, beside this file.")
+    name: str | None = Field(None, description="For tables; the file's name without its ending.")
+    role: Role = Field("fit", description="fit, validate or ignore.")
+    start: InitialState | None = Field(None, description="State at the first sample.")
+    start_pressure: Finite | None = Field(
+        None, description="Stroking pressure at the first sample, with start = 'given' [Pa]."
+    )
+    span: Window | None = Field(None, description="The part of the log to take.")
+    only: tuple[str, ...] = Field((), description="The axes that this run tests; all if empty.")
+    ignore: tuple[Window, ...] = Field((), description="Windows left out of every channel.")
+    weights: tuple[Weight, ...] = Field((), description="Windows that count more or less.")
+    weight: NotNegative = Field(1.0, description="Factor on the run's squared errors.")
+    maneuver: str | None = Field(None, description="Name of the manoeuvre, if not recognised.")
+    axes: dict[str, dict[str, Any]] = Field(
+        {}, description="Entries of an axis that differ in this run, as in [axes.NAME]."
+    )
+
+    @model_validator(mode="after")
+    def _given(self) -> Run:
+        if (self.start == "given") != (self.start_pressure is not None):
+            raise ValueError("start = 'given' and start_pressure belong together")
+        return self
+
+
+class CampaignFile(Entry):
+    """A campaign: the tests of a machine, beside their logs."""
+
+    title: str = Field("", description="For the report.")
+    virtual: bool = Field(False, description="Whether the tests are simulated.")
+    format: TextOptions = Field(
+        TextOptions(), description="How text logs are written, where that cannot be told."
+    )
+    axes: dict[str, Axis] = Field(min_length=1)
+    runs: tuple[Run, ...] = Field(min_length=1)

@@ -1,0 +1,214 @@
+"""``swashplate campaign``: a first draft, a check and a picture of measured tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swashplate.cli.quality_table import LEGEND, heading, quality_table
+from swashplate.cli.terminal import note, say, show, working
+from swashplate.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from swashplate.campaign.campaign import Campaign
+
+INIT_EXAMPLES = """\
+Examples:
+  swashplate campaign init logs/*.csv --drive hoist
+  swashplate campaign init trial1.mat trial2.mat --out trials.toml
+"""
+CHECK_EXAMPLES = """\
+Examples:
+  swashplate campaign check
+  swashplate campaign check harbour/campaign.toml --strict
+"""
+PLOT_EXAMPLES = """\
+Examples:
+  swashplate campaign plot harbour/campaign.toml --out overview.png
+  swashplate campaign plot --run hoistr6 --channel counts --from 5.8 --to 6.6
+"""
+SCHEMA_EXAMPLES = """\
+Example:
+  swashplate campaign schema > campaign.schema.json
+"""
+
+app = typer.Typer(
+    help="Measured tests: make, check and look at a campaign file.",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+)
+CampaignArgument = Annotated[
+    Path, typer.Argument(metavar="CAMPAIGN.toml", help="The campaign file, beside its logs.")
+]
+
+
+@app.command("init", epilog=INIT_EXAMPLES)
+def init(
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOGS...", help="The logs, one run of the machine each.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="The campaign file; by default campaign.toml beside the first log.",
+            metavar="FILE",
+            show_default=False,
+        ),
+    ] = None,
+    drive: Annotated[
+        str | None,
+        typer.Option(
+            help="A packaged drive or a parameter file that the tests belong to.",
+            metavar="AXIS|SET.toml",
+            show_default=False,
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace an older file.")] = False,
+) -> None:
+    """Write the first draft of a campaign file from the headers of logs.
+
+    What each column is gets guessed from its name and unit, and marked as such:
+    read the file, mend what is wrong, then run 'swashplate campaign check'.
+    """
+    from swashplate.campaign.draft import draft
+    from swashplate.tables import write_text
+
+    target = out or logs[0].parent / "campaign.toml"
+    if target.exists() and not force:
+        raise InputError(f"{target} exists already; name another with --out, or say --force.")
+    with working("Reading"):
+        text = draft(logs, target.parent, drive)
+    write_text(text, target)
+    note(f"Draft: {target}")
+    guessed = text.count("# guessed")
+    note(f"{guessed} entries are guessed: look for '# guessed', then run")
+    note(f"  swashplate campaign check {target}")
+
+
+@app.command("check", epilog=CHECK_EXAMPLES)
+def check(
+    path: CampaignArgument = Path("campaign.toml"),
+    strict: Annotated[
+        bool, typer.Option("--strict", help="End with exit code 1 if there are findings.")
+    ] = False,
+) -> None:
+    """Read a campaign with all its logs and say what the measurements are like.
+
+    Each signal's rate, jitter, longest interval, range, clipping and lost
+    counts, the manoeuvre recognised from the voltage, and below the table
+    whatever someone should look into.
+    """
+    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign.quality import examine
+
+    with working(f"Reading {path}"):
+        campaign = Campaign.from_toml(path)
+        qualities = {each.name: examine(each) for each in campaign}
+    note(heading(campaign))
+    for number, experiment in enumerate(campaign):
+        found = qualities[experiment.name]
+        show(quality_table(experiment, found, header=number == 0))
+        for each in found:
+            for text in each.findings:
+                say(f"! {each.signal}: {text}.")
+    note(LEGEND)
+    findings = sum(len(each.findings) for found in qualities.values() for each in found)
+    if not campaign.select(role="fit"):
+        note("No run has the role 'fit'.")
+    note("Nothing to look into." if not findings else f"{findings} findings, marked by '!'.")
+    if strict and findings:
+        raise typer.Exit(1)
+
+
+@app.command("plot", epilog=PLOT_EXAMPLES)
+def plot(
+    path: CampaignArgument = Path("campaign.toml"),
+    out: Annotated[
+        Path, typer.Option(help="The figure: .png, .svg or .pdf.", metavar="FILE")
+    ] = Path("campaign.png"),
+    run: Annotated[
+        str | None,
+        typer.Option(
+            help="Look at one experiment closely; --channel must be given.",
+            metavar="NAME",
+            show_default=False,
+        ),
+    ] = None,
+    channel: Annotated[
+        str | None,
+        typer.Option(
+            help="An encoder or position: raw against smoothed, and its speed. A rectified "
+            "current: measured against simulated.",
+            metavar="NAME",
+            show_default=False,
+        ),
+    ] = None,
+    begin: Annotated[
+        float | None, typer.Option("--from", help="Show from here on.", metavar="S")
+    ] = None,
+    end: Annotated[float | None, typer.Option("--to", help="Show up to here.", metavar="S")] = None,
+) -> None:
+    """Draw all runs and channels of a campaign, or one channel closely.
+
+    The overview is one figure for each axis and eight runs, numbered if there
+    are several.
+    """
+    from swashplate.campaign.campaign import Campaign
+    from swashplate.report.figures import plot_campaign, save_figure
+
+    if (run is None) != (channel is None):
+        raise InputError("--run and --channel go together: give both, or none for the overview.")
+    with working(f"Reading {path}"):
+        campaign = Campaign.from_toml(path)
+    with working("Drawing"):
+        if run is not None and channel is not None:
+            targets = [out]
+            save_figure(_close_look(campaign, run, channel, begin, end), out)
+        else:
+            title = f"{campaign.title} (virtual)" if campaign.virtual else campaign.title
+            figures = plot_campaign(campaign.experiments, title=title)
+            targets = [
+                out if len(figures) == 1 else out.with_stem(f"{out.stem}-{number}")
+                for number in range(1, len(figures) + 1)
+            ]
+            for figure, target in zip(figures, targets, strict=True):
+                save_figure(figure, target)
+    for target in targets:
+        note(f"Figure: {target}")
+
+
+def _close_look(
+    campaign: Campaign, run: str, channel: str, begin: float | None, end: float | None
+) -> Figure:
+    from swashplate.report.figures import plot_current, plot_encoder
+
+    experiment = campaign[run]
+    chosen = experiment[channel]
+    window = None
+    if begin is not None or end is not None:
+        first, last = float(chosen.time[0]), float(chosen.time[-1])
+        window = (first if begin is None else begin, last if end is None else end)
+    title = f"{run}, {channel}"
+    if chosen.is_position:
+        return plot_encoder(chosen, window=window, title=title)
+    if chosen.kind != "rectified_current":
+        raise InputError(
+            f"{run} {channel} is a {chosen.kind}; a close look is for encoders, positions and "
+            "rectified currents."
+        )
+    drive = campaign.drive(experiment.axis)
+    signal = experiment.input
+    simulation = drive.simulate(signal.values, time=signal.time, interpolation=signal.interpolation)
+    return plot_current(chosen, simulation, window=window, title=title)
+
+
+@app.command("schema", epilog=SCHEMA_EXAMPLES)
+def schema() -> None:
+    """Print the JSON Schema of a campaign file, for editors that check while one writes."""
+    from swashplate.campaign.campaign import json_schema
+
+    typer.echo(json_schema(), nl=False)

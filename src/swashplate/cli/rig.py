@@ -1,0 +1,128 @@
+"""``swashplate rig``: tests of a drive whose parameters are known, as a user would log them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from swashplate.cli.inputs import maneuver_of, parameters_of
+from swashplate.cli.terminal import note, show, table, working
+from swashplate.errors import InputError
+
+EXAMPLES = """\
+Examples:
+  swashplate rig hoist --out virtual-hoist
+  swashplate rig slew --out worn --seed 7 --severity harsh --effect backlash=strong
+  swashplate rig hoist --out short --maneuver step:4 --maneuver sine:6,0.2 --perturb 0.1
+  swashplate campaign check virtual-hoist/campaign.toml
+"""
+
+Severity = Literal["clean", "realistic", "harsh"]
+Level = Literal["off", "on", "strong"]
+Format = Literal["csv", "mat", "parquet"]
+
+
+def rig(
+    drive: Annotated[
+        str,
+        typer.Argument(
+            metavar="AXIS|SET.toml",
+            help="A packaged drive (see 'swashplate axes') or your own TOML file.",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option(help="A new or empty folder for logs and campaign.", metavar="DIR")
+    ],
+    seed: Annotated[int, typer.Option(help="The same seed gives the same files.")] = 1,
+    severity: Annotated[
+        Severity,
+        typer.Option(
+            help="The instruments: perfect, as in a good campaign, or with everything wrong."
+        ),
+    ] = "realistic",
+    effects: Annotated[
+        Level, typer.Option(help="All that the plant has and the identified model has not.")
+    ] = "off",
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="One of them: cam_ripple, spool_stiction, backlash or leakage, =off, =on or "
+            "=strong. May be repeated.",
+            metavar="NAME=LEVEL",
+        ),
+    ] = None,
+    load: Annotated[
+        float, typer.Option(help="Load as a share of the rated one; effects go with it.")
+    ] = 0.5,
+    perturb: Annotated[
+        float,
+        typer.Option(help="Draw the true parameters within this share of the drive's: 0.1."),
+    ] = 0.0,
+    maneuver: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A test instead of the source's, such as step:4. May be repeated.",
+            metavar="MANEUVER",
+        ),
+    ] = None,
+    format_: Annotated[Format, typer.Option("--format", help="Of the logs.")] = "csv",
+    force: Annotated[
+        bool, typer.Option("--force", help="Write into a folder that is not empty.")
+    ] = False,
+) -> None:
+    """Write a virtual test campaign: logs, campaign.toml and, apart, the truth.
+
+    A drive with known parameters is simulated over the tests of the source and
+    read by instruments with chosen errors. Fit it as you would your machine's
+    logs, then look into truth/. Every file says that it is virtual.
+    """
+    from swashplate.campaign import rig as bench
+    from swashplate.drive import Drive
+
+    with working("Simulating"):
+        nominal = Drive(parameters_of(drive))
+        own = drive.lower().endswith(".toml")
+        tests = bench.run(
+            nominal if own else drive,
+            None if not maneuver else [maneuver_of(each, nominal) for each in maneuver],
+            seed=seed,
+            severity=severity,
+            effects=_effects(effects, effect or [], load),
+            perturb=perturb,
+        )
+    with working("Writing"):
+        path = bench.write(tests, out, format_, overwrite=force)
+    made = table(None, "log", "manoeuvre", "role", ">rows", ">s", wrap="manoeuvre")
+    for run in tests.runs.values():
+        time = run.columns["time"]
+        made.add_row(
+            f"{run.stem}.{format_}",
+            run.name,
+            run.role,
+            f"{time.size}",
+            f"{time[-1] - time[0]:.4g}",
+        )
+    show(made)
+    note(f"Campaign: {path}")
+    note(f"Truth:    {path.parent / 'truth'} (look only after the fit)")
+
+
+def _effects(level: Level, single: list[str], load: float):  # type: ignore[no-untyped-def]
+    from dataclasses import fields
+
+    from swashplate.campaign.rig import Effects
+
+    names = [each.name for each in fields(Effects) if each.name != "load"]
+    chosen: dict[str, str] = dict.fromkeys(names, level)
+    for word in single:
+        name, equals, value = (part.strip() for part in word.partition("="))
+        if name not in names or not equals:
+            raise InputError(
+                f"--effect cannot read '{word}'; write {', '.join(names[:-1])} or {names[-1]}, "
+                "then =off, =on or =strong."
+            )
+        chosen[name] = value
+    return Effects(**chosen, load=load)  # type: ignore[arg-type]

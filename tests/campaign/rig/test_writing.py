@@ -1,0 +1,155 @@
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from scipy.io import loadmat
+
+from swashplate import Drive, FileError, InputError, maneuvers
+from swashplate.campaign import rig
+from swashplate.campaign.campaign import Campaign
+
+STEP = maneuvers.step(4.0)
+SINE = maneuvers.sine(4.0, 0.2, length=12.0)
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def harsh() -> rig.VirtualTests:
+    return rig.run("hoist", [STEP, SINE], severity="harsh", seed=4)
+
+
+def test_csv_logs_read_back_as_they_were(harsh: rig.VirtualTests, tmp_path: Path) -> None:
+    rig.write(harsh, tmp_path)
+    path = tmp_path / "hoist_step_4_V.csv"
+    assert path.read_text("utf-8").startswith("# virtual: simulated by swashplate ")
+    table = pl.read_csv(path, comment_prefix="#")
+    columns = harsh.runs[STEP.name].columns
+    assert table.columns == ["time", "voltage", "current", "counts"]
+    assert table["counts"].dtype == pl.Int64
+    for name, values in columns.items():
+        read = table[name].cast(pl.Float64).fill_null(np.nan).to_numpy()
+        np.testing.assert_array_equal(read, values)
+
+
+def test_clean_logs_keep_every_digit(tmp_path: Path) -> None:
+    tests = rig.run("slew", [SINE], severity="clean")
+    rig.write(tests, tmp_path)
+    table = pl.read_csv(tmp_path / "slew_sine_4_V_0.2_Hz.csv", comment_prefix="#")
+    for name, values in tests.runs[SINE.name].columns.items():
+        np.testing.assert_array_equal(table[name].to_numpy(), values)
+
+
+def test_parquet_logs(harsh: rig.VirtualTests, tmp_path: Path) -> None:
+    rig.write(harsh, tmp_path, "parquet")
+    path = tmp_path / "hoist_step_4_V.parquet"
+    assert "no measurement" in pl.read_parquet_metadata(path)["virtual"]
+    read = pl.read_parquet(path)["current"].fill_null(np.nan).to_numpy()
+    np.testing.assert_array_equal(read, harsh.runs[STEP.name].columns["current"])
+
+
+def test_mat_logs_are_one_matrix_of_rows(harsh: rig.VirtualTests, tmp_path: Path) -> None:
+    rig.write(harsh, tmp_path, "mat")
+    path = tmp_path / "hoist_step_4_V.mat"
+    held = loadmat(path)
+    assert held["virtual"].item().startswith("virtual: simulated by swashplate ")
+    assert held["rows"].item() == "time, voltage, current, counts"
+    columns = harsh.runs[STEP.name].columns
+    np.testing.assert_array_equal(held["data"], np.vstack(list(columns.values())))
+    assert b"virtual test" in path.read_bytes()[:116]
+
+
+@pytest.mark.parametrize("format", ["csv", "mat", "parquet"])
+def test_the_same_seed_gives_the_same_files(
+    format: str, harsh: rig.VirtualTests, tmp_path: Path
+) -> None:
+    again = rig.run("hoist", [SINE, STEP], severity="harsh", seed=4)
+    rig.write(harsh, tmp_path / "one", format)
+    rig.write(again, tmp_path / "two", format)
+    one, two = content(tmp_path / "one"), content(tmp_path / "two")
+    assert one.keys() == two.keys()
+    assert [name for name in one if one[name] != two[name]] == ["campaign.toml", "truth/truth.toml"]
+
+
+@pytest.mark.parametrize("severity", ["clean", "realistic", "harsh"])
+@pytest.mark.parametrize("format", ["csv", "mat", "parquet"])
+def test_a_campaign_reads_what_is_written(
+    severity: rig.Severity, format: str, tmp_path: Path
+) -> None:
+    tests = rig.run("hoist", [STEP, SINE], severity=severity, validate=[SINE.name])
+    read = Campaign.from_toml(rig.write(tests, tmp_path / "new" / "folder", format))
+    assert read.virtual
+    assert "Virtual" in read.title
+    assert [each.maneuver for each in read] == ["step +4 V", "sine 4 V 0.2 Hz"]
+    assert [each.role for each in read] == ["fit", "validate"]
+    for experiment, run in zip(read, tests.runs.values(), strict=True):
+        channel = experiment["counts"]
+        truth = np.interp(channel.time, run.truth.time, run.truth.shaft_position)
+        # a count is 2.5 mrad, to which hidden jitter of 0.4 ms adds at most a third
+        bound = {"clean": 1e-12, "realistic": 2.6e-3, "harsh": 4e-3}[severity]
+        assert np.abs(channel.values - truth).max() < bound
+
+
+def test_the_campaign_file_says_that_it_is_virtual(tmp_path: Path) -> None:
+    tests = rig.run("luff", severity="harsh", effects=rig.Effects(backlash="on"), seed=9)
+    path = rig.write(tests, tmp_path)
+    text = path.read_text("utf-8")
+    assert text.startswith("# Virtual tests, simulated by swashplate ")
+    assert "effects beyond the model: backlash on; seed 9" in text
+    file = tomllib.loads(text)
+    assert file["virtual"] is True
+    axis = file["axes"]["luff"]
+    assert axis["drive"] == "luff"
+    assert axis["input"]["interpolation"] == "linear"
+    assert axis["channels"]["counts"]["counts_per_turn"] == 2540.0
+    assert axis["channels"]["counts"]["rolls_over_at"] == 65536
+    assert axis["channels"]["current"]["kind"] == "rectified_current"
+    assert [run["role"] for run in file["runs"]].count("validate") == 2
+    assert all((tmp_path / run["file"]).exists() for run in file["runs"])
+
+
+def test_the_truth_lies_apart_and_complete(tmp_path: Path) -> None:
+    effects = rig.Effects(leakage="strong", load=0.8)
+    tests = rig.run("hoist", [STEP], perturb=0.1, effects=effects, seed=12)
+    rig.write(tests, tmp_path)
+    truth = tomllib.loads((tmp_path / "truth" / "truth.toml").read_text("utf-8"))
+    assert truth["virtual"] is True
+    assert truth["seed"] == 12
+    assert rig.Effects(**truth["effects"]) == effects
+    assert rig.Instruments(**truth["instruments"]) == rig.SEVERITIES["realistic"]
+    assert {"swashplate", "numpy"} <= truth["versions"].keys()
+    assert Drive.from_toml(tmp_path / "truth" / truth["drive"]) == tests.drive
+    assert tests.drive != Drive.preset("hoist")
+
+
+def test_a_drive_of_ones_own_lies_beside_the_campaign(tmp_path: Path) -> None:
+    crane = Drive.preset("hoist").scale(Z10=0.9).renamed('my "crane"')
+    tests = rig.run(crane, {"a/b": STEP}, counts_per_turn=2500.0)
+    path = rig.write(tests, tmp_path)
+    read = Campaign.from_toml(path)
+    assert list(read.axes) == ['my "crane"']
+    assert read.axes['my "crane"'].drive == "drive.toml"
+    assert Drive.from_toml(tmp_path / "drive.toml") == crane
+    assert (tmp_path / "my_crane_a-b.csv").exists()
+
+
+def test_a_folder_that_holds_something_is_kept(harsh: rig.VirtualTests, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(FileError, match="is not empty; name a new folder, or allow overwriting"):
+        rig.write(harsh, tmp_path)
+    assert content(tmp_path) == {"notes.txt": b"mine"}
+    rig.write(harsh, tmp_path, overwrite=True)
+    rig.write(harsh, tmp_path, overwrite=True)
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+    with pytest.raises(FileError, match="is a file; name a folder"):
+        rig.write(harsh, tmp_path / "notes.txt")
+    with pytest.raises(InputError, match="format is 'xls'; it is one of csv, mat, parquet"):
+        rig.write(harsh, tmp_path / "new", "xls")

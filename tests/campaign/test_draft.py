@@ -1,0 +1,83 @@
+"""A first draft of a campaign file, which must be readable as it is."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from swashplate import Campaign, InputError
+from swashplate.campaign.draft import draft
+from swashplate.campaign.guesses import guess
+from swashplate.logs import Column
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "role", "kind"),
+    [
+        ("time", None, "time", None),
+        ("Time [ms]", "ms", "time", None),
+        ("Joystick voltage", None, "input", "voltage"),
+        ("lever [V]", "V", "input", "voltage"),
+        ("Boom Cmd", None, "input", "other"),
+        ("ammeter [mA]", "mA", "channel", "rectified_current"),
+        ("Current", None, "channel", "rectified_current"),
+        ("encoderCounts", None, "channel", "encoder_counts"),
+        ("winch speed [rpm]", "rpm", "channel", "shaft_speed"),
+        ("EXP_PosFb", None, "channel", "position"),
+        ("swash angle", None, "channel", "swash_angle"),
+        ("drum [deg/s]", "deg/s", "channel", "shaft_speed"),
+        ("oil temperature", "degC", "unknown", None),
+    ],
+)
+def test_what_a_header_says(name: str, unit: str | None, role: str, kind: str | None) -> None:
+    guessed = guess(Column(name, unit))
+    assert (guessed.role, guessed.kind) == (role, kind)
+
+
+def write_logs(folder: Path) -> list[Path]:
+    rows = [f"{k / 100},{4 if k > 20 else 0},{0.4 if k > 20 else 0},{7 * k}" for k in range(100)]
+    paths = [folder / f"run{number}.csv" for number in range(4)]
+    for path in paths:
+        path.write_text("\n".join(["time [s],voltage [V],current [A],counts", *rows]) + "\n")
+    return paths
+
+
+def test_a_draft_can_be_read(tmp_path: Path) -> None:
+    text = draft(write_logs(tmp_path), tmp_path, "hoist")
+    content = tomllib.loads(text)
+    axis = content["axes"]["drive"]
+    assert axis["drive"] == "hoist"
+    assert axis["input"]["kind"] == "voltage"
+    assert set(axis["channels"]) == {"rectified_current", "encoder_counts"}
+    assert [run["role"] for run in content["runs"]] == ["fit", "fit", "fit", "validate"]
+    assert "100 samples, 0.99 s at 100 Hz, step +4 V" in text
+    (tmp_path / "campaign.toml").write_text(text, "utf-8")
+    tests = Campaign.from_toml(tmp_path / "campaign.toml")
+    assert tests["run2"].input.values[-1] == 4.0
+    assert tests["run2"]["rectified_current"].values[-1] == pytest.approx(0.4)
+
+
+def test_an_axis_for_each_prefix_and_logs_without_some(tmp_path: Path) -> None:
+    both, one = tmp_path / "both.csv", tmp_path / "one.csv"
+    both.write_text("Time,Boom Cmd,Stick Cmd,Boom Ms,Stick Ms\n0,7,6,1,2\n1,8,6,1,2\n", "utf-8")
+    one.write_text("Time,Boom Cmd,Boom Ms\n0,7,1\n1,8,2\n", "utf-8")
+    content = tomllib.loads(draft([both, one], tmp_path))
+    assert list(content["axes"]) == ["boom", "stick"]
+    assert content["axes"]["stick"]["input"]["offset"] == -6.0
+    assert content["axes"]["boom"]["channels"]["position"]["unit"] == "mm"
+    assert "only" not in content["runs"][0]
+    assert content["runs"][1]["only"] == ["boom"]
+
+
+def test_a_log_without_a_command(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("time,current\n0,1\n1,2\n", "utf-8")
+    with pytest.raises(InputError, match="no column looks like a command or voltage among 'time'"):
+        draft([tmp_path / "log.csv"], tmp_path)
+    with pytest.raises(InputError, match="at least one log"):
+        draft([], tmp_path)
+
+
+def test_names_that_need_quotes(tmp_path: Path) -> None:
+    path = tmp_path / 'a "b".csv'
+    path.write_text('time,"volt ""x"" [V]",counts\n0,1,2\n1,2,3\n', "utf-8")
+    assert tomllib.loads(draft([path], tmp_path))["runs"][0]["file"] == 'a "b".csv'

@@ -1,0 +1,143 @@
+"""Counters without roll-overs, staircases filled, angles, and counts that were lost."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swashplate.campaign.encoder import (
+    find_lost_counts,
+    interpolate_counts,
+    shaft_angle,
+    unwrap_counts,
+)
+from swashplate.errors import InputError
+
+
+def test_a_counter_of_three_bits_rolls_over_both_ways() -> None:
+    unwrapped = unwrap_counts([6, 7, 1, 2, 1, 0, 6], bits=3)
+    # 7 → 1 is +2 across the end, 0 → 6 is -2 across it
+    np.testing.assert_array_equal(unwrapped.counts, [6, 7, 9, 10, 9, 8, 6])
+    np.testing.assert_array_equal(unwrapped.rollovers, [2, 6])
+    assert unwrapped.doubtful.size == 0
+
+
+def test_large_steps_are_doubtful_and_half_the_range_is_refused() -> None:
+    unwrapped = unwrap_counts([0, 3, 4], modulus=8)
+    np.testing.assert_array_equal(unwrapped.counts, [0, 3, 4])
+    np.testing.assert_array_equal(unwrapped.doubtful, [1])
+    with pytest.raises(InputError, match="from 3 to 7 at row 2 .* half the range .* up or down"):
+        unwrap_counts([2, 3, 7], modulus=8)
+
+
+@given(
+    st.lists(st.integers(-499, 499), min_size=1, max_size=50),
+    st.integers(-(10**6), 10**6),
+    st.sampled_from([1000, 1024, 999]),
+    st.booleans(),
+)
+def test_any_motion_slower_than_half_the_range_is_recovered(
+    steps: list[int], first: int, modulus: int, signed: bool
+) -> None:
+    walk = first + np.concatenate([[0], np.cumsum(steps)])
+    low = modulus // 2 if signed else 0
+    readings = (walk + low) % modulus - low
+    unwrapped = unwrap_counts(readings, modulus=modulus)
+    np.testing.assert_array_equal(unwrapped.counts - unwrapped.counts[0], walk - walk[0])
+    assert unwrapped.counts[0] == readings[0]
+
+
+@pytest.mark.parametrize(
+    ("counts", "options", "said"),
+    [
+        ([0, 9], {"modulus": 8}, "hold 9 in row 1 .* outside the 0 to 7 of a counter of 8"),
+        ([-1, 7], {"bits": 3}, "hold 7 in row 1 .* the -4 to 3 of a signed counter"),
+        ([0, 0.5], {"bits": 3}, "whole numbers, but row 1"),
+        ([0, 1], {}, "either the bits .* or its modulus"),
+        ([0, 1], {"bits": 8, "modulus": 256}, "one of the two"),
+        ([0, 1], {"bits": 64}, "1 to 53 bits, not 64 bits"),
+        ([0, 1], {"modulus": 1}, "not a modulus of 1"),
+        ([0, np.nan], {"bits": 8}, "finite, but row 1"),
+    ],
+)
+def test_readings_that_no_such_counter_shows_are_refused(
+    counts: list, options: dict, said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        unwrap_counts(counts, **options)
+
+
+def test_interpolation_by_hand() -> None:
+    counts = [5, 5, 6, 6, 6, 8, 8, 7, 7, 7]
+    # changes at rows 2, 5, 7; the first row begins the first line; after row 7 the count is held
+    #        0        2                         5      7
+    lines = [5, 5.5, 6, 6 + 2 / 3, 6 + 4 / 3, 8, 7.5, 7, 7, 7]
+    np.testing.assert_allclose(interpolate_counts(np.arange(10.0), counts), lines, rtol=1e-15)
+
+
+def test_interpolation_follows_uneven_stamps() -> None:
+    time = [0.0, 1.0, 3.0, 4.0, 10.0]
+    # changes at 3 s and 10 s
+    lines = [0.0, 1 / 3, 1.0, 1 + 1 / 7, 2.0]
+    np.testing.assert_allclose(interpolate_counts(time, [0, 0, 1, 1, 2]), lines, rtol=1e-15)
+
+
+def test_counts_that_never_change_or_always_do_stay() -> None:
+    time = np.arange(4.0)
+    np.testing.assert_array_equal(interpolate_counts(time, [3, 3, 3, 3]), [3, 3, 3, 3])
+    np.testing.assert_array_equal(interpolate_counts(time, [3, 9, 4, 5]), [3, 9, 4, 5])
+
+
+@given(st.floats(0.02, 30.0), st.floats(0.0, 1.0), st.sampled_from([-1.0, 1.0]))
+def test_steady_motion_is_found_to_the_motion_within_one_sample(
+    speed: float, first: float, direction: float
+) -> None:
+    rows = np.arange(2000)
+    position = first + direction * speed * rows
+    counts = np.floor(position)
+    changes = np.flatnonzero(np.diff(counts)) + 1
+    inside = slice(changes[0], changes[-1] + 1)
+    lines = interpolate_counts(rows, counts)
+    # the edge below (forth) or above (back) was passed within the sample before the change
+    behind = direction * (position - lines)[inside] + (1.0 if direction < 0.0 else 0.0)
+    assert behind.min() >= -1e-9
+    assert behind.max() <= min(1.0, speed) + 1e-9
+
+
+def test_angle_of_the_hoist_winch() -> None:
+    # 400 counts a turn geared 120/19 to 1: one turn of the winch is 400·120/19 = 2526.3 counts
+    counts = np.array([0.0, 400.0 * 120.0 / 19.0, 400.0])
+    angle = shaft_angle(counts, counts_per_turn=400.0, gear_ratio=120.0 / 19.0)
+    np.testing.assert_allclose(angle, [0.0, 2 * np.pi, 2 * np.pi * 19 / 120], rtol=1e-15)
+    down = shaft_angle(counts, counts_per_turn=400.0, gear_ratio=120.0 / 19.0, sign=-1)
+    np.testing.assert_array_equal(down, -angle)
+    with pytest.raises(InputError, match="sign must be 1 or -1, not 0"):
+        shaft_angle(counts, counts_per_turn=400.0, sign=0)
+    with pytest.raises(InputError, match="counts_per_turn must be positive"):
+        shaft_angle(counts, counts_per_turn=0.0)
+
+
+def test_lost_counts_are_found_where_they_are() -> None:
+    time = np.arange(1000) / 512.0
+    counts = np.floor(300.0 * np.sin(2.0 * np.pi * time))  # at most 1885 counts/s
+    counts[400:] += 50.0
+    counts[700:] -= 21.0
+    found = find_lost_counts(time, counts)
+    np.testing.assert_array_equal(found.rows, [400, 700])
+    np.testing.assert_allclose(found.steps, [50.0, -21.0], atol=4.0)
+    # a median over single intervals of whole counts: 4 of them at most, 2048 counts/s
+    assert found.max_speed == 1.5 * 2048.0
+
+
+def test_a_given_speed_decides_and_stamps_count() -> None:
+    time, counts = [0.0, 0.1, 0.2, 1.2, 1.3], [0.0, 5.0, 10.0, 60.0, 75.0]
+    # 50 counts in the pause of 1 s are 50 counts/s; 15 in 0.1 s are not, nor with one granted
+    np.testing.assert_array_equal(find_lost_counts(time, counts, max_speed=50.0).rows, [4])
+    assert find_lost_counts(time, counts, max_speed=140.0).rows.size == 0
+    with pytest.raises(InputError, match="5 rows is too short .* give max_speed"):
+        find_lost_counts(time, counts)
+
+
+def test_rest_has_no_lost_counts() -> None:
+    flicker = np.array([0, 0, 0, 1, 0, 0, 0, 0, 1, 1, 1, 0], dtype=float)
+    assert find_lost_counts(np.arange(12.0), flicker).rows.size == 0

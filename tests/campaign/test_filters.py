@@ -1,0 +1,239 @@
+"""The source's filters by hand, the exact ones by theory, and the phase that both paths share."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.signal import lsim
+
+from swashplate.campaign.filters import (
+    DIFFERENTIATOR,
+    LOW_PASS,
+    matched_speed,
+    path_delay,
+    speed_from_angle,
+    speed_from_counts,
+)
+from swashplate.errors import InputError
+
+H = 1.0 / 512.0
+FORMS = ("source", "exact")
+
+
+@pytest.mark.interpreted
+def test_source_filters_by_hand() -> None:
+    # h = 1, a = 0.25, b = 0.5:
+    # low pass        w ← 0.75 w + 0.25 u₋₁:  0, 0.25·0 = 0, 0.25·4 = 1, 0.75 + 0.25·8 = 2.75,
+    #                                         0.75·2.75 + 0.25·8 = 4.0625
+    # differentiator  y ← 0.5 y + 0.5 (w - w₋₁):  0, 0, 0.5·1 = 0.5, 0.25 + 0.5·1.75 = 1.125,
+    #                                         0.5625 + 0.5·1.3125 = 1.21875
+    speed = speed_from_angle(
+        [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 4.0, 8.0, 8.0, 8.0], low_pass=0.25, differentiator=0.5
+    )
+    np.testing.assert_allclose(speed, [0.0, 0.0, 0.5, 1.125, 1.21875], rtol=1e-15)
+
+
+def test_source_path_from_counts_by_hand() -> None:
+    # counts 0 0 1 1 2 are interpolated to 0 0.5 1 1.5 2; one turn is 2π counts, so 1 rad a count
+    # w: 0, 0, 0.125, 0.34375, 0.6328125; y: 0, 0, 0.0625, 0.140625, 0.21484375
+    speed = speed_from_counts(
+        np.arange(5.0),
+        [0, 0, 1, 1, 2],
+        counts_per_turn=2.0 * np.pi,
+        low_pass=0.25,
+        differentiator=0.5,
+    )
+    np.testing.assert_allclose(speed, [0.0, 0.0, 0.0625, 0.140625, 0.21484375], rtol=1e-14)
+
+
+def recursions(angle: np.ndarray, a: float, b: float, h: float) -> np.ndarray:
+    """Both of the source's recursions, one after the other, as they are printed."""
+    low = np.full_like(angle, angle[0])
+    speed = np.zeros_like(angle)
+    for n in range(1, angle.size):
+        low[n] = (1.0 - a * h) * low[n - 1] + a * h * angle[n - 1]
+        speed[n] = (1.0 - b * h) * speed[n - 1] + b * (low[n] - low[n - 1])
+    return speed
+
+
+def test_source_path_is_its_two_recursions() -> None:
+    rng = np.random.default_rng(3)
+    counts = np.floor(rng.normal(0.3, 2.0, 1500).cumsum())
+    time = np.arange(counts.size) * H
+    angle = -2.0 * np.pi / 2526.3 * counts
+    np.testing.assert_allclose(
+        speed_from_angle(time, angle), recursions(angle, LOW_PASS, DIFFERENTIATOR, H), atol=1e-10
+    )
+    # every count new: nothing to interpolate
+    counts = (np.arange(300.0) * 3.0) % 701.0
+    np.testing.assert_allclose(
+        speed_from_counts(time[:300], counts, counts_per_turn=2526.3, sign=-1),
+        recursions(-2.0 * np.pi / 2526.3 * counts, LOW_PASS, DIFFERENTIATOR, H),
+        atol=1e-10,
+    )
+
+
+@pytest.mark.interpreted
+@pytest.mark.parametrize("b", [DIFFERENTIATOR, LOW_PASS])
+@pytest.mark.parametrize("rate", [512.0, 50.0])
+def test_exact_path_is_the_continuous_one(b: float, rate: float) -> None:
+    time = np.arange(400) / rate
+    angle = np.random.default_rng(4).normal(size=time.size).cumsum()
+    # a b s / ((s + a)(s + b)), straight between samples
+    _, speed, _ = lsim(
+        ([LOW_PASS * b, 0.0], [1.0, LOW_PASS + b, LOW_PASS * b]), angle - angle[0], time
+    )
+    found = speed_from_angle(time, angle, form="exact", differentiator=b)
+    np.testing.assert_allclose(found, speed, atol=1e-8 * np.abs(speed).max())
+
+
+@given(st.lists(st.tuples(st.floats(1e-4, 0.05), st.floats(-1, 1)), min_size=2, max_size=30))
+def test_exact_path_does_not_see_stamps_put_between(steps: list[tuple[float, float]]) -> None:
+    time = np.cumsum([step for step, _ in steps])
+    angle = np.array([value for _, value in steps])
+    finer = np.sort(np.concatenate([time, 0.7 * time[1:] + 0.3 * time[:-1]]))
+    speed = speed_from_angle(time, angle, form="exact")
+    between = speed_from_angle(finer, np.interp(finer, time, angle), form="exact")
+    # stamps that are even but for 5 % are taken as even: that is the tolerance here
+    scale = np.abs(np.diff(angle) / np.diff(time)).max()
+    np.testing.assert_allclose(between[::2], speed, atol=0.2 * scale + 1e-12)
+    if np.ptp(np.diff(time)) > 0.5 * np.diff(time).max():
+        np.testing.assert_allclose(between[::2], speed, atol=1e-9 * scale + 1e-12)
+
+
+def test_a_gap_leaves_its_mean_speed_and_no_overflow() -> None:
+    speed = speed_from_angle([0.0, 0.1, 1000.0, 1000.1], [0.0, 0.2, 1000.0, 1000.1], form="exact")
+    assert speed[2] == pytest.approx((1000.0 - 0.2) / (1000.0 - 0.1), rel=1e-12)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_steady_speed_passes_unchanged(form: str) -> None:
+    time = np.arange(2000) * H
+    np.testing.assert_allclose(speed_from_angle(time, 3.0 * time, form=form)[-1], 3.0, rtol=1e-9)
+    started = speed_from_angle(time, 3.0 * time, form=form, start_speed=3.0)
+    np.testing.assert_allclose(started, 3.0, rtol=1e-9)
+    np.testing.assert_allclose(
+        matched_speed(time, np.full(time.size, 3.0), form=form, start_speed=3.0), 3.0, rtol=1e-12
+    )
+
+
+def test_why_the_angle_is_not_held() -> None:
+    # a held angle, then b s/(s + b), both exact: y ← exp(-bh) y + b (u - u₋₁)
+    kept, speed = np.exp(-DIFFERENTIATOR * H), 0.0
+    for _ in range(200):
+        speed = kept * speed + DIFFERENTIATOR * (1.0 * H)
+    assert speed == pytest.approx(DIFFERENTIATOR * H / (1.0 - kept), rel=1e-12)
+    assert speed == pytest.approx(1.20, abs=0.005)
+
+
+def phase_and_amplitude(time: np.ndarray, values: np.ndarray, frequency: float) -> complex:
+    """Complex amplitude of a steady sine, by least squares."""
+    angle = 2.0 * np.pi * frequency * time
+    basis = np.column_stack([np.cos(angle), np.sin(angle), np.ones_like(time)])
+    (c, s, _), *_ = np.linalg.lstsq(basis, values, rcond=None)
+    return complex(c, -s)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("frequency", [0.3, 3.0, 10.0])
+def test_matched_sine_has_the_phase_of_the_measured_one(form: str, frequency: float) -> None:
+    time = np.arange(4096) * H
+    omega = 2.0 * np.pi * frequency
+    speed, angle = np.cos(omega * time), np.sin(omega * time) / omega
+    settled = time > 2.0
+    measured, matched, raw = (
+        phase_and_amplitude(time[settled], values[settled], frequency)
+        for values in (
+            speed_from_angle(time, angle, form=form),
+            matched_speed(time, speed, form=form),
+            matched_speed(time, speed, form=form, aligned=False),
+        )
+    )
+
+    def lag(of: complex) -> float:
+        return float(-np.angle(of / measured) / omega / H)
+
+    assert lag(matched) == pytest.approx(0.0, abs=1e-6)
+    assert lag(raw) == pytest.approx(0.5, abs=1e-6)
+    x = np.pi * frequency * H
+    assert abs(matched / measured) == pytest.approx(x / np.tan(x), rel=1e-6)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_matched_ramp_comes_when_the_measured_one_does(form: str) -> None:
+    time = np.arange(2000) * H
+    speed, angle = 4.0 * time, 2.0 * time**2
+    measured = speed_from_angle(time, angle, form=form)
+    matched = matched_speed(time, speed, form=form)
+    raw = matched_speed(time, speed, form=form, aligned=False)
+    lags = [(measured - each)[-1] / 4.0 / H for each in (matched, raw)]
+    np.testing.assert_allclose(lags, [0.0, 0.5], atol=1e-6)
+    assert time[-1] - measured[-1] / 4.0 == pytest.approx(path_delay(H, form=form), rel=1e-6)
+
+
+def test_delay_of_the_paths() -> None:
+    a, b = LOW_PASS, DIFFERENTIATOR
+    assert path_delay(H) == pytest.approx(1 / a + 1 / b - H / 2, rel=1e-12)
+    assert path_delay(H) == pytest.approx(20.24e-3, abs=5e-6)
+    # the exact one's position is straight between samples: 1/a + 1/b but for terms in h²
+    assert path_delay(H, form="exact") == pytest.approx(1 / a + 1 / b, rel=1e-5)
+
+
+def test_matched_speed_in_the_source_form_by_hand() -> None:
+    # h = 1, a = 0.25, b = 0.5; w ← 0.75 w + 0.25 u₋₁, y ← 0.5 y + 0.5 w₋₁, u = 0 8 8 8 8
+    # w: 0, 0, 2, 3.5, 4.625; y: 0, 0, 0, 1, 2.25
+    time, speed = np.arange(5.0), [0.0, 8.0, 8.0, 8.0, 8.0]
+    raw = matched_speed(time, speed, low_pass=0.25, differentiator=0.5, aligned=False)
+    np.testing.assert_allclose(raw, [0.0, 0.0, 0.0, 1.0, 2.25], rtol=1e-15)
+    # aligned, the means 4 8 8 8 drive the intervals: x 1 2.75 4.0625; y 0 0.5 1.625 2.84375
+    aligned = matched_speed(time, speed, low_pass=0.25, differentiator=0.5)
+    np.testing.assert_allclose(aligned, [0.0, 0.0, 0.5, 1.625, 2.84375], rtol=1e-15)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_sensitivities_are_filtered_column_by_column(form: str) -> None:
+    time = np.arange(300) * H
+    columns = np.random.default_rng(5).normal(size=(300, 4))
+    start = [0.0, 1.0, -2.0, 0.5]
+    together = matched_speed(time, columns, form=form, start_speed=start)
+    for k in range(4):
+        alone = matched_speed(time, columns[:, k], form=form, start_speed=start[k])
+        np.testing.assert_array_equal(together[:, k], alone)
+    weights = np.array([1.0, -2.0, 0.3, 5.0])
+    np.testing.assert_allclose(
+        together @ weights,
+        matched_speed(time, columns @ weights, form=form, start_speed=start @ weights),
+        atol=1e-12,
+    )
+    np.testing.assert_array_equal(
+        matched_speed(time, np.asfortranarray(columns), form=form, start_speed=start), together
+    )
+
+
+def test_unstable_and_uneven_are_refused_for_the_explicit_form_only() -> None:
+    slow = np.arange(100) / 94.0
+    with pytest.raises(InputError, match="unstable at 94 Hz, as at every rate up to 94.25 Hz"):
+        speed_from_angle(slow, slow)
+    assert speed_from_angle(slow, slow, form="exact")[-1] == pytest.approx(1.0)
+    assert speed_from_angle(np.arange(999) / 95.0, np.arange(999) / 95.0)[-1] == pytest.approx(1.0)
+    uneven = np.arange(50.0) ** 1.5 * H
+    with pytest.raises(InputError, match="evenly spaced stamps; take form 'exact'"):
+        matched_speed(uneven, uneven)
+    with pytest.raises(InputError, match="form must be 'source' or 'exact', not 'zoh'"):
+        matched_speed(slow, slow, form="zoh")
+
+
+def test_wrong_arguments_are_refused() -> None:
+    time = np.arange(10) * H
+    with pytest.raises(InputError, match="low_pass must be positive"):
+        speed_from_angle(time, time, low_pass=0.0)
+    with pytest.raises(InputError, match="start_speed must be one number or 1"):
+        speed_from_angle(time, time, start_speed=[1.0, 2.0])
+    with pytest.raises(InputError, match="start_speed must be finite"):
+        matched_speed(time, time, start_speed=np.nan)
+    with pytest.raises(InputError, match="angle must be finite, but row 3"):
+        speed_from_angle(time, np.where(np.arange(10) == 3, np.nan, 0.0))
+    with pytest.raises(InputError, match="speed must have one row for each of the 10 stamps"):
+        matched_speed(time, np.zeros((3, 10)))
+    with pytest.raises(InputError, match="counts must be one signal"):
+        speed_from_counts(time, np.zeros((10, 2)), counts_per_turn=100.0)

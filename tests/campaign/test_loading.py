@@ -1,0 +1,203 @@
+"""A campaign file and its logs become experiments in SI."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate import Campaign, Drive, FileError, InputError, ParameterError, SwashplateError
+
+Edit = Callable[..., Path]
+
+
+def test_signals_are_in_si(campaign_folder: Path) -> None:
+    tests = Campaign.from_toml(campaign_folder / "campaign.toml")
+    assert (tests.title, len(tests), tests.virtual) == ("Bench", 2, False)
+    up = tests["up"]
+    assert up.input.unit == "V"
+    assert up.input.time[:3] == pytest.approx([0.0, 0.01, 0.02], abs=1e-15)
+    assert up.input.values[49:51] == pytest.approx([0.0, 4.0])
+    assert up["current"].values[-1] == pytest.approx(0.4)
+    # 40 counts a sample downwards, turned round; 2000 counts for a turn of the shaft
+    counts = up["counts"]
+    assert counts.counts is not None
+    assert counts.counts[-1] == -40 * 50
+    assert counts.values[-1] == pytest.approx(2.0 * np.pi, rel=1e-12)
+    assert counts.unit == "rad"
+    assert (up.role, tests["down"].role) == ("fit", "validate")
+    assert up.start == "rest"
+
+
+def test_selection_and_drive(campaign_folder: Path) -> None:
+    tests = Campaign.from_toml(campaign_folder / "campaign.toml")
+    assert [each.name for each in tests.select(role="validate")] == ["down"]
+    assert tests.drive("winch").parameters == Drive.preset("hoist").parameters
+    with pytest.raises(InputError, match="no experiment 'sideways'; it has up, down"):
+        tests["sideways"]
+    with pytest.raises(InputError, match="no axis 'boom'; it has winch"):
+        tests.select(axis="boom")
+    with pytest.raises(InputError, match="no channel 'speed'; it has current, counts"):
+        tests["up"]["speed"]
+
+
+def test_the_manoeuvre_is_recognised_or_stated(campaign_folder: Path, edited: Edit) -> None:
+    assert Campaign.from_toml(campaign_folder / "campaign.toml")["up"].maneuver == "step +4 V"
+    path = edited('file = "up.csv"', 'file = "up.csv"\nmaneuver = "harbour lift"')
+    assert Campaign.from_toml(path)["up"].maneuver == "harbour lift"
+
+
+def test_a_drive_from_a_file_beside_the_campaign(edited: Edit, campaign_folder: Path) -> None:
+    Drive.preset("slew").to_toml(campaign_folder / "mine.toml")
+    path = edited('drive = "hoist"', 'drive = "mine.toml"')
+    assert Campaign.from_toml(path).drive("winch").name == "slew"
+
+
+def test_an_override_holds_for_its_run_alone(edited: Edit) -> None:
+    path = edited(
+        'file = "down.csv"',
+        'file = "down.csv"\naxes.winch.channels.counts.gear_ratio = 1.0\n'
+        "axes.winch.input.scale = 0.5",
+    )
+    tests = Campaign.from_toml(path)
+    assert tests["down"]["counts"].values[-1] == pytest.approx(-4.0 * np.pi)
+    assert tests["down"].input.values[-1] == pytest.approx(-2.0)
+    assert tests["up"]["counts"].values[-1] == pytest.approx(2.0 * np.pi)
+    assert tests["up"].input.values[-1] == pytest.approx(4.0)
+
+
+def test_scale_offset_and_sign(edited: Edit) -> None:
+    path = edited('unit = "mV" }', 'unit = "mV", scale = 2.0, offset = 100.0, sign = -1 }')
+    values = Campaign.from_toml(path)["up"].input.values
+    assert values[0] == pytest.approx(-0.1)
+    assert values[-1] == pytest.approx(-8.1)
+
+
+def test_a_unit_in_the_header_counts_unless_another_is_stated(edited: Edit) -> None:
+    edited("time,joystick,ammeter", "time,joystick,ammeter [dA]", "up.csv")
+    path = edited("time,joystick,ammeter", "time,joystick,ammeter [dA]", "down.csv")
+    assert Campaign.from_toml(path)["up"]["current"].values[-1] == pytest.approx(0.4)
+    edited('unit = "mA"\n', "")
+    assert Campaign.from_toml(path)["up"]["current"].values[-1] == pytest.approx(40.0)
+
+
+def test_weights_multiply_and_ignored_windows_are_zero(edited: Edit) -> None:
+    edited(
+        'unit = "mA"\n',
+        'unit = "mA"\nweight = 2.0\nweight_by_input = [[0.0, 1.0], [8.0, 0.5]]\n'
+        "weights = [{ from = 0.6, to = 0.7, factor = 3.0 },"
+        " { maneuver = 'sine *', factor = 100.0 }]\n"
+        "ignore = [{ to = 0.1 }]\n",
+    )
+    path = edited(
+        'file = "up.csv"',
+        'file = "up.csv"\nweight = 5.0\nweights = [{ maneuver = "step *", factor = 7.0 }]\n'
+        'ignore = [{ from = 0.9, why = "hit the stop" }]',
+    )
+    up = Campaign.from_toml(path)["up"]
+    weight = up["current"].weight
+    # at 4 V the polyline from 1 at 0 V to 0.5 at 8 V has 0.75
+    assert weight[[0, 10]] == pytest.approx([0.0, 0.0])
+    assert weight[20] == pytest.approx(2.0 * 5.0 * 7.0)
+    assert weight[55] == pytest.approx(2.0 * 5.0 * 7.0 * 0.75)
+    assert weight[60] == pytest.approx(2.0 * 5.0 * 7.0 * 0.75 * 3.0)
+    assert weight[90] == 0.0
+    assert up.ignored == ((0.9, np.inf, "hit the stop"),)
+    assert up["counts"].weight[0] == pytest.approx(5.0 * 7.0)
+
+
+def test_a_part_of_a_log(edited: Edit) -> None:
+    path = edited('file = "up.csv"', 'file = "up.csv"\nspan = { from = 0.2, to = 0.8 }')
+    up = Campaign.from_toml(path)["up"]
+    assert up.input.time[[0, -1]] == pytest.approx([0.2, 0.8])
+    assert up["counts"].time.size == 61
+
+
+def test_missing_samples_are_refused_or_dropped_and_counted(edited: Edit) -> None:
+    path = edited("300,0,0,0\n", "300,0,,0\n", "up.csv")
+    with pytest.raises(FileError) as caught:
+        Campaign.from_toml(path)
+    assert (
+        "up.csv: column 'ammeter' (channel 'current') has no finite number in data row 31;"
+        in str(caught.value)
+    )
+    edited('unit = "mA"', 'unit = "mA"\nmissing = "drop"')
+    up = Campaign.from_toml(path)["up"]
+    assert up["current"].dropped == 1
+    assert up["current"].time.size == 100
+    assert up["counts"].time.size == 101
+
+
+def test_a_clock_without_a_column(edited: Edit) -> None:
+    path = edited('time = { column = "time", unit = "ms" }', "time = { rate = 50, offset = 3.0 }")
+    assert Campaign.from_toml(path)["up"].input.time[:2] == pytest.approx([3.0, 3.02])
+
+
+def test_a_channel_with_its_own_clock(edited: Edit) -> None:
+    path = edited(
+        'unit = "mA"', 'unit = "mA"\ntime = { column = "time", unit = "ms", offset = 0.25 }'
+    )
+    up = Campaign.from_toml(path)["up"]
+    assert up["current"].time[0] == pytest.approx(0.25)
+    assert up["counts"].time[0] == 0.0
+
+
+def test_a_counter_that_rolls_over(edited: Edit) -> None:
+    text = ["time,joystick,ammeter,counts"]
+    text += [f"{10 * k},{0 if k < 5 else 4000},0,{(30 * k) % 256}" for k in range(60)]
+    path = edited(
+        'file = "up.csv"',
+        'file = "up.csv"\naxes.winch.channels.counts.rolls_over_at = 256',
+    )
+    (path.parent / "up.csv").write_text("\n".join(text) + "\n", "utf-8")
+    counts = Campaign.from_toml(path)["up"]["counts"].counts
+    assert counts is not None
+    assert counts[-1] == 30 * 59
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('title = "Bench"', "title = 3", "title is 3, but input should be a valid string"),
+        ('title = "Bench"', "titel = 'x'", "no entry 'titel': perhaps 'title' is meant"),
+        ('column = "joystick"', 'colum = "joystick"', "axes.winch.input"),
+        ('kind = "voltage"', 'kind = "volt"', "axes.winch.input.kind is 'volt'"),
+        ("counts_per_turn = 1000\n", "", "encoder_counts need counts_per_turn"),
+        ("gear_ratio = 2.0", "gear_ratio = 0.0", "gear_ratio is 0.0"),
+        ('{ column = "time", unit = "ms" }', "{ unit = 'ms' }", "either the column of the time"),
+        ('role = "validate"', 'role = "check"', "runs.1.role is 'check'"),
+        ('role = "validate"', 'start = "given"', "start_pressure belong together"),
+        ('role = "validate"', "ignore = [{ from = 2.0, to = 1.0 }]", "from 2.0 s to 1.0 s"),
+        ('role = "validate"', 'only = ["boom"]', "names the axis 'boom', but the axes are winch"),
+        ('role = "validate"', 'name = "up"', "two runs are called 'up'"),
+        ('role = "validate"', "axes.winch.input.unti = 'V'", "perhaps 'unit' is meant"),
+        ('column = "joystick"', 'column = "lever"', "the input: "),
+        ('unit = "mV"', 'unit = "bar"', "is given in 'bar', which does not measure the same as V"),
+        ('unit = "mA"', 'unit = "mAA"', "unknown unit 'mAA'"),
+        ('file = "up.csv"', 'file = "left.csv"', "There is no file"),
+        ('unit = "ms"', 'unit = "V"', "does not measure the same as s"),
+        ("[[runs]]", "[[runs]", "is not TOML"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(edited: Edit, old: str, new: str, sentence: str) -> None:
+    path = edited(old, new)
+    with pytest.raises(SwashplateError) as caught:
+        Campaign.from_toml(path)
+    message = str(caught.value)
+    assert sentence in message
+    assert "\n" not in message
+    assert message.endswith(".")
+
+
+def test_the_campaign_file_itself(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="There is no file"):
+        Campaign.from_toml(tmp_path / "campaign.toml")
+    (tmp_path / "campaign.toml").write_text("title = 'x'\n", "utf-8")
+    with pytest.raises(ParameterError, match="the file needs an entry 'axes'"):
+        Campaign.from_toml(tmp_path / "campaign.toml")
+
+
+def test_reversed_stamps_name_file_and_row(edited: Edit) -> None:
+    path = edited("300,0,0,0\n310,0,0,0\n", "310,0,0,0\n300,0,0,0\n", "up.csv")
+    with pytest.raises(FileError, match=r"up\.csv.*'time'.*data row 32"):
+        Campaign.from_toml(path)

@@ -1,0 +1,116 @@
+"""The check finds what is wrong with a measurement, and nothing in a good one."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate import Campaign
+from swashplate.campaign.quality import Quality, examine
+
+Edit = Callable[..., Path]
+
+
+def qualities(path: Path, run: str = "up") -> dict[str, Quality]:
+    return {each.signal: each for each in examine(Campaign.from_toml(path)[run])}
+
+
+def rewrite(path: Path, change: Callable[[np.ndarray], np.ndarray]) -> Path:
+    log = path.parent / "up.csv"
+    header, *rows = log.read_text("utf-8").splitlines()
+    table = change(np.array([[float(cell) for cell in row.split(",")] for row in rows]))
+    lines = [",".join(f"{cell:.10g}" for cell in row) for row in table]
+    log.write_text("\n".join([header, *lines]) + "\n", "utf-8")
+    return path
+
+
+def findings(path: Path) -> str:
+    return "; ".join(text for each in qualities(path).values() for text in each.findings)
+
+
+def test_a_good_log_has_no_findings(campaign_folder: Path) -> None:
+    found = qualities(campaign_folder / "campaign.toml")
+    assert list(found) == ["input", "current", "counts"]
+    for each in found.values():
+        assert each.findings == ()
+        assert each.stamps.rate == pytest.approx(100.0)
+        assert each.stamps.gaps.size == 0
+    assert (found["input"].low, found["input"].high) == (0.0, 4.0)
+    assert found["counts"].lost_counts == 0
+    assert found["current"].lost_counts is None
+
+
+def test_gaps(campaign_folder: Path) -> None:
+    path = rewrite(campaign_folder / "campaign.toml", lambda t: np.delete(t, range(20, 30), axis=0))
+    found = qualities(path)
+    assert found["current"].gap_time == pytest.approx(0.11)
+    assert "1 gaps, the longest 0.11 s; 10 samples are missing" in found["input"].findings[0]
+    assert found["current"].findings == ()
+
+
+def test_lost_counts(campaign_folder: Path) -> None:
+    def lose(table: np.ndarray) -> np.ndarray:
+        table[80:, 3] -= 900
+        return table
+
+    found = qualities(rewrite(campaign_folder / "campaign.toml", lose))
+    assert found["counts"].lost_counts == 1
+    assert "jumps 1 times" in found["counts"].findings[0]
+
+
+def test_a_turned_sign(edited: Edit) -> None:
+    assert "should its sign be -1" in findings(edited("sign = -1", "sign = 1"))
+
+
+def test_a_dead_channel(campaign_folder: Path) -> None:
+    def silence(table: np.ndarray) -> np.ndarray:
+        table[:, 2] = 12.0
+        return table
+
+    assert "is it connected" in findings(rewrite(campaign_folder / "campaign.toml", silence))
+
+
+def test_a_channel_that_freezes(campaign_folder: Path) -> None:
+    noise = np.random.default_rng(0).normal(0.0, 1.0, 400)
+
+    def freeze(table: np.ndarray) -> np.ndarray:
+        time = 10.0 * np.arange(400)
+        long = np.column_stack([time, 4000.0 * (time >= 500), 400.0 + noise, np.zeros(400)])
+        long[:, 3] = -40.0 * np.maximum(np.arange(400) - 50, 0)
+        long[200:350, 2] = long[200, 2]
+        return long
+
+    found = qualities(rewrite(campaign_folder / "campaign.toml", freeze))
+    assert found["current"].stuck == pytest.approx(1.49)
+    assert "stands still for 1.49 s" in found["current"].findings[0]
+
+
+def test_a_current_with_a_sign_is_not_rectified(campaign_folder: Path) -> None:
+    def sign(table: np.ndarray) -> np.ndarray:
+        table[60:, 2] *= -1.0
+        return table
+
+    assert "should it be signed_current" in findings(
+        rewrite(campaign_folder / "campaign.toml", sign)
+    )
+
+
+def test_clipping_at_the_ends_of_the_range(edited: Edit) -> None:
+    path = edited('unit = "mA"', 'unit = "mA"\nlimits = [0.0, 400.0]')
+    # 50 samples at 0 and 51 at 400 mA
+    assert qualities(path)["current"].clipped == 1.0
+    path = edited("limits = [0.0, 400.0]", "limits = [-10.0, 400.0]")
+    assert qualities(path)["current"].clipped == pytest.approx(51 / 101)
+
+
+def test_a_voltage_beyond_the_card(edited: Edit) -> None:
+    assert "check unit, scale and offset" in findings(edited('unit = "mV"', 'unit = "cV"'))
+
+
+def test_an_input_that_never_changes(campaign_folder: Path) -> None:
+    def rest(table: np.ndarray) -> np.ndarray:
+        table[:, 1:] = 0.0
+        return table
+
+    assert "nothing can be identified" in findings(rewrite(campaign_folder / "campaign.toml", rest))

@@ -1,0 +1,392 @@
+"""Every expected number is the manoeuvre's own: what was put in has to be found again."""
+
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swashplate import InputError, maneuvers
+from swashplate.campaign.recognition import Recognised, Window, recognise
+from swashplate.campaign.recognition.rounding import roundest
+from swashplate.logs import open_log
+from swashplate.maneuvers import Maneuver
+
+SHARED = Path(__file__).parents[3] / "shared"
+CODE = 20.0 / 4096.0
+SOURCE = [
+    (axis, name) for axis in ("hoist", "slew", "luff") for name in maneuvers.source_tests(axis)
+]
+
+
+def grid(length: float, rate: float) -> np.ndarray:
+    return np.arange(int(length * rate + 1e-9) + 1) / rate
+
+
+def irregular(length: float) -> np.ndarray:
+    """Stamps about 19 times a second, 36 to 69 ms apart."""
+    stamps = np.cumsum(np.random.default_rng(1).uniform(0.036, 0.069, int(length / 0.0525)))
+    return stamps[stamps <= length]
+
+
+def readback(values: np.ndarray, *, noise: float = 0.01, offset: float = 0.03) -> np.ndarray:
+    """12-bit codes of a command with noise and a zero error."""
+    disturbed = values + offset + np.random.default_rng(2).normal(0.0, noise, values.size)
+    return CODE * np.round(disturbed / CODE)
+
+
+@pytest.mark.parametrize(("axis", "name"), SOURCE)
+@pytest.mark.parametrize("rate", [512.0, 50.0, 19.0])
+def test_tests_of_the_source_are_recognised_through_a_12_bit_readback(
+    axis: str, name: str, rate: float
+) -> None:
+    run = maneuvers.source_tests(axis)[name]
+    time = irregular(run.length) if rate == 19.0 else grid(run.length, rate)
+    found = recognise(time, readback(run(time)))
+    assert found.name == name
+    assert found.kind == name.split()[0]
+    assert abs(found.rest - 0.03) < 0.01
+    # noise of 10 mV and the steps of the converter, to which coarse stamps add a little
+    assert found.residual < 0.015
+
+
+@pytest.mark.parametrize(("axis", "name"), SOURCE)
+def test_a_clean_command_gives_its_numbers_exactly(axis: str, name: str) -> None:
+    run = maneuvers.source_tests(axis)[name]
+    time = run.time()
+    found = recognise(time, run.sample())
+    assert found.name == name
+    expected = [float(word) for word in name.split() if word.strip("+-").replace(".", "").isdigit()]
+    # of the ends of a return alone it is known only to within what the record resolves
+    numbers = {"step": ("level",), "ramp": ("slope",), "sine": ("amplitude", "frequency")}
+    for key, value in zip(numbers[found.kind], expected, strict=True):
+        assert getattr(found, key) == value
+        assert found.fitted[key] == pytest.approx(value, rel=1e-5)
+    assert found.fitted["start"] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_windows_of_a_step() -> None:
+    run = maneuvers.step(-4.0)
+    found = recognise(run.time(), run.sample())
+    assert found.windows == {
+        "before": (Window(0.0, 1.0),),
+        "rise": (Window(1.0, 2.0),),
+        "plateau": (Window(2.0, 6.0),),
+        "fall": (Window(6.0, 7.0),),
+        "after": (Window(7.0, 10.0),),
+    }
+    assert (found.level, found.levels, found.dwell) == (-4.0, (-4.0,), 5.0)
+    shorter = recognise(run.time(), run.sample(), settling=0.2)
+    assert shorter.window("rise") == Window(1.0, 1.2)
+    assert shorter.window("after") == Window(6.2, 10.0)
+
+
+def test_windows_of_a_ramp_that_its_return_cuts_short() -> None:
+    run = maneuvers.ramp(1.0, settle=4.5)
+    found = recognise(run.time(), readback(run.sample()))
+    assert list(found.windows) == ["before", "rise", "return"]
+    assert found.limit is None
+    assert found.window("rise").start == pytest.approx(1.0, abs=0.03)
+    assert found.window("rise").stop == found.window("return").start
+    # from a crest that has hardly any curvature, the beginning is known to a few samples
+    assert found.window("return").start == pytest.approx(8.5, abs=0.03)
+    assert found.window("return").stop == pytest.approx(13.0, abs=0.03)
+
+
+def test_windows_of_a_ramp_that_is_held() -> None:
+    run = maneuvers.ramp(2.0, limit=6.0, length=13.0)
+    found = recognise(run.time(), readback(run.sample()))
+    assert found.name == "ramp +2 V/s"
+    assert found.limit == 6.0
+    assert found.window("hold") == Window(4.0, 10.5)
+    assert found.window("return") == Window(10.5, 13.0)
+
+
+def test_windows_of_a_sine() -> None:
+    run = maneuvers.sine(6.5, 0.3, length=20.0)
+    found = recognise(run.time(), readback(run.sample()))
+    assert found.window("before") == Window(0.0, 1.0)
+    # 16.5 s of 0.3 Hz are 4.95 periods
+    assert found.window("run").start == 1.0
+    assert found.window("run").stop == pytest.approx(17.5, abs=0.01)
+    periods = found.windows["periods"]
+    assert len(periods) == 4
+    assert periods[0].start == 1.0
+    assert all(b == a for (_, b), (a, _) in pairwise(periods))
+    ends = np.array([period.stop for period in periods])
+    np.testing.assert_allclose(ends, 1.0 + np.arange(1, 5) / 0.3, atol=1e-3)
+    crossings = 1.0 + np.arange(1, 10) / 0.6
+    np.testing.assert_allclose(found.zero_crossings, crossings, atol=1e-3)
+
+
+def test_stairs_and_their_windows() -> None:
+    run = maneuvers.stairs([2.0, 4.0, -6.0, 8.0], 3.0)
+    found = recognise(run.time(), readback(run.sample()))
+    assert found.name == run.name == "stairs 2/4/-6/8 V"
+    assert found.levels == (2.0, 4.0, -6.0, 8.0)
+    assert found.dwell == 3.0
+    assert [window.start for window in found.windows["rise"]] == [1.0, 4.0, 7.0, 10.0]
+    assert found.window("return") == Window(13.0, 15.5)
+    down = maneuvers.stairs([2.0, 0.0, -3.0, 0.0], 1.5)
+    found = recognise(down.time(), readback(down.sample()))
+    assert found.name == down.name
+    assert found.levels == (2.0, 0.0, -3.0)
+    assert found.window("fall") == Window(5.5, 6.5)
+
+
+def test_stairs_of_unequal_treads_have_no_dwell() -> None:
+    run = maneuvers.stairs([3.0], 2.0, settle=None) + maneuvers.stairs([5.0, 0.0], 4.0, start=0.0)
+    found = recognise(run.time(), readback(run.sample()))
+    assert found.name == "stairs 3/5/0 V"
+    assert found.dwell is None
+
+
+FREE = {
+    "chirp": maneuvers.chirp(5.0, 0.05, 1.0),
+    "narrow chirp": maneuvers.chirp(5.0, 0.1, 0.11),
+    "multisine": maneuvers.multisine(5.0, (0.1, 2.0, 8)),
+    "step and sine": maneuvers.step(4.0) + maneuvers.sine(4.0, 0.1),
+    "sine on a step": maneuvers.superpose(
+        maneuvers.sine(2.0, 0.2, settle=None), maneuvers.step(3.0, stop=30.0, length=30.0)
+    ),
+    "triangle": maneuvers.recorded([0, 5, 10], [0, 5, 0], interpolation="linear"),
+    "triangle wave": maneuvers.recorded(
+        np.arange(0, 21, 2.5), [0, 5, 0, -5, 0, 5, 0, -5, 0], interpolation="linear"
+    ),
+    "less than a period": maneuvers.sine(4.0, 0.1, length=12.5),
+    "away from rest": maneuvers.recorded([0, 5], [3, 3], interpolation="linear"),
+    "two ramps": maneuvers.ramp(1.0, length=8.0) + maneuvers.ramp(-1.0, length=8.0),
+}
+
+
+@pytest.mark.parametrize("name", FREE)
+def test_what_is_no_manoeuvre_is_free(name: str) -> None:
+    time = grid(FREE[name].length, 512.0)
+    found = recognise(time, readback(FREE[name](time)))
+    assert found.kind == found.name == "free"
+    assert not found.windows
+    assert found.reason
+
+
+def test_noise_alone_is_free_unless_it_is_small() -> None:
+    time = grid(20.0, 512.0)
+    noise = np.random.default_rng(3).normal(0.0, 1.0, time.size)
+    assert recognise(time, 2.0 * noise).kind == "free"
+    resting = recognise(time, 0.02 * noise)
+    assert resting.kind == resting.name == "rest"
+    assert resting.windows == {"rest": (Window(0.0, 20.0),)}
+    assert recognise(time, 0.02 * noise, unit="%").kind == "free"
+    assert recognise(time, 0.02 * noise, unit="%", smallest=0.1).kind == "rest"
+
+
+def test_a_glitch_is_no_part_of_a_manoeuvre() -> None:
+    run = maneuvers.sine(6.5, 0.1)
+    voltage = readback(run.sample())
+    voltage[5000:5040] = 0.0
+    assert recognise(run.time(), voltage).kind == "free"
+    step = readback(maneuvers.step(4.0).sample())
+    step[2000:2200] += np.linspace(0.0, 0.3, 200)
+    assert recognise(maneuvers.step(4.0).time(), step).kind == "free"
+
+
+def test_samples_on_the_jump_do_not_hide_a_step() -> None:
+    """A sample that is taken while the command still rises lies between both levels."""
+    time = maneuvers.step(4.0).time()
+    voltage = maneuvers.step(4.0).sample()
+    for first, last in ((511, 512), (3071, 3072)):
+        voltage[first] = 0.3 * voltage[first - 1] + 0.7 * voltage[last]
+    found = recognise(time, voltage)
+    assert found.name == "step +4 V"
+    assert found.window("plateau").stop == 6.0
+    voltage[511], voltage[3071] = 0.15, 3.9
+    assert recognise(time, voltage).name == "step +4 V"
+
+
+def test_returns_other_than_the_packages_leave_the_manoeuvre_what_it_is() -> None:
+    time = grid(14.0, 512.0)
+    eased = np.interp(time, [0.0, 1.0, 10.0, 11.0], [0.0, 0.0, 9.0, 0.0])
+    found = recognise(time, readback(eased))
+    assert found.name == "ramp +1 V/s"
+    assert found.window("return").start == pytest.approx(10.0, abs=0.05)
+    assert "return start" in found.fitted
+
+
+def test_other_units_are_relative_to_rest() -> None:
+    time = grid(5.0, 52.0)
+    duty = np.where(time < 2.5, 7.4745, 10.01)
+    found = recognise(time, duty, unit="%")
+    assert found.name == "step +2.54 %"  # 2.5355, rounded within 0.2 %
+    assert found.fitted["level"] == pytest.approx(2.5355)
+    assert found.rest == pytest.approx(7.4745)
+    known = recognise(time, duty[::-1], unit="%", rest=7.4745)
+    assert known.levels == (2.54,)
+    assert recognise(time, duty[::-1], unit="%").level == -2.54
+
+
+def test_stamps_may_begin_anywhere() -> None:
+    run = maneuvers.sine(4.0, 0.2, length=15.0)
+    found = recognise(run.time() + 1234.5, readback(run.sample()))
+    assert found.name == "sine 4 V 0.2 Hz"
+    assert found.window("before") == Window(1234.5, 1235.5)
+
+
+def test_what_a_log_begins_and_ends_within() -> None:
+    run = maneuvers.sine(4.0, 0.2, length=30.0)
+    time, voltage = run.time(), run.sample()
+    inside = (time > 3.3) & (time < 21.0)
+    found = recognise(time[inside], voltage[inside], rest=0.0)
+    assert found.name.endswith("4 V 0.2 Hz")
+    assert list(found.windows) == ["run", "periods"]
+    step = maneuvers.step(4.0)
+    found = recognise(step.time()[:2000], step.sample()[:2000])
+    assert found.name == "step +4 V"
+    assert found.dwell is None
+
+
+REAL = sorted((SHARED / "data" / "excavator").glob("*.csv"))
+
+
+@pytest.mark.skipif(not REAL, reason="the excavator's logs are not beside this checkout")
+def test_a_joystick_is_free_and_a_step_a_step() -> None:
+    neutral = {"Boom Cmd": 7.4745, "Bucket Cmd": 7.614, "Swing Cmd": 7.4695}
+    for path in REAL:
+        table = open_log(path).read(["Time", *neutral])
+        for column, zero in neutral.items():
+            found = recognise(table["Time"], table[column] - zero, unit="%")
+            if path.name.startswith("manual"):
+                assert found.kind == "free"
+            elif path.name.startswith("steps_boom") and column == "Boom Cmd":
+                assert found.name == "step -5.07 %"
+            else:
+                assert found.kind == "rest"
+
+
+def check(found: Recognised, kind: str, **numbers: float) -> None:
+    """Of the kind, fitted to 0.5 % and rounded no farther than said from what was fitted."""
+    assert found.kind == kind
+    for name, value in numbers.items():
+        assert found.fitted[name] == pytest.approx(value, rel=5e-3)
+        assert getattr(found, name) == pytest.approx(found.fitted[name], rel=4e-3)
+
+
+amplitudes = st.floats(1.0, 10.0)
+signs = st.sampled_from([-1.0, 1.0])
+noises = st.floats(0.0, 0.01)
+rates = st.sampled_from([512.0, 100.0, 50.0])
+
+
+def seen(run: Maneuver, rate: float, noise: float) -> Recognised:
+    time = grid(run.length, rate)
+    return recognise(time, readback(run(time), noise=noise))
+
+
+@given(amplitudes, signs, st.floats(0.05, 2.0), noises, rates)
+@settings(max_examples=40)
+def test_any_sine(
+    amplitude: float, sign: float, frequency: float, noise: float, rate: float
+) -> None:
+    # a longer return would begin with the slope of the sine and rise far above it
+    settle = 0.4 / frequency
+    length = 1.0 + max(1.2 / frequency, 2.0) + settle
+    run = maneuvers.sine(sign * amplitude, frequency, settle=settle, length=length)
+    found = seen(run, rate, noise)
+    check(found, "sine", amplitude=sign * amplitude, frequency=frequency)
+
+
+@given(amplitudes, signs, noises, rates, st.floats(0.2, 2.0), st.floats(0.5, 5.0))
+@settings(max_examples=60)
+def test_any_step(
+    amplitude: float, sign: float, noise: float, rate: float, start: float, dwell: float
+) -> None:
+    run = maneuvers.step(sign * amplitude, start=start, stop=start + dwell, length=10.0)
+    found = seen(run, rate, noise)
+    # the converter's step is 0.5 % of 1 V
+    check(found, "step", level=sign * amplitude)
+    assert found.window("rise").start == pytest.approx(start, abs=1.001 / rate)
+    assert found.window("fall").start == pytest.approx(start + dwell, abs=1.001 / rate)
+
+
+@given(st.floats(0.3, 20.0), signs, noises, rates, st.floats(1.0, 9.0))
+@settings(max_examples=40)
+def test_any_ramp(slope: float, sign: float, noise: float, rate: float, limit: float) -> None:
+    """From 0.2 s to a third of a minute long; held for longer than its return lasts."""
+    slope = min(slope, 5.0 * limit)
+    length = limit / slope + 8.0
+    found = seen(maneuvers.ramp(sign * slope, limit=limit, length=length), rate, noise)
+    assert found.kind == "ramp"
+    # ten samples of a rise of 1 V leave a share of the noise
+    assert found.slope == pytest.approx(sign * slope, rel=0.02)
+    assert found.limit == pytest.approx(sign * limit, rel=5e-3)
+
+
+@given(
+    st.integers(1, 300),
+    st.integers(0, 2**32 - 1),
+    st.sampled_from(
+        [
+            lambda random, n: random.normal(0.0, 3.0, n),
+            lambda random, n: np.cumsum(random.normal(0.0, 1.0, n)),
+            lambda random, n: np.round(random.normal(0.0, 1.0, n)),
+            lambda random, n: np.repeat(random.normal(0.0, 4.0, n // 20 + 1), 20)[:n],
+            lambda random, n: np.where(random.random(n) < 0.02, 5.0, 0.0),
+            lambda random, n: np.sin(random.uniform(0.0, 3.0) * np.arange(n)),
+        ]
+    ),
+)
+@settings(max_examples=100)
+def test_any_record_has_an_answer_within_itself(
+    size: int, seed: int, make: Callable[[np.random.Generator, int], np.ndarray]
+) -> None:
+    random = np.random.default_rng(seed)
+    time = np.cumsum(random.uniform(0.001, 0.1, size))
+    found = recognise(time, make(random, size))
+    assert np.isfinite(found.residual)
+    for windows in found.windows.values():
+        for window in windows:
+            assert time[0] - 1e-9 <= window.start <= window.stop <= time[-1] + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("value", "uncertainty", "expected"),
+    [
+        (0.09997, 0.0001, 0.1),
+        (6.4935, 0.013, 6.5),
+        (6.47, 0.013, 6.47),
+        (9.98, 0.02, 10.0),
+        (-123.4, 5.0, -120.0),
+        (0.003, 0.01, 0.0),
+        (1.23456, 0.0, 1.23456),
+        (0.0, 0.0, 0.0),
+    ],
+)
+def test_roundest(value: float, uncertainty: float, expected: float) -> None:
+    assert roundest(value, uncertainty) == expected
+
+
+@given(st.floats(-1e6, 1e6), st.floats(1e-9, 1e3))
+def test_the_roundest_is_near(value: float, uncertainty: float) -> None:
+    assert abs(roundest(value, uncertainty) - value) <= uncertainty
+
+
+@pytest.mark.parametrize(
+    ("time", "voltage", "sentence"),
+    [
+        ([0.0, 1.0], [0.0], "There are 2 time stamps for 1 input samples."),
+        ([0.0, 1.0, 1.0], [0.0] * 3, "row 2 (the first is 0) has 1 s after 1 s"),
+        ([0.0, 1.0], [0.0, np.nan], "The input is nan in row 1 (the first is 0)"),
+        ([], [], "The time must be one row of numbers"),
+    ],
+)
+def test_bad_records_are_refused(time: list, voltage: list, sentence: str) -> None:
+    with pytest.raises(InputError) as error:
+        recognise(time, voltage)
+    assert sentence in str(error.value)
+
+
+def test_a_window_that_is_not_there_is_refused() -> None:
+    found = recognise(grid(5.0, 50.0), np.zeros(251))
+    with pytest.raises(InputError, match="has no window 'plateau'; its windows are: rest"):
+        found.window("plateau")

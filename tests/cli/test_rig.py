@@ -1,0 +1,45 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from swashplate import Campaign
+
+Words = Callable[..., str]
+SHORT = ("--maneuver", "step:4,start=0.5,stop=1,length=2")
+
+
+def test_a_virtual_campaign_can_be_checked(done: Words, tmp_path: Path) -> None:
+    said = done("rig", "hoist", "--out", "virtual", *SHORT)
+    assert "hoist_step_4_V.csv" in said.replace("+", "")
+    tests = Campaign.from_toml(tmp_path / "virtual" / "campaign.toml")
+    assert tests.virtual
+    assert next(iter(tests)).maneuver == "step +4 V"
+    assert "virtual" in done("campaign", "check", "virtual/campaign.toml")
+
+
+@pytest.mark.parametrize("format_", ["csv", "mat", "parquet"])
+def test_formats(done: Words, tmp_path: Path, format_: str) -> None:
+    done("rig", "slew", "--out", "v", "--format", format_, "--severity", "clean", *SHORT)
+    experiment = next(iter(Campaign.from_toml(tmp_path / "v" / "campaign.toml")))
+    assert experiment.input.values.max() == 4.0
+    assert experiment.input.time.size == 1025
+
+
+def test_effects_change_the_logs(done: Words, tmp_path: Path) -> None:
+    done("rig", "slew", "--out", "a", "--severity", "clean", *SHORT)
+    done("rig", "slew", "--out", "b", "--severity", "clean", "--effect", "backlash=strong", *SHORT)
+    first, second = (
+        next(iter(Campaign.from_toml(tmp_path / name / "campaign.toml"))) for name in "ab"
+    )
+    assert (first["counts"].values != second["counts"].values).any()
+    assert (first["current"].values == second["current"].values).all()
+
+
+def test_refusals(refused: Words, done: Words) -> None:
+    assert "'wobble=on'" in refused("rig", "hoist", "--out", "x", "--effect", "wobble=on")
+    assert "not 'some'" in refused("rig", "hoist", "--out", "x", "--effect", "leakage=some")
+    assert "no packaged parameter set 'crane'" in refused("rig", "crane", "--out", "x")
+    assert "share" in refused("rig", "hoist", "--out", "x", "--load", "2", *SHORT)
+    done("rig", "slew", "--out", "y", *SHORT)
+    assert "empty" in refused("rig", "slew", "--out", "y", *SHORT)
