@@ -154,7 +154,11 @@ def test_users_units_are_converted(lines: dict[str, str], tmp_path: Path) -> Non
         ("Z13", "", "no value for Z13"),
         ("Z23", 'Z23 = { value = 1.0, unit = "1" }', "no parameter 'Z23'"),
         ("tau", 'tau = { value = 1.0, unit = "s" }', r"\[pump_motor\] has no parameter 'tau'"),
-        ("Z1", 'Z1 = { value = 1e-7, unit = "1/Pa", sauce = "" }', "no entry 'sauce': perhaps 'source' is meant"),
+        (
+            "Z1",
+            'Z1 = { value = 1e-7, unit = "1/Pa", sauce = "" }',
+            "no entry 'sauce': perhaps 'source' is meant",
+        ),
         ("Z1", 'Z1 = { value = 1e-7, unit = "1/Pa", status = "good" }', "pump_motor.Z1.status"),
         ("Z9", 'Z9 = { value = 1e7, unit = "Pa", bounds = [1e6, 2e6] }', "outside its bounds"),
         ("Z1", "Z1 = = 3", "is not TOML"),
