@@ -94,7 +94,8 @@ def _known_keys(model: type[BaseModel], where: list[str]) -> list[str]:
     definitions = schema.get("$defs", {})
 
     def resolved(node: dict[str, Any]) -> dict[str, Any]:
-        for option in (node, *node.get("anyOf", ())):
+        options: list[dict[str, Any]] = [node, *node.get("anyOf", ())]
+        for option in options:
             if "$ref" in option:
                 found: dict[str, Any] = definitions[option["$ref"].rpartition("/")[2]]
                 return found
