@@ -6,6 +6,7 @@ python benchmarks/run.py [--write]
 import argparse
 from collections.abc import Iterator
 
+import fits
 import processes
 import rows
 import table
@@ -18,6 +19,7 @@ def measured() -> Iterator[table.Row]:
     yield rows.check(marches)
     yield from rows.march_rows(marches)
     yield from rows.sensitivity_rows(marches)
+    yield from fits.fit_rows()
     yield from rows.batch_rows(marches)
     yield from processes.memory_rows()
     yield from processes.hour_rows()

@@ -179,6 +179,23 @@ def test_limiter_branches(
     assert dynamics.rate_limit_active(output, target, previous, LIMITS["I_t2"]) is limited
 
 
+@pytest.mark.parametrize(
+    ("target", "previous", "steady", "output"),
+    [
+        (0.0, 0.14, 0.0, 0.11),  # I_t2 is not reached
+        (0.0, 0.12, 0.0, 0.1 * (0.9 + 2 / 3 * 0.1)),  # reached after two thirds of the step
+        (0.095, 0.12, 0.0, 0.1 * (0.9 + 0.8 * 0.1)),  # after four fifths, led by the filter
+        (0.097, 0.104, 0.5, 0.097),  # still commanded, and the filter is higher than the decay
+        (-0.1, 0.1, 0.0, 0.09),  # reached already
+    ],
+)
+def test_decay_from_within_a_step(
+    target: float, previous: float, steady: float, output: float
+) -> None:
+    found = dynamics.limited_current(target, previous, steady, **LIMITS, split=True)
+    assert found == pytest.approx(output)
+
+
 def test_limits_can_be_off() -> None:
     off = {"lim1": inf, "lim2": inf, "I_t1": inf, "I_t2": 0.0, "decay": exp(-inf), "step": H}
     assert dynamics.limited_current(1.3, 0.2, 1.0, **off) == 1.3

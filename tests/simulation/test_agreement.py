@@ -52,6 +52,7 @@ FORMS = {
     "published": {},
     "physical root": {"pressure_root": "symmetric"},
     "literal sign": {"coulomb_sign": "literal"},
+    "split decay": {"decay_switch": "split"},
 }
 
 
@@ -193,3 +194,31 @@ def test_literal_sign_differs_by_little(hoist: Drive) -> None:
     smooth = slew.simulate(command()).current
     literal = variant(slew, "literal sign").simulate(command()).current
     assert 0.0 < np.abs(smooth - literal).max() < 0.5e-3
+
+
+def test_splitting_the_decays_step_differs_by_little(axis: Drive) -> None:
+    voltage = command()
+    split = variant(axis, "split decay").simulate(voltage)
+    difference = np.abs(split.current - axis.simulate(voltage).current)
+    # at most what lim2 and the decay differ by in one step
+    numbers = axis.parameters.numbers
+    jump = max(
+        abs(numbers[f"lim2_{side}"] - numbers[f"a_{side}"] * numbers[f"I_t2_{side}"]) / 512.0
+        for side in ("plus", "minus")
+    )
+    assert 0.0 < difference.max() < 1.1 * jump < 1e-3
+
+
+def test_only_a_split_step_lets_the_decays_threshold_count(hoist: Drive) -> None:
+    voltage, I_t2 = command(), hoist["I_t2"].value.plus
+    thresholds = I_t2 * (1.0 + np.linspace(-0.02, 0.02, 201))
+    for form, largest in (("published", 0.5e-3), ("split decay", 1e-5)):
+        drive = variant(hoist, form)
+        runs = [drive.replace(I_t2_plus=each).simulate(voltage).current for each in thresholds]
+        jumps = np.abs(np.diff(runs, axis=0)).max(axis=1)
+        if form == "published":
+            assert (jumps == 0.0).mean() > 0.9
+            assert jumps.max() > largest
+        else:
+            assert (jumps > 0.0).all()
+            assert jumps.max() < largest

@@ -22,11 +22,13 @@ class Scene:
     preset: str = "hoist"
     limit: Limit | None = None
     root: str = "published"
+    decay: str = "sampled"
     start: str = "rest"
 
     def drive(self) -> Drive:
         drive = Drive.preset(self.preset).replace(**self.changes)
-        return Drive(replace(drive.parameters, pressure_root=self.root))
+        options = {"pressure_root": self.root, "decay_switch": self.decay}
+        return Drive(replace(drive.parameters, **options))
 
 
 def steps(*levels: float) -> np.ndarray:
@@ -43,6 +45,7 @@ HARD = steps(9.0, 9.0, 0.0, -9.0, -9.0, 0.0, 3.0)
 SCENES = {
     "nothing but the dead zone": Scene(0.4 * SWING, limit=Limit.DEAD_ZONE),
     "current rate": Scene(HARD, limit=Limit.CURRENT_RATE),
+    "decay from within a step": Scene(HARD, limit=Limit.CURRENT_RATE, decay="split"),
     "orifice": Scene(2.5 * SWING, limit=Limit.ORIFICE),
     "spool stop": Scene(2.5 * SWING, {"Z14": 1.05e-4}, limit=Limit.SPOOL),
     "swash stop": Scene(HARD, {"Z16": 3e-4}, limit=Limit.SWASH_STOP),
@@ -122,6 +125,9 @@ def test_every_parameter(scene: Scene) -> None:
             assert spoiled.mean() < 0.005, (name, signal, error.max(), scale)
         moved += bool(np.abs(exact).max() > 0.0)
     assert moved > 25
+    if scene.decay == "split":
+        for name in ("I_t2_plus", "I_t2_minus"):
+            assert np.abs(by.current[:, by.names.index(name)]).max() > 0.05
 
 
 def test_coulomb_term_has_a_one_sided_derivative_at_zero(hoist: Drive) -> None:

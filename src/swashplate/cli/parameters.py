@@ -78,7 +78,11 @@ def show_parameters(
         _block(parameters, "pump_motor", "Pump and motor"),
     )
     roots, sign = parameters.pressure_root, parameters.coulomb_sign
-    say(f"Variants of the equations: pressure_root {roots}, coulomb_sign {sign}")
+    decay = parameters.decay_switch
+    say(
+        f"Variants of the equations: pressure_root {roots}, coulomb_sign {sign}, "
+        f"decay_switch {decay}"
+    )
 
 
 def _block(parameters: ParameterSet, block: Block, title: str) -> Table:

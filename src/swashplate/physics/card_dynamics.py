@@ -108,6 +108,15 @@ def decay_partials(a: float, step: float) -> tuple[float, float]:
 
 
 @component
+def remaining_decay(previous: float, fallen: float, I_t2: float, decay: float) -> float:
+    """What the rest of a step leaves of I_t2, where the output passes it on the way to `fallen`.
+
+    Both the way there and the decay count as straight within the step. [1]
+    """
+    return decay + (previous - I_t2) / (previous - fallen) * (1.0 - decay)
+
+
+@component
 def limited_current(
     target: float,
     previous: float,
@@ -118,6 +127,7 @@ def limited_current(
     I_t2: float,
     decay: float,
     step: float,
+    split: bool | None = None,
 ) -> float:
     """Channel output: the filter's state behind rate limits and the final decay.
 
@@ -137,6 +147,9 @@ def limited_current(
         exp(-a h), see `decay_factor`.
     step : float
         h. [s]
+    split : None or True
+        Where within a step the decay takes over from lim2: None at its end, True where the output
+        passes I_t2, so that the output has no jump as I_t2, or anything before it, varies.
 
     Returns
     -------
@@ -149,7 +162,11 @@ def limited_current(
             return target
         return min(target, max(previous, I_t1) + lim1 * step)
     if previous > I_t2:
-        return max(target, previous - lim2 * step, 0.0)
+        fallen = max(target, previous - lim2 * step, 0.0)
+        if split is None or fallen >= I_t2:
+            return fallen
+        left = I_t2 * remaining_decay(previous, fallen, I_t2, decay)
+        return left if steady == 0.0 else max(target, left)
     left = previous * decay
     if left < FADED:
         left = 0.0
@@ -167,13 +184,14 @@ def limiter_partials(
     I_t2: float,
     decay: float,
     step: float,
+    split: bool | None = None,
 ) -> tuple[float, float, float, float, float, float, float, float]:
     """I with its derivatives by target, previous, lim1, lim2, I_t1, I_t2, decay.
 
-    At a switch the unlimited side counts. I_t2 only chooses a branch, so its derivative is zero;
-    it is returned so that every parameter has one.
+    At a switch the unlimited side counts. Unless the step is split, I_t2 only chooses a branch, so
+    its derivative is zero; it is returned so that every parameter has one.
     """
-    value = limited_current(target, previous, steady, lim1, lim2, I_t1, I_t2, decay, step)
+    value = limited_current(target, previous, steady, lim1, lim2, I_t1, I_t2, decay, step, split)
     if target >= previous:
         if target <= I_t1 or value == target:
             return value, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -181,6 +199,28 @@ def limiter_partials(
             return value, 0.0, 1.0, step, 0.0, 0.0, 0.0, 0.0
         return value, 0.0, 0.0, step, 0.0, 1.0, 0.0, 0.0
     if previous > I_t2:
+        fallen = max(target, previous - lim2 * step, 0.0)
+        if split is not None and fallen < I_t2:
+            if steady != 0.0 and value == target:
+                return value, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            # I_t2 (decay + share (1 - decay)), and the share by both ends of the way down
+            way = 1.0 / (previous - fallen)
+            share = (previous - I_t2) * way
+            by_share = I_t2 * (1.0 - decay)
+            by_fallen = by_share * share * way
+            target_falls = 1.0 if fallen == target else 0.0
+            limit_falls = 0.0 if fallen == target or fallen == 0.0 else 1.0
+            by_previous = by_share * way * (1.0 - share) + by_fallen * limit_falls
+            return (
+                value,
+                by_fallen * target_falls,
+                by_previous,
+                0.0,
+                -step * by_fallen * limit_falls,
+                0.0,
+                decay + share * (1.0 - decay) - by_share * way,
+                I_t2 * (1.0 - share),
+            )
         if value == target:
             return value, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         if value == 0.0:

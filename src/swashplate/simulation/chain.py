@@ -68,6 +68,7 @@ def channel_sample(
         channel.I_t2,
         channel.decay,
         step,
+        channel.split,
     )
     limited = rate_limit_active(current, state, output, channel.I_t2)
     following = filtered_current(

@@ -28,6 +28,8 @@ class Channel(NamedTuple):
     """exp(-a h)."""
     literal: bool | None
     """True: literal Coulomb sign."""
+    split: bool | None
+    """True: the decay takes over within a step, where the current passes I_t2."""
 
 
 class Delay(NamedTuple):

@@ -62,11 +62,38 @@ def check_domain(name: str, worst: float, drive: str) -> None:
         )
 
 
-def simulate_drive(parameters: ParameterSet, record: Record, start: Start) -> Simulation:
-    """March card and pump over a voltage record; see `Drive.simulate`."""
+def check_start_pressure(name: str, pressure: float, pump: Pump) -> float:
+    """A pressure to start with, refused where the drive cannot have it. [Pa]
+
+    Raises
+    ------
+    InputError
+        If it is no finite number.
+    DomainError
+        If it lies beyond a stop of the swash plate or Z15.
+    """
+    if not np.isfinite(pressure):
+        raise InputError(f"The pressure at the start must be a finite number, not {pressure}.")
+    if not pump.lower <= pressure <= pump.upper:
+        raise DomainError(
+            f"{name}: the pressure at the start is {pressure:.6g} Pa, but the stops of the swash "
+            f"plate and Z15 keep it between {pump.lower:.6g} and {pump.upper:.6g} Pa."
+        )
+    return float(pressure)
+
+
+def simulate_drive(
+    parameters: ParameterSet, record: Record, start: Start, start_pressure: float | None = None
+) -> Simulation:
+    """March card and pump over a voltage record; see `Drive.simulate`.
+
+    With `start_pressure` the pump begins there [Pa] and only the card's state is that of `start`.
+    """
     delay, plus, minus, pump, step = build(parameters, record.step)
     command = record.values
     before, state = drive_start(command, plus, minus, pump, start)
+    if start_pressure is not None:
+        state = (*state[:2], check_start_pressure(parameters.name, start_pressure, pump))
     current_plus, current_minus, pressure = (np.empty_like(command) for _ in range(3))
     flags = np.empty(command.size, dtype=np.uint8)
     worst = march_drive(
@@ -88,12 +115,16 @@ def simulate_drive(parameters: ParameterSet, record: Record, start: Start) -> Si
     return Simulation(parameters.name, record, pump, pressure, card)
 
 
-def simulate_pump(parameters: ParameterSet, record: Record, start: Start) -> Simulation:
+def simulate_pump(
+    parameters: ParameterSet, record: Record, start: Start, start_pressure: float | None = None
+) -> Simulation:
     """March the pump alone over a signed current; see `Drive.simulate_current`."""
     pump = build_pump(parameters)
     current = record.values
     pressure = np.empty_like(current)
     state = pump_start(current, pump, start)
+    if start_pressure is not None:
+        state = check_start_pressure(parameters.name, start_pressure, pump)
     worst = march_pump(current, pump, record.step, state, pressure)
     check_domain(parameters.name, worst, "current")
     return Simulation(parameters.name, record, pump, pressure)

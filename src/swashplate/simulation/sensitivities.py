@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from swashplate.physics.component import component
 from swashplate.physics.control_card import interpolated_partials, steady_partials
+from swashplate.simulation.card_tangent import channel_tangent
 from swashplate.simulation.chain import moment_squared
 from swashplate.simulation.compilation import kernel
 from swashplate.simulation.constants import Channel, Delay, Pump
@@ -13,8 +14,8 @@ from swashplate.simulation.tangent import (
     N_CHANNEL,
     N_PUMP,
     TAU,
-    channel_tangent,
-    pump_tangent,
+    limits_by_parameters,
+    pump_partials,
     speed_tangent,
 )
 
@@ -81,9 +82,10 @@ def march_drive_sensitivities(
     state_m, previous_m, output_m = start[1], start[1], start[1]
     d_state_p, d_previous_p, d_output_p = d_plus.copy(), d_plus.copy(), d_plus
     d_state_m, d_previous_m, d_output_m = d_minus.copy(), d_minus.copy(), d_minus
+    direct_p, direct_m = np.zeros(N_CHANNEL + 1), np.zeros(N_CHANNEL + 1)
     d_current = np.zeros(2 * N_CHANNEL + 1)
-    opening_by = np.zeros(N_PUMP)
-    next_by = np.zeros(N_PUMP)
+    direct = np.zeros(2 * N_PUMP)
+    limits_by = limits_by_parameters(pump)
     p = start[2]
     worst = 0.0
     for n in range(command.size):
@@ -102,6 +104,7 @@ def march_drive_sensitivities(
             output_p,
             plus,
             step,
+            direct_p,
             d_state_p,
             d_previous_p,
             d_output_p,
@@ -120,6 +123,7 @@ def march_drive_sensitivities(
             output_m,
             minus,
             step,
+            direct_m,
             d_state_m,
             d_previous_m,
             d_output_m,
@@ -137,8 +141,8 @@ def march_drive_sensitivities(
         d_current_minus[n] = d_output_m
         current = output_p - output_m
         worst = max(worst, moment_squared(current, pump))
-        following, by_p, by_i, opening, opening_by_p, opening_by_i = pump_tangent(
-            p, current, pump, step, opening_by, next_by
+        following, by_p, by_i, opening, opening_by_p, opening_by_i = pump_partials(
+            p, current, pump, limits_by, step, direct, 0, N_PUMP, 1
         )
         speed[n] = speed_tangent(
             p,
@@ -146,12 +150,12 @@ def march_drive_sensitivities(
             opening_by_p,
             opening_by_i,
             pump,
-            opening_by,
+            direct[N_PUMP:],
             d_pressure,
             d_current,
             d_speed[n],
         )
-        advance(by_p, by_i, next_by, d_current, d_pressure)
+        advance(by_p, by_i, direct, d_current, d_pressure)
         p = following
     return worst
 
@@ -169,20 +173,28 @@ def march_pump_sensitivities(
 ) -> float:
     """March the pump alone with the derivatives of its N_PUMP parameters; see above."""
     none = np.zeros(0)
-    opening_by = np.zeros(N_PUMP)
-    next_by = np.zeros(N_PUMP)
+    direct = np.zeros(2 * N_PUMP)
+    limits_by = limits_by_parameters(pump)
     p = start
     worst = 0.0
     for n in range(current.size):
         pressure[n] = p
         worst = max(worst, moment_squared(current[n], pump))
-        following, by_p, by_i, opening, opening_by_p, opening_by_i = pump_tangent(
-            p, current[n], pump, step, opening_by, next_by
+        following, by_p, by_i, opening, opening_by_p, opening_by_i = pump_partials(
+            p, current[n], pump, limits_by, step, direct, 0, N_PUMP, 1
         )
         speed[n] = speed_tangent(
-            p, opening, opening_by_p, opening_by_i, pump, opening_by, d_pressure, none, d_speed[n]
+            p,
+            opening,
+            opening_by_p,
+            opening_by_i,
+            pump,
+            direct[N_PUMP:],
+            d_pressure,
+            none,
+            d_speed[n],
         )
-        advance(by_p, by_i, next_by, none, d_pressure)
+        advance(by_p, by_i, direct, none, d_pressure)
         p = following
     return worst
 
@@ -203,11 +215,13 @@ def fill_fixed_point(
     pressure: float, current: float, pump: Pump, step: float, d_pressure: Array
 ) -> tuple[float, float]:
     """Derivatives of a steady δP by the pump's parameters; returns those of one step."""
-    opening_by = np.zeros(N_PUMP)
-    next_by = np.zeros(N_PUMP)
-    _, by_p, by_i, _, _, _ = pump_tangent(pressure, current, pump, step, opening_by, next_by)
+    direct = np.zeros(2 * N_PUMP)
+    limits_by = limits_by_parameters(pump)
+    _, by_p, by_i, _, _, _ = pump_partials(
+        pressure, current, pump, limits_by, step, direct, 0, N_PUMP, 1
+    )
     for k in range(N_PUMP):
-        d_pressure[k] = next_by[k] / (1.0 - by_p)
+        d_pressure[k] = direct[k] / (1.0 - by_p)
     return by_p, by_i
 
 

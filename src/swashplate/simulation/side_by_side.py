@@ -51,7 +51,9 @@ def row(block: Array, number: int, lane: int) -> float:
 
 
 @component
-def channel_of(block: Array, first: int, lane: int, literal: bool | None) -> Channel:
+def channel_of(
+    block: Array, first: int, lane: int, literal: bool | None, split: bool | None
+) -> Channel:
     """One lane's channel; its numbers lie in rows from `first` on, in the order of `Channel`."""
     return Channel(
         row(block, first + 0, lane),
@@ -69,6 +71,7 @@ def channel_of(block: Array, first: int, lane: int, literal: bool | None) -> Cha
         row(block, first + 12, lane),
         row(block, first + 13, lane),
         literal,
+        split,
     )
 
 
@@ -167,11 +170,11 @@ def advance_channel(
 
 
 @component
-def advance_cards(literal: bool | None, step: float, block: Array) -> None:
+def advance_cards(literal: bool | None, split: bool | None, step: float, block: Array) -> None:
     """One sample of every lane's card."""
     for lane in range(LANES):
-        plus = channel_of(block, PLUS, lane, literal)
-        minus = channel_of(block, MINUS, lane, literal)
+        plus = channel_of(block, PLUS, lane, literal, split)
+        minus = channel_of(block, MINUS, lane, literal, split)
         current = advance_channel(1.0, plus, STATE_P, lane, step, block)
         current -= advance_channel(-1.0, minus, STATE_M, lane, step, block)
         block[CURRENT * LANES + lane] = current
@@ -216,6 +219,7 @@ def march_drives(
     whole: Indices,
     share_whole: Indices,
     literal: bool | None,
+    split: bool | None,
     leaky: bool | None,
     loaded: bool | None,
     steep: bool | None,
@@ -235,7 +239,7 @@ def march_drives(
         Command at the samples, zero before. [V]
     whole, share_whole : (LANES,) arrays of int
         Whole samples of the delays, see `Delay`.
-    literal, leaky, loaded, steep, symmetric : None or True
+    literal, split, leaky, loaded, steep, symmetric : None or True
         The options of `Channel` and `Pump`, the same for all lanes.
     block : (N_ROWS * LANES,) array
         Parameters and states at the start; the states are advanced in place, and the rows COST
@@ -250,7 +254,7 @@ def march_drives(
     for n in range(command.size):
         half_step = 0.5 * step if n > 0 else 0.0
         read_commands(n, command, whole, share_whole, block)
-        advance_cards(literal, step, block)
+        advance_cards(literal, split, step, block)
         for lane in range(LANES):
             advance_pump(
                 lane,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -108,7 +108,7 @@ def run(
     effects : Effects, optional
         What the plant has beyond the model; by default nothing.
     truth : Drive, optional
-        What is simulated instead of `drive`.
+        What is simulated instead of `drive`; the decay of its card takes over within a step.
     perturb : float
         Or: draw what is simulated about `drive`, values within so much of its own, see `perturbed`.
         0 leaves them. [1]
@@ -143,6 +143,8 @@ def run(
     simulated = truth if truth is not None else nominal
     if perturb:
         simulated = perturbed(nominal, perturb, seed)
+    # a real card's decay does not wait for the next sample of a log (docs/decisions/0008)
+    simulated = Drive(replace(simulated.parameters, decay_switch="split"))
     axis = axis or nominal.name
     tests = _named(maneuvers, axis)
     kinds = _checked(channels)

@@ -1,0 +1,429 @@
+"""Residuals against plain simulations, the Jacobian against differences, the triangle against both.
+
+The readable sensitivities, and extrapolated differences of the residuals, are the references.
+"""
+
+import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from swashplate import DomainError, Drive, InputError, Limit, ParameterError, maneuvers
+from swashplate.simulation.build import ALL_PARAMETERS
+from swashplate.simulation.constants import PUMP_PARAMETERS
+from swashplate.simulation.observation import Observation, ObservedRecord, Own
+from swashplate.simulation.observe import OBSERVABLE
+from swashplate.simulation.record import record_of
+from swashplate.simulation.residuals import jacobian, residuals, triangle
+from swashplate.simulation.run import simulate_drive
+from swashplate.simulation.triangle import combine
+
+RATE = 512.0
+SWING = maneuvers.sine(3.0, 0.8, start=0.05, length=3.0, settle=0.4).sample(RATE)
+CARD = ("current", "current_sum", "current_positive", "current_negative")
+
+
+def steps(*levels: float) -> np.ndarray:
+    """Half a second at each level between slow flanks."""
+    t = np.arange(int(0.6 * len(levels) * RATE)) / RATE
+    corners = np.concatenate([[0.6 * k, 0.6 * k + 0.1] for k in range(len(levels))])
+    return np.interp(t, corners, np.repeat([0.0, *levels], 2)[1:-1])
+
+
+HARD = steps(9.0, 9.0, 0.0, -9.0, -9.0, 0.0, 3.0)
+
+# One drive in which every option of the equations counts, and one for each limit.
+EVERYTHING = {"Z7": 0.4, "Z12": 0.3, "Z11": 0.02, "Z2": 0.005, "Z13": 0.6, "Z16": 6e-4}
+SCENES = {
+    "hoist, hard": (HARD, {}, "rest"),
+    "hoist, steady start": (3.0 + SWING, {}, "steady"),
+    "spool stop": (2.5 * SWING, {"Z14": 1.05e-4}, "rest"),
+    "relief valve": (HARD, {"Z15": 3e5}, "rest"),
+    "one way": (np.abs(2.0 * SWING), {}, "rest"),
+    "everything": (HARD, EVERYTHING, "rest"),
+    "everything, steady start": (-2.0 + SWING, EVERYTHING, "steady"),
+}
+
+
+def drive_of(changes: dict) -> Drive:
+    drive = Drive.preset("hoist").replace(**changes)
+    if changes is not EVERYTHING:
+        return drive
+    return Drive(replace(drive.parameters, pressure_root="symmetric", decay_switch="split"))
+
+
+def observed_at_samples(command: np.ndarray, start: str = "rest", signals=OBSERVABLE, **more):
+    time = np.arange(command.size) / RATE
+    seen = [Observation(signal, time, np.zeros(time.size)) for signal in signals]
+    return ObservedRecord(record_of(command, RATE, what="voltage"), seen, start=start, **more)
+
+
+def simulated(run, signal: str) -> np.ndarray:
+    if signal == "current_sum":
+        return run.current_positive + run.current_negative
+    return getattr(run, signal)
+
+
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
+def test_signals_are_those_of_a_simulation_to_the_last_bit(scene) -> None:
+    command, changes, start = scene
+    drive = drive_of(changes)
+    observed = observed_at_samples(command, start)
+    run, found = drive.simulate(command, start=start), residuals(drive.parameters, observed)
+    for number, signal in enumerate(OBSERVABLE):
+        assert np.array_equal(found[observed.rows_of(number)], simulated(run, signal)), signal
+
+
+def test_a_current_drives_the_pump_alone(hoist: Drive) -> None:
+    run = hoist.simulate(2.0 * SWING)
+    current = np.array(run.current)
+    time = np.arange(current.size) / RATE
+    observed = ObservedRecord(
+        record_of(current, RATE, what="current"),
+        [Observation(signal, time, np.zeros(time.size)) for signal in OBSERVABLE],
+        driven_by="current",
+    )
+    alone = hoist.simulate_current(current)
+    found = jacobian(hoist.parameters, observed, ALL_PARAMETERS)
+    for number, signal in enumerate(OBSERVABLE):
+        assert np.array_equal(found.residuals[observed.rows_of(number)], simulated(alone, signal))
+    by = hoist.sensitivities_current(current)
+    speed = found.columns[observed.rows_of(OBSERVABLE.index("shaft_speed"))]
+    close(speed[:, : len(PUMP_PARAMETERS)], by.shaft_speed)
+    assert (speed[:, len(PUMP_PARAMETERS) :] == 0.0).all()
+    for signal in CARD:
+        assert (found.columns[observed.rows_of(OBSERVABLE.index(signal))] == 0.0).all()
+
+
+def close(found: np.ndarray, expected: np.ndarray, tolerance: float = 1e-11) -> None:
+    """Columns agree by the scale of each."""
+    scale = np.abs(expected).max(axis=0)
+    error = np.abs(found - expected).max(axis=0)
+    assert (error <= tolerance * scale).all(), (error / np.where(scale > 0.0, scale, 1.0)).max()
+
+
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
+def test_derivatives_are_those_of_the_readable_form(scene) -> None:
+    command, changes, start = scene
+    drive = drive_of(changes)
+    observed = observed_at_samples(command, start)
+    found = jacobian(drive.parameters, observed, ALL_PARAMETERS)
+    by = drive.sensitivities(command, start=start)
+    assert found.names == by.names
+    for signal in ("current", "current_positive", "current_negative", "shaft_speed"):
+        close(found.columns[observed.rows_of(OBSERVABLE.index(signal))], getattr(by, signal))
+    sums = found.columns[observed.rows_of(OBSERVABLE.index("current_sum"))]
+    close(sums, by.current_positive + by.current_negative)
+    close(found.columns[observed.rows_of(OBSERVABLE.index("shaft_position"))], by.shaft_position)
+
+
+def test_limits_act_in_the_scenes() -> None:
+    for name, limit in (
+        ("hoist, hard", Limit.CURRENT_RATE | Limit.ORIFICE),
+        ("spool stop", Limit.SPOOL),
+        ("relief valve", Limit.RELIEF),
+    ):
+        command, changes, start = SCENES[name]
+        assert drive_of(changes).simulate(command, start=start).active(limit).sum() > 20
+
+
+def everything_observed(command: np.ndarray, start: str = "rest") -> ObservedRecord:
+    """All signals off the grid, some behind low passes, with unknowns of their own."""
+    rng = np.random.default_rng(0)
+    poles = {"shaft_speed": (62.8, 188.5), "current_sum": (300.0,), "shaft_position": (40.0,)}
+    own = {"shaft_position": ("offset",), "shaft_speed": ("clock_offset", "offset")}
+    seen = []
+    for signal in OBSERVABLE:
+        # away from grid points, where the slope by time jumps
+        time = (np.arange(3, command.size - 6, 3) + rng.uniform(0.1, 0.9)) / RATE
+        weight = rng.uniform(0.5, 2.0, time.size)
+        weight[20:30] = 0.0
+        seen.append(
+            Observation(
+                signal,
+                time,
+                rng.normal(size=time.size),
+                weight=weight,
+                poles=poles.get(signal, ()),
+                delay=0.5 / RATE if signal == "shaft_speed" else 0.0,
+                unknown=own.get(signal, ()),
+            )
+        )
+    return ObservedRecord(record_of(command, RATE, what="voltage"), seen, start=start)
+
+
+OWN = Own(
+    start_pressure=2e4,
+    offsets=(0.0, 0.0, 0.0, 0.0, 0.1, -0.2, 0.0, 0.0, 0.0),
+    clock_offsets=(0.0, 0.0, 0.0, 0.0, 1.3e-4, 0.0, 0.0, 0.0, 0.0),
+)
+
+
+@pytest.mark.parametrize("name", ["hoist, hard", "everything", "everything, steady start"])
+def test_derivatives_are_those_of_differences(name: str) -> None:
+    command, changes, start = SCENES[name]
+    drive, observed = drive_of(changes), everything_observed(command, start)
+    columns = (*ALL_PARAMETERS, "start_pressure")
+    found = jacobian(drive.parameters, observed, columns, OWN)
+    assert found.names[len(columns) :] == observed.own_columns
+    assert np.array_equal(found.residuals, residuals(drive.parameters, observed, OWN))
+    base = [np.abs(found.residuals[observed.rows_of(r)]).max() for r in range(len(OBSERVABLE))]
+
+    def at(column: str, offset: float) -> np.ndarray:
+        own, changed = OWN, drive
+        number = OBSERVABLE.index("shaft_position" if "position" in column else "shaft_speed")
+        if column == "start_pressure":
+            own = OWN._replace(start_pressure=OWN.start_pressure + offset)
+        elif column in observed.own_columns:
+            field = "clock_offsets" if column.startswith("clock") else "offsets"
+            values = list(getattr(OWN, field))
+            values[number] += offset
+            own = OWN._replace(**{field: values})
+        else:
+            changed = drive.replace(**{column: drive.parameters.numbers[column] + offset})
+        return residuals(changed.parameters, observed, own)
+
+    sizes = {"start_pressure": 2e4, "Z2": 1e-3, "Z18": 1e-5, "clock_offset": 1e-4}
+    moved = 0
+    for j, column in enumerate(found.names):
+        value = drive.parameters.numbers.get(column, 0.0)
+        if np.isinf(value) or (value == 0.0 and column[:2] in ("C_", "Z7")):
+            continue  # off, or at the end of its range
+        size = abs(value) or sizes.get(column.split(" ")[0], 1e-2)
+        exact, differences = found.columns[:, j], []
+        for h in (2e-6 * size, 5e-5 * size, 1e-3 * size):
+            coarse = (at(column, h) - at(column, -h)) / (2.0 * h)
+            fine = (at(column, 0.5 * h) - at(column, -0.5 * h)) / h
+            differences.append((4.0 * fine - coarse) / 3.0)
+        for r in range(len(OBSERVABLE)):
+            rows = observed.rows_of(r)
+            tolerance = 1e-5 * np.abs(exact[rows]).max() + 1e-10 * base[r] / size
+            error = np.min([np.abs(each[rows] - exact[rows]) for each in differences], axis=0)
+            assert (error > tolerance).mean() < 0.005, (column, OBSERVABLE[r], error.max())
+        moved += bool(np.abs(exact).max() > 0.0)
+    assert moved > 40
+
+
+@pytest.mark.parametrize("start", ["rest", "steady"])
+def test_a_start_pressure_is_that_of_a_simulation(hoist: Drive, start: str) -> None:
+    observed, own = observed_at_samples(3.0 + SWING, start), Own(start_pressure=-5e4)
+    found = residuals(hoist.parameters, observed, own)
+    run = simulate_drive(hoist.parameters, observed.record, start, -5e4)
+    assert run.stroker_pressure[0] == -5e4
+    for number, signal in enumerate(OBSERVABLE):
+        assert np.array_equal(found[observed.rows_of(number)], simulated(run, signal)), signal
+
+
+def test_low_passes_are_scipys(hoist: Drive) -> None:
+    run = hoist.simulate(HARD)
+    time, poles, delay = run.time[10:-10], (62.8, 188.5), 0.5 / RATE
+    filtered = np.array(run.shaft_speed)
+    for pole in poles:
+        kept = np.exp(-pole / RATE)
+        begin = [filtered[0]]  # the first output is the first input
+        filtered, _ = lfilter([0.0, 1.0 - kept], [1.0, -kept], filtered, zi=begin)
+    observed = ObservedRecord(
+        record_of(HARD, RATE, what="voltage"),
+        [Observation("shaft_speed", time, np.zeros(time.size), poles=poles, delay=delay)],
+    )
+    found = residuals(hoist.parameters, observed)
+    expected = np.interp(time - delay, run.time, filtered)
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-13 * np.abs(expected).max())
+
+
+def test_slope_by_the_clock_on_the_grid_is_the_mean_of_both_sides(hoist: Drive) -> None:
+    run = hoist.simulate(HARD)
+    observed = ObservedRecord(
+        record_of(HARD, RATE, what="voltage"),
+        [
+            Observation(
+                "shaft_speed",
+                run.time,
+                np.zeros(run.time.size),
+                unknown=["clock_offset"],
+                weight=3.0,
+            )
+        ],
+    )
+    padded = np.pad(run.shaft_speed, 1, mode="edge")
+    found = jacobian(hoist.parameters, observed, []).columns
+    np.testing.assert_allclose(found[:, 0], 1.5 * RATE * (padded[2:] - padded[:-2]), atol=1e-10)
+
+
+def test_other_rates_are_compared_on_the_marchs_grid(hoist: Drive) -> None:
+    command = maneuvers.sine(3.0, 0.8, start=0.1, length=3.0, settle=0.4).sample(100.0)
+    run = hoist.simulate(command, 100.0)
+    observed = ObservedRecord(
+        record_of(command, 100.0, what="voltage"),
+        [Observation("shaft_speed", run.time, np.zeros(run.time.size))],
+    )
+    found = jacobian(hoist.parameters, observed, ["Z16", "omega"])
+    assert np.array_equal(found.residuals, run.shaft_speed)
+    by = hoist.sensitivities(command, 100.0, parameters=["Z16", "omega"])
+    close(found.columns, by.shaft_speed)
+
+
+FREE = ("Z8", "G1", "Z16", "tau", "Z6", "start_pressure", "Z10", "Z12", "lim1_minus")
+
+
+@pytest.mark.parametrize("columns", [FREE, ALL_PARAMETERS, ()], ids=["some", "all", "own alone"])
+@pytest.mark.parametrize("name", ["hoist, hard", "one way"])
+def test_triangle_is_the_qr_of_the_jacobian(name: str, columns: tuple) -> None:
+    command, changes, start = SCENES[name]
+    drive, observed = drive_of(changes), everything_observed(command, start)
+    whole = jacobian(drive.parameters, observed, columns, OWN)
+    found = triangle(drive.parameters, observed, columns, OWN)
+    assert found.names == whole.names
+    matrix = np.column_stack([whole.columns, whole.residuals])
+    size = np.linalg.norm(matrix, axis=0)
+    size[size == 0.0] = 1.0
+    factor = found.factor
+    assert np.array_equal(factor, np.triu(factor))
+    products = (factor.T @ factor - matrix.T @ matrix) / np.outer(size, size)
+    assert np.abs(products).max() < 1e-12
+    expected = np.linalg.svd(matrix / size, compute_uv=False)
+    np.testing.assert_allclose(
+        np.linalg.svd(factor / size, compute_uv=False), expected, atol=1e-12 * expected[0]
+    )
+    squares = [np.sum(whole.residuals[observed.rows_of(r)] ** 2) for r in range(len(OBSERVABLE))]
+    np.testing.assert_allclose(found.squares, squares, rtol=1e-13)
+    np.testing.assert_allclose(whole.squares, squares, rtol=1e-13)
+
+
+def test_steps_of_a_fit_are_those_of_the_jacobian(hoist: Drive) -> None:
+    run = hoist.simulate(HARD)
+    observed = ObservedRecord(
+        record_of(np.array(run.current), RATE, what="current"),
+        [Observation("shaft_speed", run.time, 1.01 * run.shaft_speed + 0.01)],
+        driven_by="current",
+    )
+    columns = ["Z3", "Z8", "Z10", "Z16", "Z17"]  # none of them a gauge of another
+    whole = jacobian(hoist.parameters, observed, columns)
+    factor = triangle(hoist.parameters, observed, columns).factor
+    size = np.linalg.norm(whole.columns, axis=0)
+    expected, *_ = np.linalg.lstsq(whole.columns / size, whole.residuals)
+    found = np.linalg.solve(factor[:-1, :-1] / size, factor[:-1, -1])
+    np.testing.assert_allclose(found, expected, rtol=1e-10)
+
+
+def test_gauges_are_null_directions_of_the_triangle(hoist: Drive) -> None:
+    observed = observed_at_samples(HARD, signals=["shaft_speed"])
+    numbers = hoist.parameters.numbers
+    columns = ["Z4", "Z6", "Z8", "Z19", "Z20", "Z21", "Z22", "Z14"]
+    found = triangle(hoist.parameters, observed, columns)
+    scale = np.array([numbers[name] or 1.0 for name in found.names])
+    relative = found.factor[:-1, :-1] * scale
+    singular = np.linalg.svd(relative, compute_uv=False)
+    assert (found.factor[:, found.names.index("Z14")] == 0.0).all()  # its stop is never reached
+    # a force may be scaled with the spring; of Z6 and Z8 only Z8/(1 + Z6) counts off the stops
+    direction = np.array(
+        [2.0 * (n == "Z4") + (n[:3] in FORCES and numbers[n] != 0.0) for n in found.names]
+    )
+    assert np.linalg.norm(relative @ direction) < 1e-10 * singular[0]
+    assert (singular < 1e-10 * singular[0]).sum() >= 2
+
+
+FORCES = ("Z19", "Z20", "Z21", "Z22")
+
+
+@pytest.mark.parametrize("block", [2, 3, 64, 511])
+def test_blocks_of_any_size_give_the_same(hoist: Drive, block: int) -> None:
+    observed = everything_observed(HARD)
+    columns = ["Z8", "Z13", "G1", "tau", "start_pressure"]
+    expected = jacobian(hoist.parameters, observed, columns, OWN)
+    found = jacobian(hoist.parameters, observed, columns, OWN, block=block)
+    assert np.array_equal(found.residuals, expected.residuals)
+    close(found.columns, expected.columns, 1e-13)
+    assert np.array_equal(
+        residuals(hoist.parameters, observed, OWN, block=block), expected.residuals
+    )
+    factor = triangle(hoist.parameters, observed, columns, OWN).factor
+    size = np.abs(factor).max(axis=0)
+    size[size == 0.0] = 1.0
+    other = triangle(hoist.parameters, observed, columns, OWN, block=block).factor
+    np.testing.assert_allclose(other / size, factor / size, rtol=0.0, atol=1e-12)
+
+
+def test_records_of_a_few_samples(hoist: Drive) -> None:
+    for samples in (1, 2, 3):
+        observed = observed_at_samples(np.full(samples, 5.0), "steady")
+        found = jacobian(hoist.parameters, observed, ["Z8", "G1_plus", "Z10"])
+        run = hoist.simulate(np.full(samples, 5.0), start="steady")
+        speed = observed.rows_of(OBSERVABLE.index("shaft_speed"))
+        assert np.array_equal(found.residuals[speed], run.shaft_speed)
+        triangle(hoist.parameters, observed, ["Z8"])
+
+
+def test_experiments_combine(hoist: Drive) -> None:
+    columns = ["Z8", "Z10", "G1", "Z16"]
+    parts = [observed_at_samples(each, signals=["shaft_speed"]) for each in (HARD, 2.0 * SWING)]
+    whole = np.concatenate(
+        [
+            np.column_stack([found.columns, found.residuals])
+            for found in (jacobian(hoist.parameters, each, columns) for each in parts)
+        ]
+    )
+    factor = combine(triangle(hoist.parameters, each, columns).factor for each in parts)
+    size = np.linalg.norm(whole, axis=0)
+    products = (factor.T @ factor - whole.T @ whole) / np.outer(size, size)
+    assert np.abs(products).max() < 1e-12
+
+
+def test_a_triangle_needs_no_memory_for_the_jacobian(hoist: Drive) -> None:
+    command = np.tile(SWING, 60)
+    observed = observed_at_samples(command, signals=["shaft_speed"])
+    residuals(hoist.parameters, observed)  # whatever is made once
+    tracemalloc.start()
+    triangle(hoist.parameters, observed, PUMP_PARAMETERS)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 3e6 < 8 * command.size * len(PUMP_PARAMETERS)
+
+
+def test_threads_do_not_disturb_each_other(hoist: Drive) -> None:
+    tests = [observed_at_samples(level * SWING, signals=["shaft_speed"]) for level in (1, 2, 3)]
+    columns = ["Z8", "Z16", "G1"]
+    alone = [triangle(hoist.parameters, each, columns).factor for each in tests]
+    with ThreadPoolExecutor(3) as pool:
+        found = pool.map(lambda each: triangle(hoist.parameters, each, columns).factor, 20 * tests)
+        assert all(np.array_equal(a, b) for a, b in zip(found, 20 * alone, strict=True))
+
+
+def test_memory_is_written_where_the_caller_says(hoist: Drive) -> None:
+    observed = observed_at_samples(HARD, signals=["shaft_speed", "current"])
+    first = jacobian(hoist.parameters, observed, ["Z8", "Z14"])
+    out = np.full_like(first.rows, np.nan)
+    second = jacobian(hoist.parameters, observed, ["Z8", "Z14"], out=out)
+    assert second.rows is out
+    assert np.array_equal(out, first.rows)
+    with pytest.raises(InputError, match=r"out must be a plain array of floats of shape \(3, "):
+        jacobian(hoist.parameters, observed, ["Z8", "Z14"], out=out[:2])
+
+
+def test_refusals(hoist: Drive) -> None:
+    observed = observed_at_samples(HARD, signals=["shaft_speed"])
+    with pytest.raises(InputError, match="Z16_plus is asked for twice"):
+        jacobian(hoist.parameters, observed, ["Z16", "Z16_plus"])
+    with pytest.raises(ParameterError, match="no parameter 'Z99'"):
+        triangle(hoist.parameters, observed, ["Z99"])
+    with pytest.raises(InputError, match="start_pressure is a column, so Own needs a value"):
+        jacobian(hoist.parameters, observed, ["start_pressure"])
+    with pytest.raises(InputError, match="must be a finite number, not nan"):
+        residuals(hoist.parameters, observed, Own(start_pressure=np.nan))
+    with pytest.raises(DomainError, match="the pressure at the start is 1e\\+07 Pa, but"):
+        residuals(hoist.parameters, observed, Own(start_pressure=1e7))
+    with pytest.raises(InputError, match="block is 1, but must be 2 to 512"):
+        residuals(hoist.parameters, observed, block=1)
+    current = ObservedRecord(
+        record_of([0.0, 3.0, 3.0], RATE, what="current"),
+        [Observation("shaft_speed", [0.0], [0.0])],
+        driven_by="current",
+    )
+    with pytest.raises(DomainError, match="overpowers the feedback spring"):
+        triangle(hoist.parameters, current, ["Z8"])
+    # currents alone do not ask the pump
+    alone = replace(current, observations=[Observation("current_sum", [0.0], [0.0])])
+    assert residuals(hoist.parameters, alone).tolist() == [0.0]
