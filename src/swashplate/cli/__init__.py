@@ -12,7 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from swashplate.__about__ import __version__
-from swashplate.cli import campaign, compare, demo, parameters, rig, simulate
+from swashplate.cli import campaign, compare, demo, fit, parameters, rig, simulate
 from swashplate.cli.terminal import say_error
 from swashplate.errors import SwashplateError
 
@@ -99,6 +99,7 @@ app.command("axes", epilog=parameters.AXES_EXAMPLES)(parameters.axes)
 app.command("show", epilog=parameters.SHOW_EXAMPLES)(parameters.show_parameters)
 app.add_typer(campaign.app, name="campaign")
 app.command("rig", epilog=rig.EXAMPLES)(rig.rig)
+app.command("fit", epilog=fit.EXAMPLES)(fit.fit)
 app.command("demo", epilog=demo.EXAMPLES)(demo.demo)
 
 

@@ -1,0 +1,1 @@
+"""Identification: what a fit minimises, finds, knows and does not know."""

@@ -1,0 +1,168 @@
+"""What a stage's data tell: identifiability, errors of the estimates, quality of each run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.campaign.experiment import Experiment
+from swashplate.identification.fit import StageFit
+from swashplate.identification.identifiability import Identifiability, identifiability
+from swashplate.identification.linearised import TOLERANCE, LinearisedFit, LinearisedRun
+from swashplate.identification.measures import Measures, measures
+from swashplate.identification.model import Differentiable
+from swashplate.identification.problem import Problem
+from swashplate.identification.residual_tests import ResidualTest, residual_test
+from swashplate.identification.uncertainty import Uncertainty, uncertainty
+from swashplate.identification.variables import Variables
+
+Array = NDArray[np.float64]
+BY_DIFFERENCES = 1e-6
+"""Singular values of difference derivatives below this part of the largest count as zero."""
+
+
+def variables_of(problem: Problem, vector: Array) -> Variables:
+    """The unknowns at a point, as the statistics see them."""
+    unknowns = problem.unknowns
+    bounds = unknowns.at_bounds(vector)
+    side = {"lower": -1, "upper": 1}
+    return Variables.of(
+        unknowns.names,
+        list(unknowns.values(vector).values()),
+        scales=[each.scale for each in unknowns],
+        logarithmic=[each.log for each in unknowns],
+        at_bound=[side.get(bounds.get(name, ""), 0) for name in unknowns.names],
+    )
+
+
+def linearised_fit(problem: Problem, vector: Array) -> LinearisedFit:
+    """Residuals and derivatives of every run at a point, ignored samples left out.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was fitted.
+    vector : (K,) array
+        The solver's vector at the optimum.
+    """
+    runs = []
+    for number, experiment in enumerate(problem.experiments):
+        weights = problem.weights[number]
+        for name, part in problem.linearised(vector, number).items():
+            used = weights[name] > 0.0
+            runs.append(
+                LinearisedRun(
+                    experiment.name,
+                    name,
+                    experiment[name].time[used],
+                    part.values[used],
+                    part.by[used],
+                    weights[name][used],
+                )
+            )
+    _, prior = problem.unknowns.prior_rows(vector)
+    exact = isinstance(problem.model, Differentiable)
+    return LinearisedFit.of(
+        runs,
+        variables_of(problem, vector),
+        prior=prior,
+        tolerance=TOLERANCE if exact else BY_DIFFERENCES,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class RunQuality:
+    """How well one channel of one run is simulated."""
+
+    experiment: Experiment
+    channel: str
+    simulated: Array
+    """(m,) at the channel's stamps, its free zero included. [unit of the channel]"""
+    measures: Measures
+    test: ResidualTest | None
+    """None where there are too few samples."""
+
+    @property
+    def residual(self) -> Array:
+        """(m,) simulated less measured."""
+        return self.simulated - self.experiment[self.channel].values
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """What a stage's data tell of its unknowns, and how good the fit is."""
+
+    stage: StageFit
+
+    @property
+    def _vector(self) -> Array:
+        return self.stage.solution.vector
+
+    @cached_property
+    def linearised(self) -> LinearisedFit:
+        """Residuals and derivatives at the optimum."""
+        return linearised_fit(self.stage.problem, self._vector)
+
+    @cached_property
+    def identifiability(self) -> Identifiability:
+        """Which unknowns the tests determine."""
+        problem = self.stage.problem
+        fixed = {
+            name: value
+            for name, value in self.stage.parameters.numbers.items()
+            if name not in problem.unknowns.names
+        }
+        return identifiability(
+            self.linearised.triangle,
+            self.linearised.variables,
+            tolerance=self.linearised.tolerance,
+            fixed=fixed,
+        )
+
+    @cached_property
+    def uncertainty(self) -> Uncertainty:
+        """Errors of the estimates, for coloured residuals."""
+        return uncertainty(self.linearised)
+
+    @cached_property
+    def runs(self) -> tuple[RunQuality, ...]:
+        """Quality of each channel of each run that was fitted."""
+        return run_qualities(self.stage.problem, self._vector)
+
+
+def run_qualities(problem: Problem, vector: Array) -> tuple[RunQuality, ...]:
+    """Quality of each channel of each run of a problem at a point."""
+    return tuple(
+        compared(experiment, name, simulated)
+        for number, experiment in enumerate(problem.experiments)
+        for name, simulated in problem.outputs(vector, number).items()
+        if experiment[name].used.any()
+    )
+
+
+def compared(experiment: Experiment, name: str, simulated: Array) -> RunQuality:
+    """Quality of one channel of one run, simulated at its stamps."""
+    channel = experiment[name]
+    used = channel.used
+    return RunQuality(
+        experiment,
+        name,
+        simulated,
+        measures(channel.values, simulated, channel.weight),
+        _tested(experiment, channel.time[used], (simulated - channel.values)[used]),
+    )
+
+
+def _tested(experiment: Experiment, time: Array, residual: Array) -> ResidualTest | None:
+    if time.size < 8:
+        return None
+    return residual_test(time, residual, experiment.input.at(time))
+
+
+def assess(stages: Sequence[StageFit]) -> tuple[Assessment, ...]:
+    """The assessment of each stage of a fit."""
+    return tuple(Assessment(each) for each in stages)

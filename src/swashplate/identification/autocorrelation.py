@@ -1,0 +1,240 @@
+"""How long residuals stay correlated: autocorrelation across gaps, effective sample size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+from swashplate.identification.linearised import LinearisedFit, LinearisedRun
+
+Array = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+LONGEST = 0.25
+"""Longest lag looked at, as a part of the longest run: beyond it too few pairs are left."""
+
+DRIFTING = 0.3
+"""Correlation length, as a part of the longest lag looked at, from which it is a model error."""
+
+SAME_STEP = 0.01
+"""Relative difference of two runs' sampling steps below which they are treated as one."""
+
+
+class Grid(NamedTuple):
+    """Even time grid that a run's samples lie on, its gaps left empty."""
+
+    places: Places
+    """(n,) place of each sample, from 0, increasing."""
+    size: int
+    """Places in all."""
+    step: float
+    """[s]"""
+
+    @property
+    def whole(self) -> bool:
+        """Whether there are no gaps."""
+        return self.size == self.places.size
+
+    def spread(self, samples: Array) -> Array:
+        """(size, ...) samples (n, ...) on the grid, 0 in the gaps."""
+        if self.whole:
+            return samples
+        spread = np.zeros((self.size, *samples.shape[1:]))
+        spread[self.places] = samples
+        return spread
+
+
+def grid_of(time: Array) -> Grid:
+    """The grid of a run from its stamps; the step is their median distance.
+
+    Every sample gets a place of its own, so that jitter of the stamps moves the grid, not the
+    order. Very long gaps are shortened to at least fifteen times the samples in all gaps' total,
+    far longer than any lag that is looked at.
+    """
+    if time.size < 2:
+        return Grid(np.zeros(time.size, np.intp), time.size, 1.0)
+    apart = np.diff(time)
+    step = float(np.median(apart))
+    steps = np.maximum(np.rint(apart / step), 1.0)
+    gaps = int(np.count_nonzero(steps > 1.0))
+    steps = np.minimum(steps, max(15 * time.size // max(gaps, 1), 2))
+    places = np.concatenate([[0], np.cumsum(steps)]).astype(np.intp)
+    return Grid(places, int(places[-1]) + 1, step)
+
+
+def pair_sums(samples: Array, grid: Grid, lags: int) -> tuple[Array, Array]:
+    """Sums of products of samples a lag apart, and how many pairs there are.
+
+    Parameters
+    ----------
+    samples : (n,) array
+        Of one run.
+    grid : Grid
+        Where they lie.
+    lags : int
+        Largest lag, in steps.
+
+    Returns
+    -------
+    sums, counts : (lags + 1,) arrays
+        For the lags 0 to `lags`; pairs across a gap count with their true distance.
+    """
+    size = next_fast_len(grid.size + lags, real=True)
+    spectrum = rfft(grid.spread(samples), size)
+    sums = irfft(np.abs(spectrum) ** 2, size)[: lags + 1]
+    if grid.whole:
+        counts = np.maximum(grid.size - np.arange(lags + 1.0), 0.0)
+    else:
+        present = rfft(grid.spread(np.ones(samples.size)), size)
+        counts = np.rint(irfft(np.abs(present) ** 2, size)[: lags + 1])
+    return sums, counts
+
+
+def correlation_length(autocovariance: Array, counts: Array) -> int:
+    """First lag after which the autocorrelation stays inside its band.
+
+    Parameters
+    ----------
+    autocovariance : (m + 1,) array
+        At the lags 0 to m.
+    counts : (m + 1,) array
+        Pairs that each was taken from.
+
+    Returns
+    -------
+    int
+        0 for white noise, at most m.
+
+    Notes
+    -----
+    The band at lag k is ±2 √((1 + 2 Σ_{j<k} ρ_j²)/n), Bartlett's for noise that is correlated over
+    fewer than k lags; "stays" means max(5, √log₁₀ n, k/4) lags in a row (Politis 2003). A
+    first-order plug-in from the lag-one correlation (Andrews 1991) is not used: filtered noise is
+    smooth from sample to sample and its lag one says hardly anything of its length, and a small
+    slow part under white noise would be missed.
+    """
+    variance = float(autocovariance[0])
+    if not variance > 0.0:
+        return 0
+    rho = autocovariance / variance
+    before = np.concatenate([[0.0], np.cumsum(rho[1:-1] ** 2)]) if rho.size > 1 else np.zeros(0)
+    band = 2.0 * np.sqrt((1.0 + 2.0 * before) / np.maximum(counts[1:], 1.0))
+    outside = np.flatnonzero(np.abs(rho[1:]) > band) + 1
+    run_needed = max(5.0, float(np.sqrt(np.log10(max(counts[0], 10.0)))))
+    length = 0
+    for lag in outside:
+        if lag - length > max(run_needed, 0.25 * length):
+            break
+        length = int(lag)
+    return length
+
+
+def flat_top(lags: Array, length: float) -> Array:
+    """Taper that leaves lags up to `length` alone and falls to 0 at twice that.
+
+    Politis's (2003) flat top, with a cosine in place of the straight flank: a tone in the
+    residuals, the beat of an ammeter's current, then leaks less into other frequencies.
+    """
+    beyond = np.clip(lags / max(length, 1.0) - 1.0, 0.0, 1.0)
+    return 0.5 * (1.0 + np.cos(np.pi * beyond))
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseColour:
+    """How the residuals of one channel are correlated, from all its runs of one sampling step."""
+
+    channel: str
+    members: tuple[int, ...]
+    """Numbers of the runs in the fit."""
+    step: float
+    """Sampling step. [s]"""
+    correlation: Array
+    """(L + 1,) autocorrelation at the lags 0 to L, tapered; beyond L it is 0."""
+    length: int
+    """Lag after which it stays inside its band, in steps."""
+    longest: int
+    """Longest lag looked at, in steps."""
+
+    @property
+    def duration(self) -> float:
+        """Time over which the residuals stay correlated. [s]"""
+        return self.length * self.step
+
+    @property
+    def inflation(self) -> float:
+        """Samples that stand for one independent sample, at least 1: 1 + 2 Σ ρ."""
+        return max(1.0, float(2.0 * self.correlation.sum() - 1.0))
+
+    @property
+    def drifting(self) -> bool:
+        """Whether the runs are only a few correlation lengths long: no noise does that."""
+        return self.length > max(DRIFTING * self.longest, 5.0)
+
+    def effective_samples(self, samples: int) -> float:
+        """Independent samples that `samples` correlated ones are worth.
+
+        Notes
+        -----
+        n/(1 + 2 Σ ρ_k), for noise of first order n (1 - ρ)/(1 + ρ).
+        """
+        return max(samples / self.inflation, min(1.0, float(samples)))
+
+
+def unweighted(run: LinearisedRun) -> Array:
+    """(n,) differences simulated less measured, without the weights if those are known."""
+    return run.residual if run.weight is None else run.residual / run.weight
+
+
+def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
+    """Colours of the residuals of each channel, pooled over its runs."""
+    colours = []
+    grids = [grid_of(run.time) for run in fit.runs]
+    for members in _alike(fit, grids):
+        longest = int(LONGEST * max(grids[k].size for k in members))
+        sums, counts = np.zeros(longest + 1), np.zeros(longest + 1)
+        for k in members:
+            added, pairs = pair_sums(unweighted(fit.runs[k]), grids[k], longest)
+            sums, counts = sums + added, counts + pairs
+        colours.append(
+            colour_of(fit.runs[members[0]].channel, members, grids[members[0]].step, sums, counts)
+        )
+    return tuple(colours)
+
+
+def colour_of(
+    channel: str, members: Sequence[int], step: float, sums: Array, counts: Array
+) -> NoiseColour:
+    """A colour from sums of products and their counts at the lags 0 to m."""
+    autocovariance = sums / np.maximum(counts, 1.0)
+    length = correlation_length(autocovariance, counts)
+    flat = min(length, (sums.size - 1) // 2)  # the taper must have come down at the longest lag
+    lags = np.arange(min(2 * max(flat, 1), sums.size - 1) + 1.0)
+    white = np.where(lags == 0.0, 1.0, 0.0)
+    correlation = (
+        autocovariance[: lags.size] / autocovariance[0] * flat_top(lags, flat)
+        if autocovariance[0] > 0.0 and flat
+        else white
+    )
+    return NoiseColour(channel, tuple(members), step, correlation, length, sums.size - 1)
+
+
+def _alike(fit: LinearisedFit, grids: Sequence[Grid]) -> list[tuple[int, ...]]:
+    """Numbers of runs of the same channel and step."""
+    groups: list[list[int]] = []
+    for k, run in enumerate(fit.runs):
+        for group in groups:
+            first = group[0]
+            if fit.runs[first].channel == run.channel and (
+                abs(grids[k].step - grids[first].step) <= SAME_STEP * grids[first].step
+                or run.time.size < 2
+            ):
+                group.append(k)
+                break
+        else:
+            groups.append([k])
+    return [tuple(group) for group in groups]

@@ -1,0 +1,159 @@
+"""Where independent pieces of work run: here, in processes, or on a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from swashplate.errors import InputError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor as Pool
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+Shared = TypeVar("Shared")
+
+
+class Executor(Protocol):
+    """Runs one function over many items; all give the same results, in any order."""
+
+    def run(
+        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
+    ) -> Iterator[tuple[int, Result]]:
+        """Yield (position of the item, result) as each is done.
+
+        Parameters
+        ----------
+        function : callable
+            Of a module, so that it can be sent to another process.
+        shared :
+            Its first argument, the same for all items; sent once to each worker.
+        items : sequence
+            Its second argument.
+        """
+        ...
+
+
+class Serial:
+    """One after another, in this process."""
+
+    def run(
+        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
+    ) -> Iterator[tuple[int, Result]]:
+        """See `Executor.run`."""
+        for position, item in enumerate(items):
+            yield position, function(shared, item)
+
+
+_shared: Any = None
+
+
+def _receive(shared: Any) -> None:
+    global _shared
+    _shared = shared
+
+
+def _apply(function: Callable[[Any, Any], Any], item: Any) -> Any:
+    return function(_shared, item)
+
+
+@dataclass(frozen=True)
+class Processes:
+    """Worker processes on this machine."""
+
+    workers: int | None = None
+    """How many; by default one for each core that this process may use."""
+
+    def run(
+        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
+    ) -> Iterator[tuple[int, Result]]:
+        """See `Executor.run`.
+
+        Raises
+        ------
+        InputError
+            If a worker dies or cannot import the model.
+        """
+        from concurrent.futures import ProcessPoolExecutor
+        from concurrent.futures.process import BrokenProcessPool
+        from multiprocessing import get_context
+
+        workers = min(self.workers or available_cores(), max(len(items), 1))
+        if workers == 1:
+            yield from Serial().run(function, shared, items)
+            return
+        # spawned, not forked: a fork copies locks of NumPy's and Numba's threads in any state
+        with ProcessPoolExecutor(
+            workers, get_context("spawn"), initializer=_receive, initargs=(shared,)
+        ) as pool:
+            try:
+                yield from _completed(pool, function, items)
+            except BrokenProcessPool:
+                raise InputError(
+                    "A worker process died or could not import the model; a model must stand in a "
+                    "module, and a script must guard its start by if __name__ == '__main__'."
+                ) from None
+
+
+def _completed(
+    pool: Pool, function: Callable[[Any, Item], Result], items: Sequence[Item]
+) -> Iterator[tuple[int, Result]]:
+    from concurrent.futures import as_completed
+
+    futures = {pool.submit(_apply, function, item): k for k, item in enumerate(items)}
+    try:
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+@dataclass(frozen=True)
+class Dask:
+    """Workers of a Dask cluster, by the scheduler's address."""
+
+    address: str
+    """Such as ``tcp://10.0.0.1:8786``."""
+    retries: int = 3
+    """How often an item is done again after its worker was lost."""
+
+    def run(
+        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
+    ) -> Iterator[tuple[int, Result]]:
+        """See `Executor.run`.
+
+        Raises
+        ------
+        InputError
+            If Dask is not installed or no scheduler answers.
+        """
+        try:
+            from distributed import Client, as_completed
+        except ImportError:
+            raise InputError(
+                "A cluster needs Dask: install swashplate with its extra 'dask'."
+            ) from None
+        try:
+            client = Client(self.address, timeout=10, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise InputError(f"No Dask scheduler answers at {self.address}: {error}.") from None
+        with client:
+            sent = client.scatter(shared, broadcast=True, hash=False)
+            futures = {
+                client.submit(function, sent, item, pure=False, retries=self.retries): k
+                for k, item in enumerate(items)
+            }
+            for future, result in as_completed(list(futures), loop=client.loop, with_results=True):
+                yield futures[future], result
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on Windows and macOS
+        return os.cpu_count() or 1

@@ -1,0 +1,193 @@
+"""The fit of a drive to a campaign: stage after stage, each from what the ones before found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from hashlib import blake2b
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.__about__ import __version__
+from swashplate.campaign.experiment import Experiment
+from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.executors import Executor, Serial
+from swashplate.identification.problem import Problem
+from swashplate.identification.setup import Setup, Stage
+from swashplate.identification.solving import Loss, Method, Progress, Solution, solve
+from swashplate.identification.staging import stage_problem
+from swashplate.identification.starts import StartResult, sobol_starts, solve_from
+from swashplate.parameters.parameter_set import ParameterSet
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Search:
+    """Starts besides the nominal one, in each stage."""
+
+    starts: int
+    """Sobol points over the bounds, besides the nominal values."""
+    seed: int = 0
+    executor: Executor = field(default_factory=Serial)
+    store: Path | None = None
+    """Folder that keeps each result as it is ready, a folder in it for each stage."""
+    resume: bool = False
+    """Take what is in the store instead of computing it again."""
+    watch: Callable[[str, StartResult, int], None] | None = None
+    """Told the stage, each result and how many there are by now."""
+
+
+@dataclass(frozen=True, eq=False)
+class StageFit:
+    """What one stage found."""
+
+    stage: Stage
+    problem: Problem
+    solution: Solution
+    parameters: ParameterSet
+    """The drive with what was found."""
+    starts: tuple[StartResult, ...] = ()
+    """How each start ended, where there was more than one."""
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The unknowns by name, in their units."""
+        return self.problem.unknowns.values(self.solution.vector)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fitted drive and how it came about."""
+
+    setup: Setup
+    nominal: ParameterSet
+    stages: tuple[StageFit, ...]
+
+    @property
+    def parameters(self) -> ParameterSet:
+        """The fitted drive's parameters."""
+        return self.stages[-1].parameters
+
+
+def fit(
+    experiments: Sequence[Experiment],
+    nominal: ParameterSet,
+    setup: Setup,
+    *,
+    method: Method = "trf",
+    loss: Loss = "linear",
+    tolerance: float = 1e-10,
+    max_evaluations: int = 300,
+    threads: int | None = None,
+    search: Search | None = None,
+    watch: Callable[[str, Progress], None] | None = None,
+) -> Fit:
+    """Fit a drive to experiments.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+        The runs to fit.
+    nominal : ParameterSet
+        Where to begin, and what stays fixed. The decay's switch is split, see `smooth`.
+    setup : Setup
+        Stages and their free parameters.
+    method, loss, tolerance, max_evaluations :
+        As of `solving.solve`, in each stage.
+    threads : int, optional
+        Threads over experiments; all cores by default. The result does not depend on it.
+    search : Search, optional
+        More starts than the nominal one; the best is refined.
+    watch : callable, optional
+        Told the stage's name and each of its iterations.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If campaign and set-up do not fit each other.
+    DomainError
+        If the model does not hold at the nominal values.
+    """
+    parameters, stages = smooth(nominal), []
+    for stage in setup.stages:
+        problem = stage_problem(stage, parameters, experiments, threads=threads)
+        begin: Array | None = None
+        results: tuple[StartResult, ...] = ()
+        if search is not None and search.starts > 0:
+            results = _searched(stage, problem, search, method, tolerance, max_evaluations)
+            begin = np.array(min(results, key=lambda each: each.cost).vector)
+        solution = solve(
+            problem,
+            begin,
+            method=method,
+            loss=loss,
+            tolerance=tolerance,
+            max_evaluations=max_evaluations,
+            watch=None if watch is None else _named(watch, stage.name),
+        )
+        model = problem.model
+        assert isinstance(model, DriveModel)
+        parameters = model.parameters_at(problem.unknowns.targets(solution.vector, ""))
+        stages.append(StageFit(stage, problem, solution, parameters, results))
+        if solution.interrupted:
+            break
+    return Fit(setup, nominal, tuple(stages))
+
+
+def smooth(parameters: ParameterSet) -> ParameterSet:
+    """The set with the decay's switch split within the step.
+
+    Sampled, as published, it makes the current jump by up to 0.7 mA as any of the card's parameters
+    varies, and a fit ends where it was caught (docs/decisions/0008).
+    """
+    return replace(parameters, decay_switch="split")
+
+
+def _searched(
+    stage: Stage,
+    problem: Problem,
+    search: Search,
+    method: Method,
+    tolerance: float,
+    max_evaluations: int,
+) -> tuple[StartResult, ...]:
+    # starts run side by side, so each of them runs on one thread
+    alone = replace(problem, threads=1)
+    watch = search.watch
+    return solve_from(
+        alone,
+        [problem.start, *sobol_starts(alone, search.starts, search.seed)],
+        executor=search.executor,
+        store=None if search.store is None else search.store / stage.name,
+        fingerprint=_fingerprint(stage, problem, search, method, tolerance, max_evaluations),
+        resume=search.resume,
+        method=method,
+        tolerance=tolerance,
+        max_evaluations=max_evaluations,
+        watch=None if watch is None else (lambda result, done: watch(stage.name, result, done)),
+    )
+
+
+def _fingerprint(stage: Stage, problem: Problem, search: Search, *settings: object) -> str:
+    """Hash of all that the result of a start depends on."""
+    digest = blake2b(digest_size=16)
+    model = problem.model
+    assert isinstance(model, DriveModel)
+    numbers = sorted(model.parameters.numbers.items())
+    words = (__version__, stage.model_dump_json(), search.seed, settings, numbers)
+    digest.update(repr(words).encode())
+    for experiment, weights in zip(problem.experiments, problem.weights, strict=True):
+        arrays = [experiment.input.time, experiment.input.values]
+        for name, weight in weights.items():
+            channel = experiment[name]
+            arrays += [channel.time, channel.values, weight]
+        for array in arrays:
+            digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def _named(watch: Callable[[str, Progress], None], name: str) -> Callable[[Progress], None]:
+    return lambda progress: watch(name, progress)

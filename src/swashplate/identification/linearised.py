@@ -1,0 +1,215 @@
+"""A fit near its optimum: residuals and derivatives of every run, and what the runs determine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.errors import InputError
+from swashplate.identification.variables import Variables
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-10
+"""Singular values below this part of the largest count as zero.
+
+With exact derivatives a gauge of the hoist set-up lies at 1e-15 and the faintest direction that the
+tests do tell at 2e-5. Derivatives by central differences are good to about 1e-9: use 1e-6 there.
+"""
+
+
+class LinearisedRun(NamedTuple):
+    """One channel of one experiment at the optimum; only the samples that count."""
+
+    name: str
+    """The experiment's."""
+    channel: str
+    time: Array
+    """(n,) stamps, increasing; ignored samples are simply absent. [s]"""
+    residual: Array
+    """(n,) weighted: w times (simulated less measured)."""
+    jacobian: Array
+    """(n, K) derivatives of `residual` by the solver's vector."""
+    weight: Array | None = None
+    """(n,) the factors w; None where all are alike. Samples of factor 0 are dropped."""
+
+    @property
+    def label(self) -> str:
+        """Experiment and channel, for people."""
+        return f"{self.name}, {self.channel}"
+
+
+@dataclass(frozen=True, eq=False)
+class LinearisedFit:
+    """All runs of a fit at its optimum. Make it with `of`, which checks and cleans."""
+
+    runs: tuple[LinearisedRun, ...]
+    variables: Variables
+    prior: Array
+    """(p, K) rows of the Gaussian priors: derivatives of (number less mean)/deviation."""
+    tolerance: float = TOLERANCE
+
+    @classmethod
+    def of(
+        cls,
+        runs: Sequence[LinearisedRun],
+        variables: Variables,
+        *,
+        prior: Array | None = None,
+        tolerance: float = TOLERANCE,
+    ) -> LinearisedFit:
+        """Check the runs, drop samples of weight 0 and runs without samples.
+
+        Raises
+        ------
+        InputError
+            If shapes do not fit, stamps do not increase, a number is not finite, or no sample is
+            left; the sentence names the run.
+        """
+        count = variables.count
+        kept = [_checked(run, count) for run in runs]
+        kept = [run for run in kept if run.time.size]
+        if not kept:
+            raise InputError(
+                "No sample counts: every run is empty or has weight 0; give a window a weight."
+            )
+        rows = np.zeros((0, count)) if prior is None else np.asarray(prior, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != count or not np.isfinite(rows).all():
+            raise InputError(f"The rows of the priors need {count} finite columns each.")
+        return cls(tuple(kept), variables, rows, tolerance)
+
+    @property
+    def samples(self) -> int:
+        """Samples of all runs."""
+        return sum(run.time.size for run in self.runs)
+
+    @cached_property
+    def squares(self) -> float:
+        """Sum of the squared weighted residuals."""
+        return float(sum(run.residual @ run.residual for run in self.runs))
+
+    @cached_property
+    def triangle(self) -> Array:
+        """(<= K, K) factor R of all derivatives and priors, RᵀR = JᵀJ, by blocks of runs.
+
+        Never from the normal equations: a null direction of JᵀJ drowns in rounding at 1e-8.
+        """
+        triangle = self.prior
+        for run in self.runs:
+            triangle = triangular_factor(np.vstack([triangle, run.jacobian]))
+        return triangle
+
+    @cached_property
+    def _decomposed(self) -> tuple[Array, NDArray[np.bool_]]:
+        return whitening(self.triangle, self.variables.free, self.tolerance)
+
+    @property
+    def whitening(self) -> Array:
+        """(K, rank) matrix W with W Wᵀ the inverse of JᵀJ on what the runs determine.
+
+        The columns of J W are orthonormal. Rows of unknowns at a bound are 0: they are held there.
+        """
+        return self._decomposed[0]
+
+    @property
+    def determined(self) -> NDArray[np.bool_]:
+        """(K,) unknowns that are free and have no part in any null direction."""
+        return self._decomposed[1]
+
+    @property
+    def rank(self) -> int:
+        """How many combinations of the unknowns the runs determine."""
+        return int(self.whitening.shape[1])
+
+    @property
+    def spare_samples(self) -> int:
+        """Samples more than combinations determined.
+
+        Raises
+        ------
+        InputError
+            If there are none: then the residual tells nothing of the noise.
+        """
+        spare = self.samples - self.rank
+        if spare < 1:
+            raise InputError(
+                f"{self.samples} sample{'s' if self.samples > 1 else ''} for {self.rank} "
+                f"unknown{'s' if self.rank > 1 else ''} leave nothing to tell the noise from; take "
+                "more samples or fewer unknowns."
+            )
+        return spare
+
+
+def triangular_factor(matrix: Array) -> Array:
+    """(min(m, K), K) factor R of a matrix (m, K), RᵀR = matrixᵀ matrix."""
+    factor: Array = np.linalg.qr(matrix, mode="r")  # type: ignore[assignment]
+    return factor
+
+
+def whitening(
+    triangle: Array, free: NDArray[np.bool_], tolerance: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Inverse of a triangular factor on what it determines.
+
+    Parameters
+    ----------
+    triangle : (m, K) array
+        Derivatives, or their triangular factor.
+    free : (K,) array of bool
+        Unknowns that may move; the others are held.
+    tolerance : float
+        Singular values of the column-scaled factor below this part of the largest count as zero.
+
+    Returns
+    -------
+    (K, rank) array, (K,) array of bool
+        W with W Wᵀ = (JᵀJ)⁻¹ on the free unknowns, and which unknowns are determined.
+    """
+    count = triangle.shape[1]
+    if triangle.shape[0] > count:
+        triangle = triangular_factor(triangle)
+    length = np.linalg.norm(triangle, axis=0)
+    moving = np.flatnonzero(free & (length > 0.0))
+    determined = np.zeros(count, dtype=np.bool_)
+    if not moving.size:
+        return np.zeros((count, 0)), determined
+    _, sizes, rows = np.linalg.svd(triangle[:, moving] / length[moving], full_matrices=True)
+    rank = int(np.count_nonzero(sizes > tolerance * sizes[0]))
+    inverse = np.zeros((count, rank))
+    inverse[moving] = (rows[:rank].T / sizes[:rank]) / length[moving, None]
+    # an unknown whose unit vector lies in the row space is determined in spite of null directions
+    determined[moving] = np.sum(rows[rank:] ** 2, axis=0) < 1e-8
+    return inverse, determined
+
+
+def _checked(run: LinearisedRun, count: int) -> LinearisedRun:
+    samples = run.time.shape
+    shapes = {"residual": (run.residual, samples), "jacobian": (run.jacobian, (*samples, count))}
+    if run.weight is not None:
+        shapes["weight"] = (run.weight, samples)
+    for what, (array, wanted) in shapes.items():
+        if array.shape != wanted:
+            raise InputError(f"{run.label}: {what} has the shape {array.shape}, needs {wanted}.")
+        if not np.isfinite(array).all():
+            row = int(np.argwhere(~np.isfinite(array))[0][0])
+            raise InputError(
+                f"{run.label}: {what} is not finite at {run.time[row]:g} s; leave the sample out."
+            )
+    if not (np.diff(run.time) > 0.0).all() or not np.isfinite(run.time).all():
+        raise InputError(f"{run.label}: the time stamps must be finite and increase.")
+    if run.weight is None or (run.weight > 0.0).all():
+        return run
+    if (run.weight < 0.0).any():
+        raise InputError(f"{run.label}: a weight is negative; a factor on a residual is not.")
+    used = run.weight > 0.0
+    return run._replace(
+        time=run.time[used],
+        residual=run.residual[used],
+        jacobian=run.jacobian[used],
+        weight=run.weight[used],
+    )

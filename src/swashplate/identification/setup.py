@@ -1,0 +1,133 @@
+"""What a fit is to find: stages, free parameters, bounds; read from TOML or packaged."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
+
+from swashplate.campaign.kinds import ChannelKind
+from swashplate.campaign.schema import Weight
+from swashplate.documents import parse_toml, read_text, validated
+from swashplate.errors import ParameterError
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Pair = tuple[Finite, Finite]
+
+
+class Entry(BaseModel):
+    """A table of the file; a key that it does not know is refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class GivenPrior(Entry):
+    """What is known beforehand: mean and standard deviation."""
+
+    mean: Finite
+    deviation: PositiveFloat
+
+
+class Free(Entry):
+    """How a parameter is free: both directions apart, unless tied."""
+
+    relative: Pair | None = Field(None, description="Bounds as factors on the nominal value.")
+    bounds: Pair | None = Field(None, description="Bounds in SI units.")
+    log: bool = Field(False, description="Move the logarithm: for positive numbers.")
+    tied: bool = Field(False, description="One value for both directions.")
+    prior: GivenPrior | None = Field(
+        None, description="A normal distribution, of the logarithm if log."
+    )
+
+    @model_validator(mode="after")
+    def _bounded(self) -> Free:
+        if (self.relative is None) == (self.bounds is None):
+            raise ValueError("give either relative bounds or bounds")
+        return self
+
+
+class GivenForces(Entry):
+    """Effective currents at which the solenoids' forces are the unknowns, instead of Z19 to Z22."""
+
+    plus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat]
+    minus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat]
+    relative: Pair = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
+
+
+class Stage(Entry):
+    """One fit: a part of the drive against its channels."""
+
+    name: str
+    part: Literal["card", "pump", "chain"]
+    current: Literal["simulated", "measured"] = Field(
+        "simulated",
+        description="What drives the pump alone: the fitted card's current, or the "
+        "input, where that is a current.",
+    )
+    channels: tuple[ChannelKind, ...] = Field((), description="Kinds to fit; all if empty.")
+    free: dict[str, Free] = Field(min_length=1)
+    forces: GivenForces | None = None
+    weights: dict[ChannelKind, tuple[Weight, ...]] = Field(
+        {}, description="Windows that count more or less, besides those of the campaign."
+    )
+
+
+class Setup(Entry):
+    """A fit in one stage or several, each starting from what the ones before found."""
+
+    title: str = ""
+    stages: tuple[Stage, ...] = Field(min_length=1)
+
+    def joint(self) -> Setup:
+        """The same unknowns, all at once through the whole chain.
+
+        Raises
+        ------
+        ParameterError
+            If two stages free the same parameter.
+        """
+        free: dict[str, Free] = {}
+        for stage in self.stages:
+            twice = sorted(set(free) & set(stage.free))
+            if twice:
+                raise ParameterError(f"{twice[0]} is free in two stages; a joint fit needs one.")
+            free |= stage.free
+        forces = next((each.forces for each in self.stages if each.forces is not None), None)
+        weights = {kind: w for stage in self.stages for kind, w in stage.weights.items()}
+        stage = Stage(name="chain", part="chain", free=free, forces=forces, weights=weights)
+        return Setup(title=self.title, stages=(stage,))
+
+
+def setup_names() -> tuple[str, ...]:
+    """Names of the packaged set-ups."""
+    folder = files("swashplate.identification").joinpath("setups")
+    return tuple(
+        sorted(
+            each.name.removesuffix(".toml")
+            for each in folder.iterdir()
+            if each.name.endswith(".toml")
+        )
+    )
+
+
+def load_setup(name: str | Path) -> Setup:
+    """A packaged set-up by name, or one's own from a TOML file.
+
+    Raises
+    ------
+    ParameterError
+        If there is none of that name, or an entry is wrong.
+    FileError
+        If the file cannot be read.
+    """
+    if str(name).lower().endswith(".toml"):
+        return validated(parse_toml(read_text(name), str(name)), Setup, str(name))
+    if name not in setup_names():
+        raise ParameterError(
+            f"There is no packaged set-up '{name}'; there are {', '.join(setup_names())}, or give "
+            "a .toml file."
+        )
+    text = files("swashplate.identification").joinpath("setups", f"{name}.toml").read_text("utf-8")
+    return validated(parse_toml(text, f"{name}.toml"), Setup, f"{name}.toml")

@@ -1,0 +1,196 @@
+"""From a set-up's stage and a drive to the problem that it states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from swashplate.campaign.campaign import Campaign
+from swashplate.campaign.experiment import Experiment
+from swashplate.campaign.weighting import applying, inside
+from swashplate.errors import InputError, ParameterError
+from swashplate.identification.drive_model import (
+    CURRENTS,
+    SIGNALS,
+    DriveModel,
+    current_record,
+    simulated_current,
+)
+from swashplate.identification.executors import available_cores
+from swashplate.identification.forces import Forces
+from swashplate.identification.problem import Problem, noise_scales
+from swashplate.identification.setup import Free, Setup, Stage, load_setup
+from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
+from swashplate.parameters.parameter_set import ParameterSet, find
+from swashplate.simulation.residuals import START_PRESSURE
+
+
+def setup_of(campaign: Campaign, axis: str, name: str | None = None) -> Setup:
+    """The set-up of a name, or the packaged one of the axis's drive.
+
+    Raises
+    ------
+    InputError
+        If none is named and the drive has no packaged one.
+    """
+    if name is not None:
+        return load_setup(name)
+    drive = campaign.drive(axis).name
+    try:
+        return load_setup(drive)
+    except ParameterError:
+        raise InputError(
+            f"There is no packaged set-up for the drive '{drive}': give one of your own, a .toml "
+            "file with stages and free parameters."
+        ) from None
+
+
+def stage_problem(
+    stage: Stage,
+    parameters: ParameterSet,
+    experiments: Sequence[Experiment],
+    *,
+    threads: int | None = None,
+) -> Problem:
+    """The problem of a stage.
+
+    Parameters
+    ----------
+    stage : Stage
+        What is free and what is fitted.
+    parameters : ParameterSet
+        Nominal values, those of earlier stages already found.
+    experiments : sequence of Experiment
+        The runs to fit.
+    threads : int, optional
+        Threads over experiments; all cores by default.
+
+    Raises
+    ------
+    InputError
+        If no experiment has a channel that the stage fits.
+    ParameterError
+        If a free parameter is unknown or its bounds are wrong.
+    """
+    channels = _channels(stage, experiments)
+    runs = tuple(each for each in experiments if any(name in each.channels for name in channels))
+    forces = None
+    if stage.forces is not None:
+        forces = Forces(stage.forces.plus, stage.forces.minus)
+    currents = {}
+    if stage.part == "pump":
+        currents = {
+            each.name: current_record(each)
+            if stage.current == "measured" or each.input.kind == "current"
+            else simulated_current(each, parameters)
+            for each in runs
+        }
+    unknowns = (
+        *_parameters(stage.free, parameters),
+        *_forces(stage, forces, parameters),
+        *_own(stage, runs, channels),
+    )
+    return Problem(
+        DriveModel(parameters, stage.part, currents, forces),
+        tuple(_weighted(each, stage) for each in runs),
+        Unknowns(unknowns),
+        channels,
+        noise_scales(runs, channels),
+        threads=threads or available_cores(),
+    )
+
+
+def _channels(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, ...]:
+    """Names of the channels that a stage fits."""
+    kinds = stage.channels or tuple(
+        kind
+        for kind in SIGNALS
+        if stage.part == "chain" or (kind in CURRENTS) == (stage.part == "card")
+    )
+    names = dict.fromkeys(
+        name
+        for each in experiments
+        for name, channel in each.channels.items()
+        if channel.kind in kinds
+    )
+    if not names:
+        had = ", ".join(dict.fromkeys(c.kind for e in experiments for c in e.channels.values()))
+        raise InputError(
+            f"The stage '{stage.name}' fits {', '.join(kinds)}, but the runs to fit have "
+            f"{had or 'no channel'}."
+        )
+    return tuple(names)
+
+
+def _parameters(free: Mapping[str, Free], parameters: ParameterSet) -> list[Unknown]:
+    unknowns: list[Unknown] = []
+    for name, entry in free.items():
+        definition = find(name)
+        columns = definition.columns if name == definition.symbol else (name,)
+        groups = [columns] if entry.tied or len(columns) == 1 else [(each,) for each in columns]
+        unknowns += [
+            bounded(
+                name if entry.tied else group[0],
+                float(np.mean([parameters.numbers[column] for column in group])),
+                relative=entry.relative,
+                absolute=entry.bounds,
+                unit=definition.unit,
+                log=entry.log,
+                prior=None
+                if entry.prior is None
+                else Prior(entry.prior.mean, entry.prior.deviation),
+                sets=group,
+            )
+            for group in groups
+        ]
+    return unknowns
+
+
+def _forces(stage: Stage, forces: Forces | None, parameters: ParameterSet) -> list[Unknown]:
+    if forces is None or stage.forces is None:
+        return []
+    return [
+        bounded(name, value, relative=stage.forces.relative, unit="N", log=value > 0.0)
+        for name, value in forces.values(parameters).items()
+    ]
+
+
+def _own(stage: Stage, experiments: Sequence[Experiment], channels: Sequence[str]) -> list[Unknown]:
+    """Unknowns of single experiments: free zeros of positions, an estimated initial pressure."""
+    unknowns = []
+    for each in experiments:
+        for name in channels:
+            channel = each.channels.get(name)
+            if channel is None or not channel.is_position:
+                continue
+            # a free zero: far enough both ways never to be reached
+            first, reach = float(channel.values[0]), 1.0 + 10.0 * float(np.ptp(channel.values))
+            unknowns.append(
+                Unknown(
+                    f"offset {name}",
+                    first,
+                    first - reach,
+                    first + reach,
+                    channel.unit,
+                    run=each.name,
+                )
+            )
+        if stage.part != "card" and each.start == "estimated":
+            unknowns.append(Unknown(START_PRESSURE, 0.0, -4e6, 4e6, "Pa", run=each.name))
+    return unknowns
+
+
+def _weighted(experiment: Experiment, stage: Stage) -> Experiment:
+    """The experiment with the stage's own weights multiplied in."""
+    from dataclasses import replace
+
+    if not stage.weights:
+        return experiment
+    channels = {}
+    for name, channel in experiment.channels.items():
+        weight = channel.weight.copy()
+        for window in applying(stage.weights.get(channel.kind, ()), experiment.maneuver):
+            weight[inside(window, channel.time)] *= window.factor
+        channels[name] = replace(channel, weight=weight)
+    return replace(experiment, channels=channels)

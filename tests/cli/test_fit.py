@@ -1,0 +1,98 @@
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from swashplate import Drive
+
+Words = Callable[..., str]
+TESTS = (
+    "--maneuver",
+    "step:4,start=0.5,stop=2.5,length=4",
+    "--maneuver",
+    "step:-5,start=0.5,stop=2.5,length=4",
+)
+SETUP = """
+[[stages]]
+name = "card"
+part = "card"
+free.J = { relative = [0.5, 2.0] }
+free.omega_plus = { relative = [0.5, 2.0] }
+
+[[stages]]
+name = "pump"
+part = "pump"
+free.Z8 = { relative = [0.5, 2.0], log = true }
+free.Z16 = { relative = [0.5, 2.0], log = true }
+"""
+
+
+@pytest.fixture
+def campaign(done: Words, tmp_path: Path) -> Path:
+    """Virtual tests of a hoist with other orifices and another jump."""
+    truth = Drive.preset("hoist").replace(Z16=(1.3e-4, 1.3e-4), J=(0.26, 0.31))
+    truth.to_toml(tmp_path / "truth.toml")
+    done("rig", "truth.toml", "--out", "virtual", *TESTS)
+    path = tmp_path / "virtual" / "campaign.toml"
+    path.write_text(path.read_text("utf-8").replace('drive = "drive.toml"', 'drive = "hoist"'))
+    (tmp_path / "setup.toml").write_text(SETUP, "utf-8")
+    return path
+
+
+def test_a_campaign_becomes_a_drive(done: Words, campaign: Path, tmp_path: Path) -> None:
+    said = done("fit", "virtual/campaign.toml", "--setup", "setup.toml", "--out", "fitted")
+    assert "Stage card" in said
+    assert "Stage pump" in said
+    fitted = Drive.from_toml(tmp_path / "fitted" / "drive.toml")
+    assert fitted["Z16"].value == pytest.approx((1.3e-4, 1.3e-4), rel=2e-3)
+    assert fitted["J"].value == pytest.approx((0.26, 0.31), rel=2e-3)
+    assert "speed at the end" in done("simulate", "fitted/drive.toml", "step:4")
+    header, *rows = (tmp_path / "fitted" / "estimates.csv").read_text("utf-8").splitlines()
+    assert header.startswith("stage,unknown,unit,nominal,estimate")
+    assert len([row for row in rows if "offset" not in row]) == 6
+
+
+def test_starts_are_resumed_after_a_kill(campaign: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "swashplate", "fit", "virtual/campaign.toml"]
+    command += ["--setup", "setup.toml", "--out", "fitted", "--starts", "12", "--jobs", "1"]
+    store = tmp_path / "fitted" / "starts" / "card"
+    running = subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    deadline = time.monotonic() + 120.0
+    while not (store.exists() and len(list(store.glob("start-*.json"))) >= 2):
+        assert running.poll() is None, "it ended before it could be killed"
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    os.kill(running.pid, signal.SIGKILL)
+    running.wait()
+    kept = {path: path.stat().st_mtime_ns for path in store.glob("start-*.json")}
+    again = subprocess.run(
+        [*command, "--resume"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert "Stage pump" in again.stdout
+    assert len(list(store.glob("start-*.json"))) == 13
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept
+    whole = [word if word != "fitted" else "whole" for word in command]
+    subprocess.run(whole, cwd=tmp_path, capture_output=True, check=True)
+    assert (tmp_path / "fitted" / "drive.toml").read_text("utf-8") == (
+        tmp_path / "whole" / "drive.toml"
+    ).read_text("utf-8")
+
+
+def test_refusals(refused: Words, campaign: Path, tmp_path: Path) -> None:
+    fit = ("fit", "virtual/campaign.toml")
+    assert "no packaged set-up 'boom'" in refused(*fit, "--setup", "boom")
+    assert "no axis 'boom'; it has hoist" in refused(*fit, "--axis", "boom")
+    (tmp_path / "bad.toml").write_text(SETUP.replace("Z16", "Z61"), "utf-8")
+    assert "no parameter 'Z61'" in refused(*fit, "--setup", "bad.toml")
+    (tmp_path / "bad.toml").write_text(SETUP.replace("relative", "relativ", 1), "utf-8")
+    assert "perhaps 'relative' is meant" in refused(*fit, "--setup", "bad.toml")
+    text = campaign.read_text("utf-8").replace('role = "fit"', 'role = "ignore"')
+    campaign.write_text(text, "utf-8")
+    assert "no run of the axis 'hoist' has the role 'fit'" in refused(*fit)

@@ -1,0 +1,58 @@
+"""Intervals in the unknowns' own units."""
+
+import numpy as np
+import pytest
+
+from swashplate.errors import InputError
+from swashplate.identification.covariance import Covariance
+from swashplate.identification.intervals import estimates
+from swashplate.identification.variables import Variables
+
+
+def covariance(freedom: float = np.inf, **more: object) -> Covariance:
+    variables = Variables.of(
+        ["plain", "positive"], [3.0, 2.0], scales=[10.0, 1.0], logarithmic=[False, True], **more
+    )
+    matrix = np.diag([0.01, 0.04])
+    return Covariance("coloured", variables, matrix, np.ones(2, bool), np.full(2, freedom))
+
+
+def test_intervals_by_hand() -> None:
+    plain, positive = estimates(covariance())
+    assert plain.standard_error == pytest.approx(1.0)  # 0.1 of the scale 10
+    assert (plain.lower, plain.upper) == pytest.approx((3.0 - 1.959964, 3.0 + 1.959964))
+    # 20 % in the logarithm: 2 exp(±0.392)
+    assert positive.standard_error == pytest.approx(0.4)
+    assert (positive.lower, positive.upper) == pytest.approx((1.351418, 2.959854), rel=1e-6)
+
+
+def test_few_degrees_of_freedom_widen() -> None:
+    # Student's quantile for 5 degrees of freedom, 2.570582
+    assert estimates(covariance(5.0))[0].upper == pytest.approx(3.0 + 2.570582)
+
+
+def test_another_level() -> None:
+    assert estimates(covariance(), level=0.5)[0].upper == pytest.approx(3.0 + 0.6744898)
+
+
+def test_at_a_bound_there_is_no_interval() -> None:
+    plain, positive = estimates(covariance(at_bound=[-1, 1]))
+    assert plain.status == "at its lower bound"
+    assert positive.status == "at its upper bound"
+    assert plain[3:] == (None, None, None, None)
+
+
+def test_undetermined_there_is_none_either() -> None:
+    base = covariance()
+    found = estimates(
+        Covariance("HAC", base.variables, base.matrix, np.array([False, True]), np.ones(2))
+    )
+    assert found[0].status == "undetermined"
+    assert found[0].standard_error is None
+    assert found[1].status == "estimated"
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0, 95.0])
+def test_a_level_is_a_probability(level: float) -> None:
+    with pytest.raises(InputError, match="between 0 and 1"):
+        estimates(covariance(), level=level)

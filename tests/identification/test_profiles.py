@@ -1,0 +1,197 @@
+"""Profile likelihoods."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, least_squares, minimize_scalar
+from scipy.stats import t as student
+
+from swashplate.errors import DomainError, InputError
+from swashplate.identification.profiles import Profile, Threshold, profile, threshold
+
+RNG = np.random.default_rng(6)
+J = RNG.normal(size=(60, 3)) @ np.array([[1.0, 0.0, 0.0], [0.9, 0.3, 0.0], [0.0, 0.2, 2.0]])
+Y = J @ np.array([1.0, -2.0, 0.5]) + 0.3 * RNG.normal(size=60)
+
+
+def linear(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
+    others = [k for k in range(3) if k != index]
+    vector = np.empty(3)
+    vector[index] = value
+    vector[others] = np.linalg.lstsq(J[:, others], Y - value * J[:, index], rcond=None)[0]
+    return 0.5 * float(np.sum((J @ vector - Y) ** 2)), vector
+
+
+OPTIMUM = np.linalg.lstsq(J, Y, rcond=None)[0]
+COST = 0.5 * float(np.sum((J @ OPTIMUM - Y) ** 2))
+
+
+@pytest.mark.parametrize("index", [0, 1, 2])
+@pytest.mark.parametrize("inflation", [1.0, 5.0])
+@pytest.mark.parametrize("first", [0.05, 1.0, 20.0])
+def test_a_linear_model_has_the_textbooks_interval(
+    index: int, inflation: float, first: float
+) -> None:
+    error = np.sqrt(2.0 * COST / 57.0 * np.linalg.inv(J.T @ J)[index, index])
+    found = profile(
+        linear,
+        OPTIMUM,
+        COST,
+        index,
+        threshold(COST, 60, 3, inflation=inflation),
+        first * error,
+    )
+    reach = student.ppf(0.975, 60.0 / inflation - 3.0) * np.sqrt(inflation) * error
+    assert found.endings == ("crossed", "crossed")
+    assert found.lower == pytest.approx(OPTIMUM[index] - reach, abs=2e-3 * reach)
+    assert found.upper == pytest.approx(OPTIMUM[index] + reach, abs=2e-3 * reach)
+    assert found.sentences("Z8") == ()
+    numbers = [point.number for point in found.points]
+    assert numbers == sorted(numbers)
+    assert len(numbers) < 40
+
+
+def nonlinear() -> tuple[np.ndarray, np.ndarray, object]:
+    time = np.linspace(0.0, 3.0, 40)
+    measured = 2.0 * np.exp(-1.5 * time) + 0.1 * np.random.default_rng(0).normal(size=40)
+
+    def minimise(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
+        def residual(free: np.ndarray) -> np.ndarray:
+            gain, rate = np.insert(free, index, value)
+            return gain * np.exp(-rate * time) - measured
+
+        found = least_squares(residual, np.delete(start, index))
+        return float(found.cost), np.insert(found.x, index, value)
+
+    return time, measured, minimise
+
+
+def test_a_nonlinear_model_agrees_with_a_root_search() -> None:
+    time, measured, minimise = nonlinear()
+    best = least_squares(lambda v: v[0] * np.exp(-v[1] * time) - measured, [1.0, 1.0])
+    limit = threshold(best.cost, 40, 2)
+    found = profile(minimise, best.x, best.cost, 1, limit, 0.1)  # type: ignore[arg-type]
+
+    def over(rate: float) -> float:
+        shape = np.exp(-rate * time)
+        gain = shape @ measured / (shape @ shape)
+        return 0.5 * float(np.sum((gain * shape - measured) ** 2)) - best.cost - limit.rise
+
+    assert found.lower == pytest.approx(brentq(over, 0.5, best.x[1]), rel=1e-3)
+    assert found.upper == pytest.approx(brentq(over, best.x[1], 4.0), rel=1e-3)
+    # the interval is not symmetric
+    assert found.upper - best.x[1] > 1.05 * (best.x[1] - found.lower)
+
+
+def test_starts_are_warm() -> None:
+    """Each minimisation begins at the nearest vector found before, with the unknown moved."""
+    starts: list[np.ndarray] = []
+
+    def watched(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
+        assert start[index] == value
+        starts.append(start)
+        return linear(index, value, start)
+
+    profile(watched, OPTIMUM, COST, 0, threshold(COST, 60, 3), 0.1)
+    up = [start for start in starts if start[0] > OPTIMUM[0]]
+    np.testing.assert_allclose(up[1][1:], linear(0, up[0][0], up[0])[1][1:])
+
+
+def bowl(height: float = 1.0) -> tuple:
+    """One unknown, cost ½ u² beside a noise cost of 1."""
+    return lambda index, value, start: (1.0 + 0.5 * height * value**2, np.array([value]))
+
+
+LIMIT = Threshold(0.5, 0.95, 1.0)
+ZERO = np.zeros(1)
+
+
+def test_a_bound_leaves_a_side_open() -> None:
+    found = profile(bowl(), ZERO, 1.0, 0, LIMIT, 1.0, (-0.4, np.inf))
+    assert found.endings == ("bound", "crossed")
+    assert found.lower is None
+    assert found.upper == pytest.approx(1.0, rel=2e-3)
+    assert found.points[0].number == -0.4
+    assert found.sentences("Z17") == (
+        "Z17 reaches its bound before the cost rises enough on its lower side: no end of the "
+        "interval there.",
+    )
+
+
+def test_an_optimum_at_its_bound_has_one_side() -> None:
+    found = profile(bowl(), ZERO, 1.0, 0, LIMIT, 1.0, (0.0, 5.0))
+    assert found.endings == ("bound", "crossed")
+    assert found.points[0].number == 0.0
+
+
+def test_an_undetermined_unknown_is_open() -> None:
+    found = profile(bowl(0.0), ZERO, 1.0, 0, LIMIT, 1.0)
+    assert found.endings == ("open", "open")
+    assert (found.lower, found.upper) == (None, None)
+    assert "as far as was looked" in found.sentences("Z6")[0]
+
+
+def test_the_domains_edge_ends_a_side() -> None:
+    def edged(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
+        if value > 0.5:
+            raise DomainError("|sin φ| reaches 1.")
+        return 1.0 + 0.5 * value**2, np.array([value])
+
+    found = profile(edged, ZERO, 1.0, 0, LIMIT, 1.0)
+    assert found.endings == ("crossed", "domain")
+    assert found.points[-1].number == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_better_optimum_stops_it() -> None:
+    def two(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
+        return 1.0 + min(0.5 * value**2, 0.5 * (value - 0.8) ** 2 - 0.3), np.array([value, 7.0])
+
+    found = profile(two, np.zeros(2), 1.0, 0, LIMIT, 1.0)
+    assert found.better is not None
+    assert found.better.cost < 1.0
+    assert found.better.vector[1] == 7.0
+    assert (found.lower, found.upper) == (None, None)
+    (said,) = found.sentences("Z9")
+    assert "met a better optimum" in said
+    assert "against 1: fit again from there" in said
+
+
+def test_the_root_of_a_kinked_cost_is_found() -> None:
+    kinked = lambda i, value, s: (1.0 + max(0.02 * abs(value), 3.0 * (value - 0.9)), ZERO)  # noqa: E731
+    found = profile(kinked, ZERO, 1.0, 0, LIMIT, 0.3)
+    expected = minimize_scalar(lambda v: (3.0 * (v - 0.9) - 0.5) ** 2, bounds=(0, 2)).x
+    assert found.upper == pytest.approx(expected, rel=5e-3)
+
+
+def test_thresholds_by_hand() -> None:
+    # s² = 2·28.5/57 = 1, q = 2.0025 for 57 degrees of freedom
+    assert threshold(28.5, 60, 3).rise == pytest.approx(0.5 * 2.002465**2, rel=1e-5)
+    given = threshold(28.5, 60, 3, inflation=4.0, freedom=1e9)
+    assert given.rise == pytest.approx(4.0 * 0.5 * 1.959964**2, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"samples": 3}, "3 samples for 3 unknowns"),
+        ({"inflation": 0.5}, "cannot stand for one"),
+        ({"inflation": 40.0}, "worth 1.5 independent ones"),
+        ({"level": 1.0}, "between 0 and 1"),
+    ],
+)
+def test_thresholds_that_mean_nothing_are_refused(change: dict, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        threshold(**{"cost": 1.0, "samples": 60, "unknowns": 3, **change})
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"step": 0.0}, "must be positive"),
+        ({"threshold": Threshold(0.0, 0.95, 1.0)}, "exactly zero"),
+        ({"bounds": (1.0, 2.0)}, "outside the bounds"),
+    ],
+)
+def test_profiles_that_cannot_begin_are_refused(change: dict, said: str) -> None:
+    arguments = {"threshold": LIMIT, "step": 1.0, "bounds": (-9.0, 9.0), **change}
+    with pytest.raises(InputError, match=said):
+        _: Profile = profile(bowl(), ZERO, 1.0, 0, **arguments)

@@ -1,0 +1,223 @@
+"""Problems, solvers and starts on a model whose optimum is known."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate import Channel, DomainError, Experiment, FileError, InputError, maneuvers
+from swashplate.campaign import rig
+from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.identification.executors import Processes, Serial
+from swashplate.identification.problem import Problem, noise_scales
+from swashplate.identification.setup import Free, Stage
+from swashplate.identification.solving import Progress, solve
+from swashplate.identification.staging import stage_problem
+from swashplate.identification.starts import StartResult, sobol_starts, solve_from
+from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
+
+GAIN, LAG = 3.0, 0.7
+Make = Callable[..., Experiment]
+UNKNOWNS = Unknowns(
+    (
+        bounded("gain", 1.0, absolute=(0.1, 20.0), log=True),
+        bounded("lag", 2.0, absolute=(0.05, 5.0), log=True),
+    )
+)
+
+
+@pytest.fixture
+def problem(rise, experiment: Make, measured) -> Problem:
+    runs = tuple(
+        experiment(f"run {level}", level, measured(level, GAIN, LAG)) for level in (1.0, -2.0)
+    )
+    return Problem(rise, runs, UNKNOWNS, ("y",), {"y": 0.1})
+
+
+def test_residuals_are_weighted_and_scaled(rise, experiment: Make, measured) -> None:
+    run = experiment("run", 1.0, measured(1.0, GAIN, LAG) + 0.2, weight=4.0)
+    made = Problem(rise, (run,), UNKNOWNS, ("y",), {"y": 0.1})
+    residuals = made.residuals(UNKNOWNS.vector({"gain": GAIN, "lag": LAG}), 0)
+    assert residuals == pytest.approx(np.full(81, -0.2 * 2.0 / 0.1))
+    assert made.cost(UNKNOWNS.vector({"gain": GAIN, "lag": LAG})) == pytest.approx(0.5 * 81 * 16.0)
+
+
+def test_differences_stand_in_for_missing_derivatives(problem: Problem) -> None:
+    vector = UNKNOWNS.vector({"gain": 2.0, "lag": 0.5})
+    found = problem.linearised(vector, 0)["y"].by
+    time = problem.experiments[0]["y"].time
+    decay = np.exp(-time / 0.5)
+    by_gain = (1.0 - decay) * 2.0 / 0.1  # by ln gain
+    by_lag = -2.0 * decay * time / 0.5**2 * 0.5 / 0.1  # by ln lag
+    np.testing.assert_allclose(found, np.column_stack([by_gain, by_lag]), rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.parametrize("method", ["trf", "slsqp"])
+def test_the_truth_is_found(problem: Problem, method) -> None:
+    seen: list[Progress] = []
+    solution = solve(problem, method=method, tolerance=1e-14, watch=seen.append)
+    rel = 1e-9 if method == "trf" else 1e-3
+    assert UNKNOWNS.values(solution.vector) == pytest.approx({"gain": GAIN, "lag": LAG}, rel=rel)
+    assert solution.converged
+    assert solution.cost < 1e-4 * solution.start_cost
+    assert [each.iteration for each in seen] == list(range(1, len(seen) + 1))
+
+
+def test_a_robust_loss_ignores_an_outlier(rise, experiment: Make, measured) -> None:
+    y = measured(1.0, GAIN, LAG)
+    y[40] += 30.0
+    made = Problem(rise, (experiment("run", 1.0, y),), UNKNOWNS, ("y",), {"y": 0.1})
+    plain = UNKNOWNS.values(solve(made).vector)
+    robust = UNKNOWNS.values(solve(made, loss="soft_l1").vector)
+    assert abs(plain["gain"] - GAIN) > 0.2
+    assert robust["gain"] == pytest.approx(GAIN, abs=0.02)
+
+
+def test_a_prior_pulls(rise, experiment: Make, measured) -> None:
+    run = experiment("run", 1.0, measured(1.0, GAIN, LAG))
+    sure = Unknowns(
+        (bounded("gain", 1.0, absolute=(0.1, 20.0), prior=Prior(5.0, 1e-6)), UNKNOWNS[1])
+    )
+    made = Problem(rise, (run,), sure, ("y",), {"y": 0.1})
+    assert sure.values(solve(made).vector)["gain"] == pytest.approx(5.0, abs=1e-4)
+
+
+def test_offsets_belong_to_their_run(rise, experiment: Make, measured) -> None:
+    runs = (
+        experiment("a", 1.0, measured(1.0, GAIN, LAG) + 0.4),
+        experiment("b", 2.0, measured(2.0, GAIN, LAG) - 0.9),
+    )
+    free = Unknowns(
+        (*UNKNOWNS, *(Unknown("offset y", 0.0, -5.0, 5.0, run=each.name) for each in runs))
+    )
+    made = Problem(rise, runs, free, ("y",), {"y": 0.1})
+    values = free.values(solve(made, tolerance=1e-14).vector)
+    assert values == pytest.approx(
+        {"gain": GAIN, "lag": LAG, "offset y (a)": 0.4, "offset y (b)": -0.9}, rel=1e-7
+    )
+
+
+class Fragile:
+    """Holds only below a gain of 4."""
+
+    def simulate(self, values, experiment):
+        if values["gain"] > 4.0:
+            raise DomainError("The gain must stay below 4.")
+        return {"y": values["gain"] ** 2 * experiment.input.values}
+
+
+def test_a_step_out_of_the_domain_is_taken_back(experiment: Make) -> None:
+    run = experiment("run", 1.0, np.full(81, 15.9))
+    alone = UNKNOWNS.free_of(["lag"])
+    made = Problem(Fragile(), (run,), alone, ("y",), {"y": 0.1})
+    # the first step leads to e^7.45: far out of the domain
+    solution = solve(made)
+    assert alone.values(solution.vector)["gain"] == pytest.approx(np.sqrt(15.9), rel=1e-9)
+    with pytest.raises(DomainError, match="below 4"):
+        solve(made, alone.vector({"gain": 5.0}))
+
+
+def test_interrupted_with_the_best_so_far(problem: Problem) -> None:
+    def stop(progress: Progress) -> None:
+        if progress.iteration == 2:
+            raise KeyboardInterrupt
+
+    solution = solve(problem, watch=stop)
+    assert solution.interrupted
+    assert not solution.converged
+    assert solution.cost < solution.start_cost
+
+
+def test_impossible_problems(rise, experiment: Make, measured) -> None:
+    run = experiment("run", 1.0, measured(1.0, GAIN, LAG))
+    with pytest.raises(InputError, match="at least one unknown"):
+        Problem(rise, (run,), Unknowns(()), ("y",), {"y": 0.1})
+    with pytest.raises(InputError, match="at least one experiment"):
+        Problem(rise, (), UNKNOWNS, ("y",), {"y": 0.1})
+    ignored = experiment("run", 1.0, measured(1.0, GAIN, LAG), weight=0.0)
+    with pytest.raises(InputError, match="No sample of y counts"):
+        Problem(rise, (ignored,), UNKNOWNS, ("y",), {"y": 0.1})
+    with pytest.raises(InputError, match="No experiment has a channel 'x'; there are y"):
+        noise_scales((run,), ("x",))
+    with pytest.raises(InputError, match="'y' never changes"):
+        noise_scales((experiment("flat", 1.0, np.zeros(81)),), ("y",))
+
+
+def test_starts_are_spread_seeded_and_inside(problem: Problem) -> None:
+    starts = list(sobol_starts(problem, 12, seed=5))
+    low, high = problem.bounds
+    assert all(((low <= each) & (each <= high)).all() for each in starts)
+    again = list(sobol_starts(problem, 20, seed=5))
+    np.testing.assert_array_equal(starts, again[:12])
+    assert not np.array_equal(starts[0], next(iter(sobol_starts(problem, 1, seed=6))))
+
+
+def test_starts_outside_the_domain_are_drawn_again(experiment: Make) -> None:
+    run = experiment("run", 1.0, np.full(81, 3.9))
+    made = Problem(Fragile(), (run,), UNKNOWNS, ("y",), {"y": 0.1})
+    for start in sobol_starts(made, 6, seed=1):
+        assert UNKNOWNS.values(start)["gain"] <= 4.0
+
+
+def card_problem(tests: rig.VirtualTests) -> Problem:
+    (run,) = tests.runs.values()
+    source = Source(Path(run.stem), "")
+    time, volts, amperes = (run.columns[name] for name in ("time", "voltage", "current"))
+    drive = InputSignal("voltage", "V", time, volts, "linear", source)
+    current = Channel(
+        "current", "rectified_current", "A", time, amperes, np.ones(time.size), source
+    )
+    experiment = Experiment(
+        run.name, "hoist", run.name, "fit", "rest", None, drive, {"current": current}
+    )
+    free = {"J_plus": Free(relative=(0.5, 2.0)), "G1_plus": Free(relative=(0.5, 2.0))}
+    stage = Stage(name="card", part="card", free=free)
+    return stage_problem(stage, tests.nominal.parameters, [experiment], threads=1)
+
+
+def test_processes_give_the_same_as_one_after_another() -> None:
+    tests = rig.run("hoist", [maneuvers.step(4.0, stop=2.0, length=3.0)], seed=1)
+    problem = card_problem(tests)
+    starts = list(sobol_starts(problem, 3, seed=2))
+    here = solve_from(problem, starts, executor=Serial())
+    there = solve_from(problem, starts, executor=Processes(2))
+    for one, other in zip(here, there, strict=True):
+        assert (one.number, one.vector, one.cost) == (other.number, other.vector, other.cost)
+
+
+def test_what_is_done_is_on_disk_and_is_not_done_again(problem: Problem, tmp_path: Path) -> None:
+    starts = list(sobol_starts(problem, 5, seed=2))
+    store = tmp_path / "starts"
+
+    def stop(result: StartResult, done: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    first = solve_from(problem, starts, store=store, fingerprint="x", watch=stop)
+    assert [each.number for each in first] == [0, 1]
+    assert len(list(store.glob("start-*.json"))) == 2
+    seen: list[int] = []
+    full = solve_from(
+        problem,
+        starts,
+        store=store,
+        fingerprint="x",
+        resume=True,
+        watch=lambda result, done: seen.append(result.number),
+    )
+    assert seen == [2, 3, 4]
+    whole = solve_from(problem, starts)
+    assert [each.vector for each in full] == [each.vector for each in whole]
+
+
+def test_results_of_another_fit_are_not_resumed(problem: Problem, tmp_path: Path) -> None:
+    starts = list(sobol_starts(problem, 2, seed=2))
+    solve_from(problem, starts, store=tmp_path, fingerprint="x")
+    with pytest.raises(FileError, match="resume it, or remove the folder"):
+        solve_from(problem, starts, store=tmp_path, fingerprint="x")
+    with pytest.raises(FileError, match="belongs to another campaign"):
+        solve_from(problem, starts, store=tmp_path, fingerprint="y", resume=True)
+    (tmp_path / "start-00000.json").write_text("{", "utf-8")
+    with pytest.raises(FileError, match="is no result of a start"):
+        solve_from(problem, starts, store=tmp_path, fingerprint="x", resume=True)

@@ -1,0 +1,149 @@
+"""Do intervals cover the truth as often as they say?"""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.stats import t as student
+
+from swashplate.errors import InputError
+from swashplate.identification.covariance import Covariance
+from swashplate.identification.linearised import LinearisedFit, LinearisedRun
+from swashplate.identification.uncertainty import Uncertainty, uncertainty
+from swashplate.identification.variables import Variables
+
+RHO, RUNS, N = 0.98, 4, 2048
+TIME = np.arange(N) / 512.0
+
+
+def shapes(rng: np.random.Generator) -> np.ndarray:
+    """Slow derivatives, one that a single transient tells, none white."""
+    lag, turn = rng.uniform(0.1, 0.5), rng.uniform(0.3, 2.0)
+    return np.column_stack(
+        [
+            1.0 - np.exp(-TIME / lag),
+            np.sin(turn * TIME + rng.uniform(0.0, 6.0)),
+            np.exp(-((TIME - rng.uniform(1.0, 3.0)) ** 2) / 0.02),
+        ]
+    )
+
+
+def first_order(rng: np.random.Generator) -> np.ndarray:
+    noise = rng.normal(size=(RUNS, N + 400))
+    return lfilter([np.sqrt(1.0 - RHO**2)], [1.0, -RHO], noise)[:, 400:]
+
+
+def fitted(designs: list[np.ndarray], noise: np.ndarray) -> tuple[LinearisedFit, np.ndarray]:
+    """A linear regression whose truth is 0, and its estimate."""
+    total = sum(each.T @ each for each in designs)
+    estimate = -np.linalg.solve(total, sum(J.T @ e for J, e in zip(designs, noise, strict=True)))
+    runs = [
+        LinearisedRun(f"run {k}", "speed", TIME, e + J @ estimate, J)
+        for k, (J, e) in enumerate(zip(designs, noise, strict=True))
+    ]
+    return LinearisedFit.of(runs, Variables.of("abc", np.ones(3))), estimate
+
+
+def covers(covariance: Covariance, error: np.ndarray) -> np.ndarray:
+    quantile = student.ppf(0.975, covariance.degrees_of_freedom)
+    return np.abs(error) <= quantile * covariance.standard_errors
+
+
+@pytest.fixture(scope="module")
+def campaigns() -> list[tuple[Uncertainty, np.ndarray]]:
+    """120 campaigns of noise with ρ = 0.98: 83 independent samples of 8192 each."""
+    rng = np.random.default_rng(10)
+    designs = [shapes(rng) for _ in range(RUNS)]
+    made = []
+    for _ in range(120):
+        fit, estimate = fitted(designs, first_order(rng))
+        made.append((uncertainty(fit), estimate))
+    return made
+
+
+@pytest.mark.parametrize("which", ["quoted", "coloured", "hac"])
+def test_intervals_for_coloured_noise_cover_the_truth(campaigns: list, which: str) -> None:
+    """95 % within three standard deviations of 360 cases: 91.5 to 98.5 %."""
+    share = np.mean([covers(getattr(each, which), error) for each, error in campaigns])
+    assert 0.915 <= share <= 0.985
+
+
+def test_white_noise_intervals_do_not(campaigns: list) -> None:
+    """They are nine times too narrow and cover a sixth."""
+    share = np.mean([covers(each.white, error) for each, error in campaigns])
+    assert share < 0.3
+    spread = np.std([error for _, error in campaigns], axis=0)
+    white = np.mean([each.white.standard_errors for each, _ in campaigns], axis=0)
+    assert ((spread / white > 6.0) & (spread / white < 11.0)).all()
+
+
+def test_the_sentences_say_so(campaigns: list) -> None:
+    first = campaigns[0][0]
+    said = " ".join(first.sentences())
+    assert "Residuals of speed stay correlated over 0." in said
+    assert "White-noise errors would be" in said
+    assert first.inflation.min() > 30.0
+    label, samples, worth = first.samples[0]
+    assert (label, samples) == ("run 0, speed", N)
+    assert worth == pytest.approx(N / 99.0, rel=0.5)
+
+
+def test_noise_that_differs_within_runs_gets_the_wider_interval() -> None:
+    """Ten times the noise where the third shape is alone: stationary errors miss it."""
+    rng = np.random.default_rng(11)
+    bump = np.exp(-((TIME - 2.0) ** 2) / 0.02)
+    design = np.column_stack([bump, np.ones(N), np.sin(3.0 * TIME)])
+    noise = rng.normal(size=(12, N)) * np.where(bump > 0.01, 10.0, 1.0)
+    total = 12 * design.T @ design
+    estimate = -np.linalg.solve(total, sum(design.T @ e for e in noise))
+    runs = [
+        LinearisedRun(f"run {k}", "speed", TIME, e + design @ estimate, design)
+        for k, e in enumerate(noise)
+    ]
+    found = uncertainty(LinearisedFit.of(runs, Variables.of("abc", np.ones(3))))
+    assert "a" in found.uneven
+    assert found.quoted.standard_errors[0] > 1.5 * found.coloured.standard_errors[0]
+    assert any("the wider HAC interval is quoted" in each for each in found.sentences())
+
+
+def test_white_residuals_are_called_white() -> None:
+    rng = np.random.default_rng(12)
+    design = shapes(rng)
+    fit, _ = fitted([design] * RUNS, rng.normal(size=(RUNS, N)))
+    assert uncertainty(fit).sentences() == ("Residuals of speed are white.",)
+
+
+def test_perfect_data_give_zero_errors_and_no_nan() -> None:
+    fit, _ = fitted([shapes(np.random.default_rng(13))] * RUNS, np.zeros((RUNS, N)))
+    found = uncertainty(fit)
+    assert all(each.standard_error == 0.0 for each in found.estimates)
+    assert np.isfinite(found.inflation).all()
+    assert found.sentences()[0].startswith("The residuals are exactly zero")
+
+
+def test_a_model_error_is_not_called_noise() -> None:
+    rng = np.random.default_rng(14)
+    slow = np.tile(np.sin(2.0 * np.pi * TIME / 2.5), (RUNS, 1))
+    fit, _ = fitted([shapes(rng) for _ in range(RUNS)], slow)
+    assert any("model error" in each for each in uncertainty(fit).sentences())
+
+
+@pytest.mark.parametrize(
+    ("jacobian", "more"),
+    [(np.zeros((50, 2)), {}), (np.ones((50, 2)), {}), (np.ones((50, 2)), {"at_bound": [1, -1]})],
+)
+def test_what_is_not_determined_has_no_number(jacobian: np.ndarray, more: dict) -> None:
+    noise = np.random.default_rng(15).normal(size=50)
+    run = LinearisedRun("a", "speed", TIME[:50], noise, jacobian)
+    found = uncertainty(LinearisedFit.of([run], Variables.of("ab", np.ones(2), **more)))
+    assert all(each.standard_error is None for each in found.estimates)
+    assert {each.status for each in found.estimates} <= {
+        "undetermined",
+        "at its lower bound",
+        "at its upper bound",
+    }
+
+
+def test_one_sample_is_refused() -> None:
+    run = LinearisedRun("a", "speed", np.zeros(1), np.ones(1), np.ones((1, 1)))
+    with pytest.raises(InputError, match="1 sample for 1 unknown leave nothing"):
+        uncertainty(LinearisedFit.of([run], Variables.of(["p"], [1.0])))

@@ -1,0 +1,86 @@
+"""Known drives are found again from clean virtual tests, staged and joint."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate import Drive
+from swashplate.campaign import rig
+from swashplate.campaign.campaign import Campaign
+from swashplate.identification.assessment import Assessment, assess
+from swashplate.identification.fit import Fit, fit
+from swashplate.identification.setup import Setup, load_setup
+from swashplate.parameters.parameter_set import columns_of
+
+AXES = ("hoist", "slew", "luff")
+
+
+def drawn(axis: str, setup: Setup, seed: int) -> Drive:
+    """A drive whose free parameters are some 5 % off the published ones."""
+    published = Drive.preset(axis)
+    random = np.random.default_rng(seed)
+    names = [name for stage in setup.stages for name in columns_of(list(stage.free))]
+    if any(stage.forces is not None for stage in setup.stages):
+        names += columns_of(["Z19", "Z21"])
+    numbers = published.parameters.numbers
+    return published.replace(
+        **{name: numbers[name] * float(np.exp(random.normal(0.0, 0.05))) for name in names}
+    )
+
+
+def measured(axis: str, truth: Drive, path: Path) -> Campaign:
+    tests = rig.run(
+        axis,
+        severity="clean",
+        truth=truth,
+        channels=("rectified_current", "shaft_speed"),
+    )
+    return Campaign.from_toml(rig.write(tests, path))
+
+
+def found(result: Fit) -> dict[str, float]:
+    return {
+        name: value
+        for stage in result.stages
+        for name, value in stage.values.items()
+        if "(" not in name
+    }
+
+
+def determined(assessment: Assessment) -> list[str]:
+    names = np.array(assessment.linearised.variables.names)
+    return list(names[assessment.linearised.determined])
+
+
+@pytest.mark.parametrize("joint", [False, True], ids=["staged", "joint"])
+@pytest.mark.parametrize("seed", [0, 4])
+@pytest.mark.parametrize("axis", AXES)
+def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Path) -> None:
+    setup = load_setup(axis)
+    truth = drawn(axis, setup, seed)
+    campaign = measured(axis, truth, tmp_path / "virtual")
+    plan = setup.joint() if joint else setup
+    result = fit(campaign.experiments, campaign.drive(axis).parameters, plan, tolerance=1e-14)
+    expected = dict(truth.parameters.numbers)
+    for stage in result.stages:
+        forces = stage.problem.model.forces
+        if forces is not None:
+            expected |= forces.values(truth.parameters)
+    told = [name for each in assess(result.stages) for name in determined(each)]
+    # with seed 4 the slew drive does not reach its stop downwards, and the fit says so
+    assert len(told) >= len(found(result)) - (1 if (axis, seed) == ("slew", 4) else 0)
+    for name in told:
+        assert found(result)[name] == pytest.approx(expected[name], rel=1e-6), name
+    assert all(each.solution.converged for each in result.stages)
+
+
+def test_counts_and_noise_leave_small_errors(tmp_path: Path) -> None:
+    setup = load_setup("hoist")
+    truth = drawn("hoist", setup, seed=5)
+    tests = rig.run("hoist", severity="realistic", truth=truth, seed=2)
+    campaign = Campaign.from_toml(rig.write(tests, tmp_path / "virtual"))
+    result = fit(campaign.select(role="fit"), campaign.drive("hoist").parameters, setup)
+    fitted, true = Drive(result.parameters), truth
+    for volts in (-9.0, -6.5, -2.0, 2.0, 4.0, 9.0):
+        assert fitted.steady_speed(volts) == pytest.approx(true.steady_speed(volts), rel=2e-3)
