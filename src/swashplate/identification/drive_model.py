@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.kinds import ChannelKind
 from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.identification.drives import voltage_record
 from swashplate.identification.forces import Forces
 from swashplate.identification.model import Linearised, Reduced
 from swashplate.parameters.catalogue import COLUMNS
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.observation import Observation, ObservedRecord, Own, Signal
-from swashplate.simulation.record import SLOWEST, SOURCE_RATE, Record, check_voltage, record_of
+from swashplate.simulation.record import Record
 from swashplate.simulation.residuals import START_PRESSURE, jacobian, residuals, triangle
-from swashplate.simulation.run import Start, simulate_drive
+from swashplate.simulation.run import Start
 
 Array = NDArray[np.float64]
 Result = TypeVar("Result")
@@ -241,55 +242,3 @@ class DriveModel:
                 raise InputError(f"{experiment.name} has no current to drive the pump.")
             return ObservedRecord(self.currents[experiment.name], observations, "current", start)
         return ObservedRecord(voltage_record(experiment), observations, "voltage", start)
-
-
-def voltage_record(experiment: Experiment) -> Record:
-    """An experiment's command on the march's grid.
-
-    Raises
-    ------
-    InputError
-        If its input is no voltage, or leaves the card's range.
-    """
-    if experiment.input.kind != "voltage":
-        raise InputError(
-            f"{experiment.name} is driven by a {experiment.input.kind}, not by a voltage: fit the "
-            "pump alone."
-        )
-    return check_voltage(_record(experiment, "voltage"), clip=False)
-
-
-def current_record(experiment: Experiment) -> Record:
-    """An experiment's signed current, measured as its input, on the march's grid."""
-    if experiment.input.kind != "current":
-        raise InputError(f"{experiment.name} is not driven by a current.")
-    return _record(experiment, "current")
-
-
-def simulated_current(experiment: Experiment, parameters: ParameterSet) -> Record:
-    """The signed current that a card makes of an experiment's command."""
-    record = voltage_record(experiment)
-    start: Start = "steady" if experiment.start == "steady" else "rest"
-    run = simulate_drive(parameters, record, start)
-    assert run.card is not None
-    current = run.card.current_positive - run.card.current_negative
-    return Record(current, record.start, record.rate, record.substeps)
-
-
-def _record(experiment: Experiment, what: str) -> Record:
-    """The input on a uniform grid, its own where its stamps are even."""
-    time, values = experiment.input.time, experiment.input.values
-    rate = (time.size - 1) / (time[-1] - time[0])
-    even = time[0] + np.arange(time.size) / rate
-    if rate >= SLOWEST and np.abs(time - even).max() < 0.02 / rate:
-        if abs(rate - round(rate)) < 1e-6 * rate:
-            rate = round(rate)
-        own = record_of(values, rate, what=what, interpolation=experiment.input.interpolation)
-        return Record(own.values, float(time[0]), own.rate, own.substeps)
-    return record_of(
-        values,
-        SOURCE_RATE,
-        what=what,
-        time=time,
-        interpolation=experiment.input.interpolation,
-    )

@@ -10,13 +10,8 @@ from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.weighting import applying, inside
 from swashplate.errors import InputError, ParameterError
-from swashplate.identification.drive_model import (
-    CURRENTS,
-    SIGNALS,
-    DriveModel,
-    current_record,
-    simulated_current,
-)
+from swashplate.identification.drive_model import CURRENTS, SIGNALS, DriveModel
+from swashplate.identification.drives import current_record, simulated_current
 from swashplate.identification.executors import available_cores
 from swashplate.identification.forces import Forces
 from swashplate.identification.problem import Problem, noise_scales

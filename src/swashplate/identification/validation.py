@@ -9,7 +9,8 @@ import numpy as np
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import InputError
 from swashplate.identification.assessment import RunQuality, compared
-from swashplate.identification.drive_model import SIGNALS, DriveModel, current_record
+from swashplate.identification.drive_model import SIGNALS, DriveModel
+from swashplate.identification.drives import current_record
 from swashplate.parameters.parameter_set import ParameterSet
 
 

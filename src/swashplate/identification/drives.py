@@ -1,0 +1,63 @@
+"""What drives the march in an experiment: its command, or a signed current, on the march's grid."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from swashplate.campaign.experiment import Experiment
+from swashplate.errors import InputError
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.simulation.record import SLOWEST, SOURCE_RATE, Record, check_voltage, record_of
+from swashplate.simulation.run import Start, simulate_drive
+
+
+def voltage_record(experiment: Experiment) -> Record:
+    """An experiment's command on the march's grid.
+
+    Raises
+    ------
+    InputError
+        If its input is no voltage, or leaves the card's range.
+    """
+    if experiment.input.kind != "voltage":
+        raise InputError(
+            f"{experiment.name} is driven by a {experiment.input.kind}, not by a voltage: fit the "
+            "pump alone."
+        )
+    return check_voltage(_record(experiment, "voltage"), clip=False)
+
+
+def current_record(experiment: Experiment) -> Record:
+    """An experiment's signed current, measured as its input, on the march's grid."""
+    if experiment.input.kind != "current":
+        raise InputError(f"{experiment.name} is not driven by a current.")
+    return _record(experiment, "current")
+
+
+def simulated_current(experiment: Experiment, parameters: ParameterSet) -> Record:
+    """The signed current that a card makes of an experiment's command."""
+    record = voltage_record(experiment)
+    start: Start = "steady" if experiment.start == "steady" else "rest"
+    run = simulate_drive(parameters, record, start)
+    assert run.card is not None
+    current = run.card.current_positive - run.card.current_negative
+    return Record(current, record.start, record.rate, record.substeps)
+
+
+def _record(experiment: Experiment, what: str) -> Record:
+    """The input on a uniform grid, its own where its stamps are even."""
+    time, values = experiment.input.time, experiment.input.values
+    rate = (time.size - 1) / (time[-1] - time[0])
+    even = time[0] + np.arange(time.size) / rate
+    if rate >= SLOWEST and np.abs(time - even).max() < 0.02 / rate:
+        if abs(rate - round(rate)) < 1e-6 * rate:
+            rate = round(rate)
+        own = record_of(values, rate, what=what, interpolation=experiment.input.interpolation)
+        return Record(own.values, float(time[0]), own.rate, own.substeps)
+    return record_of(
+        values,
+        SOURCE_RATE,
+        what=what,
+        time=time,
+        interpolation=experiment.input.interpolation,
+    )
