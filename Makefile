@@ -13,7 +13,7 @@ export PIP_BUILD_CONSTRAINT := constraints.txt
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test lint bench fuzz tools format clean
+.PHONY: help .venv demo test lint bench cluster fuzz tools browser format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[.a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
@@ -52,6 +52,10 @@ MINUTES ?= 3
 fuzz: $(STAMP) ## read damaged files for MINUTES=3: each must end in a sentence
 	@$(BIN)/python tests/fuzz/run.py --minutes $(MINUTES)
 
+cluster: $(STAMP) ## many starts on a local Dask cluster that loses a worker
+	@$(BIN)/pip install -qq -c constraints.txt -e '.[dask]'
+	@$(BIN)/python benchmarks/cluster.py
+
 tools: ## make sure that there is a C compiler, for bench
 	@if command -v cc >/dev/null; then :; \
 	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
@@ -60,6 +64,15 @@ tools: ## make sure that there is a C compiler, for bench
 	else \
 	  echo "The bench needs a C compiler: install gcc and the C library's headers (libc6-dev)."; \
 	  exit 1; \
+	fi
+
+browser: ## make sure that there is a Chromium, for the test of the report's page
+	@if command -v chromium >/dev/null || command -v chromium-browser >/dev/null; then :; \
+	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	  echo "No Chromium found: installing it."; \
+	  apt-get update -qq && apt-get install -qq -y chromium; \
+	else \
+	  echo "Install Chromium to see the report tested in a browser; without it that test is skipped."; \
 	fi
 
 format: $(STAMP) ## sort the imports, mend what can be mended, format

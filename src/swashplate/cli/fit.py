@@ -83,6 +83,9 @@ def fit(
         Method, typer.Option(help="Trust region on exact derivatives, or SQP by differences.")
     ] = "trf",
     loss: Annotated[Loss, typer.Option(help="Robust losses forgive outliers.")] = "linear",
+    report: Annotated[
+        bool, typer.Option(help="Write report.html, one file that works offline.")
+    ] = True,
 ) -> None:
     """Identify a drive from its tests.
 
@@ -124,6 +127,9 @@ def fit(
         assessments = assess(result.stages)
         predicted = predict(result.parameters, campaign.select(axis=chosen, role="validate"))
         written = _written(result, assessments, out)
+    if report:
+        with working("Writing the report"):
+            written.append(_reported(result, campaign, assessments, predicted, out, seed))
     note(f"{campaign.title}{' (virtual)' if campaign.virtual else ''}: fitted in {seconds:.2f} s")
     for each in assessments:
         show(_estimates(each))
@@ -140,6 +146,36 @@ def fit(
         note(line)
     if result.stages[-1].solution.interrupted:
         note("Interrupted: this is the best so far, not an optimum.")
+
+
+def _reported(
+    result: Fit,
+    campaign: Campaign,
+    assessments: Sequence[Assessment],
+    predicted: Sequence[RunQuality],
+    out: Path,
+    seed: int,
+) -> str:
+    import platform
+
+    from swashplate.__about__ import __version__
+    from swashplate.report.fit_page import write_fit_report
+
+    write_fit_report(
+        result,
+        campaign,
+        out / "report.html",
+        assessments=assessments,
+        validation=predicted,
+        starts=result.stages[-1].starts,
+        notes={
+            "swashplate": __version__,
+            "Python": platform.python_version(),
+            "seed of the starts": str(seed),
+            "campaign": str(campaign.path),
+        },
+    )
+    return f"Report:    {out / 'report.html'}"
 
 
 def _axis(campaign: Campaign, axis: str | None) -> str:

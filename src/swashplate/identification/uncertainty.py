@@ -70,9 +70,14 @@ class Uncertainty:
         said = []
         for colour in self.colours:
             if colour.length:
+                worth = (
+                    f"{colour.inflation:.3g} samples are worth one"
+                    if colour.inflation > 1.05
+                    else "they swing to and fro, so that each sample still counts as one"
+                )
                 said.append(
                     f"Residuals of {colour.channel} stay correlated over {colour.duration:.3g} s: "
-                    f"{colour.inflation:.3g} samples are worth one."
+                    f"{worth}."
                 )
             else:
                 said.append(f"Residuals of {colour.channel} are white.")

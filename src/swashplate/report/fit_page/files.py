@@ -1,0 +1,193 @@
+"""The report's figures as files for print: one of each run, and the starts' costs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from swashplate.campaign.campaign import Campaign
+from swashplate.errors import FileError
+from swashplate.identification.assessment import Assessment, RunQuality, assess
+from swashplate.identification.fit import Fit
+from swashplate.identification.starts import StartResult
+from swashplate.report.broken_lines import draw_broken
+from swashplate.report.display_units import display_unit
+from swashplate.report.files import save_figure
+from swashplate.report.fit_page.run_tables import quality_row
+from swashplate.report.fit_page.runs import ShownRun, ignored_windows, shown_runs
+from swashplate.report.style import (
+    BLUE,
+    FAINT,
+    GREY,
+    INK,
+    NORMAL,
+    VERMILION,
+    Margins,
+    dress,
+    label_below,
+    line_up_labels,
+    margins,
+    new_figure,
+    put_legend,
+    write_title,
+    zero_line,
+)
+
+WIDTH = 8.6
+HEIGHTS = {"input": 0.75, "overlay": 1.5, "residual": 0.85}
+GAP = 0.28
+AROUND = Margins(left=0.95, right=0.25, bottom=0.5, top=0.75)
+"""Sizes. [inch]"""
+
+
+def save_fit_figures(
+    fit: Fit,
+    campaign: Campaign,
+    folder: str | Path,
+    format: Literal["svg", "pdf", "png"] = "svg",
+    *,
+    assessments: Sequence[Assessment] | None = None,
+    validation: Sequence[RunQuality] = (),
+    starts: Sequence[StartResult] = (),
+) -> tuple[Path, ...]:
+    """Save the figures of a fit's report: the overlay of each run, and the starts' costs.
+
+    Parameters
+    ----------
+    fit : Fit
+        What was fitted.
+    campaign : Campaign
+        The tests that it was fitted to.
+    folder : path
+        Where to; it is made if there is none.
+    format : {"svg", "pdf", "png"}
+        Of the files.
+    assessments, validation, starts :
+        As of `write_fit_report`.
+
+    Returns
+    -------
+    tuple of Path
+        ``overlay-01-hoistr3.svg`` and so on, ``waterfall.svg`` last where there are several starts.
+
+    Raises
+    ------
+    FileError
+        If the folder cannot be made or a file cannot be written.
+    """
+    place = Path(folder)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{place} cannot be made: {error.strerror or error}.") from None
+    assessed = assess(fit.stages) if assessments is None else assessments
+    paths = []
+    for number, run in enumerate(shown_runs(assessed, validation), start=1):
+        path = place / f"overlay-{number:02d}-{_plain_name(run.experiment.name)}.{format}"
+        save_figure(plot_overlay(run, virtual=campaign.virtual), path)
+        paths.append(path)
+    if len(starts) > 1:
+        paths.append(place / f"waterfall.{format}")
+        save_figure(plot_waterfall(starts), paths[-1])
+    return tuple(paths)
+
+
+def plot_overlay(run: ShownRun, *, virtual: bool = False) -> Figure:
+    """Figure of one run: its input, and of each channel measured, simulated and residual."""
+    kinds = ["input", *(["overlay", "residual"] * len(run.channels))]
+    heights = [HEIGHTS[kind] for kind in kinds]
+    around = AROUND._replace(top=AROUND.top + 0.17 * len(run.channels))
+    total = around.bottom + around.top + sum(heights) + GAP * (len(kinds) - 1)
+    figure = new_figure(WIDTH, total)
+    axes = figure.subplots(
+        len(kinds),
+        sharex=True,
+        gridspec_kw={
+            **margins(figure, around),
+            "height_ratios": heights,
+            "hspace": GAP * len(heights) / sum(heights),
+        },
+    )
+    drive = run.experiment.input
+    unit = display_unit(drive.unit, float(np.abs(drive.values).max(initial=0.0)))
+    dress(axes[0], unit.label(drive.kind if drive.kind != "other" else "input"))
+    held = drive.interpolation == "previous"
+    draw_broken(axes[0], drive.time, unit.factor * drive.values, INK, held=held)
+    for place, shown in enumerate(run.channels):
+        upper, lower = axes[1 + 2 * place], axes[2 + 2 * place]
+        time, factor = shown.channel.time, shown.unit.factor
+        dress(upper, shown.unit.label(shown.quality.channel))
+        dress(lower, shown.small.label("residual"))
+        zero_line(lower)
+        draw_broken(upper, time, factor * shown.channel.values, GREY)
+        draw_broken(upper, time, factor * shown.quality.simulated, VERMILION)
+        draw_broken(lower, time, shown.small.factor * shown.quality.residual, BLUE)
+        for first, last in ignored_windows(run.experiment, shown.channel):
+            for ax in (upper, lower):
+                ax.axvspan(first, last, color=FAINT, alpha=0.35, linewidth=0.0)
+    axes[-1].set_xlim(float(drive.time[0]), float(drive.time[-1]))
+    label_below(axes[-1], "time (s)")
+    line_up_labels(figure, axes, 0.62)
+    role = "held out" if run.validates else "fitted"
+    kind = "virtual test, " if virtual else ""
+    write_title(figure, f"{run.experiment.name} ({kind}{role})", AROUND.left)
+    _measures(figure, run)
+    handles = [
+        Line2D([], [], color=color, linewidth=2.0, label=words)
+        for color, words in (
+            (GREY, "virtual test" if virtual else "measured"),
+            (VERMILION, "simulated"),
+            (BLUE, "simulated less " + ("virtual test" if virtual else "measured")),
+        )
+    ]
+    put_legend(figure, handles, AROUND.left, 0.45 + 0.17 * len(run.channels))
+    return figure
+
+
+def plot_waterfall(starts: Sequence[StartResult]) -> Figure:
+    """Figure of the costs that the starts reached, best first; hollow ones did not converge."""
+    ended = sorted((each for each in starts if np.isfinite(each.cost)), key=lambda s: s.cost)
+    around = AROUND._replace(top=0.5)
+    figure = new_figure(WIDTH, 3.2)
+    ax = figure.subplots(gridspec_kw=margins(figure, around))
+    dress(ax, "cost")
+    if ended and ended[-1].cost > 1.5 * ended[0].cost > 0.0:
+        ax.set_yscale("log")
+    ax.scatter(
+        range(1, len(ended) + 1),
+        [each.cost for each in ended],
+        s=22.0,
+        facecolors=[BLUE if each.converged else "white" for each in ended],
+        edgecolors=BLUE,
+    )
+    label_below(ax, "starts, best first")
+    failed = len(starts) - len(ended)
+    left_out = f"; {failed} left the model's domain" if failed else ""
+    write_title(figure, f"{len(starts)} starts{left_out}", AROUND.left)
+    return figure
+
+
+def _measures(figure: Figure, run: ShownRun) -> None:
+    """Write what must stand beside every fit % below the title."""
+    width, height = figure.get_size_inches()
+    for place, shown in enumerate(run.channels):
+        row = quality_row(run, shown)
+        figure.text(
+            AROUND.left / width,
+            1.0 - (0.4 + 0.17 * place) / height,
+            f"{row.channel}: fit {row.fit} %, RMSE {row.rmse}, R² {row.r_squared}; "
+            f"initial state {row.start}; ignored: {row.ignored}",
+            fontsize=NORMAL - 1.0,
+            color=INK,
+            va="top",
+        )
+
+
+def _plain_name(name: str) -> str:
+    """A name that any file system takes."""
+    return "".join(letter if letter.isalnum() or letter in "-_+." else "-" for letter in name)

@@ -1,0 +1,195 @@
+"""Tables of a fit's parameters: what was found, how sure it is, what was held."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from swashplate.errors import InputError
+from swashplate.identification.assessment import Assessment
+from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.fit import Fit, StageFit
+from swashplate.identification.intervals import Estimate, estimates
+from swashplate.identification.unknowns import Unknown
+from swashplate.parameters.catalogue import CATALOGUE, COLUMNS
+from swashplate.report.fit_page.numbers import NONE, percent, plain, spread, unit_text
+from swashplate.simulation.residuals import START_PRESSURE
+
+
+class ParameterRow(NamedTuple):
+    """One unknown, as text."""
+
+    name: str
+    meaning: str
+    unit: str
+    nominal: str
+    estimate: str
+    change: str
+    """Of the nominal value."""
+    interval: str
+    """For coloured noise; empty where none may be given."""
+    half_width: str
+    """Of that interval, of the value."""
+    white: str
+    """The interval for white noise."""
+    status: str
+
+
+class ParameterTable(NamedTuple):
+    """The unknowns of one stage."""
+
+    stage: str
+    level: str
+    """Of the intervals, as ``"95 %"``."""
+    white: str
+    """Heading of the white-noise intervals: what they are good for."""
+    rows: tuple[ParameterRow, ...]
+    """Of all runs together."""
+    own: tuple[ParameterRow, ...]
+    """Of single runs."""
+
+
+class HeldRow(NamedTuple):
+    """A parameter that was not fitted."""
+
+    name: str
+    meaning: str
+    unit: str
+    value: str
+    source: str
+
+
+def parameter_table(assessment: Assessment) -> ParameterTable:
+    """Table of a stage's unknowns."""
+    stage = assessment.stage
+    level = 0.95
+    quoted: Sequence[Estimate | None]
+    white: Sequence[Estimate | None]
+    try:
+        found = assessment.uncertainty
+        level, quoted = found.level, found.estimates
+        white = estimates(found.white, level=level)
+    except InputError:
+        # the verdict says why there are no intervals
+        quoted = white = [None] * len(stage.problem.unknowns)
+    values = stage.values
+    at_bounds = stage.problem.unknowns.at_bounds(stage.solution.vector)
+    rows, own = list[ParameterRow](), list[ParameterRow]()
+    for name, unknown, estimate, narrow in zip(
+        stage.problem.unknowns.names, stage.problem.unknowns, quoted, white, strict=True
+    ):
+        row = _row(stage, name, unknown, values[name], estimate, narrow, at_bounds.get(name))
+        (rows if unknown.run is None else own).append(row)
+    return ParameterTable(
+        stage.stage.name,
+        f"{100.0 * level:g} %",
+        _white_words(quoted, white),
+        tuple(rows),
+        tuple(own),
+    )
+
+
+def held_rows(fit: Fit) -> tuple[HeldRow, ...]:
+    """The drive's parameters that no stage moved."""
+    moved: set[str] = set()
+    for each in fit.stages:
+        for unknown in each.problem.unknowns:
+            moved |= set(unknown.targets)
+        if isinstance(each.problem.model, DriveModel) and each.problem.model.forces is not None:
+            moved |= set(each.problem.model.forces.columns)
+    rows = []
+    for column, symbol in COLUMNS.items():
+        if column in moved:
+            continue
+        parameter = fit.parameters[symbol]
+        rows.append(
+            HeldRow(
+                column,
+                meaning_of(column),
+                unit_text(parameter.unit),
+                plain(fit.parameters.numbers[column]),
+                parameter.source,
+            )
+        )
+    return tuple(rows)
+
+
+def meaning_of(name: str, stage: StageFit | None = None) -> str:
+    """What an unknown is, in words; empty if nothing is known of the name."""
+    side = name.rpartition("_")[2]
+    for known, suffix in ((COLUMNS.get(name), side), (name, "")):
+        if known in CATALOGUE:
+            definition = CATALOGUE[known]
+            way = {"plus": ", positive", "minus": ", negative"}.get(suffix, "")
+            return definition.name + (way if definition.directional else "")
+    if name.startswith("force_"):
+        return _force_words(name, stage)
+    if name == START_PRESSURE:
+        return "stroking pressure at the first sample"
+    kind, _, channel = name.partition(" ")
+    if kind == "offset":
+        return f"free zero of {channel}"
+    if kind == "clock":
+        return f"lead of the input's clock before that of {channel}"
+    return ""
+
+
+def _white_words(quoted: Sequence[Estimate | None], white: Sequence[Estimate | None]) -> str:
+    """Too small as a rule; of residuals that alternate it is the other way round."""
+    pairs = [
+        (wide.standard_error, narrow.standard_error)
+        for wide, narrow in zip(quoted, white, strict=True)
+        if wide is not None and narrow is not None
+    ]
+    ratios = sorted(narrow / wide for wide, narrow in pairs if wide and narrow)
+    if ratios and ratios[len(ratios) // 2] > 1.0:
+        return "white noise, for comparison"
+    return "white noise, too small"
+
+
+def _force_words(name: str, stage: StageFit | None) -> str:
+    """``solenoid force at 0.35 A, positive``."""
+    _, side, number = name.split("_")
+    way = "positive" if side == "plus" else "negative"
+    model = stage.problem.model if stage is not None else None
+    if isinstance(model, DriveModel) and model.forces is not None:
+        current = (model.forces.plus if side == "plus" else model.forces.minus)[int(number) - 1]
+        return f"solenoid force {current:g} A beyond the dead zone, {way}"
+    return f"solenoid force, {way}"
+
+
+def _row(
+    stage: StageFit,
+    name: str,
+    unknown: Unknown,
+    value: float,
+    estimate: Estimate | None,
+    white: Estimate | None,
+    bound: str | None,
+) -> ParameterRow:
+    shown, interval, half, narrow = plain(value), NONE, NONE, NONE
+    status = f"at its {bound} bound" if bound is not None else "estimated"
+    if estimate is not None:
+        status = estimate.status
+        if estimate.lower is not None and estimate.upper is not None:
+            shown, interval = spread(value, estimate.lower, estimate.upper)
+            half = f"±{percent(0.5 * (estimate.upper - estimate.lower), value)}"
+    if white is not None and white.lower is not None and white.upper is not None:
+        narrow = spread(value, white.lower, white.upper)[1]
+    change = (
+        NONE
+        if unknown.run is not None
+        else percent(value - unknown.start, unknown.start, sign=True)
+    )
+    return ParameterRow(
+        name,
+        meaning_of(unknown.name, stage),
+        unit_text(unknown.unit),
+        plain(unknown.start),
+        shown,
+        change,
+        interval,
+        half,
+        narrow,
+        status,
+    )

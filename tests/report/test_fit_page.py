@@ -1,0 +1,414 @@
+"""The report of a fit: what stands in it is what was found, and it needs nothing but itself."""
+
+import json
+import re
+import shutil
+import subprocess
+from base64 import b64decode
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate import Campaign, Drive, FileError, InputError, maneuvers
+from swashplate.campaign import rig
+from swashplate.identification.assessment import assess, run_qualities
+from swashplate.identification.fit import Fit, fit
+from swashplate.identification.profile_side import Point
+from swashplate.identification.profiles import Profile, Threshold
+from swashplate.identification.setup import Setup
+from swashplate.identification.staging import stage_problem
+from swashplate.identification.starts import StartResult
+from swashplate.report.fit_page import save_fit_figures, write_fit_report
+from swashplate.report.fit_page.numbers import percent, plain, spread, unit_text
+from swashplate.report.fit_page.page import StageProfile
+from swashplate.report.fit_page.runs import ignored_words
+
+HOSTILE = "</script><img src=x onerror=alert(1)>"
+SETUP = Setup.model_validate(
+    {
+        "title": "two stages",
+        "stages": [
+            {
+                "name": "card",
+                "part": "card",
+                "free": {
+                    "G1": {"relative": (0.5, 2.0), "log": True},
+                    # stands at its upper bound, which lies below the truth
+                    "omega": {"relative": (0.5, 1.1), "log": True, "tied": True},
+                },
+            },
+            {
+                "name": "pump",
+                "part": "pump",
+                "free": {"Z10": {"relative": (0.8, 1.4), "log": True}},
+            },
+        ],
+    }
+)
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    """Three virtual runs of the hoist, the last held out, a window of the first ignored."""
+    folder = tmp_path_factory.mktemp("campaign") / "tests"
+    commands = [maneuvers.step(4.0), maneuvers.ramp(1.0), maneuvers.step(-6.5)]
+    truth = Drive.preset("hoist").replace(omega=(75.0, 80.0), G1=(0.051, 0.056))
+    rig.write(rig.run("hoist", commands, seed=4, truth=truth), folder)
+    before, _, after = (folder / "campaign.toml").read_text("utf-8").rpartition('role = "fit"')
+    (folder / "campaign.toml").write_text(f'{before}role = "validate"{after}', "utf-8")
+    return Campaign.from_toml(folder / "campaign.toml")
+
+
+@pytest.fixture(scope="module")
+def fitted(campaign: Campaign) -> Fit:
+    runs = campaign.select(role="fit")
+    first = runs[0]
+    channel = first["current"]
+    weight = np.where(channel.time < 0.5, 0.0, channel.weight)
+    first = replace(
+        first,
+        channels={**first.channels, "current": replace(channel, weight=weight)},
+        ignored=((0.0, 0.5, "the dither starts"),),
+    )
+    return fit([first, *runs[1:]], campaign.drive("hoist").parameters, SETUP, threads=1)
+
+
+@pytest.fixture(scope="module")
+def assessments(fitted: Fit):
+    return assess(fitted.stages)
+
+
+@pytest.fixture(scope="module")
+def validation(campaign: Campaign, fitted: Fit):
+    stage = fitted.stages[0]
+    problem = stage_problem(stage.stage, fitted.parameters, campaign.select(role="validate"))
+    return run_qualities(problem, stage.solution.vector)
+
+
+STARTS = tuple(
+    StartResult(number, (0.0,), (0.0,), 9.0, cost, 10, number != 2, "done", 0.1)
+    for number, cost in enumerate((3.0, 3.0, 70.0, float("inf")))
+)
+NOTES = {"command": HOSTILE, "seed": "4"}
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory, campaign, fitted, assessments, validation) -> Path:
+    path = tmp_path_factory.mktemp("report") / "fit.html"
+    optimum = Point(0.0, 3.0, np.zeros(1))
+    points = (Point(-0.1, 4.0, np.zeros(1)), optimum, Point(0.1, 4.5, np.zeros(1)))
+    profile = Profile(
+        0, 3.0, points, Threshold(1.0, 0.95, 1.0), -0.1, 0.08, ("crossed", "crossed"), None
+    )
+    write_fit_report(
+        fitted,
+        campaign,
+        path,
+        assessments=assessments,
+        validation=validation,
+        starts=STARTS,
+        profiles=[StageProfile("card", profile)],
+        notes=NOTES,
+    )
+    return path
+
+
+class Page(HTMLParser):
+    """Tables by their class, each row a list of texts; scripts by id; every tag with attributes."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tables: dict[str, list[list[str]]] = {}
+        self.scripts: dict[str, str] = {}
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.words = ""
+        self._table = self._script = ""
+        self._cell: list[str] | None = None
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag == "table":
+            self._table = dict(attrs)["class"]
+            self.tables.setdefault(self._table, [])
+        elif tag == "tr":
+            self.tables[self._table].append([])
+        elif tag in ("td", "th"):
+            self._cell = []
+        elif tag in ("script", "style"):
+            self._script = dict(attrs).get("id") or tag
+
+    def handle_endtag(self, tag):
+        if tag in ("td", "th") and self._cell is not None:
+            self.tables[self._table][-1].append(" ".join("".join(self._cell).split()))
+            self._cell = None
+        elif tag in ("script", "style"):
+            self._script = ""
+
+    def handle_data(self, data):
+        if self._script:
+            self.scripts[self._script] = self.scripts.get(self._script, "") + data
+            return
+        self.words += data
+        if self._cell is not None:
+            self._cell.append(data)
+
+
+@pytest.fixture(scope="module")
+def read(page: Path) -> Page:
+    return Page(page.read_text("utf-8"))
+
+
+def number(text: str) -> float:
+    """A table's number: true minus, power of ten apart, unit behind."""
+    plain_text = text.replace("−", "-").replace(",", "")
+    found = re.match(r"(-?[\d.]+)(?: ·10(\S+))?", plain_text)
+    assert found, text
+    raised = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+    return float(found[1]) * 10.0 ** int((found[2] or "0").translate(raised))
+
+
+def test_estimates_and_intervals_are_those_of_the_fit(read: Page, assessments) -> None:
+    rows = {row[0].split(" ")[0]: row for row in read.tables["parameters"]}
+    for assessment in assessments:
+        for estimate in assessment.uncertainty.estimates:
+            if estimate.name.startswith("offset"):
+                continue
+            row = next(row for name, row in rows.items() if name.startswith(estimate.name))
+            assert number(row[3]) == pytest.approx(estimate.value, rel=1e-3), row
+            if estimate.lower is None:
+                assert (row[5], row[7]) == ("–", "–")
+                assert row[8] == estimate.status
+            else:
+                low, _, high = row[5].partition("…")
+                power = row[5].split("·10")[1:]
+                low = f"{low}·10{power[0]}" if power else low
+                half = 0.5 * (estimate.upper - estimate.lower)
+                assert number(low.strip()) == pytest.approx(estimate.lower, abs=0.06 * half)
+                assert number(high.strip()) == pytest.approx(estimate.upper, abs=0.06 * half)
+
+
+def test_no_interval_at_an_active_bound(read: Page) -> None:
+    row = next(row for row in read.tables["parameters"] if row[0].startswith("omega"))
+    assert row[5:] == ["–", "–", "–", "at its upper bound"]
+    assert "omega stands at its upper bound: no symmetric interval" in read.words
+
+
+def test_held_parameters_are_listed_and_free_ones_are_not(read: Page) -> None:
+    held = {row[0] for row in read.tables["held"][1:]}
+    assert {"tau", "Z1", "Z18", "zeta_plus"} <= held
+    assert not held & {"G1_plus", "G1_minus", "omega_plus", "omega_minus", "Z10"}
+
+
+def test_rmse_and_fit_of_a_run_are_recomputed(read: Page, fitted: Fit) -> None:
+    problem, vector = fitted.stages[0].problem, fitted.stages[0].solution.vector
+    experiment = problem.experiments[0]
+    channel = experiment["current"]
+    counted = channel.time >= 0.5
+    measured = channel.values[counted]
+    difference = problem.outputs(vector, 0)["current"][counted] - measured
+    rmse = float(np.sqrt(np.mean(difference**2)))
+    fit_percent = 100.0 * (1.0 - rmse / float(np.std(measured)))
+    row = next(
+        row for row in read.tables["agreement"] if row[0] == experiment.name and row[2] == "current"
+    )
+    assert float(row[3]) == pytest.approx(fit_percent, abs=0.006)
+    assert row[4].endswith(" mA")
+    assert number(row[4]) == pytest.approx(1e3 * rmse, rel=6e-3)
+
+
+def test_initial_state_and_ignored_windows_stand_beside_every_fit_percent(
+    read: Page, page: Path
+) -> None:
+    head, *rows = read.tables["agreement"]
+    assert head[-2:] == ["initial state", "ignored"]
+    assert all(row[-2] == "at rest" for row in rows)
+    assert any("the dither starts" in row[-1] for row in rows)
+    beside = re.findall(r'<p class="measures">.*?</p>', page.read_text("utf-8"), re.DOTALL)
+    assert len(beside) == len(rows)
+    assert all("initial state at rest" in each and "ignored:" in each for each in beside)
+
+
+def test_a_run_that_was_held_out_is_marked(read: Page, campaign: Campaign) -> None:
+    (held,) = campaign.select(role="validate")
+    roles = {row[0]: row[1] for row in read.tables["agreement"][1:]}
+    assert [name for name, role in roles.items() if role == "validate"] == [held.name]
+
+
+def test_a_position_is_judged_by_its_speed_too(read: Page) -> None:
+    channels = {row[2] for row in read.tables["agreement"][1:]}
+    assert channels == {"current", "counts", "speed from counts"}
+    assert "speed from counts" in read.words
+    assert "zero crossings" in read.words
+    assert "start transient" in read.words
+
+
+def test_every_sample_is_in_the_file(read: Page, fitted: Fit) -> None:
+    data = json.loads(read.scripts["samples-0"])
+    kept = np.frombuffer(b64decode(data["channels"][0]["measured"]["data"]), "<f4")
+    measured = fitted.stages[0].problem.experiments[0]["current"].values
+    assert np.array_equal(kept[np.isfinite(kept)], measured.astype("<f4"))
+    clock = data["clocks"][data["channels"][0]["clock"]]
+    assert clock["type"] == "float32"
+    time = np.frombuffer(b64decode(clock["data"]), "<f4")
+    assert time.size == kept.size
+    assert (np.diff(time) >= 0.0).all()
+
+
+def test_the_page_needs_no_network(read: Page) -> None:
+    for tag, attributes in read.tags:
+        for key in ("src", "href", "action", "data"):
+            address = attributes.get(key) or ""
+            assert address.startswith(("#", "data:")) or not address, (tag, key, address)
+        assert tag not in ("iframe", "object", "embed", "base")
+        assert tag != "link" or attributes.get("rel") == "icon"
+    assert "@import" not in read.scripts["style"]
+    assert "url(" not in read.scripts["style"]
+
+
+def test_virtual_tests_are_called_that(read: Page) -> None:
+    assert "Virtual tests. Every run of this campaign was simulated" in read.words
+    assert "measured simulated residual" not in " ".join(read.words.split())
+
+
+def test_hostile_names_stay_text(tmp_path, campaign, fitted, assessments, validation) -> None:
+    held = [replace(each, experiment=replace(each.experiment, name=HOSTILE)) for each in validation]
+    path = tmp_path / "fit.html"
+    write_fit_report(
+        fitted,
+        replace(campaign, title=HOSTILE),
+        path,
+        assessments=assessments,
+        validation=held,
+        notes={HOSTILE: HOSTILE},
+    )
+    text = path.read_text("utf-8")
+    assert HOSTILE not in text
+    tags = Page(text).tags
+    assert not [tag for tag, _ in tags if tag == "img"]
+    assert not [attributes for _, attributes in tags if "onerror" in attributes]
+    assert HOSTILE in Page(text).words
+
+
+def test_without_validation_it_says_so(tmp_path, campaign, fitted, assessments) -> None:
+    path = tmp_path / "fit.html"
+    write_fit_report(fitted, campaign, path, assessments=assessments)
+    assert "No run was held out" in path.read_text("utf-8")
+
+
+def test_a_page_that_cannot_be_written_leaves_the_old_one(
+    tmp_path, campaign, fitted, assessments
+) -> None:
+    with pytest.raises(FileError, match="cannot be written"):
+        write_fit_report(
+            fitted, campaign, tmp_path / "no folder" / "fit.html", assessments=assessments
+        )
+    path = tmp_path / "fit.html"
+    path.write_text("old")
+    with pytest.raises(InputError, match="one assessment for each stage"):
+        write_fit_report(fitted, campaign, path, assessments=assessments[:1])
+    assert path.read_text() == "old"
+    assert [each.name for each in tmp_path.iterdir()] == ["fit.html"]
+
+
+def test_a_profile_of_no_stage_is_refused(tmp_path, campaign, fitted, assessments) -> None:
+    profile = StageProfile(
+        "brake", Profile(0, 1.0, (), Threshold(1, 0.95, 1), None, None, ("open", "open"), None)
+    )
+    with pytest.raises(InputError, match="'brake' belongs to no stage; there are card, pump"):
+        write_fit_report(
+            fitted, campaign, tmp_path / "f.html", assessments=assessments, profiles=[profile]
+        )
+
+
+@pytest.mark.parametrize("kind", ["svg", "pdf"])
+def test_figures_for_print(tmp_path, campaign, fitted, assessments, validation, kind) -> None:
+    paths = save_fit_figures(
+        fitted,
+        campaign,
+        tmp_path / "figures",
+        kind,
+        assessments=assessments,
+        validation=validation,
+        starts=STARTS,
+    )
+    assert [each.suffix for each in paths] == [f".{kind}"] * 4
+    assert paths[-1].name == f"waterfall.{kind}"
+    assert all(each.stat().st_size > 2000 for each in paths)
+
+
+ZOOM = """<script>
+setTimeout(() => {
+  const run = Bokeh.documents.find((each) => each.get_model_by_name("overlay 0") !== null);
+  run.get_model_by_name("time").setv({ start: 2.0, end: 3.0 });
+  setTimeout(() => {
+    const { time } = run.get_model_by_name("overlay 0").data;
+    document.body.dataset.rows = Array.from(time).filter((t) => t >= 2.0 && t <= 3.0).length;
+  }, 2000);
+}, 8000);
+</script></body>"""
+
+
+def test_the_page_renders_and_zooms_in_a_browser_without_errors(
+    page: Path, tmp_path: Path, fitted: Fit
+) -> None:
+    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    if browser is None:
+        pytest.skip("there is no Chromium here; `make browser` installs it where it can")
+    zoomed = tmp_path / "zoomed.html"
+    zoomed.write_text(page.read_text("utf-8").replace("</body>", ZOOM), "utf-8")
+    done = subprocess.run(
+        [
+            browser,
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--enable-logging=stderr",
+            "--virtual-time-budget=20000",
+            f"--user-data-dir={tmp_path / 'profile'}",
+            "--window-size=1280,1000",
+            "--dump-dom",
+            f"{zoomed.as_uri()}#all",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    said = [line for line in done.stderr.splitlines() if ":CONSOLE" in line]
+    assert [line for line in said if "setting log level" not in line] == []
+    figures = len(re.findall(r'class="figure[ "]', page.read_text("utf-8")))
+    # 3 runs, 3 for each of two stages less the pump's correlations, starts, a profile
+    assert figures == 3 + 2 + 2 + 1 + 1 + done.stdout.count('data-item="correlation-')
+    assert done.stdout.count('data-drawn="yes"') == figures
+    # a second in view: every sample of it
+    time = fitted.stages[0].problem.experiments[0]["current"].time
+    expected = int(np.count_nonzero((time >= 2.0) & (time <= 3.0)))
+    rows = re.search(r'data-rows="(\d+)"', done.stdout)
+    assert rows is not None
+    assert expected > 500
+    assert abs(int(rows[1]) - expected) <= 1  # stamps in single precision
+
+
+def test_numbers_show_what_is_known() -> None:
+    assert plain(0.0) == "0"
+    assert plain(123.456) == "123.46"
+    assert plain(-4.5e-7, 2) == "−4.5 ·10⁻⁷"
+    assert plain(1.23456e9) == "1.2346 ·10⁹"
+    assert spread(0.1272955, 0.126961, 0.127630) == ("0.12730", "0.12696 … 0.12763")
+    assert spread(2e6, 1.9e6, 2.1e6) == ("2.00 ·10⁶", "1.90 … 2.10 ·10⁶")
+    assert percent(-0.0053, 1.0, sign=True) == "−0.53 %"
+    assert percent(1.0, 0.0) == "–"
+    assert unit_text("A/V^2") == "A/V²"
+    assert unit_text("sqrt(Pa)/(m s)") == "√Pa/(m s)"
+    assert unit_text("N^2 m^2") == "N² m²"
+
+
+def test_ignored_windows_in_words(fitted: Fit) -> None:
+    experiment = fitted.stages[0].problem.experiments[0]
+    words = ignored_words(experiment, experiment["current"])
+    assert re.fullmatch(r"0 to 0\.\d+ s \(the dither starts\)", words)
+    assert ignored_words(experiment, experiment["counts"]) == "nothing"
