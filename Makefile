@@ -29,7 +29,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@$(BIN)/pip install -qq -c constraints.txt -e '.[dev]'
 	@touch $@
 
-demo: $(STAMP) ## simulate the three drives, figures and tables into demo/
+demo: $(STAMP) ## identify a virtual hoist from its tests, with a report, into demo/
 	@$(BIN)/swashplate demo --out demo
 
 test: lint ## lint, then all tests: compiled, and a part of them interpreted

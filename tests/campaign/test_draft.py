@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from swashplate import Campaign, InputError
+from swashplate import Campaign, InputError, ParameterError
 from swashplate.campaign.draft import draft
 from swashplate.campaign.guesses import guess
 from swashplate.logs import Column
@@ -43,18 +43,26 @@ def write_logs(folder: Path) -> list[Path]:
 
 
 def test_a_draft_can_be_read(tmp_path: Path) -> None:
-    text = draft(write_logs(tmp_path), tmp_path, "hoist")
+    text = draft(write_logs(tmp_path), tmp_path, "hoist", 2526.3)
     content = tomllib.loads(text)
-    axis = content["axes"]["drive"]
+    axis = content["axes"]["hoist"]
     assert axis["drive"] == "hoist"
     assert axis["input"]["kind"] == "voltage"
     assert set(axis["channels"]) == {"rectified_current", "encoder_counts"}
     assert [run["role"] for run in content["runs"]] == ["fit", "fit", "fit", "validate"]
     assert "100 samples, 0.99 s at 100 Hz, step +4 V" in text
+    assert axis["channels"]["encoder_counts"]["counts_per_turn"] == 2526.3
     (tmp_path / "campaign.toml").write_text(text, "utf-8")
     tests = Campaign.from_toml(tmp_path / "campaign.toml")
     assert tests["run2"].input.values[-1] == 4.0
     assert tests["run2"]["rectified_current"].values[-1] == pytest.approx(0.4)
+
+
+def test_what_cannot_be_guessed_is_left_open(tmp_path: Path) -> None:
+    text = draft(write_logs(tmp_path), tmp_path, "hoist")
+    (tmp_path / "campaign.toml").write_text(text, "utf-8")
+    with pytest.raises(ParameterError, match="encoder_counts need counts_per_turn"):
+        Campaign.from_toml(tmp_path / "campaign.toml")
 
 
 def test_an_axis_for_each_prefix_and_logs_without_some(tmp_path: Path) -> None:

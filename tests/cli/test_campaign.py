@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 Done = Callable[..., str]
+COUNTS = ("--counts-per-turn", "1000")
 
 ROWS = [
     f"{k / 100},{4 if k > 20 else 0},{0.4 if k > 20 else 0},{7 * max(k - 20, 0)}"
@@ -22,7 +23,7 @@ def logs(tmp_path: Path) -> list[str]:
 
 
 def test_from_logs_to_a_check(done: Done, logs: list[str], tmp_path: Path) -> None:
-    said = done("campaign", "init", *logs, "--drive", "hoist")
+    said = done("campaign", "init", *logs, *COUNTS, "--drive", "hoist")
     assert "Draft: campaign.toml" in said
     said = done("campaign", "check")
     assert "2 experiments (2 to fit)" in said
@@ -31,7 +32,7 @@ def test_from_logs_to_a_check(done: Done, logs: list[str], tmp_path: Path) -> No
 
 
 def test_a_draft_replaces_no_file(done: Done, refused: Callable[..., str], logs: list[str]) -> None:
-    done("campaign", "init", *logs)
+    done("campaign", "init", *logs, *COUNTS)
     assert "campaign.toml exists already" in refused("campaign", "init", *logs)
     done("campaign", "init", *logs, "--force")
 
@@ -39,7 +40,7 @@ def test_a_draft_replaces_no_file(done: Done, refused: Callable[..., str], logs:
 def test_strict_fails_on_findings(
     run: Callable[..., object], done: Done, logs: list[str], tmp_path: Path
 ) -> None:
-    done("campaign", "init", *logs)
+    done("campaign", "init", *logs, *COUNTS)
     path = tmp_path / "campaign.toml"
     path.write_text(
         path.read_text("utf-8").replace("counts_per_turn", "sign = -1\ncounts_per_turn"), "utf-8"
@@ -56,13 +57,13 @@ def test_the_schema_is_json(done: Done) -> None:
 
 
 def test_a_picture(done: Done, logs: list[str], tmp_path: Path) -> None:
-    done("campaign", "init", *logs)
+    done("campaign", "init", *logs, *COUNTS)
     done("campaign", "plot", "--out", "tests.png")
     assert (tmp_path / "tests.png").stat().st_size > 10_000
 
 
 def test_a_close_look(done: Done, refused: Callable[..., str], logs: list[str]) -> None:
-    done("campaign", "init", *logs, "--drive", "hoist")
+    done("campaign", "init", *logs, *COUNTS, "--drive", "hoist")
     look = ("campaign", "plot", "--run", "lift", "--channel")
     for channel in ("encoder_counts", "rectified_current"):
         assert f"Figure: {channel}.svg" in done(

@@ -1,48 +1,23 @@
-from io import StringIO
+import re
 
-import polars as pl
 import pytest
-from rich.console import Console
 
-from swashplate.maneuvers import source_tests
-from swashplate.parameters.files import AXES
+from swashplate import Drive
 
 
-@pytest.fixture
-def printed(done):
-    return done("demo", "--out", "sub/demo")
-
-
-def test_every_run_is_written_and_listed(printed, tmp_path):
+@pytest.mark.slow
+def test_the_main_job(done, tmp_path):
+    printed = done("demo", "--out", "sub/demo", "--seed", "3")
     folder = tmp_path / "sub/demo"
-    names = {
-        f"{axis}/{name.replace('/', ' per ')}.csv" for axis in AXES for name in source_tests(axis)
-    }
-    figures = {"overview.png", "steady.png"}
-    written = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
-    assert written == names | figures
-    assert len(names) == 25
-    assert pl.read_csv(folder / "hoist/step +9 V.csv").height == 5121
-    assert {"hoist/ramp -1 V per s.csv", "slew/sine 6 V 0.05 Hz.csv"} <= names
-    (row,) = [line for line in printed.splitlines() if line.startswith("hoist  step +9 V ")]
-    assert row.split()[4:7] == ["5121", "196.00", "0.00"]
-    assert "swash stop" in printed
-    for figure in figures:
-        assert (folder / figure).read_bytes().startswith(b"\x89PNG")
-        assert f"sub/demo/{figure}" in printed
-    assert max(map(len, printed.splitlines())) <= 80
-
-
-def test_a_person_who_waits_sees_a_bar(run, monkeypatch):
-    terminal = Console(file=StringIO(), force_terminal=True, width=80, markup=False)
-    monkeypatch.setattr("swashplate.cli.terminal.side", terminal)
-    assert run("demo").exit_code == 0
-    seen = terminal.file.getvalue()
-    assert "0/27" in seen
-    assert "hoist, ramp +1 V/s" in seen
-    assert seen.endswith("\x1b[?25h\r\x1b[1A\x1b[2K")  # the bar is wiped out, the cursor is back
-
-
-def test_a_folder_that_cannot_be_made(refused, tmp_path):
-    (tmp_path / "file").write_text("")
-    assert "file/hoist cannot be made: Not a directory" in refused("demo", "--out", "file")
+    assert len(list((folder / "virtual").glob("*.csv"))) == 13
+    assert (folder / "report.html").stat().st_size > 1_000_000
+    fitted, truth = (
+        Drive.from_toml(folder / name) for name in ("drive.toml", "virtual/truth/drive.toml")
+    )
+    for volts in (-6.5, -2.0, 2.0, 6.5):
+        assert fitted.steady_speed(volts) == pytest.approx(truth.steady_speed(volts), rel=2e-3)
+    inside, counted = map(int, re.search(r"for (\d+) of (\d+) unknowns", printed).groups())
+    assert counted > 30
+    assert inside > 0.8 * counted
+    for name in ("drive.toml", "estimates.csv", "report.html"):
+        assert f"sub/demo/{name}" in printed

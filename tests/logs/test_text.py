@@ -1,6 +1,7 @@
 """How text is written: delimiters, decimal signs, headers, units, comments, encodings."""
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -258,3 +259,13 @@ def test_a_large_file_is_read_in_pieces(tmp_path, text, all_of, monkeypatch):
     assert all_of(text("time,u\r\n" + paused)) == expected
     with pytest.raises(FileError, match=r"'u' holds 'x', .* in data row 151 \(line 152\)"):
         all_of(text("time,u\r\n" + rows.replace("150.5", "x")))
+
+
+def test_a_word_of_another_language_may_stand_among_units(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "Zeit;Spannung;Strom;Zähler\ns;V;mA;Imp\n0,0;1,0;2,5;3\n0,1;1,5;2,5;4\n", "utf-8"
+    )
+    log = open_log(path)
+    assert [column.name for column in log.columns] == ["Zeit", "Spannung", "Strom", "Zähler"]
+    assert [column.unit for column in log.columns] == ["s", "V", "mA", "Imp"]

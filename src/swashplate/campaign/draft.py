@@ -38,7 +38,12 @@ class _Look(NamedTuple):
         return next((each for each in self.guesses if each.role == "time"), None)
 
 
-def draft(logs: Sequence[str | Path], folder: str | Path, drive: str | None = None) -> str:
+def draft(
+    logs: Sequence[str | Path],
+    folder: str | Path,
+    drive: str | None = None,
+    counts_per_turn: float | None = None,
+) -> str:
     """The text of a campaign file for some logs.
 
     Parameters
@@ -49,6 +54,9 @@ def draft(logs: Sequence[str | Path], folder: str | Path, drive: str | None = No
         Where the campaign file will lie; the logs are named from there.
     drive : str, optional
         A packaged drive or a parameter file for all axes.
+    counts_per_turn : float, optional
+        Of all encoders. Without it the entry is left to be filled in, and the file is refused
+        until it is.
 
     Returns
     -------
@@ -67,12 +75,13 @@ def draft(logs: Sequence[str | Path], folder: str | Path, drive: str | None = No
     looks = [_look(open_log(path)) for path in logs]
     first = looks[0]
     axes = by_axis(first.guesses)
-    named = {prefix or "drive": guesses for prefix, guesses in axes.items()}
+    plain = Path(drive).stem if drive is not None else "drive"
+    named = {prefix or plain: guesses for prefix, guesses in axes.items()}
     for guesses in named.values():
         _demand(first.log, guesses)
     lines = [HEADER, f'title = "{_quoted(Path(folder).resolve().name)}"', ""]
     for name, guesses in named.items():
-        lines += _axis(name, guesses, first, drive)
+        lines += _axis(name, guesses, first, drive, counts_per_turn)
     taken = {each.column.name for guesses in named.values() for each in guesses}
     left = [
         each.column.name
@@ -105,7 +114,13 @@ def _demand(log: Log, guesses: list[Guess]) -> None:
             )
 
 
-def _axis(name: str, guesses: list[Guess], look: _Look, drive: str | None) -> list[str]:
+def _axis(
+    name: str,
+    guesses: list[Guess],
+    look: _Look,
+    drive: str | None,
+    counts_per_turn: float | None,
+) -> list[str]:
     lines = [f"[axes.{_key(name)}]"]
     if drive is not None:
         lines.append(f'drive = "{_quoted(drive)}"')
@@ -118,8 +133,8 @@ def _axis(name: str, guesses: list[Guess], look: _Look, drive: str | None) -> li
     ]
     drives = [each for each in guesses if each.role == "input"]
     lines += [f"[axes.{_key(name)}.input]"]
-    lines += _signal(drives[0], look)
-    lines += ['interpolation = "previous"    # held between samples; or "linear"', ""]
+    lines += _signal(drives[0], look, None)
+    lines += ['interpolation = "previous"    # guessed: held between samples; or "linear"', ""]
     for each in drives[1:]:
         lines += [f"# another input? '{each.column.name}'"]
     used: set[str] = set()
@@ -130,7 +145,11 @@ def _axis(name: str, guesses: list[Guess], look: _Look, drive: str | None) -> li
         while channel in used:
             channel += "_2"
         used.add(channel)
-        lines += [f"[axes.{_key(name)}.channels.{channel}]", *_signal(each, look), ""]
+        lines += [
+            f"[axes.{_key(name)}.channels.{channel}]",
+            *_signal(each, look, counts_per_turn),
+            "",
+        ]
     return lines
 
 
@@ -142,14 +161,20 @@ def _clock(look: _Look) -> str:
     return f'time = {{ column = "{_quoted(column.name)}"{unit} }}'
 
 
-def _signal(guessed: Guess, look: _Look) -> list[str]:
+def _signal(guessed: Guess, look: _Look, counts_per_turn: float | None) -> list[str]:
     column, kind = guessed.column, str(guessed.kind)
     lines = [
         f'kind = "{kind}"    # guessed: {KINDS[kind].meaning}',
         f'column = "{_quoted(column.name)}"',
     ]
     if kind == "encoder_counts":
-        lines += ["counts_per_turn = 1000    # guessed: quadrature included", "gear_ratio = 1.0"]
+        given = "" if counts_per_turn is None else f"{counts_per_turn:.12g}"
+        lines += [
+            f"counts_per_turn = {given}"
+            if given
+            else "# counts_per_turn = 1000    # fill in: for one turn, quadrature included",
+            "gear_ratio = 1.0    # turns of the encoder for one turn of the shaft",
+        ]
     elif column.unit is None:
         unit = "mm" if guessed.linear else next(iter(KINDS[kind].units), "1")
         lines.append(f'unit = "{unit}"    # guessed: the header gives none')

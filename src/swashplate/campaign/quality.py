@@ -17,6 +17,10 @@ Flags = NDArray[np.bool_]
 
 FULL_COMMAND = 10.0
 """Range of a command where the campaign file gives none. [V]"""
+LONG_GAP = 5.0
+"""An interval of more than this many usual ones is worth a look; single lost rows are not."""
+LOST_SHARE = 0.01
+"""Nor are they worth one until they are more than this share."""
 STUCK = 1.0
 """A noisy signal that stays the same to the last bit for longer than this is stuck. [s]"""
 LIVELY = 0.5
@@ -147,7 +151,7 @@ def _channel_quality(experiment: Experiment, drive: InputSignal, channel: Channe
 
 
 def _stamp_findings(stamps: StampStatistics) -> Iterator[str]:
-    if stamps.gaps.size:
+    if stamps.longest > LONG_GAP * stamps.period or stamps.missing > LOST_SHARE * stamps.rows:
         yield (
             f"{stamps.gaps.size} gaps, the longest {stamps.longest:.3g} s; {stamps.missing} "
             "samples are missing at the median rate"

@@ -126,7 +126,7 @@ class Channel(Signal):
     @model_validator(mode="after")
     def _encoder(self) -> Channel:
         if self.kind == "encoder_counts" and self.counts_per_turn is None:
-            raise ValueError("encoder_counts need counts_per_turn")
+            raise ValueError("encoder_counts need counts_per_turn, quadrature included")
         if self.kind != "encoder_counts" and (self.counts_per_turn or self.rolls_over_at):
             raise ValueError("counts_per_turn and rolls_over_at belong to encoder_counts alone")
         levels = [level for level, _ in self.weight_by_input]

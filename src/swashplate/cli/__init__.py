@@ -12,7 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from swashplate.__about__ import __version__
-from swashplate.cli import campaign, compare, demo, fit, parameters, rig, simulate
+from swashplate.cli import campaign, compare, demo, fit, parameters, rig, simulate, tour
 from swashplate.cli.terminal import say_error
 from swashplate.errors import SwashplateError
 
@@ -43,6 +43,7 @@ Examples:
   swashplate compare hoist mine.toml                  what that changes
   swashplate campaign init logs/*.csv                 tests of your machine
   swashplate rig hoist --out virtual                  tests of a virtual one
+  swashplate fit virtual/campaign.toml                the drive behind them
   swashplate demo                                     everything at once
 
 Files are written in SI, whole or not at all. What is wrong is said in one
@@ -100,6 +101,7 @@ app.command("show", epilog=parameters.SHOW_EXAMPLES)(parameters.show_parameters)
 app.add_typer(campaign.app, name="campaign")
 app.command("rig", epilog=rig.EXAMPLES)(rig.rig)
 app.command("fit", epilog=fit.EXAMPLES)(fit.fit)
+app.command("tour", epilog=tour.EXAMPLES)(tour.tour)
 app.command("demo", epilog=demo.EXAMPLES)(demo.demo)
 
 

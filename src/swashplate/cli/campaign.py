@@ -67,6 +67,14 @@ def init(
             show_default=False,
         ),
     ] = None,
+    counts_per_turn: Annotated[
+        float | None,
+        typer.Option(
+            help="Of the encoder, quadrature included; else it is left to be filled in.",
+            metavar="COUNTS",
+            show_default=False,
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an older file.")] = False,
 ) -> None:
     """Write the first draft of a campaign file from the headers of logs.
@@ -81,11 +89,14 @@ def init(
     if target.exists() and not force:
         raise InputError(f"{target} exists already; name another with --out, or say --force.")
     with working("Reading"):
-        text = draft(logs, target.parent, drive)
+        text = draft(logs, target.parent, drive, counts_per_turn)
     write_text(text, target)
     note(f"Draft: {target}")
     guessed = text.count("# guessed")
     note(f"{guessed} entries are guessed: look for '# guessed', then run")
+    for line in text.splitlines():
+        if line.startswith("# Columns that are not used") or "# fill in" in line:
+            note(f"  {line.lstrip('# ')}")
     note(f"  swashplate campaign check {target}")
 
 
@@ -108,6 +119,9 @@ def check(
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
         qualities = {each.name: examine(each) for each in campaign}
+        for name, axis in campaign.axes.items():
+            if axis.drive is not None:
+                campaign.drive(name)  # a drive that there is not is better known now
     note(heading(campaign))
     for number, experiment in enumerate(campaign):
         found = qualities[experiment.name]

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from swashplate.campaign.campaign import Campaign
     from swashplate.identification.assessment import Assessment, RunQuality
     from swashplate.identification.fit import Fit, Search
+    from swashplate.identification.solving import Progress
 
 EXAMPLES = """\
 Examples:
@@ -54,7 +55,12 @@ def fit(
         ),
     ] = None,
     joint: Annotated[
-        bool, typer.Option("--joint", help="All unknowns at once, through the whole chain.")
+        bool,
+        typer.Option(
+            "--joint",
+            help="After the stages all unknowns at once, through the whole chain: intervals then "
+            "take in what the card's stage does not know.",
+        ),
     ] = False,
     begin: Annotated[
         str | None,
@@ -97,6 +103,7 @@ def fit(
     from swashplate.campaign.campaign import Campaign
     from swashplate.identification.assessment import assess
     from swashplate.identification.fit import fit as fitted
+    from swashplate.identification.fit import refined
     from swashplate.identification.staging import setup_of
     from swashplate.identification.validation import predict
 
@@ -104,32 +111,30 @@ def fit(
         campaign = Campaign.from_toml(path)
         chosen = _axis(campaign, axis)
         plan = setup_of(campaign, chosen, setup)
-        plan = plan.joint() if joint else plan
         nominal = parameters_of(begin) if begin is not None else campaign.drive(chosen).parameters
         runs = campaign.select(axis=chosen, role="fit")
     if not runs:
         raise InputError(f"{path}: no run of the axis '{chosen}' has the role 'fit'.")
     begun = perf_counter()
     with working("Fitting") as status:
-        result = fitted(
-            runs,
-            nominal,
-            plan,
-            method=method,
-            loss=loss,
-            search=_search(starts, seed, jobs, dask, out, resume, status),
-            watch=lambda stage, now: status.update(
+
+        def watch(stage: str, now: Progress) -> None:
+            status.update(
                 f"{stage}: iteration {now.iteration}, cost {now.cost:.6g}, {now.seconds:.1f} s"
-            ),
-        )
+            )
+
+        search = _search(starts, seed, jobs, dask, out, resume, status)
+        result = fitted(runs, nominal, plan, method=method, loss=loss, search=search, watch=watch)
+        if joint and len(plan.stages) > 1 and not result.stages[-1].solution.interrupted:
+            result = refined(result, runs, watch=watch)
     seconds = perf_counter() - begun
     with working("Judging"):
         assessments = assess(result.stages)
         predicted = predict(result.parameters, campaign.select(axis=chosen, role="validate"))
-        written = _written(result, assessments, out)
+        lines = written(result, assessments, out)
     if report:
         with working("Writing the report"):
-            written.append(_reported(result, campaign, assessments, predicted, out, seed))
+            lines.append(reported(result, campaign, assessments, predicted, out, seed))
     note(f"{campaign.title}{' (virtual)' if campaign.virtual else ''}: fitted in {seconds:.2f} s")
     for each in assessments:
         show(_estimates(each))
@@ -139,16 +144,16 @@ def fit(
         )
         for sentence in (*each.identifiability.sentences(), *each.uncertainty.sentences()):
             say(f"- {sentence}")
-    show(_quality("Runs that were fitted", [q for each in assessments for q in each.runs]))
+    show(quality_table("Runs that were fitted", [q for each in assessments for q in each.runs]))
     if predicted:
-        show(_quality("Runs that were held back and predicted", predicted))
-    for line in written:
+        show(quality_table("Runs that were held back and predicted", predicted))
+    for line in lines:
         note(line)
     if result.stages[-1].solution.interrupted:
         note("Interrupted: this is the best so far, not an optimum.")
 
 
-def _reported(
+def reported(
     result: Fit,
     campaign: Campaign,
     assessments: Sequence[Assessment],
@@ -156,6 +161,7 @@ def _reported(
     out: Path,
     seed: int,
 ) -> str:
+    """Write report.html; a line that says so."""
     import platform
 
     from swashplate.__about__ import __version__
@@ -239,7 +245,8 @@ def _estimates(assessment: Assessment) -> Table:
     return made
 
 
-def _quality(title: str, runs: Sequence[RunQuality]) -> Table:
+def quality_table(title: str, runs: Sequence[RunQuality]) -> Table:
+    """Errors and fit % of runs, with start and ignored share beside them."""
     from math import degrees
 
     made = table(title, "run", "channel", "start", ">ignored", ">RMSE", "", ">fit %", wrap="run")
@@ -263,7 +270,8 @@ def _quality(title: str, runs: Sequence[RunQuality]) -> Table:
     return made
 
 
-def _written(result: Fit, assessments: Sequence[Assessment], out: Path) -> list[str]:
+def written(result: Fit, assessments: Sequence[Assessment], out: Path) -> list[str]:
+    """Write the drive and the estimates; lines that say so."""
     import polars as pl
 
     from swashplate.drive import Drive

@@ -59,7 +59,7 @@ def rig(
     ] = 0.5,
     perturb: Annotated[
         float,
-        typer.Option(help="Draw the true parameters within this share of the drive's: 0.1."),
+        typer.Option(help="Draw all true parameters, held ones too, within this share: 0.1."),
     ] = 0.0,
     maneuver: Annotated[
         list[str] | None,

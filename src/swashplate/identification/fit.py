@@ -137,6 +137,39 @@ def fit(
     return Fit(setup, nominal, tuple(stages))
 
 
+def refined(
+    staged: Fit,
+    experiments: Sequence[Experiment],
+    *,
+    tolerance: float = 1e-10,
+    max_evaluations: int = 100,
+    threads: int | None = None,
+    watch: Callable[[str, Progress], None] | None = None,
+) -> Fit:
+    """All unknowns of a staged fit at once through the whole chain, from where the stages ended.
+
+    A staged fit takes each stage's result for granted in the next one, so that its intervals leave
+    out what the earlier stages do not know. Those of a joint fit do not; from afar, though, a joint
+    fit is often caught on its way.
+
+    Parameters
+    ----------
+    staged : Fit
+        Of more than one stage.
+    experiments, tolerance, max_evaluations, threads, watch :
+        As of `fit`.
+    """
+    return fit(
+        experiments,
+        staged.parameters,
+        staged.setup.joint(),
+        tolerance=tolerance,
+        max_evaluations=max_evaluations,
+        threads=threads,
+        watch=watch,
+    )
+
+
 def smooth(parameters: ParameterSet) -> ParameterSet:
     """The set with the decay's switch split within the step.
 

@@ -17,6 +17,8 @@ _KNOWN = frozenset(
     - – − 1 none n/a dimensionless
     """.split()  # noqa: SIM905 - a list of so many strings is unreadable
 )
+_SHORT = 4
+"""Letters that a word may have that is taken for a unit because of its neighbours."""
 _PARTS = re.compile(r"[\s*/·.()^²³0-9-]+")
 _BRACKETS = re.compile(r"\[.*\]|\(.*\)")
 
@@ -32,7 +34,10 @@ def is_unit(cell: str) -> bool:
 def units_of(cells: Sequence[str]) -> tuple[str | None, ...] | None:
     """Units of a row of them, None where a cell is empty; or None if it is no such row."""
     filled = [cell for cell in cells if cell]
-    if not filled or not all(is_unit(cell) for cell in filled):
+    known = sum(is_unit(cell) for cell in filled)
+    # a short word of another language may stand among units, such as Imp for pulses
+    others = [cell for cell in filled if not is_unit(cell)]
+    if not known or 2 * known <= len(filled) or any(len(cell) > _SHORT for cell in others):
         return None
     return tuple(
         cell[1:-1].strip() if _BRACKETS.fullmatch(cell) else cell or None for cell in cells
