@@ -32,13 +32,13 @@ def test_help_is_a_page_with_examples(tmp_path, word):
     done = swashplate(word, cwd=tmp_path, COLUMNS="80")
     assert done.returncode == 0
     assert done.stderr == ""
-    for words in ("sine:6.5,0.1", "swashplate simulate hoist step:9", "demo", "exit code 2"):
+    for words in ("sine:6.5,0.1", "swashplate simulate hoist step:9", "tour", "exit code 2"):
         assert words in done.stdout
     assert max(map(len, done.stdout.splitlines())) <= 80
     assert "\x1b" not in done.stdout
 
 
-@pytest.mark.parametrize("command", ["simulate", "compare", "axes", "show", "demo"])
+@pytest.mark.parametrize("command", ["simulate", "compare", "axes", "show", "tour"])
 def test_each_command_has_an_example(run, command):
     text = run(command, "--help").stdout
     assert f"swashplate {command}" in text.partition("Example")[2]
@@ -106,7 +106,7 @@ def test_a_broken_pipe_is_silent(tmp_path, words):
 @pytest.mark.parametrize("kind", ["ramp", "step", "sine"])
 def test_ctrl_c_leaves_whole_files_only(tmp_path, kind):
     process = subprocess.Popen(
-        [sys.executable, "-m", "swashplate", "demo"],
+        [sys.executable, "-m", "swashplate", "tour"],
         cwd=tmp_path,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
