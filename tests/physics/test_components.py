@@ -187,9 +187,13 @@ def test_limiter_branches(
         (0.095, 0.12, 0.0, 0.1 * (0.9 + 0.8 * 0.1)),  # after four fifths, led by the filter
         (0.097, 0.104, 0.5, 0.097),  # still commanded, and the filter is higher than the decay
         (-0.1, 0.1, 0.0, 0.09),  # reached already
+        (0.9, 0.1, 0.9, 0.3 + 0.75 * 0.02),  # on the way up I_t1 is passed after a quarter
+        (0.31, 0.1, 0.9, 0.3 + 0.02 / 21.0),  # shortly before the step's end
+        (0.31, 0.295, 0.9, 0.31),  # the filter is slower than the limit
+        (0.9, 0.5, 0.9, 0.52),  # passed already
     ],
 )
-def test_decay_from_within_a_step(
+def test_switches_from_within_a_step(
     target: float, previous: float, steady: float, output: float
 ) -> None:
     found = dynamics.limited_current(target, previous, steady, **LIMITS, split=True)

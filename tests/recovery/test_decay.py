@@ -22,7 +22,7 @@ CARD = tuple(
 
 @pytest.mark.parametrize("seed", range(3))
 def test_all_of_the_card_is_found_if_its_decay_may_begin_within_a_step(seed: int) -> None:
-    truth = replace(Drive.preset("hoist").parameters, decay_switch="split")
+    truth = replace(Drive.preset("hoist").parameters, card_switch="split")
     tests = []
     for test in source_tests("hoist").values():
         voltage = test.sample(512.0)

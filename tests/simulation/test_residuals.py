@@ -52,7 +52,7 @@ def drive_of(changes: dict) -> Drive:
     drive = Drive.preset("hoist").replace(**changes)
     if changes is not EVERYTHING:
         return drive
-    return Drive(replace(drive.parameters, pressure_root="symmetric", decay_switch="split"))
+    return Drive(replace(drive.parameters, pressure_root="symmetric", card_switch="split"))
 
 
 def observed_at_samples(command: np.ndarray, start: str = "rest", signals=OBSERVABLE, **more):

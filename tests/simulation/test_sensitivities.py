@@ -27,7 +27,7 @@ class Scene:
 
     def drive(self) -> Drive:
         drive = Drive.preset(self.preset).replace(**self.changes)
-        options = {"pressure_root": self.root, "decay_switch": self.decay}
+        options = {"pressure_root": self.root, "card_switch": self.decay}
         return Drive(replace(drive.parameters, **options))
 
 

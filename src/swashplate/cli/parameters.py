@@ -78,10 +78,10 @@ def show_parameters(
         _block(parameters, "pump_motor", "Pump and motor"),
     )
     roots, sign = parameters.pressure_root, parameters.coulomb_sign
-    decay = parameters.decay_switch
+    decay = parameters.card_switch
     say(
         f"Variants of the equations: pressure_root {roots}, coulomb_sign {sign}, "
-        f"decay_switch {decay}"
+        f"card_switch {decay}"
     )
 
 

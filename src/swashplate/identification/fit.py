@@ -176,7 +176,7 @@ def smooth(parameters: ParameterSet) -> ParameterSet:
     Sampled, as published, it makes the current jump by up to 0.7 mA as any of the card's parameters
     varies, and a fit ends where it was caught (docs/decisions/0008).
     """
-    return replace(parameters, decay_switch="split")
+    return replace(parameters, card_switch="split")
 
 
 def _searched(

@@ -70,7 +70,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
         parameters,
         contents.model.pressure_root,
         contents.model.coulomb_sign,
-        contents.model.decay_switch,
+        contents.model.card_switch,
     )
 
 
@@ -87,7 +87,7 @@ def dump_set(parameters: ParameterSet) -> str:
     options = table()
     options.add("pressure_root", parameters.pressure_root)
     options.add("coulomb_sign", parameters.coulomb_sign)
-    options.add("decay_switch", parameters.decay_switch)
+    options.add("card_switch", parameters.card_switch)
     text.add("model", options)
     for block in ("control_card", "pump_motor"):
         entries = table()

@@ -12,7 +12,7 @@ from swashplate.parameters.rules import check_bounds, check_rules
 
 PressureRoot = Literal["published", "symmetric"]
 CoulombSign = Literal["smooth", "literal"]
-DecaySwitch = Literal["sampled", "split"]
+CardSwitch = Literal["sampled", "split"]
 Status = Literal["fitted", "assumed", "approximate", "inactive", "user"]
 
 
@@ -83,7 +83,7 @@ class ParameterSet(Mapping[str, Parameter]):
     parameters: Mapping[str, Parameter]
     pressure_root: PressureRoot = "published"
     coulomb_sign: CoulombSign = "smooth"
-    decay_switch: DecaySwitch = "sampled"
+    card_switch: CardSwitch = "sampled"
     numbers: Mapping[str, float] = field(init=False, repr=False, compare=False)
     """Every single value by column, e.g. ``Z16_plus``."""
 
@@ -134,7 +134,7 @@ class ParameterSet(Mapping[str, Parameter]):
             dict(self.parameters),
             self.pressure_root,
             self.coulomb_sign,
-            self.decay_switch,
+            self.card_switch,
         )
 
     def replace(self, changes: Mapping[str, Change]) -> "ParameterSet":

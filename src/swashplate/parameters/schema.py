@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from swashplate.parameters.parameter_set import CoulombSign, DecaySwitch, PressureRoot, Status
+from swashplate.parameters.parameter_set import CoulombSign, CardSwitch, PressureRoot, Status
 
 TwoNumbers = Annotated[list[float], Field(min_length=2, max_length=2)]
 
@@ -28,7 +28,7 @@ class ModelOptions(BaseModel):
 
     pressure_root: PressureRoot = "published"
     coulomb_sign: CoulombSign = "smooth"
-    decay_switch: DecaySwitch = "sampled"
+    card_switch: CardSwitch = "sampled"
 
 
 class CardFile(BaseModel):

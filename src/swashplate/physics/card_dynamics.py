@@ -117,6 +117,15 @@ def remaining_decay(previous: float, fallen: float, I_t2: float, decay: float) -
 
 
 @component
+def taken_over(target: float, previous: float, I_t1: float, lim1: float, step: float) -> float:
+    """Output after a step in which it passes I_t1 on the way to `target` and then rises by lim1.
+
+    The way to I_t1 counts as straight, as steep as from `previous` to `target` in one step. [A]
+    """
+    return I_t1 + lim1 * step * (target - I_t1) / (target - previous)
+
+
+@component
 def limited_current(
     target: float,
     previous: float,
@@ -148,8 +157,9 @@ def limited_current(
     step : float
         h. [s]
     split : None or True
-        Where within a step the decay takes over from lim2: None at its end, True where the output
-        passes I_t2, so that the output has no jump as I_t2, or anything before it, varies.
+        Where within a step lim1 takes over from the filter, and the decay from lim2: None at the
+        step's end, True where the output passes I_t1 or I_t2. Then it follows both thresholds,
+        and anything before them, without flat stretches or jumps.
 
     Returns
     -------
@@ -160,7 +170,9 @@ def limited_current(
     if target >= previous:
         if target <= I_t1:
             return target
-        return min(target, max(previous, I_t1) + lim1 * step)
+        if split is None or previous >= I_t1:
+            return min(target, max(previous, I_t1) + lim1 * step)
+        return min(target, taken_over(target, previous, I_t1, lim1, step))
     if previous > I_t2:
         fallen = max(target, previous - lim2 * step, 0.0)
         if split is None or fallen >= I_t2:
@@ -189,7 +201,8 @@ def limiter_partials(
     """I with its derivatives by target, previous, lim1, lim2, I_t1, I_t2, decay.
 
     At a switch the unlimited side counts. Unless the step is split, I_t2 only chooses a branch, so
-    its derivative is zero; it is returned so that every parameter has one.
+    its derivative is zero; it is returned so that every parameter has one. I_t1 then counts only
+    where the filter rises by more than lim1 h beyond it in the very step that passes it.
     """
     value = limited_current(target, previous, steady, lim1, lim2, I_t1, I_t2, decay, step, split)
     if target >= previous:
@@ -197,6 +210,20 @@ def limiter_partials(
             return value, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         if previous > I_t1:
             return value, 0.0, 1.0, step, 0.0, 0.0, 0.0, 0.0
+        if split is not None:
+            way = 1.0 / (target - previous)
+            share = (target - I_t1) * way
+            steep = lim1 * step * way
+            return (
+                value,
+                steep * (1.0 - share),
+                steep * share,
+                step * share,
+                0.0,
+                1.0 - steep,
+                0.0,
+                0.0,
+            )
         return value, 0.0, 0.0, step, 0.0, 1.0, 0.0, 0.0
     if previous > I_t2:
         fallen = max(target, previous - lim2 * step, 0.0)

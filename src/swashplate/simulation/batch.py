@@ -78,7 +78,7 @@ def simulate_many(
     costs = np.full(count, np.inf) if cost is not None else None
     outputs = np.full((count, samples), np.nan) if cost is None else None
     literal = True if parameters.coulomb_sign == "literal" else None
-    split = True if parameters.decay_switch == "split" else None
+    split = True if parameters.card_switch == "split" else None
     symmetric = True if parameters.pressure_root == "symmetric" else None
 
     def march(job: tuple[NDArray[np.intp], tuple[bool | None, ...]]) -> None:

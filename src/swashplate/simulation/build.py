@@ -66,7 +66,7 @@ def build_channel(parameters: ParameterSet, side: str, step: float) -> Channel:
     values = [numbers[f"{name}_{side}"] for name in CHANNEL_PARAMETERS]
     decay = uncompiled(decay_factor)(numbers[f"a_{side}"], step)
     literal = True if parameters.coulomb_sign == "literal" else None
-    split = True if parameters.decay_switch == "split" else None
+    split = True if parameters.card_switch == "split" else None
     return Channel._make([*values, decay, literal, split])
 
 

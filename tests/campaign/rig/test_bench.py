@@ -21,7 +21,7 @@ def same(one: rig.VirtualRun, other: rig.VirtualRun) -> bool:
 
 def split(drive: Drive) -> Drive:
     """The drive as the rig simulates it: its decay takes over within a step."""
-    return Drive(replace(drive.parameters, decay_switch="split"))
+    return Drive(replace(drive.parameters, card_switch="split"))
 
 
 def test_clean_logs_are_the_model_to_the_last_bit() -> None:

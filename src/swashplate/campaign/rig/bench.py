@@ -144,7 +144,7 @@ def run(
     if perturb:
         simulated = perturbed(nominal, perturb, seed)
     # a real card's decay does not wait for the next sample of a log (docs/decisions/0008)
-    simulated = Drive(replace(simulated.parameters, decay_switch="split"))
+    simulated = Drive(replace(simulated.parameters, card_switch="split"))
     axis = axis or nominal.name
     tests = _named(maneuvers, axis)
     kinds = _checked(channels)
