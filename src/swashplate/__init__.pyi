@@ -9,6 +9,9 @@ from .errors import FileError as FileError
 from .errors import InputError as InputError
 from .errors import ParameterError as ParameterError
 from .errors import SwashplateError as SwashplateError
+from .linear.frequency_response import FrequencyResponse as FrequencyResponse
+from .linear.model import LinearDrive as LinearDrive
+from .linear.operating_point import OperatingPoint as OperatingPoint
 from .parameters.parameter_set import Pair as Pair
 from .parameters.parameter_set import Parameter as Parameter
 from .parameters.parameter_set import ParameterSet as ParameterSet

@@ -11,6 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.errors import InputError
+from swashplate.linear.continuous import linearize
+from swashplate.linear.frequency_response import FrequencyResponse
+from swashplate.linear.model import Coulomb, LinearDrive
+from swashplate.linear.operating_point import Input
+from swashplate.linear.sweep import SweptInput, SweptOutput, frequency_response
 from swashplate.parameters.files import dump_set, load_preset, load_set
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -300,6 +305,106 @@ class Drive:
             As in `simulate`.
         """
         return Stepper(self.parameters, h, interpolation, start)
+
+    def linearize(
+        self,
+        at: float | None = None,
+        *,
+        current: float | None = None,
+        speed: float | None = None,
+        input: Input | None = None,
+        outputs: Sequence[str] = ("shaft_speed",),
+        coulomb: Coulomb = "ignored",
+    ) -> LinearDrive:
+        """Linear model of small motions about a steady state, from the exact partial derivatives.
+
+        Parameters
+        ----------
+        at, current, speed : float
+            Where, one of the three: a constant voltage [V], a constant signed current [A], or the
+            speed [rad/s] that a voltage settles at.
+        input : {"voltage", "current", "solenoid_force"}, optional
+            What moves the model; by default the voltage, or the current where one is given. With
+            another than the voltage it is the pump and motor alone.
+        outputs : sequence of str
+            ``"shaft_speed"``, ``"swash_angle"``, ``"stroker_pressure"``, ``"orifice_opening"``,
+            ``"spool_position"``, ``"solenoid_force"``, ``"current"``.
+        coulomb : {"ignored", "tangent"}
+            The card's Coulomb term: left out, which suits motions whose current moves much faster
+            than 0.01 A/s, or with the slope of its smooth sign, exact for those that are slower.
+
+        Returns
+        -------
+        LinearDrive
+            Continuous, with its delay apart; `LinearDrive.discrete` samples it. The card's rate
+            limits are taken as not active.
+
+        Raises
+        ------
+        InputError
+            For a point or option that there is not.
+        DomainError
+            Where the gain is 0: in a dead zone or at a stop.
+        """
+        return linearize(
+            self.parameters,
+            voltage=at,
+            current=current,
+            speed=speed,
+            input=input,
+            outputs=outputs,
+            coulomb=coulomb,
+        )
+
+    def frequency_response(
+        self,
+        frequencies: ArrayLike,
+        amplitudes: ArrayLike,
+        *,
+        bias: float = 0.0,
+        input: SweptInput = "voltage",
+        output: SweptOutput = "shaft_speed",
+        rate: float = SOURCE_RATE,
+        tolerance: float = 1e-4,
+    ) -> FrequencyResponse:
+        """Gain and phase under sines of any size: the describing function, by simulation.
+
+        Parameters
+        ----------
+        frequencies : (f,) array_like
+            Rising, from 1 mHz to an eighth of the rate. [Hz]
+        amplitudes : (a,) array_like
+            Of the sine about the bias. [V or A]
+        bias : float
+            Mean of the input. [V or A]
+        input : {"voltage", "current"}
+            Whole drive, or pump and motor alone.
+        output : str
+            A signal as in `linearize`.
+        rate : float
+            Steps a second, at least 512. At each frequency the step is shortened a little, so that
+            a cycle has a whole number of them and its harmonics are exact. [Hz]
+        tolerance : float
+            Relative change of the first harmonic, from one block of cycles to the next, below which
+            the drive repeats itself.
+
+        Raises
+        ------
+        InputError
+            For frequencies, amplitudes or options out of range.
+        DomainError
+            If nothing moves at all, or the answer does not come to repeat itself.
+        """
+        return frequency_response(
+            self.parameters,
+            frequencies,
+            amplitudes,
+            bias=bias,
+            input=input,
+            output=output,
+            rate=rate,
+            tolerance=tolerance,
+        )
 
     @overload
     def steady_speed(self, voltage: float) -> float: ...

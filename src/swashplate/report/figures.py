@@ -1,5 +1,6 @@
 """The figures, by name: `matplotlib.figure.Figure` objects in the units that people read."""
 
+from swashplate.report.bode_view import plot_bode as plot_bode
 from swashplate.report.campaign_page import plot_campaign as plot_campaign
 from swashplate.report.comparison import plot_comparison as plot_comparison
 from swashplate.report.current_view import plot_current as plot_current

@@ -1,0 +1,282 @@
+"""A linear drive: state space at an operating point, and what follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from math import log
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.errors import DomainError
+from swashplate.linear.margins import LoopMargins, bandwidth, largest_gain, loop_margins
+from swashplate.linear.operating_point import Input, OperatingPoint
+from swashplate.linear.state_space import state_space_response
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.simulation.record import Interpolation
+
+if TYPE_CHECKING:
+    from scipy.signal import StateSpace
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+Coulomb = Literal["ignored", "tangent"]
+Controller = float | Callable[[Array], ComplexArray]
+
+_MOVING = ("current_rate", "current_before", "current", "stroker_pressure")
+"""States of card and pump; the others of a sampled model are commands on their way."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearDrive:
+    """Small motions about an operating point.
+
+    Continuous (`sample_time` None): x' = A x + B u(t - delay), y = C x + D u(t - delay). Sampled:
+    x[n+1] = A x[n] + B u[n - k], y[n] = C x[n] + D u[n - k], where the delay is k samples. All are
+    deviations from the operating point, in SI.
+    """
+
+    A: Array
+    """(n, n)"""
+    B: Array
+    """(n, 1)"""
+    C: Array
+    """(m, n)"""
+    D: Array
+    """(m, 1)"""
+    states: tuple[str, ...]
+    outputs: tuple[str, ...]
+    input: Input
+    delay: float
+    """What stands exactly before the input; of a sampled model whole samples. [s]"""
+    sample_time: float | None
+    """Interval of a sampled model, None of a continuous one. [s]"""
+    operating_point: OperatingPoint
+    coulomb: Coulomb
+    """Whether the card's Coulomb term is left out or counts with its slope at rest."""
+    parameters: ParameterSet
+    """The drive that was linearised."""
+
+    def __repr__(self) -> str:
+        time = "continuous" if self.sample_time is None else f"sampled at {self.sample_time:g} s"
+        return f"LinearDrive({self.name!r}, {self.input} to {', '.join(self.outputs)}, {time})"
+
+    @property
+    def name(self) -> str:
+        """Name of the drive."""
+        return self.parameters.name
+
+    @cached_property
+    def poles(self) -> ComplexArray:
+        """Poles of card and pump, the slowest first; the delay's, all at z = 0, are left out.
+
+        Of a continuous model in the s-plane [rad/s], of a sampled one in the z-plane [1].
+        """
+        dynamic = [k for k, name in enumerate(self.states) if name in _MOVING]
+        found = np.linalg.eigvals(self.A[np.ix_(dynamic, dynamic)]).astype(np.complex128)
+        slowness = found.real if self.sample_time is None else np.abs(found)
+        return np.asarray(found[np.lexsort((found.imag, -slowness))])
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether every motion dies out."""
+        if self.sample_time is None:
+            return bool((self.poles.real < 0.0).all())
+        return bool((np.abs(self.poles) < 1.0).all())
+
+    @property
+    def time_constant(self) -> float:
+        """Time constant of the pump's lag, from current to swash angle. [s]
+
+        At rest without plussing τ = (1 + Z6)/(Z1 Z3 Z5 Z8 √(Z9/2)); Kruse (2001), eqs. 6.72-6.74
+        with errata 4 and 23. Of a sampled model that of the lag with the same pole.
+
+        Raises
+        ------
+        DomainError
+            If a sampled model's lag is shorter than its step.
+        """
+        k = self.states.index("stroker_pressure")
+        pole = float(self.A[k, k])
+        if self.sample_time is None:
+            return -1.0 / pole
+        if not 0.0 < pole < 1.0:
+            raise DomainError(
+                f"{self.name}: sampled at {self.sample_time:g} s the pump's pole is at z = "
+                f"{pole:g}, which is no lag's; take a smaller sample time."
+            )
+        return -self.sample_time / log(pole)
+
+    @cached_property
+    def gains(self) -> Array:
+        """Steady gain to each output, in the output's unit by the input's, (m,)."""
+        n = self.A.shape[0]
+        rest = -self.A if self.sample_time is None else np.eye(n) - self.A
+        return np.asarray((self.C @ np.linalg.solve(rest, self.B) + self.D)[:, 0])
+
+    @property
+    def gain(self) -> float:
+        """Steady gain to the first output, which is the shaft speed unless chosen otherwise."""
+        return float(self.gains[0])
+
+    def response(self, frequency: ArrayLike) -> ComplexArray:
+        """Frequency response of the outputs by the input, with the exact delay.
+
+        Parameters
+        ----------
+        frequency : float or (f,) array_like
+            At or above 0, of a sampled model at or below 1/(2 h). [Hz]
+
+        Returns
+        -------
+        (m,) or (m, f) complex array
+            Amplitude and phase of each output.
+        """
+        return state_space_response(
+            self.A, self.B, self.C, self.D, self.delay, self.sample_time, frequency
+        )
+
+    def _first(self, frequency: Array) -> ComplexArray:
+        return np.asarray(self.response(frequency)[0])
+
+    def _fastest(self) -> float:
+        """Frequency far beyond all poles, or half the rate of a sampled model. [Hz]"""
+        if self.sample_time is not None:
+            return 0.5 / self.sample_time
+        return 1e3 * float(np.abs(self.poles).max())
+
+    def _check_stable(self) -> None:
+        if not self.is_stable:
+            raise DomainError(
+                f"{self.name}: the linear model is unstable (poles {self.poles}), so that a "
+                "bandwidth or margin means nothing."
+            )
+
+    @property
+    def bandwidth(self) -> float:
+        """Frequency at which the first output falls 3 dB (to 1/√2) below its steady gain. [Hz]
+
+        Infinite where it never does, below half the rate of a sampled model.
+        """
+        self._check_stable()
+        return bandwidth(self._first, self.gain, self._fastest())
+
+    @property
+    def largest_gain(self) -> float:
+        """Proportional gain at which the loop u = K (r - y) of the first output begins to swing.
+
+        In the input's unit by the output's, positive; infinite where none does.
+        """
+        self._check_stable()
+        return largest_gain(self._first, self.delay, self._fastest(), self.gain)
+
+    def margins(self, controller: Controller) -> LoopMargins:
+        """Margins of the loop u = K (r - y) closed over the first output.
+
+        Parameters
+        ----------
+        controller : float or callable
+            A proportional gain K, e.g. in V/(rad/s), or a controller's frequency response: a
+            function of frequencies [Hz] that returns complex numbers. It must not be unstable by
+            itself; one that integrates is fine.
+
+        Raises
+        ------
+        DomainError
+            If the closed loop is unstable; it then has no margin.
+        """
+        self._check_stable()
+
+        def loop(frequency: Array) -> ComplexArray:
+            factor = controller(frequency) if callable(controller) else controller
+            return np.asarray(factor * self._first(frequency))
+
+        return loop_margins(loop, self.delay, self._fastest(), self.name)
+
+    def delay_margin(self, controller: Controller) -> float:
+        """Delay more than the model's own that the loop of `margins` bears before it swings. [s]"""
+        return self.margins(controller).delay_margin
+
+    def discrete(self, sample_time: float, interpolation: Interpolation = "linear") -> LinearDrive:
+        """The model at a sample time, with the recurrences of the march.
+
+        Parameters
+        ----------
+        sample_time : float
+            10 µs to 0.1 s; above 1/512 s the march's own sub-steps are taken. [s]
+        interpolation : {"linear", "previous"}
+            What the input is between samples: a straight line or held, as in `Drive.simulate`.
+
+        Returns
+        -------
+        LinearDrive
+            Agrees with a small motion of `Drive.simulate` or `Drive.stepper` sample for sample.
+        """
+        from swashplate.linear.sampled import sampled
+
+        return sampled(
+            self.parameters,
+            self.operating_point,
+            self.input,
+            self.outputs,
+            self.coulomb,
+            sample_time,
+            interpolation,
+        )
+
+    def transfer_function(self, output: str | None = None) -> tuple[Array, Array]:
+        """Numerator and denominator, highest power first, without the delay.
+
+        Parameters
+        ----------
+        output : str, optional
+            By default the first.
+        """
+        from swashplate.linear.transfer import polynomials
+
+        return polynomials(self, self.outputs[0] if output is None else output)
+
+    def to_scipy(self, pade: int | None = None) -> StateSpace:
+        """The model as `scipy.signal.StateSpace`, continuous or sampled.
+
+        Parameters
+        ----------
+        pade : int, optional
+            Order of the Padé approximant for a continuous model's delay, 0 to leave the delay
+            out; must be said where there is one. A sampled model's delay is exact, as states.
+        """
+        from swashplate.linear.export import to_scipy
+
+        return to_scipy(self, pade)
+
+    def to_control(
+        self,
+        form: Literal["state_space", "transfer_function"] = "state_space",
+        pade: int | None = None,
+    ) -> Any:
+        """The model as python-control's StateSpace or TransferFunction; `pade` as in `to_scipy`.
+
+        Raises
+        ------
+        InputError
+            If python-control is not installed.
+        """
+        from swashplate.linear.export import to_control
+
+        return to_control(self, form, pade)
+
+    def write(self, path: str | Path) -> None:
+        """Write matrices, names, units, delay and operating point as .toml or .json, in SI.
+
+        Raises
+        ------
+        FileError
+            For another ending or a place that cannot be written.
+        """
+        from swashplate.linear.files import write_model
+
+        write_model(self, path)

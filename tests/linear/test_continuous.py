@@ -1,0 +1,163 @@
+"""The continuous model: lags and gains against closed forms and differences of steady states."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swashplate import DomainError, Drive, InputError
+
+
+@pytest.mark.parametrize(("name", "tau"), [("hoist", 0.1214), ("slew", 0.2066), ("luff", 0.2015)])
+def test_the_source_s_time_constant(name: str, tau: float) -> None:
+    # the source's small motion starts from a closed valve and a plate upright: no plussing
+    model = Drive.preset(name).replace(Z18=0.0).linearize(current=0.0, input="solenoid_force")
+    assert model.time_constant == pytest.approx(tau, abs=5e-5)
+    assert model.states == ("stroker_pressure",)
+    np.testing.assert_allclose(model.poles, [-1.0 / model.time_constant])
+
+
+def test_the_closed_form_of_the_hoist_s_lag(hoist: Drive) -> None:
+    # (1 + Z6)/(Z1 Z3 Z5 Z8 √(Z9/2)) and the gain Z10 Z5/(Z3 √Z4) by the source's numbers
+    model = hoist.replace(Z18=0.0).linearize(current=0.0, input="solenoid_force")
+    tau = 1.073926 / (4.6441e-7 * 0.62542 * 0.0079568 * 1651400.0 * np.sqrt(10743000.0 / 2.0))
+    assert model.time_constant == pytest.approx(tau, rel=1e-12)
+    assert model.gain == pytest.approx(12.396 * 0.0079568 / (0.62542 * np.sqrt(0.053604)))
+
+
+VARIANTS = {
+    "published": {},
+    "leaky": {"Z7": 0.8},
+    "loaded": {"Z12": 0.2, "Z11": 0.05},
+    "offset": {"Z2": 0.01},
+    "steep": {"Z13": 0.6, "Z10": 6.0},
+}
+
+
+@pytest.mark.parametrize("at", [-3.0, 1.0, 4.0])
+@pytest.mark.parametrize("changes", VARIANTS.values(), ids=VARIANTS.keys())
+def test_gain_is_the_slope_of_the_steady_speed(
+    hoist: Drive, derivative, changes: dict, at: float
+) -> None:
+    drive = hoist.replace(**changes)
+    model = drive.linearize(at)
+    slope = derivative(lambda volts: drive.steady_speed(volts), [at], 0, 1e-3)
+    assert model.gain == pytest.approx(slope, rel=1e-7)
+    assert model.operating_point.shaft_speed == drive.steady_speed(at)
+    assert model.operating_point.current == drive.steady_current(at)
+    assert model.response(0.0) == pytest.approx(model.gain)
+
+
+def test_poles_of_the_card(axis: Drive) -> None:
+    numbers = axis.parameters.numbers
+    zeta, omega, C = (numbers[f"{name}_minus"] for name in ("zeta", "omega", "C"))
+    for coulomb, damping in (
+        ("ignored", 2.0 * zeta * omega),
+        ("tangent", 2.0 * zeta * omega + C / 0.01),
+    ):
+        model = axis.linearize(-2.0, coulomb=coulomb)
+        expected = [*np.roots([1.0, damping, omega**2]), -1.0 / model.time_constant]
+        np.testing.assert_allclose(np.sort_complex(model.poles), np.sort_complex(expected))
+        assert (np.diff(model.poles.real) <= 1e-9).all()
+        assert model.delay == 0.014
+        assert model.is_stable
+
+
+def test_outputs_belong_together(hoist: Drive) -> None:
+    names = ("shaft_speed", "swash_angle", "stroker_pressure", "current", "spool_position")
+    speed, angle, pressure, current, spool = hoist.linearize(4.0, outputs=names).gains
+    assert speed == pytest.approx(12.396 * angle)
+    tangent = 4.6441e-7 * hoist.linearize(4.0).operating_point.stroker_pressure
+    assert angle == pytest.approx(4.6441e-7 * pressure / (1.0 + tangent**2))
+    # I_ss = J + G1 d + G2 d² + G3 d³ at d = 4 V - V_dz
+    d = 4.0 - 0.12663
+    assert current == pytest.approx(0.049315 + 2 * 0.00081975 * d - 3 * 4.5317e-05 * d**2)
+    assert spool == pytest.approx(0.0, abs=1e-12)  # a settled spool is closed
+
+
+def test_a_point_given_by_its_speed(hoist: Drive) -> None:
+    for speed in (-2.0, 1.5):
+        point = hoist.linearize(speed=speed).operating_point
+        assert point.shaft_speed == pytest.approx(speed, rel=1e-9)
+        assert hoist.steady_speed(point.voltage) == pytest.approx(speed, rel=1e-9)
+
+
+def test_the_pump_alone_from_its_current(hoist: Drive) -> None:
+    whole, pump = hoist.linearize(4.0), hoist.linearize(current=hoist.steady_current(4.0))
+    assert pump.input == "current"
+    assert pump.delay == 0.0
+    assert pump.time_constant == whole.time_constant
+    by_volt = hoist.linearize(4.0, outputs=["current"]).gain
+    assert pump.gain * by_volt == pytest.approx(whole.gain)
+
+
+def test_switches_are_declared(hoist: Drive) -> None:
+    neutral = Drive.preset("neutral").linearize(0.0)
+    assert neutral.gain == pytest.approx(1.0)
+    assert neutral.time_constant == pytest.approx(0.1)
+    assert len(neutral.operating_point.one_sided) == 2
+    physical = Drive(replace(hoist.parameters, pressure_root="symmetric"))
+    published, one_sided = hoist.linearize(-4.0), physical.linearize(-4.0)
+    assert published.operating_point.one_sided == ()
+    (said,) = one_sided.operating_point.one_sided
+    assert "positive opening" in said
+    assert one_sided.time_constant == pytest.approx(published.time_constant, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("where", "said"),
+    [
+        ({"at": 0.1}, "the card's dead zone, which ends beyond \\+0.12663 V"),
+        ({"at": -0.05}, "ends beyond -0.097857 V"),
+        ({"at": 0.14}, "the solenoids' dead zone of Z17 = ±0.27867 A"),
+        ({"current": 0.2}, "the solenoids' dead zone"),
+        ({"at": 9.0}, "at its stop, so the gain is 0"),
+        ({"at": -8.0, "input": "solenoid_force"}, "at its stop"),
+        ({"current": 5.0}, "overpowers the feedback spring"),
+    ],
+)
+def test_where_nothing_moves(hoist: Drive, where: dict, said: str) -> None:
+    with pytest.raises(DomainError, match=said):
+        hoist.linearize(**where)
+
+
+def test_other_places_without_gain(hoist: Drive) -> None:
+    with pytest.raises(DomainError, match="at its limit Z15"):
+        hoist.replace(Z15=2e5).linearize(4.0)
+    with pytest.raises(DomainError, match="leakage takes all"):
+        hoist.replace(Z7=3000.0).linearize(4.0)
+
+
+@pytest.mark.parametrize(
+    ("where", "said"),
+    [
+        ({}, "exactly one"),
+        ({"at": 4.0, "current": 0.4}, "exactly one"),
+        ({"at": float("nan")}, "must be a finite number"),
+        ({"at": 11.0}, "the card takes ±10 V"),
+        ({"at": 4.0, "input": "pressure"}, "must be one of voltage, current"),
+        ({"current": 0.4, "input": "voltage"}, "needs a voltage or a speed"),
+        ({"speed": 10.0}, "no constant voltage settles at 572.958 deg/s"),
+        ({"at": 4.0, "outputs": ["torque"]}, "'torque' is no output"),
+        ({"current": 0.4, "outputs": ["current"]}, "'current' is no output"),
+        ({"at": 4.0, "outputs": []}, "one output or several"),
+        ({"at": 4.0, "coulomb": "half"}, "coulomb is 'half'"),
+    ],
+)
+def test_refusals(hoist: Drive, where: dict, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        hoist.linearize(**where)
+
+
+def test_a_speed_that_the_jump_leaves_out() -> None:
+    # the slew card jumps to 0.170 A, beyond the solenoids' dead zone of 0.162 A
+    with pytest.raises(InputError, match="no constant voltage settles at 0.0572958 deg/s"):
+        Drive.preset("slew").linearize(speed=0.001)
+
+
+def test_a_literal_sign_has_no_tangent() -> None:
+    slew = Drive.preset("slew")
+    literal = Drive(replace(slew.parameters, coulomb_sign="literal"))
+    with pytest.raises(InputError, match="has no slope"):
+        literal.linearize(2.0, coulomb="tangent")
+    assert literal.linearize(2.0).gain == slew.linearize(2.0).gain

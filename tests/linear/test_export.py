@@ -1,0 +1,169 @@
+"""Models as SciPy's and python-control's objects, as polynomials and as files."""
+
+import json
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from swashplate import Drive, FileError, InputError
+from swashplate.linear.transfer import pade_polynomials
+
+control = pytest.importorskip("control", reason="python-control is not installed")
+
+F = np.geomspace(0.01, 20.0, 30)
+OUTPUTS = ("shaft_speed", "stroker_pressure", "current")
+
+
+def of_scipy(system: scipy.signal.StateSpace, f: np.ndarray, row: int) -> np.ndarray:
+    """A response that uses nothing but the object's matrices."""
+    point = 2j * np.pi * f if system.dt is None else np.exp(2j * np.pi * f * system.dt)
+    eye = np.eye(system.A.shape[0])
+    return np.array(
+        [
+            (system.C @ np.linalg.solve(p * eye - system.A, system.B) + system.D)[row, 0]
+            for p in point
+        ]
+    )
+
+
+def test_without_delay(hoist: Drive) -> None:
+    model = hoist.linearize(current=0.45, outputs=OUTPUTS[:2])
+    expected = model.response(F)
+    system, states = model.to_scipy(), model.to_control()
+    transfer = model.to_control("transfer_function")
+    assert system.dt is None
+    assert states.state_labels == ["stroker_pressure"]
+    assert states.output_labels == list(OUTPUTS[:2])
+    assert states.input_labels == ["current"]
+    for row in range(2):
+        np.testing.assert_allclose(of_scipy(system, F, row), expected[row], rtol=1e-9)
+        np.testing.assert_allclose(states(2j * np.pi * F)[row, 0], expected[row], rtol=1e-9)
+        np.testing.assert_allclose(transfer(2j * np.pi * F)[row, 0], expected[row], rtol=1e-9)
+    np.testing.assert_allclose(control.poles(states), model.poles)
+    np.testing.assert_allclose(control.dcgain(states)[:, 0], model.gains)
+
+
+@pytest.mark.parametrize("rate", [100.0, 512.0])
+def test_a_sampled_model_is_exact(axis: Drive, rate: float) -> None:
+    model = axis.linearize(2.0, outputs=OUTPUTS).discrete(1.0 / rate)
+    expected = model.response(F)
+    system, states = model.to_scipy(), model.to_control()
+    transfer = model.to_control("transfer_function")
+    assert system.dt == states.dt == transfer.dt == 1.0 / rate
+    assert len(states.state_labels) == system.A.shape[0]
+    z = np.exp(2j * np.pi * F / rate)
+    for row in range(3):
+        np.testing.assert_allclose(of_scipy(system, F, row), expected[row], rtol=1e-8)
+        np.testing.assert_allclose(states(z)[row, 0], expected[row], rtol=1e-8)
+        np.testing.assert_allclose(transfer(z)[row, 0], expected[row], rtol=1e-5)
+
+
+def test_python_control_marches_like_the_simulation(hoist: Drive) -> None:
+    model = hoist.linearize(4.0).discrete(1.0 / 512.0)
+    u = 1e-5 * np.minimum(np.arange(400) / 50.0, 1.0)
+    run = hoist.simulate(4.0 + u, start="steady")
+    _, answer = control.forced_response(model.to_control(), inputs=u)
+    moved = run.shaft_speed - run.shaft_speed[0]
+    np.testing.assert_allclose(answer, moved, rtol=0.0, atol=1e-4 * np.abs(moved).max())
+
+
+@pytest.mark.parametrize("order", [1, 2, 5, 8])
+def test_a_delay_as_a_rational_function(hoist: Drive, order: int) -> None:
+    model = hoist.linearize(4.0)
+    expected = model.response(F)[0]
+    # the approximant agrees with e^(-p) to p^(2n+1): here p = jω delay up to 1.76
+    worst = {1: 0.4, 2: 0.04, 5: 1e-7, 8: 1e-9}[order]
+    for got in (
+        of_scipy(model.to_scipy(pade=order), F, 0),
+        model.to_control(pade=order)(2j * np.pi * F),
+        model.to_control("transfer_function", pade=order)(2j * np.pi * F),
+    ):
+        np.testing.assert_allclose(got, expected, rtol=worst)
+    ours, theirs = pade_polynomials(0.014, order), control.pade(0.014, order)
+    for mine, other in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(np.divide(mine, ours[1][0]), np.divide(other, theirs[1][0]))
+
+
+def test_the_delay_left_out(hoist: Drive) -> None:
+    model = hoist.linearize(4.0)
+    without = model.response(F)[0] * np.exp(2j * np.pi * F * 0.014)
+    np.testing.assert_allclose(of_scipy(model.to_scipy(pade=0), F, 0), without)
+    np.testing.assert_allclose(model.to_control(pade=0)(2j * np.pi * F), without)
+    numerator, denominator = model.transfer_function()
+    np.testing.assert_allclose(
+        np.polyval(numerator, 2j * np.pi * F) / np.polyval(denominator, 2j * np.pi * F), without
+    )
+    # gain ω²/τ over three poles, no zero
+    assert numerator.shape == (1,)
+    assert denominator[0] == 1.0
+
+
+def test_zeros_where_there_are(hoist: Drive) -> None:
+    loaded = hoist.replace(Z12=0.2).linearize(current=0.45)
+    numerator, denominator = loaded.transfer_function()
+    assert numerator.size == denominator.size == 2
+    np.testing.assert_allclose(
+        np.polyval(numerator, 2j * np.pi * F) / np.polyval(denominator, 2j * np.pi * F),
+        loaded.response(F)[0],
+    )
+    still = hoist.linearize(current=0.45, outputs=["shaft_speed", "solenoid_force"])
+    numerator, _ = still.transfer_function("solenoid_force")
+    assert numerator.size == 2  # the pump's pole cancels
+
+
+def test_refusals(hoist: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = hoist.linearize(4.0)
+    for export in (model.to_scipy, model.to_control):
+        with pytest.raises(InputError, match="has a delay of 0.014 s, which no state space holds"):
+            export()
+        for order in (-1, 9):
+            with pytest.raises(InputError, match=f"is {order}, but must be 1 to 8"):
+                export(pade=order)
+    with pytest.raises(InputError, match="leave pade out"):
+        model.discrete(0.01).to_scipy(pade=2)
+    with pytest.raises(InputError, match="form is 'zpk'"):
+        model.to_control("zpk", pade=2)
+    with pytest.raises(InputError, match="has no output 'torque'"):
+        model.transfer_function("torque")
+    monkeypatch.setitem(sys.modules, "control", None)
+    with pytest.raises(InputError, match="not installed: pip install"):
+        model.to_control(pade=2)
+
+
+@pytest.mark.parametrize("ending", ["toml", "json"])
+def test_files_hold_everything(hoist: Drive, tmp_path: Path, ending: str) -> None:
+    model = hoist.linearize(4.0, outputs=OUTPUTS).discrete(1.0 / 512.0)
+    path = tmp_path / f"model.{ending}"
+    model.write(path)
+    text = path.read_text("utf-8")
+    read = tomllib.loads(text) if ending == "toml" else json.loads(text)
+    for name in "ABCD":
+        np.testing.assert_array_equal(read[name], getattr(model, name))
+    assert read["drive"] == "hoist"
+    assert read["kind"] == "sampled"
+    assert read["sample_time"] == 1.0 / 512.0
+    assert read["delay"] == 7.0 / 512.0
+    assert read["input_unit"] == "V"
+    assert read["output_units"] == ["rad/s", "Pa", "A"]
+    assert read["operating_point"]["voltage"] == 4.0
+    assert read["operating_point"]["shaft_speed"] == hoist.steady_speed(4.0)
+
+
+def test_a_model_from_a_current_has_no_voltage(hoist: Drive, tmp_path: Path) -> None:
+    hoist.linearize(current=0.45).write(tmp_path / "pump.toml")
+    read = tomllib.loads((tmp_path / "pump.toml").read_text("utf-8"))
+    assert read["kind"] == "continuous"
+    assert "voltage" not in read["operating_point"]
+    assert "sample_time" not in read
+
+
+def test_places_that_cannot_be_written(hoist: Drive, tmp_path: Path) -> None:
+    model = hoist.linearize(4.0)
+    with pytest.raises(FileError, match="is written as .toml or .json"):
+        model.write(tmp_path / "model.mat")
+    with pytest.raises(FileError, match="cannot be written"):
+        model.write(tmp_path / "none" / "model.json")
