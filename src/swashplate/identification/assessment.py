@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
+from swashplate.identification.checked_ends import checked_ends
 from swashplate.identification.fit import StageFit
+from swashplate.identification.handed_on import Handed, slopes_by_earlier
 from swashplate.identification.identifiability import Identifiability, identifiability
+from swashplate.identification.intervals import reach
 from swashplate.identification.linearised import TOLERANCE, LinearisedFit, LinearisedRun
 from swashplate.identification.measures import Measures, measures
 from swashplate.identification.model import Differentiable
@@ -97,6 +100,8 @@ class Assessment:
     """What a stage's data tell of its unknowns, and how good the fit is."""
 
     stage: StageFit
+    earlier: tuple[Assessment, ...] = ()
+    """Of the stages before, whose results this one takes for granted."""
 
     @property
     def _vector(self) -> Array:
@@ -125,8 +130,18 @@ class Assessment:
 
     @cached_property
     def uncertainty(self) -> Uncertainty:
-        """Errors of the estimates, for coloured residuals."""
-        return uncertainty(self.linearised)
+        """Errors of the estimates, for coloured residuals, those of earlier stages taken in."""
+        handed = []
+        for each in self.earlier:
+            slopes = slopes_by_earlier(self.stage, each.stage, self.linearised)
+            if slopes is not None:
+                handed.append(Handed(each.uncertainty.quoted, slopes))
+        found = uncertainty(self.linearised, handed=handed)
+        if not found.noisy:
+            return found
+        half = reach(found.own, found.level)
+        ends = checked_ends(self.stage.problem, self._vector, self.linearised, half)
+        return replace(found, ends=ends)
 
     @cached_property
     def runs(self) -> tuple[RunQuality, ...]:
@@ -165,4 +180,7 @@ def _tested(experiment: Experiment, time: Array, residual: Array) -> ResidualTes
 
 def assess(stages: Sequence[StageFit]) -> tuple[Assessment, ...]:
     """The assessment of each stage of a fit."""
-    return tuple(Assessment(each) for each in stages)
+    made: list[Assessment] = []
+    for each in stages:
+        made.append(Assessment(each, tuple(made)))
+    return tuple(made)

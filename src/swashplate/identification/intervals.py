@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.errors import InputError
 from swashplate.identification.covariance import Covariance
 
-Status = Literal["estimated", "at its lower bound", "at its upper bound", "undetermined"]
+Array = NDArray[np.float64]
+Status = Literal[
+    "estimated",
+    "at its lower bound",
+    "at its upper bound",
+    "undetermined",
+    "no lower end",
+    "no upper end",
+]
 
 
 class Estimate(NamedTuple):
@@ -22,12 +33,36 @@ class Estimate(NamedTuple):
     """In the unknown's unit; of a logarithmic one the value times the logarithm's. None unless
     estimated."""
     lower: float | None
-    """End of the interval; asymmetric about the value for a logarithmic unknown."""
+    """End of the interval; asymmetric about the value for a logarithmic unknown. None where there
+    is no end."""
     upper: float | None
     degrees_of_freedom: float | None
 
 
-def estimates(covariance: Covariance, *, level: float = 0.95) -> tuple[Estimate, ...]:
+def reach(covariance: Covariance, level: float = 0.95) -> Array:
+    """(K,) half widths of the intervals in the solver's vector; 0 for unknowns without one.
+
+    Raises
+    ------
+    InputError
+        If the level is not between 0 and 1.
+    """
+    if not 0.0 < level < 1.0:
+        raise InputError(f"The level {level:g} of an interval must lie between 0 and 1.")
+    from scipy.stats import t as student
+
+    quantiles = student.ppf(0.5 + 0.5 * level, covariance.degrees_of_freedom)
+    errors = np.where(covariance.determined, covariance.standard_errors, 0.0)
+    half: Array = np.where(covariance.determined, quantiles * errors, 0.0)
+    return half
+
+
+def estimates(
+    covariance: Covariance,
+    *,
+    level: float = 0.95,
+    ends: Mapping[tuple[int, bool], float] = MappingProxyType({}),
+) -> tuple[Estimate, ...]:
     """Estimates with intervals from a covariance.
 
     Parameters
@@ -36,6 +71,9 @@ def estimates(covariance: Covariance, *, level: float = 0.95) -> tuple[Estimate,
         Of the solver's vector.
     level : float
         Probability of the intervals, between 0 and 1.
+    ends : mapping, optional
+        By unknown's number and side, True for the upper, distances of ends that differ from the
+        covariance's, in the solver's vector; inf where there is none.
 
     Raises
     ------
@@ -49,30 +87,42 @@ def estimates(covariance: Covariance, *, level: float = 0.95) -> tuple[Estimate,
     the normal quantile, because the variance is itself estimated, from a number of independent
     stretches of residual that may be small.
     """
-    if not 0.0 < level < 1.0:
-        raise InputError(f"The level {level:g} of an interval must lie between 0 and 1.")
-    from scipy.stats import t as student
-
+    half = reach(covariance, level)
     variables = covariance.variables
     errors = covariance.standard_errors
-    quantiles = student.ppf(0.5 + 0.5 * level, covariance.degrees_of_freedom)
-    reach = np.where(
-        covariance.determined, quantiles * np.where(covariance.determined, errors, 0), 0
-    )
-    lower = variables.to_values(variables.vector - reach)
-    upper = variables.to_values(variables.vector + reach)
+    distances = {
+        upper: np.array([ends.get((k, upper), half[k]) for k in range(half.size)])
+        for upper in (False, True)
+    }
+    open_ended = {upper: np.isinf(distances[upper]) for upper in distances}
+    with np.errstate(invalid="ignore"):
+        lower = variables.to_values(variables.vector - distances[False])
+        upper = variables.to_values(variables.vector + distances[True])
     made = []
     for k, name in enumerate(variables.names):
         value = float(variables.values[k])
+        below, above = bool(open_ended[False][k]), bool(open_ended[True][k])
         if variables.at_bound[k]:
             low = variables.at_bound[k] < 0
             side: Status = "at its lower bound" if low else "at its upper bound"
             made.append(Estimate(name, value, side, None, None, None, None))
-        elif not covariance.determined[k]:
+        elif not covariance.determined[k] or (below and above):
             made.append(Estimate(name, value, "undetermined", None, None, None, None))
         else:
-            error = float(abs(variables.slopes[k]) * errors[k])
             freedom = float(covariance.degrees_of_freedom[k])
-            ends = float(lower[k]), float(upper[k])
-            made.append(Estimate(name, value, "estimated", error, *ends, freedom))
+            error = float(abs(variables.slopes[k]) * errors[k])
+            status: Status = "estimated"
+            if below or above:
+                status = "no lower end" if below else "no upper end"
+            made.append(
+                Estimate(
+                    name,
+                    value,
+                    status,
+                    error if status == "estimated" else None,
+                    None if below else float(lower[k]),
+                    None if above else float(upper[k]),
+                    freedom,
+                )
+            )
     return tuple(made)

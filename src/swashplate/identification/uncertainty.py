@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.identification.autocorrelation import NoiseColour, noise_colours
+from swashplate.identification.checked_ends import CheckedEnd
 from swashplate.identification.coloured_noise import coloured_noise_covariance
 from swashplate.identification.covariance import (
     Covariance,
     hac_covariance,
     white_noise_covariance,
 )
-from swashplate.identification.intervals import Estimate, estimates
+from swashplate.identification.handed_on import Handed, with_handed
+from swashplate.identification.intervals import Estimate, estimates, reach
 from swashplate.identification.linearised import LinearisedFit
+from swashplate.identification.tones import Tone, separated
 
 Array = NDArray[np.float64]
 
@@ -33,6 +36,8 @@ class Uncertainty:
     """Errors of a fit's estimates: those to quote, and others beside them."""
 
     quoted: Covariance
+    """That of the stage's own noise with what earlier stages handed on."""
+    own: Covariance
     """Stationary coloured noise, or HAC for unknowns where that is significantly larger."""
     coloured: Covariance
     hac: Covariance
@@ -46,28 +51,44 @@ class Uncertainty:
     noisy: bool
     """Whether there are any residuals at all."""
     level: float
+    handed: tuple[Handed, ...] = ()
+    """What earlier stages do not know."""
+    tones: tuple[Tone, ...] = ()
+    """Lines in the residuals' spectra, taken out before the noise was judged."""
+    ends: tuple[CheckedEnd, ...] = ()
+    """Sides on which the cost does not rise as the covariance says."""
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
-        """Values with the quoted intervals."""
-        return estimates(self.quoted, level=self.level)
+        """Values with the quoted intervals; ends that were checked stand in place of others."""
+        more = reach(self.quoted, self.level) ** 2 - reach(self.own, self.level) ** 2
+        ends = {
+            (end.number, end.upper): float(np.sqrt(end.distance**2 + max(more[end.number], 0.0)))
+            for end in self.ends
+        }
+        return estimates(self.quoted, level=self.level, ends=ends)
 
     @property
     def inflation(self) -> Array:
         """(K,) samples that stand for one independent one, at least 1, unknown by unknown.
 
-        The ratio of the quoted variance to that of white noise; for profiles.
+        The ratio of the stage's own variance to that of white noise; for profiles.
         """
         white = np.diag(self.white.matrix)
-        known = self.quoted.determined & (white > 0.0)
-        ratio = np.divide(np.diag(self.quoted.matrix), white, out=np.ones_like(white), where=known)
+        known = self.own.determined & (white > 0.0)
+        ratio = np.divide(np.diag(self.own.matrix), white, out=np.ones_like(white), where=known)
         return np.maximum(ratio, 1.0)
 
     def sentences(self) -> tuple[str, ...]:
         """What the errors rest on."""
         if not self.noisy:
             return ("The residuals are exactly zero: errors of zero say nothing of other tests.",)
-        said = []
+        said = [
+            f"A tone at {tone.frequency:.3g} Hz makes {100.0 * tone.share:.2g} % of the residuals' "
+            f"variance of {tone.channel}; no unknown depends on it, and the noise is judged "
+            "without it."
+            for tone in self.tones
+        ]
         for colour in self.colours:
             if colour.length:
                 worth = (
@@ -97,19 +118,52 @@ class Uncertainty:
                 f"The noise is not alike in all parts of the runs: for {', '.join(self.uneven)} "
                 "the wider HAC interval is quoted."
             )
+        for end in self.ends:
+            side, name = "upper" if end.upper else "lower", self.own.variables.names[end.number]
+            if end.better is not None:
+                said.append(
+                    f"Moving {name} met a better optimum, cost {end.better:.6g}: start from more "
+                    "points."
+                )
+            elif not np.isfinite(end.distance):
+                said.append(
+                    f"{name} has no {side} end: the cost does not rise enough on that side."
+                )
+            else:
+                said.append(f"The {side} end of {name} is that of its profile, which is lopsided.")
+        widened = self._widened()
+        if widened is not None:
+            said.append(widened)
         return tuple(said)
 
+    def _widened(self) -> str | None:
+        """What the uncertainty of earlier stages does."""
+        known = self.own.determined & (np.diag(self.own.matrix) > 0.0)
+        if not self.handed or not known.any():
+            return None
+        ratio = np.where(known, self.quoted.standard_errors, 1.0) / np.where(
+            known, self.own.standard_errors, 1.0
+        )
+        most = int(np.argmax(ratio))
+        return (
+            "Intervals take in what the stages before do not know: it widens them by a factor of "
+            f"{float(np.median(ratio[known])):.2f} in the middle and of {ratio[most]:.2f} for "
+            f"{self.own.variables.names[most]}."
+        )
+
     def _ratio(self) -> float | None:
-        """Median of quoted over white error."""
-        known = self.quoted.determined & (self.white.standard_errors > 0.0)
+        """Median of the stage's own over white error."""
+        known = self.own.determined & (self.white.standard_errors > 0.0)
         if not known.any():
             return None
-        ratio = self.quoted.standard_errors[known] / self.white.standard_errors[known]
+        ratio = self.own.standard_errors[known] / self.white.standard_errors[known]
         median = float(np.median(ratio))
         return median if median > 1.05 else None
 
 
-def uncertainty(fit: LinearisedFit, *, level: float = 0.95) -> Uncertainty:
+def uncertainty(
+    fit: LinearisedFit, *, level: float = 0.95, handed: Sequence[Handed] = ()
+) -> Uncertainty:
     """Errors of a fit's estimates for coloured residuals, with white-noise ones beside them.
 
     Parameters
@@ -118,19 +172,23 @@ def uncertainty(fit: LinearisedFit, *, level: float = 0.95) -> Uncertainty:
         The fit at its optimum.
     level : float
         Probability of the intervals.
+    handed : sequence of Handed, optional
+        What earlier stages do not know.
 
     Raises
     ------
     InputError
         If there are no more samples than unknowns, or the level is not between 0 and 1.
     """
-    colours = noise_colours(fit)
-    coloured = coloured_noise_covariance(fit, colours=colours)
-    hac = hac_covariance(fit)
-    quoted, uneven = _wider(coloured, hac)
+    clean = separated(fit)
+    colours = noise_colours(clean.fit)
+    coloured = _with(coloured_noise_covariance(clean.fit, colours=colours), clean.covariance)
+    hac = _with(hac_covariance(clean.fit), clean.covariance)
+    own, uneven = _wider(coloured, hac)
     worth = {m: colour for colour in colours for m in colour.members}
     made = Uncertainty(
-        quoted,
+        with_handed(own, handed),
+        own,
         coloured,
         hac,
         white_noise_covariance(fit),
@@ -142,9 +200,16 @@ def uncertainty(fit: LinearisedFit, *, level: float = 0.95) -> Uncertainty:
         uneven,
         fit.squares > 0.0,
         level,
+        tuple(handed),
+        clean.tones,
     )
     made.estimates  # noqa: B018  refuses a wrong level
     return made
+
+
+def _with(covariance: Covariance, added: Array) -> Covariance:
+    known = np.outer(covariance.determined, covariance.determined)
+    return replace(covariance, matrix=covariance.matrix + np.where(known, added, 0.0))
 
 
 def _wider(coloured: Covariance, hac: Covariance) -> tuple[Covariance, tuple[str, ...]]:

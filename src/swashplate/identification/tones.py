@@ -1,0 +1,183 @@
+"""Tones in residuals, such as an ammeter's ripple: found, and told apart from the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, rfft, rfftfreq
+from scipy.ndimage import median_filter
+from scipy.signal import welch
+
+from swashplate.identification.autocorrelation import Grid, grid_of, unweighted
+from swashplate.identification.linearised import LinearisedFit, LinearisedRun
+
+Array = NDArray[np.float64]
+
+SEGMENT = 1024
+"""Samples in a stretch of the averaged spectrum: 2 s at 512 Hz, a resolution of some 0.75 Hz."""
+NEIGHBOURS = 81
+"""Bins about a peak whose median is its background."""
+OUTSTANDING = 6.0
+"""By how many of its standard deviations a peak must rise above it."""
+FLANK = 2.5
+"""A tone's band goes on to where the spectrum rises by fewer."""
+ROUNDS = 3
+"""How often tones are sought: weaker ones show when the stronger are gone."""
+MUTE = 0.02
+"""Share of the derivatives' power in a tone's band up to which it tells nothing of the unknowns."""
+
+
+class Tone(NamedTuple):
+    """A line in the spectrum of a channel's residuals."""
+
+    channel: str
+    low: float
+    """Ends of its band. [Hz]"""
+    high: float
+    share: float
+    """Of the residuals' variance. [1]"""
+
+    @property
+    def frequency(self) -> float:
+        """Its middle. [Hz]"""
+        return 0.5 * (self.low + self.high)
+
+
+class Separated(NamedTuple):
+    """A fit's residuals without their tones, and what the tones do to the estimates."""
+
+    fit: LinearisedFit
+    """The fit with tones taken out of the residuals."""
+    tones: tuple[Tone, ...]
+    scores: Array
+    """(rank, rank) Σ s sᵀ over runs, s the tones' scores in orthonormal directions."""
+
+    @property
+    def covariance(self) -> Array:
+        """(K, K) what the tones add to the estimates' covariance."""
+        added: Array = self.fit.whitening @ self.scores @ self.fit.whitening.T
+        return added
+
+
+def separated(fit: LinearisedFit) -> Separated:
+    """Take tones out of a fit's residuals.
+
+    Parameters
+    ----------
+    fit : LinearisedFit
+        The fit at its optimum.
+
+    Notes
+    -----
+    A tone of 100 Hz stays correlated over a whole run. Its power then leaks, through any taper of
+    the autocovariance, to the low frequencies where the derivatives are, and every error comes out
+    too large by as much as the tone stands above the noise. A line counts as a tone only where
+    the derivatives have next to no power: a model error at the frequency of a test is none.
+    """
+    middle = np.zeros((fit.rank, fit.rank))
+    runs, found = list(fit.runs), []
+    for channel, step, members in _groups(fit):
+        if min(fit.runs[m].time.size for m in members) < SEGMENT:
+            continue
+        bands: list[Tone] = []
+        left = {m: unweighted(fit.runs[m]) for m in members}
+        whole = sum(float(each @ each) for each in left.values())
+        for _ in range(ROUNDS):
+            grids = {m: grid_of(fit.runs[m].time) for m in members}
+            more = _tones(channel, step, [grids[m].spread(left[m]) for m in members])
+            more = [
+                t for t in more if _mute(t, step, [fit.runs[m] for m in members], fit.whitening)
+            ]
+            if not more:
+                break
+            remain = sum(float(each @ each) for each in left.values())
+            bands += [tone._replace(share=tone.share * remain / whole) for tone in more]
+            for m in members:
+                left[m] = left[m] - _within(left[m], grids[m], more)
+        if not bands:
+            continue
+        found += bands
+        for m in members:
+            run = runs[m]
+            part = unweighted(run) - left[m]
+            weighted = part if run.weight is None else part * run.weight
+            score = (run.jacobian @ fit.whitening).T @ weighted
+            middle += np.outer(score, score)
+            runs[m] = run._replace(residual=run.residual - weighted)
+    if not found:
+        return Separated(fit, (), middle)
+    return Separated(replace(fit, runs=tuple(runs)), tuple(found), middle)
+
+
+def _groups(fit: LinearisedFit) -> list[tuple[str, float, list[int]]]:
+    """Runs of one channel whose steps are alike to a part in a thousand."""
+    groups: list[tuple[str, float, list[int]]] = []
+    for number, run in enumerate(fit.runs):
+        step = grid_of(run.time).step
+        for channel, known, members in groups:
+            if channel == run.channel and abs(known - step) < 1e-3 * step:
+                members.append(number)
+                break
+        else:
+            groups.append((run.channel, step, [number]))
+    return groups
+
+
+def _tones(channel: str, step: float, runs: Sequence[Array]) -> list[Tone]:
+    """Lines of the averaged spectrum of samples on even grids."""
+    power = np.zeros(SEGMENT // 2 + 1)
+    stretches = 0.0
+    for samples in runs:
+        frequencies, density = welch(samples, 1.0 / step, nperseg=SEGMENT, detrend="constant")
+        power += samples.size * density
+        stretches += 2.0 * samples.size / SEGMENT - 1.0
+    if not power.any():
+        return []
+    background = np.maximum(median_filter(power, NEIGHBOURS, mode="nearest"), 1e-300)
+    # Hann stretches that overlap by half are nearly independent of each other (Welch 1967)
+    above = (power / background - 1.0) * np.sqrt(stretches)
+    made: list[Tone] = []
+    for peak in np.flatnonzero(above > OUTSTANDING):
+        if made and frequencies[peak] <= made[-1].high:
+            continue
+        low = high = int(peak)
+        while low > 0 and above[low - 1] > FLANK:
+            low -= 1
+        while high < power.size - 1 and above[high + 1] > FLANK:
+            high += 1
+        share = float(power[low : high + 1].sum() / power.sum())
+        made.append(Tone(channel, float(frequencies[low]), float(frequencies[high]), share))
+    return made
+
+
+def _mute(tone: Tone, step: float, runs: Sequence[LinearisedRun], whitening: Array) -> bool:
+    """Whether no direction's derivatives have more than little power in a tone's band."""
+    inside = np.zeros(whitening.shape[1])
+    total = np.zeros(whitening.shape[1])
+    for run in runs:
+        grid = grid_of(run.time)
+        power = np.abs(rfft(grid.spread(run.jacobian @ whitening), axis=0)) ** 2
+        band = _band(tone, grid.size, step)
+        inside += power[band].sum(axis=0)
+        total += power.sum(axis=0)
+    return bool((inside <= MUTE * total).all())
+
+
+def _within(samples: Array, grid: Grid, tones: Sequence[Tone]) -> Array:
+    """(n,) the part of a run's samples that lies in the tones' bands."""
+    spectrum = rfft(grid.spread(samples))
+    kept = np.zeros(spectrum.size, dtype=np.bool_)
+    for tone in tones:
+        kept |= _band(tone, grid.size, grid.step)
+    part: Array = irfft(np.where(kept, spectrum, 0.0), grid.size)[grid.places]
+    return part
+
+
+def _band(tone: Tone, size: int, step: float) -> NDArray[np.bool_]:
+    frequencies = rfftfreq(size, step)
+    inside: NDArray[np.bool_] = (frequencies >= tone.low) & (frequencies <= tone.high)
+    return inside
