@@ -4,14 +4,13 @@ The components are those of `spool_mechanism`, `stroker_flow`, `swash_mechanism`
 `motor_pressure`. What holds the states at their limits is left to whoever integrates them.
 """
 
-from math import sqrt, tan
+from math import tan
 from typing import NamedTuple
 
 from swashplate.physics.component import component
-from swashplate.physics.motor_pressure import load_torque, motor_pressure_drop, pump_flow
+from swashplate.physics.motor_pressure import load_torque, motor_pressure_drop
 from swashplate.physics.spool import orifice_opening
 from swashplate.physics.spool_mechanism import (
-    feedback_moment,
     spool_acceleration,
     spool_acceleration_partials,
 )
@@ -220,47 +219,4 @@ def free_rate_partials(
             -stiffness * machine.piston_area * speed_r,
         ),
         (r_p, r_t * stretch, r_r + r_m * m_r),
-    )
-
-
-@component
-def machine_powers(
-    position: float,
-    velocity: float,
-    pressure: float,
-    angle: float,
-    swash_rate: float,
-    force: float,
-    machine: Machine,
-) -> tuple[float, float, float, float, float, float, float]:
-    """Powers that pass through the mechanisms. [W]
-
-    Returns
-    -------
-    solenoid, spool_damping, feedback : float
-        Work done on the spool's mechanism by the solenoids, lost in its damping, done on it by the
-        swash plate's feedback arm.
-    piston, piston_damping, pumping : float
-        Work done on the plate by the stroker pressure, lost in the piston's damping, done by the
-        plate against the pumping pistons.
-    motor : float
-        Hydraulic power that the pump sends to the motor, (P_hi - P_lo) Q.
-    """
-    tangent = tan(angle)
-    stretch = 1.0 + tangent * tangent
-    sine = machine.arm_ratio * tangent
-    arm_rate = machine.arm_ratio * stretch * swash_rate / sqrt(1.0 - sine * sine)
-    moment = feedback_moment(
-        position, sine, machine.spool_arm, machine.spring_moment, machine.plussing
-    )
-    speed = piston_speed(tangent, swash_rate, machine.swash_arm)
-    motor_pressure = machine_motor_pressure(swash_rate, machine)
-    return (
-        force * velocity,
-        machine.spool_damping * velocity * velocity,
-        moment * arm_rate,
-        pressure * machine.piston_area * speed,
-        machine.piston_damping * speed * speed,
-        motor_pressure * machine.pumping_moment / sqrt(stretch) * swash_rate,
-        motor_pressure * pump_flow(angle, machine.flow_gain),
     )

@@ -1,0 +1,101 @@
+"""The full-order model: how long 30 s take, how well its paths agree, how good the reduction is.
+
+.venv/bin/python benchmarks/full_order.py            prints all tables
+.venv/bin/python benchmarks/full_order.py --write    also puts them into docs/full-order.md
+"""
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate import maneuvers
+from swashplate.full_order.drive import FullOrderDrive
+from swashplate.full_order.reduction import convergence, validity_table
+
+DOCUMENT = Path(__file__).parent.parent / "docs" / "full-order.md"
+CASES = {
+    "sine 6.5 V, 0.1 Hz": maneuvers.sine(6.5, 0.1, length=30.0),
+    "sine 9 V, 0.1 Hz, at both stops": maneuvers.sine(9.0, 0.1, length=30.0),
+}
+METHODS = ("march", "radau", "lsoda")
+ROUNDS = {"march": 9, "radau": 3, "lsoda": 3}
+EPSILONS = tuple(4.0**-k for k in range(6))
+
+
+def speeds() -> Iterator[str]:
+    """30 s of the hoist by each path: time, difference in speed, balances, events."""
+    yield "| 30 s of the hoist | path | median | speed off Radau at 1e-8 | worst balance | events |"
+    yield "|---|---|--:|--:|--:|--:|"
+    hoist = FullOrderDrive.preset("hoist")
+    for title, maneuver in CASES.items():
+        current = hoist.drive.simulate(maneuver.sample(512.0)).current
+        trusted = hoist.simulate_current(current, method="radau", tolerance=1e-8).shaft_speed
+        for method in METHODS:
+            run = hoist.simulate_current(current, method=method)
+            times = []
+            for _ in range(ROUNDS[method]):
+                begin = perf_counter()
+                hoist.simulate_current(current, method=method)
+                times.append(perf_counter() - begin)
+            off = np.degrees(np.abs(run.shaft_speed - trusted).max())
+            yield (
+                f"| {title} | {method} | {_seconds(median(times))} | {off:.1e} deg/s | "
+                f"{run.balances().worst:.0e} | {run.events} |"
+            )
+
+
+def validity() -> Iterator[str]:
+    """For which manoeuvres the one-state model will do."""
+    yield "| axis | manoeuvre | largest, % | rms, % | step error at 512 Hz, % | within |"
+    yield "|---|---|--:|--:|--:|---|"
+    for row in validity_table().iter_rows(named=True):
+        within = "0.1 %" if row["within_0_1_percent"] else "1 %" * row["within_1_percent"]
+        yield (
+            f"| {row['axis']} | {row['maneuver']} | {row['largest_percent']:.2f} | "
+            f"{row['rms_percent']:.2f} | {row['step_error_percent']:.2f} | {within or 'no'} |"
+        )
+
+
+def limit() -> Iterator[str]:
+    """How the difference shrinks with the inertias."""
+    yield "| axis | " + " | ".join(f"ε = 1/{1.0 / e:.0f}" for e in EPSILONS) + " | exponent |"
+    yield "|---|" + "--:|" * (len(EPSILONS) + 1)
+    step = maneuvers.step(4.0, start=0.5, stop=2.0, length=3.0).sample(512.0)
+    for name in ("hoist", "slew", "luff"):
+        found = convergence(FullOrderDrive.preset(name), step, EPSILONS)
+        sizes = 100.0 * np.array([each.rms / each.top_speed for _, each in found])
+        yield f"| {name} | " + " | ".join(f"{e:.4f}" for e in sizes) + f" | {_slope(sizes):.2f} |"
+
+
+def _slope(sizes: NDArray[np.float64]) -> float:
+    return float(np.polyfit(np.log(EPSILONS), np.log(sizes), 1)[0])
+
+
+def _seconds(time: float) -> str:
+    return f"{time:.2f} s" if time >= 1.0 else f"{1e3 * time:.0f} ms"
+
+
+def main() -> None:
+    """Print the tables, and on request write them into the documentation."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--write", action="store_true", help="also write docs/full-order.md")
+    write = parser.parse_args().write
+    for name, lines in (("limit", limit()), ("validity", validity()), ("speed", speeds())):
+        table = "\n".join(lines)
+        print(f"\n{table}", flush=True)
+        if write:
+            text = DOCUMENT.read_text("utf-8")
+            head, rest = text.split(f"<!-- {name}: begin -->")
+            tail = rest.split(f"<!-- {name}: end -->")[1]
+            DOCUMENT.write_text(
+                f"{head}<!-- {name}: begin -->\n{table}\n<!-- {name}: end -->{tail}", "utf-8"
+            )
+
+
+if __name__ == "__main__":
+    main()

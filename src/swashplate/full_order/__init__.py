@@ -1,0 +1,1 @@
+"""The five-state physical model behind the lumped parameters (Kruse 2001, chapter 6)."""
