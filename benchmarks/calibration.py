@@ -19,6 +19,7 @@ from collections import defaultdict
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
+from statistics import median
 
 # one core for each campaign: threads of the linear algebra would only wait for each other
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
@@ -60,15 +61,24 @@ def campaign(case, seed, axis):
     return rows
 
 
+def ends(row):
+    """Both ends of an interval, infinite where there is none; None for no interval at all."""
+    if not row["lower"] and not row["upper"]:
+        return None
+    return float(row["lower"] or -math.inf), float(row["upper"] or math.inf)
+
+
 def summary(rows):
     """Unknowns with an interval, how many hold the truth, and those without one."""
-    held = [float(r["lower"]) <= float(r["truth"]) <= float(r["upper"]) for r in rows if r["lower"]]
-    return len(held), sum(held), len(rows) - len(held)
+    told = [(ends(row), float(row["truth"])) for row in rows if ends(row)]
+    held = sum(low <= truth <= high for (low, high), truth in told)
+    return len(told), held, len(rows) - len(told)
 
 
 def table(rows, case):
     """Coverage of each unknown in one case, as Markdown."""
-    print("| stage | unknown | intervals | hold the truth | error, % (rms) | half width, % (median) |")
+    heads = ("stage", "unknown", "intervals", "hold the truth", "median error, %", "half width, %")
+    print(f"| {' | '.join(heads)} |")
     print("|---|---|--:|--:|--:|--:|")
     named = defaultdict(list)
     for row in rows:
@@ -76,15 +86,16 @@ def table(rows, case):
             named[row["stage"], row["unknown"]].append(row)
     for (stage, name), some in named.items():
         count, inside, _ = summary(some)
-        told = [row for row in some if row["lower"]]
-        error = [100.0 * (float(r["estimate"]) / float(r["truth"]) - 1.0) for r in told]
-        rms = math.sqrt(sum(e * e for e in error) / max(len(error), 1))
-        half = sorted(
-            50.0 * (float(r["upper"]) - float(r["lower"])) / abs(float(r["truth"])) for r in told
-        )
-        middle = half[len(half) // 2] if half else math.nan
+        both = [row for row in some if row["lower"] and row["upper"]]
+        errors = [abs(100.0 * (float(r["estimate"]) / float(r["truth"]) - 1.0)) for r in some]
+        widths = [
+            50.0 * (float(r["upper"]) - float(r["lower"])) / abs(float(r["truth"])) for r in both
+        ]
         share = 100.0 * inside / count if count else math.nan
-        print(f"| {stage} | {name} | {count} | {share:.1f} % | {rms:.3g} | {middle:.3g} |")
+        print(
+            f"| {stage} | {name} | {count} | {share:.1f} % | {median(errors):.2g} | "
+            f"{median(widths):.2g} |"
+        )
 
 
 def report(rows):

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from typer.testing import Result
 
 from swashplate import Drive
 
@@ -85,10 +86,49 @@ def test_starts_are_resumed_after_a_kill(campaign: Path, tmp_path: Path) -> None
     ).read_text("utf-8")
 
 
+def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path: Path) -> None:
+    asked = ("--folds", "2", "--bootstrap", "40", "--profile", "Z8", "--profile", "J_plus")
+    setup = ("--setup", "setup.toml", "--jobs", "1", "--figures", "svg")
+    said = done("fit", "virtual/campaign.toml", *setup, *asked)
+    assert "bootstrap" in said
+    assert "40 draws of blocks" in said
+    assert "Cross-validation" in said
+    assert "Held at their nominal values: V_dz, G1" in said
+    header, *rows = (tmp_path / "fitted" / "estimates.csv").read_text("utf-8").splitlines()
+    assert header.endswith("bootstrap lower 95 %,bootstrap upper 95 %")
+    # by other noise of the same kind the estimates move about as far as the errors say
+    columns = header.split(",")
+    for row in rows:
+        entry = dict(zip(columns, row.split(","), strict=True))
+        if "offset" in entry["unknown"]:
+            continue
+        wide = [float(entry[f"{name} 95 %"]) for name in ("lower", "upper")]
+        drawn = [float(entry[f"bootstrap {name} 95 %"]) for name in ("lower", "upper")]
+        assert 0.3 < (drawn[1] - drawn[0]) / (wide[1] - wide[0]) < 2.0, entry["unknown"]
+    assert list((tmp_path / "fitted" / "figures").glob("*.svg"))
+    page = (tmp_path / "fitted" / "report.html").read_text("utf-8")
+    assert "profile" in page.lower()
+    again = done("report", "fitted", "virtual/campaign.toml", "--out", "again")
+    assert "again/report.html" in again
+
+
+def test_a_result_that_is_of_no_use_ends_with_1(
+    run: Callable[..., Result], campaign: Path, tmp_path: Path
+) -> None:
+    narrow = SETUP.replace("relative = [0.5, 2.0]", "relative = [0.99, 1.01]")
+    (tmp_path / "narrow.toml").write_text(narrow, "utf-8")
+    result = run("fit", "virtual/campaign.toml", "--setup", "narrow.toml", "--no-report")
+    assert result.exit_code == 1
+    assert result.stderr.startswith("Not usable: ")
+    assert "bound" in result.stderr
+
+
 def test_refusals(refused: Words, campaign: Path, tmp_path: Path) -> None:
     fit = ("fit", "virtual/campaign.toml")
     assert "no packaged set-up 'boom'" in refused(*fit, "--setup", "boom")
     assert "no axis 'boom'; it has hoist" in refused(*fit, "--axis", "boom")
+    assert "20 draws do not reach the ends" in refused(*fit, "--bootstrap", "20")
+    assert "no unknown 'Z99'" in refused(*fit, "--setup", "setup.toml", "--profile", "Z99")
     (tmp_path / "bad.toml").write_text(SETUP.replace("Z16", "Z61"), "utf-8")
     assert "no parameter 'Z61'" in refused(*fit, "--setup", "bad.toml")
     (tmp_path / "bad.toml").write_text(SETUP.replace("relative", "relativ", 1), "utf-8")

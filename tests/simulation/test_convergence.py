@@ -64,3 +64,16 @@ def test_unstable_filter_is_refused_with_advice() -> None:
     settled = slew.simulate(voltage, substeps=2).current[5 * 512]
     # the Coulomb term may hold the filter within C/ω² of its level
     assert settled == pytest.approx(slew.steady_current(2.0), abs=4.8368 / 196.754**2 + 1e-6)
+
+
+def test_a_filter_with_little_damping_needs_short_steps() -> None:
+    """An explicit step is stable for ωh below 2ζ only: by hand 56/512 = 0.109, so ζ > 0.0547."""
+    voltage = maneuvers.step(4.0).sample(512.0)
+    omega = 56.0
+    stable = Drive.preset("hoist").replace(omega=omega, zeta=0.06)
+    assert np.isfinite(stable.simulate(voltage).current).all()
+    with pytest.raises(InputError, match="substeps=2 or more"):
+        stable.replace(zeta=0.05).simulate(voltage)
+    assert np.isfinite(stable.replace(zeta=0.05).simulate(voltage, substeps=2).current).all()
+    with pytest.raises(InputError, match="raise zeta"):
+        stable.replace(zeta=1e-5).simulate(voltage)

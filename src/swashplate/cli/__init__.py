@@ -12,7 +12,27 @@ import typer
 from typer.core import TyperGroup
 
 from swashplate.__about__ import __version__
-from swashplate.cli import campaign, compare, demo, fit, parameters, rig, simulate, tour
+from swashplate.cli import (
+    advise,
+    bode,
+    campaign,
+    compare,
+    compensate,
+    demo,
+    excite,
+    fit,
+    limits,
+    linearize,
+    parameters,
+    report,
+    rig,
+    sensitivity,
+    simulate,
+    size,
+    tour,
+    validate,
+    whatif,
+)
 from swashplate.cli.terminal import say_error
 from swashplate.errors import SwashplateError
 
@@ -96,11 +116,22 @@ def options(
 
 app.command("simulate", epilog=simulate.EXAMPLES)(simulate.simulate)
 app.command("compare", epilog=compare.EXAMPLES)(compare.compare)
+app.command("linearize", epilog=linearize.EXAMPLES)(linearize.linearize)
+app.command("bode", epilog=bode.EXAMPLES)(bode.bode)
+app.command("limits", epilog=limits.EXAMPLES)(limits.limits)
+app.command("compensate", epilog=compensate.EXAMPLES)(compensate.compensate)
+app.command("whatif", epilog=whatif.EXAMPLES)(whatif.whatif)
+app.command("sensitivity", epilog=sensitivity.EXAMPLES)(sensitivity.sensitivity)
+app.command("size", epilog=size.EXAMPLES)(size.size)
 app.command("axes", epilog=parameters.AXES_EXAMPLES)(parameters.axes)
 app.command("show", epilog=parameters.SHOW_EXAMPLES)(parameters.show_parameters)
 app.add_typer(campaign.app, name="campaign")
 app.command("rig", epilog=rig.EXAMPLES)(rig.rig)
+app.command("excitation", epilog=excite.EXAMPLES)(excite.excitation)
+app.command("advise", epilog=advise.EXAMPLES)(advise.advise)
 app.command("fit", epilog=fit.EXAMPLES)(fit.fit)
+app.command("validate", epilog=validate.EXAMPLES)(validate.validate)
+app.command("report", epilog=report.EXAMPLES)(report.report)
 app.command("tour", epilog=tour.EXAMPLES)(tour.tour)
 app.command("demo", epilog=demo.EXAMPLES)(demo.demo)
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swashplate.cli.fit import quality_table, reported, written
+from swashplate.cli.fit_output import quality_table, written
+from swashplate.cli.judging import Wanted, judged_fit
 from swashplate.cli.terminal import note, progress, say, show, table
 
 if TYPE_CHECKING:
@@ -16,15 +17,12 @@ if TYPE_CHECKING:
 
     from swashplate.drive import Drive
     from swashplate.identification.assessment import Assessment
-    from swashplate.identification.setup import Setup
 
 EXAMPLES = """\
 Examples:
   swashplate demo
   swashplate demo --out results --seed 3
 """
-SPREAD = 0.05
-"""Standard deviation of the logarithm by which true parameters differ from the published ones."""
 
 
 def demo(
@@ -43,55 +41,40 @@ def demo(
     from swashplate.campaign import rig
     from swashplate.campaign.campaign import Campaign
     from swashplate.drive import Drive
-    from swashplate.identification.assessment import assess
-    from swashplate.identification.fit import fit, refined
+    from swashplate.identification.fit import fit
+    from swashplate.identification.known_truth import drawn
     from swashplate.identification.setup import load_setup
-    from swashplate.identification.validation import predict
 
     setup = load_setup("hoist")
     nominal = Drive.preset("hoist")
     with progress(5) as begin:
         begin("testing the virtual hoist")
-        truth = _drawn(nominal, setup, seed)
+        truth = drawn(nominal, setup, seed)
         tests = rig.run("hoist", truth=truth, seed=seed)
         path = rig.write(tests, out / "virtual", overwrite=True)
         begin("reading its logs")
         campaign = Campaign.from_toml(path)
-        begin("fitting card and pump, then both together")
+        begin("fitting the card, then pump and motor")
         begun = perf_counter()
         runs = campaign.select(role="fit")
-        staged = fit(runs, campaign.drive("hoist").parameters, setup)
-        result = refined(staged, runs)
+        start = campaign.drive("hoist").parameters
+        result = fit(runs, start, setup)
         seconds = perf_counter() - begun
         begin("judging what the data tell")
-        assessments = assess(result.stages)
-        predicted = predict(result.parameters, campaign.select(role="validate"))
-        shown = [_truth_beside_estimate(each, nominal, truth) for each in assessments]
+        found = judged_fit(campaign, "hoist", runs, start, setup, result, Wanted(seed=seed))
+        shown = [_truth_beside_estimate(each, nominal, truth) for each in found.assessments]
         begin("writing the report")
-        lines = written(result, assessments, out)
-        lines.append(reported(result, campaign, assessments, predicted, out, seed))
+        lines = [*written(result, found.assessments, out), found.stored(out)]
+        lines.append(found.reported(out, truth.parameters))
     note(f"Campaign:  {path}")
     show(*(made for made, _, _ in shown))
     inside, counted = (sum(each) for each in zip(*(pair[1:] for pair in shown), strict=True))
     say(f"The truth lies within the 95 % interval for {inside} of {counted} unknowns.")
-    show(quality_table("Held back from the fit, and predicted", predicted))
+    show(quality_table("Held back from the fit, and predicted", found.predicted))
+    say(found.verdict.headline)
     note(f"Fitted in {seconds:.2f} s, compiling included where it was the first time.")
     for line in lines:
         note(line)
-
-
-def _drawn(nominal: Drive, setup: Setup, seed: int) -> Drive:
-    """A drive whose free parameters differ from the nominal ones."""
-    import numpy as np
-
-    from swashplate.parameters.parameter_set import columns_of
-
-    random = np.random.default_rng(seed)
-    names = [name for stage in setup.stages for name in columns_of(list(stage.free))]
-    names += columns_of(["Z19", "Z21"])
-    numbers = nominal.parameters.numbers
-    factors = {name: float(np.exp(random.normal(0.0, SPREAD))) for name in names}
-    return nominal.replace(**{name: numbers[name] * factor for name, factor in factors.items()})
 
 
 def _truth_beside_estimate(
@@ -99,9 +82,12 @@ def _truth_beside_estimate(
 ) -> tuple[Table, int, int]:
     """The table of a stage, how many intervals hold the truth, and of how many."""
     from swashplate.identification.drive_model import DriveModel
+    from swashplate.identification.known_truth import true_value
 
+    parts = {"card": "The control card", "pump": "Pump and motor"}
+    name = assessment.stage.stage.name
     made = table(
-        "Card, pump and motor, fitted together",
+        parts.get(name, name),
         "unknown",
         ">published",
         ">truth",
@@ -112,22 +98,20 @@ def _truth_beside_estimate(
     )
     model = assessment.stage.problem.model
     assert isinstance(model, DriveModel)
-    published, true = (
-        {**each.numbers, **(model.forces.values(each) if model.forces is not None else {})}
-        for each in (nominal.parameters, truth.parameters)
-    )
     inside, counted = 0, 0
     unknowns = assessment.stage.problem.unknowns
     for each, unknown in zip(assessment.uncertainty.estimates, unknowns, strict=True):
-        if unknown.run is not None:
+        value = true_value(unknown, model, truth.parameters)
+        begun = true_value(unknown, model, nominal.parameters)
+        if value is None or begun is None:
             continue
-        value = true[unknown.targets[0]]
-        begun = published[unknown.targets[0]]
-        row = [each.name, f"{begun:.5g}", f"{value:.5g}", f"{each.value:.5g}"]
-        if each.lower is None or each.upper is None:
+        row = [each.name, f"{begun:.3g}", f"{value:.5g}", f"{each.value:.5g}"]
+        if each.lower is None and each.upper is None:
             made.add_row(*row, each.status, "", "")
             continue
-        holds = each.lower <= value <= each.upper
+        lower = -float("inf") if each.lower is None else each.lower
+        upper = float("inf") if each.upper is None else each.upper
+        holds = lower <= value <= upper
         inside, counted = inside + holds, counted + 1
-        made.add_row(*row, f"{each.lower:.5g}", f"{each.upper:.5g}", "yes" if holds else "no")
+        made.add_row(*row, f"{lower:.5g}", f"{upper:.5g}", "yes" if holds else "no")
     return made, inside, counted

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from swashplate.cli.fit_output import (
+    estimates_table,
+    folds_table,
+    held_line,
+    quality_table,
+    written,
+)
 from swashplate.cli.inputs import parameters_of
-from swashplate.cli.terminal import note, say, show, table, working
+from swashplate.cli.judging import Wanted, judged_fit
+from swashplate.cli.terminal import note, say, show, side, working
+from swashplate.cli.validate import chosen_axis
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
     from rich.status import Status
-    from rich.table import Table
 
-    from swashplate.campaign.campaign import Campaign
-    from swashplate.identification.assessment import Assessment, RunQuality
-    from swashplate.identification.fit import Fit, Search
+    from swashplate.identification.fit import Search
     from swashplate.identification.solving import Progress
 
 EXAMPLES = """\
@@ -27,11 +32,16 @@ Examples:
   swashplate rig hoist --out virtual --perturb 0.1
   swashplate fit virtual/campaign.toml --out fitted
   swashplate fit harbour/campaign.toml --setup mine.toml --starts 50 --seed 1
+  swashplate fit harbour/campaign.toml --folds 5 --bootstrap 1000 --profile Z16_plus
   swashplate simulate fitted/drive.toml step:9
 """
 
+FEWEST_DRAWS = 40
+"""Of a bootstrap: one beyond each end of a 95 % interval."""
+
 Method = Literal["trf", "slsqp"]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
+Figures = Literal["svg", "pdf"]
 
 
 def fit(
@@ -48,19 +58,15 @@ def fit(
     setup: Annotated[
         str | None,
         typer.Option(
-            help="What is free: hoist, slew, luff, or your own TOML file; by default the one of "
-            "the axis's drive.",
+            help="What is free: a packaged set-up (hoist, slew, luff, hoist-source ...) or your "
+            "own TOML file; by default the one of the axis's drive.",
             metavar="NAME|FILE",
             show_default=False,
         ),
     ] = None,
     joint: Annotated[
         bool,
-        typer.Option(
-            "--joint",
-            help="After the stages all unknowns at once, through the whole chain: intervals then "
-            "take in what the card's stage does not know.",
-        ),
+        typer.Option("--joint", help="After the stages all unknowns at once, through the chain."),
     ] = False,
     begin: Annotated[
         str | None,
@@ -72,12 +78,26 @@ def fit(
         ),
     ] = None,
     starts: Annotated[int, typer.Option(help="More starts, spread over the bounds.", min=0)] = 0,
-    seed: Annotated[int, typer.Option(help="Of the starts.", min=0)] = 0,
-    jobs: Annotated[int, typer.Option(help="Processes for the starts; 0: all cores.", min=0)] = 0,
+    folds: Annotated[
+        int, typer.Option(help="Cross-validate over so many parts of the runs; 0: not.", min=0)
+    ] = 0,
+    bootstrap: Annotated[
+        int, typer.Option(help="Fit again to so many draws of the noise.", min=0)
+    ] = 0,
+    profile: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Follow the cost along this unknown, or 'all'; may be repeated.",
+            metavar="NAME",
+            show_default=False,
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of starts, folds and bootstrap.", min=0)] = 0,
+    jobs: Annotated[int, typer.Option(help="Processes for all of these; 0: all cores.", min=0)] = 0,
     dask: Annotated[
         str | None,
         typer.Option(
-            help="Run the starts on the cluster of this scheduler.",
+            help="Run them on the cluster of this scheduler.",
             metavar="ADDRESS",
             show_default=False,
         ),
@@ -92,29 +112,39 @@ def fit(
     report: Annotated[
         bool, typer.Option(help="Write report.html, one file that works offline.")
     ] = True,
+    figures: Annotated[
+        Figures | None,
+        typer.Option(help="Figures for print as well, in DIR/figures.", show_default=False),
+    ] = None,
 ) -> None:
     """Identify a drive from its tests.
 
     Fits the runs with the role 'fit', stage after stage, predicts those with the
     role 'validate', and says what the data can and cannot tell. Writes the drive
-    as a parameter file that 'simulate' takes, and the estimates with their
-    intervals. Ctrl-C keeps the best so far.
+    as a parameter file that 'simulate' takes, the estimates with their intervals,
+    and what 'report' needs to write the report again. Ctrl-C keeps the best so
+    far. The exit code is 1 if the result is not usable.
     """
     from swashplate.campaign.campaign import Campaign
-    from swashplate.identification.assessment import assess
+    from swashplate.identification.executors import Dask, Processes
     from swashplate.identification.fit import fit as fitted
     from swashplate.identification.fit import refined
     from swashplate.identification.staging import setup_of
-    from swashplate.identification.validation import predict
 
+    if 0 < bootstrap < FEWEST_DRAWS:
+        raise InputError(
+            f"{bootstrap} draws do not reach the ends of a 95 % interval; take {FEWEST_DRAWS} or "
+            "more, 1000 for smooth ones."
+        )
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
-        chosen = _axis(campaign, axis)
+        chosen = chosen_axis(campaign, axis)
         plan = setup_of(campaign, chosen, setup)
         nominal = parameters_of(begin) if begin is not None else campaign.drive(chosen).parameters
         runs = campaign.select(axis=chosen, role="fit")
-    if not runs:
-        raise InputError(f"{path}: no run of the axis '{chosen}' has the role 'fit'.")
+        if not runs:
+            raise InputError(f"{path}: no run of the axis '{chosen}' has the role 'fit'.")
+    executor = Dask(dask) if dask is not None else Processes(jobs or None)
     begun = perf_counter()
     with working("Fitting") as status:
 
@@ -123,182 +153,65 @@ def fit(
                 f"{stage}: iteration {now.iteration}, cost {now.cost:.6g}, {now.seconds:.1f} s"
             )
 
-        search = _search(starts, seed, jobs, dask, out, resume, status)
+        search = _search(starts, seed, executor, out, resume, status) if starts else None
         result = fitted(runs, nominal, plan, method=method, loss=loss, search=search, watch=watch)
-        if joint and len(plan.stages) > 1 and not result.stages[-1].solution.interrupted:
+        if joint and len(plan.stages) > 1 and not result.interrupted:
             result = refined(result, runs, watch=watch)
     seconds = perf_counter() - begun
-    with working("Judging"):
-        assessments = assess(result.stages)
-        predicted = predict(result.parameters, campaign.select(axis=chosen, role="validate"))
-        lines = written(result, assessments, out)
+    wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, method, loss)
+    found = judged_fit(campaign, chosen, runs, nominal, plan, result, wanted)
+    lines = [*written(result, found.assessments, out, found.bootstraps), found.stored(out)]
     if report:
-        with working("Writing the report"):
-            lines.append(reported(result, campaign, assessments, predicted, out, seed))
+        lines.append(found.reported(out))
+    if figures is not None:
+        lines.append(found.drawn(out, figures))
     note(f"{campaign.title}{' (virtual)' if campaign.virtual else ''}: fitted in {seconds:.2f} s")
-    for each in assessments:
-        show(_estimates(each))
-        solution = each.stage.solution
-        say(
-            f"{each.stage.stage.name}: {solution.message} after {solution.evaluations} evaluations."
-        )
-        for sentence in (*each.identifiability.sentences(), *each.uncertainty.sentences()):
+    for sentence in result.doubts:
+        say(f"! {sentence}")
+    for each in found.assessments:
+        name, solution = each.stage.stage.name, each.stage.solution
+        show(estimates_table(each, found.bootstraps.get(name)))
+        say(f"{name}: {solution.message} after {solution.evaluations} evaluations.")
+        said = (*each.identifiability.sentences(), *each.uncertainty.sentences())
+        drawn = found.bootstraps[name].sentences() if name in found.bootstraps else ()
+        for sentence in (*said, *drawn):
             say(f"- {sentence}")
-    show(quality_table("Runs that were fitted", [q for each in assessments for q in each.runs]))
-    if predicted:
-        show(quality_table("Runs that were held back and predicted", predicted))
+    for each_profile in found.profiles:
+        for sentence in each_profile.profile.sentences(found.name_of(each_profile)):
+            say(f"- {sentence}")
+    say(held_line(result))
+    fitted_runs = [quality for each in found.assessments for quality in each.runs]
+    show(quality_table("Runs that were fitted", fitted_runs))
+    if found.predicted:
+        show(quality_table("Runs that were held back and predicted", found.predicted))
+    if found.folds is not None:
+        show(folds_table(found.folds))
+        for sentence in found.folds.sentences():
+            say(f"- {sentence}")
     for line in lines:
         note(line)
-    if result.stages[-1].solution.interrupted:
+    if result.interrupted:
         note("Interrupted: this is the best so far, not an optimum.")
-
-
-def reported(
-    result: Fit,
-    campaign: Campaign,
-    assessments: Sequence[Assessment],
-    predicted: Sequence[RunQuality],
-    out: Path,
-    seed: int,
-) -> str:
-    """Write report.html; a line that says so."""
-    import platform
-
-    from swashplate.__about__ import __version__
-    from swashplate.report.fit_page import write_fit_report
-
-    write_fit_report(
-        result,
-        campaign,
-        out / "report.html",
-        assessments=assessments,
-        validation=predicted,
-        starts=result.stages[-1].starts,
-        notes={
-            "swashplate": __version__,
-            "Python": platform.python_version(),
-            "seed of the starts": str(seed),
-            "campaign": str(campaign.path),
-        },
-    )
-    return f"Report:    {out / 'report.html'}"
-
-
-def _axis(campaign: Campaign, axis: str | None) -> str:
-    if axis is None:
-        if len(campaign.axes) > 1:
-            raise InputError(
-                f"{campaign.path} has the axes {', '.join(campaign.axes)}; name one with --axis."
-            )
-        return next(iter(campaign.axes))
-    campaign.select(axis=axis)
-    return axis
+    if not found.verdict.usable:
+        side.print(found.verdict.headline)
+        raise typer.Exit(1)
+    say(found.verdict.headline)
 
 
 def _search(
-    starts: int, seed: int, jobs: int, dask: str | None, out: Path, resume: bool, status: Status
-) -> Search | None:
+    starts: int, seed: int, executor: object, out: Path, resume: bool, status: Status
+) -> Search:
     from swashplate.identification.executors import Dask, Processes
     from swashplate.identification.fit import Search
 
-    if not starts:
-        return None
+    assert isinstance(executor, Processes | Dask)
     return Search(
         starts,
         seed,
-        Dask(dask) if dask is not None else Processes(jobs or None),
+        executor,
         out / "starts",
         resume,
         lambda stage, result, done: status.update(
             f"{stage}: {done} of {starts + 1} starts, the last to cost {result.cost:.6g}"
         ),
     )
-
-
-def _estimates(assessment: Assessment) -> Table:
-    made = table(
-        f"Stage {assessment.stage.stage.name}",
-        "unknown",
-        ">nominal",
-        ">estimate",
-        ">95 % interval",
-        "",
-        "unit",
-    )
-    unknowns = assessment.stage.problem.unknowns
-    for each, unknown in zip(assessment.uncertainty.estimates, unknowns, strict=True):
-        if unknown.run is not None:
-            continue
-        low, high = (
-            ("", "")
-            if each.lower is None or each.upper is None
-            else (f"{each.lower:.5g}", f"{each.upper:.5g}")
-        )
-        made.add_row(
-            unknown.name,
-            f"{unknown.start:.5g}",
-            f"{each.value:.5g}",
-            low if low else each.status,
-            high,
-            unknown.unit,
-        )
-    return made
-
-
-def quality_table(title: str, runs: Sequence[RunQuality]) -> Table:
-    """Errors and fit % of runs, with start and ignored share beside them."""
-    from math import degrees
-
-    made = table(title, "run", "channel", "start", ">ignored", ">RMSE", "", ">fit %", wrap="run")
-    for each in runs:
-        channel = each.experiment[each.channel]
-        rmse, unit = each.measures.rmse, channel.unit
-        if unit.startswith("rad"):
-            rmse, unit = degrees(rmse), unit.replace("rad", "deg")
-        elif unit == "A":
-            rmse, unit = 1e3 * rmse, "mA"
-        ignored = 1.0 - channel.used.mean()
-        made.add_row(
-            each.experiment.run,
-            each.channel,
-            each.experiment.start,
-            f"{100.0 * ignored:.3g} %",
-            f"{rmse:.3g}",
-            unit,
-            "-" if each.measures.fit_percent is None else f"{each.measures.fit_percent:.2f}",
-        )
-    return made
-
-
-def written(result: Fit, assessments: Sequence[Assessment], out: Path) -> list[str]:
-    """Write the drive and the estimates; lines that say so."""
-    import polars as pl
-
-    from swashplate.drive import Drive
-    from swashplate.errors import FileError
-    from swashplate.tables import write_table
-
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(f"{out} cannot be made: {error.strerror or error}.") from None
-    Drive(result.parameters).to_toml(out / "drive.toml")
-    rows = [
-        {
-            "stage": each.stage.stage.name,
-            "unknown": estimate.name,
-            "unit": unknown.unit,
-            "nominal": unknown.start,
-            "estimate": estimate.value,
-            "lower 95 %": estimate.lower,
-            "upper 95 %": estimate.upper,
-            "standard error": estimate.standard_error,
-            "status": estimate.status,
-        }
-        for each in assessments
-        for estimate, unknown in zip(
-            each.uncertainty.estimates, each.stage.problem.unknowns, strict=True
-        )
-    ]
-    write_table(pl.DataFrame(rows), out / "estimates.csv")
-    return [f"Drive:     {out / 'drive.toml'}", f"Estimates: {out / 'estimates.csv'}"]

@@ -82,6 +82,11 @@ class Advice:
     duration: float | None
 
     @property
+    def rank(self) -> tuple[int, int, float]:
+        """Least for the best: unknowns newly determined, combinations, D-gain."""
+        return -len(self.newly_determined), -self.ranks, -self.d_gain
+
+    @property
     def best(self) -> Gain | None:
         """The unknown that gains most, of those that are then known to better than 100 %."""
         known = [gain for gain in self.gains if gain.after <= KNOWN]
@@ -146,11 +151,7 @@ def advise(
         if not 1.0 <= each.inflation < inf:
             raise InputError(f"{each.name}: {each.inflation:g} samples cannot stand for one.")
     judged = [_judge(present, each, variables, tolerance) for each in candidates]
-    return tuple(sorted(judged, key=_order))
-
-
-def _order(advice: Advice) -> tuple[int, int, float]:
-    return -len(advice.newly_determined), -advice.ranks, -advice.d_gain
+    return tuple(sorted(judged, key=lambda each: each.rank))
 
 
 def scaled_rows(derivatives: Array, deviation: float, inflation: float = 1.0) -> Array:

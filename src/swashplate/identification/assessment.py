@@ -26,6 +26,8 @@ from swashplate.identification.variables import Variables
 Array = NDArray[np.float64]
 BY_DIFFERENCES = 1e-6
 """Singular values of difference derivatives below this part of the largest count as zero."""
+LIMITS = ("Z13", "Z14", "Z15", "Z16")
+"""Parameters that limit something: stops, strokes, relief, orifices."""
 
 
 def variables_of(problem: Problem, vector: Array) -> Variables:
@@ -140,7 +142,12 @@ class Assessment:
         if not found.noisy:
             return found
         half = reach(found.own, found.level)
-        ends = checked_ends(self.stage.problem, self._vector, self.linearised, half)
+        limits = [
+            number
+            for number, unknown in enumerate(self.stage.problem.unknowns)
+            if unknown.targets[0].startswith(LIMITS)
+        ]
+        ends = checked_ends(self.stage.problem, self._vector, self.linearised, half, limits)
         return replace(found, ends=ends)
 
     @cached_property

@@ -21,6 +21,12 @@ LONGEST = 0.25
 DRIFTING = 0.3
 """Correlation length, as a part of the longest lag looked at, from which it is a model error."""
 
+IN_A_ROW = 5
+"""Lags in a row that must lie inside their band where a correlation is said to end."""
+
+STRAY = 0.2
+"""Share of those that follow that may lie outside."""
+
 SAME_STEP = 0.01
 """Relative difference of two runs' sampling steps below which they are treated as one."""
 
@@ -113,10 +119,12 @@ def correlation_length(autocovariance: Array, counts: Array) -> int:
     Notes
     -----
     The band at lag k is ±2 √((1 + 2 Σ_{j<k} ρ_j²)/n), Bartlett's for noise that is correlated over
-    fewer than k lags; "stays" means max(5, √log₁₀ n, k/4) lags in a row (Politis 2003). A
-    first-order plug-in from the lag-one correlation (Andrews 1991) is not used: filtered noise is
-    smooth from sample to sample and its lag one says hardly anything of its length, and a small
-    slow part under white noise would be missed.
+    fewer than k lags; "stays" means at least five lags in a row (Politis 2003), and not more than a
+    fifth of the next max(20, k/4): far out one lag in twenty lies outside by chance, and to wait
+    for k/4 in a row there would be to wait for ever. A first-order plug-in from the lag-one
+    correlation (Andrews 1991) is not used: filtered noise is smooth from sample to sample and its
+    lag one says hardly anything of its length, and a small slow part under white noise would be
+    missed.
     """
     variance = float(autocovariance[0])
     if not variance > 0.0:
@@ -124,14 +132,12 @@ def correlation_length(autocovariance: Array, counts: Array) -> int:
     rho = autocovariance / variance
     before = np.concatenate([[0.0], np.cumsum(rho[1:-1] ** 2)]) if rho.size > 1 else np.zeros(0)
     band = 2.0 * np.sqrt((1.0 + 2.0 * before) / np.maximum(counts[1:], 1.0))
-    outside = np.flatnonzero(np.abs(rho[1:]) > band) + 1
-    run_needed = max(5.0, float(np.sqrt(np.log10(max(counts[0], 10.0)))))
-    length = 0
-    for lag in outside:
-        if lag - length > max(run_needed, 0.25 * length):
-            break
-        length = int(lag)
-    return length
+    outside = np.abs(rho[1:]) > band  # of lag k at k - 1
+    for length in (0, *(np.flatnonzero(outside) + 1)):
+        after = outside[length : length + max(20, length // 4)]
+        if not after[:IN_A_ROW].any() and after.sum() <= STRAY * max(after.size, 1):
+            return int(length)
+    return int(rho.size - 1)
 
 
 def flat_top(lags: Array, length: float) -> Array:

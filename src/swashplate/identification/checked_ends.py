@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +18,10 @@ Array = NDArray[np.float64]
 
 SHALLOW = 0.25
 """Part of the linearised rise of the cost below which an interval's end is looked for anew."""
-FURTHEST = 24
+FURTHEST = 8
 """Most points of the profile on such a side."""
+TRIES = 20
+"""Evaluations of a fit without a limit: one that is not needed is let go of in ten."""
 
 
 class CheckedEnd(NamedTuple):
@@ -35,7 +38,11 @@ class CheckedEnd(NamedTuple):
 
 
 def checked_ends(
-    problem: Problem, vector: Array, linearised: LinearisedFit, reach: Array
+    problem: Problem,
+    vector: Array,
+    linearised: LinearisedFit,
+    reach: Array,
+    limits: Collection[int] = (),
 ) -> tuple[CheckedEnd, ...]:
     """Sides on which the cost does not rise as the linearised fit says, and how it does.
 
@@ -49,6 +56,8 @@ def checked_ends(
         The fit there.
     reach : (K,) array
         Half width of each interval in the solver's vector; 0 for unknowns without one.
+    limits : collection of int
+        Numbers of the unknowns that limit something, such as a stop.
 
     Notes
     -----
@@ -56,6 +65,11 @@ def checked_ends(
     side only: the linearised interval is narrow on both. So the cost is taken at both ends, the
     other unknowns moved along as linear theory says. Where it has risen by less than a quarter of
     what it should, the profile is followed on that side, to a true end or to none.
+
+    A level that a drive keeps may be a stop, or the balance of its forces: two optima far apart. So
+    each limit is also put out of the way, at its upper bound, and all else fitted again; if that
+    costs less than the interval's end would, the data do not need the limit, and it has no upper
+    end.
     """
     inverse = linearised.whitening @ linearised.whitening.T
     low, high = problem.bounds
@@ -64,6 +78,9 @@ def checked_ends(
     for index in np.flatnonzero(reach > 0.0):
         direction = inverse[index] / inverse[index, index]
         rise = 0.5 * reach[index] ** 2 / inverse[index, index]
+        if index in limits and _unneeded(problem, vector, int(index), cost + rise):
+            found.append(CheckedEnd(int(index), True, np.inf))
+            continue
         for sign in (-1.0, 1.0):
             end = np.clip(vector + sign * reach[index] * direction, low, high)
             try:
@@ -74,7 +91,7 @@ def checked_ends(
                 continue
             bound = float(high[index] if sign > 0.0 else low[index])
             side = ProfileSide(
-                minimiser(problem),
+                minimiser(problem, tolerance=1e-6, max_evaluations=TRIES),
                 Point(float(vector[index]), cost, vector),
                 int(index),
                 rise,
@@ -88,3 +105,16 @@ def checked_ends(
             better = side.better.cost if side.better is not None else None
             found.append(CheckedEnd(int(index), sign > 0.0, float(distance), better))
     return tuple(found)
+
+
+def _unneeded(problem: Problem, vector: Array, index: int, allowed: float) -> bool:
+    """Whether a fit with a limit out of the way is as good."""
+    start = vector.copy()
+    start[index] = problem.bounds[1][index]
+    try:
+        cost, _ = minimiser(problem, tolerance=1e-6, max_evaluations=TRIES)(
+            index, float(start[index]), start
+        )
+    except DomainError:
+        return False
+    return cost < allowed

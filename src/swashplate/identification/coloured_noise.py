@@ -82,6 +82,8 @@ class NoiseModel(NamedTuple):
     """For each colour (rank, rank) covariance of the scores in orthonormal directions."""
     prior: Array
     """(rank, rank) the same of the priors."""
+    freedoms: tuple[Array, ...]
+    """For each colour (K,) degrees of freedom of what it adds to each unknown's variance."""
 
 
 def noise_model(fit: LinearisedFit, *, colours: Sequence[NoiseColour] | None = None) -> NoiseModel:
@@ -115,7 +117,8 @@ def noise_model(fit: LinearisedFit, *, colours: Sequence[NoiseColour] | None = N
             for m in colour.members:
                 losses[m] = parts[m].loss(levels[m] * colour.correlation, whole)
             refined[k] = _refined(colour, parts, losses)
-    return NoiseModel(tuple(refined), levels, tuple(middles), prior)
+    freedoms = tuple(_spectral_freedom(fit, colour, parts, levels) for colour in refined)
+    return NoiseModel(tuple(refined), levels, tuple(middles), prior, freedoms)
 
 
 class _Part:
@@ -136,20 +139,21 @@ class _Part:
         spectra: Complex = rfft(spread, self.size)
         return spectra
 
-    def _power(self, autocovariance: Array) -> Array:
+    def power(self, autocovariance: Array) -> Array:
+        """(size//2 + 1,) the noise's spectrum."""
         # a tapered estimate may dip below zero between two peaks; a spectrum does not
         return np.maximum(spectrum(autocovariance[: self.sums.size], self.size), 0.0)
 
     def middle(self, autocovariance: Array) -> Array:
         """(rank, rank) Uᵀ Γ U."""
-        power = self._power(autocovariance)
+        power = self.power(autocovariance)
         power[1 : (self.size + 1) // 2] *= 2.0
         products: Array = ((self.by_noise * power) @ self.by_noise.conj().T).real / self.size
         return 0.5 * (products + products.T)
 
     def loss(self, autocovariance: Array, whole: Array) -> Array:
         """(lags + 1,) what the fit takes from the sums of products, if the noise is like this."""
-        filtered = irfft(self.by_noise * self._power(autocovariance), self.size)
+        filtered = irfft(self.by_noise * self.power(autocovariance), self.size)
         # only where the run has samples
         kept = filtered[:, self.grid.places] if not self.grid.whole else filtered
         kept = kept[:, : self.grid.size]
@@ -186,14 +190,39 @@ def _refined(colour: NoiseColour, parts: Sequence[_Part], losses: Sequence[Array
     return colour_of(colour.channel, colour.members, colour.step, sums, counts)
 
 
+def _spectral_freedom(
+    fit: LinearisedFit, colour: NoiseColour, parts: Sequence[_Part], levels: Mapping[int, float]
+) -> Array:
+    """(K,) degrees of freedom of a colour's part of each unknown's variance.
+
+    Those of the smoothed spectrum at one frequency, or, where more, two for each run and each of
+    the frequencies over which an unknown's derivatives spread: it averages over those.
+    """
+    samples = sum(fit.runs[m].time.size for m in colour.members)
+    smoothed = samples / max(FLAT_TOP_ENERGY * colour.length, 1.0)
+    weight = np.zeros(fit.variables.count)
+    counted = np.zeros(fit.variables.count)
+    for m in colour.members:
+        part = parts[m]
+        power = part.power(levels[m] * colour.correlation)
+        seen = np.abs(fit.whitening @ part.by_noise) ** 2 * power
+        total, squares = seen.sum(axis=1), np.sum(seen**2, axis=1)
+        # bins of the padded spectrum that stand for one independent frequency
+        padded = part.size / part.grid.size
+        spread = np.divide(total**2, squares, out=np.zeros_like(total), where=squares > 0.0)
+        weight += total
+        counted += total * np.maximum(spread / padded, 1.0)
+    frequencies = np.divide(counted, weight, out=np.ones_like(weight), where=weight > 0.0)
+    averaged = 2.0 * len(colour.members) * frequencies
+    freedom: Array = np.clip(np.maximum(smoothed, averaged), 1.0, max(samples - fit.rank, 1))
+    return freedom
+
+
 def _freedom(fit: LinearisedFit, model: NoiseModel) -> Array:
-    """(K,) degrees of freedom of each variance, from those of the channels' spectra."""
+    """(K,) degrees of freedom of each variance, from those of the channels."""
     total = np.einsum("ki,ij,kj->k", fit.whitening, model.prior, fit.whitening)
     spread = np.zeros(fit.variables.count)
-    for colour, middle in zip(model.colours, model.middles, strict=True):
-        samples = sum(fit.runs[m].time.size for m in colour.members)
-        spectral = samples / max(FLAT_TOP_ENERGY * colour.length, 1.0)
-        independent = max(min(spectral, float(samples - fit.rank)), 1.0)
+    for middle, independent in zip(model.middles, model.freedoms, strict=True):
         share = np.einsum("ki,ij,kj->k", fit.whitening, middle, fit.whitening)
         total = total + share
         spread += share**2 / independent

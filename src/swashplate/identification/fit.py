@@ -17,6 +17,7 @@ from swashplate.identification.executors import Executor, Serial
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Setup, Stage
 from swashplate.identification.solving import Loss, Method, Progress, Solution, solve
+from swashplate.identification.soundness import check_sound, refuse_unsound
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.starts import StartResult, sobol_starts, solve_from
 from swashplate.parameters.parameter_set import ParameterSet
@@ -65,11 +66,18 @@ class Fit:
     setup: Setup
     nominal: ParameterSet
     stages: tuple[StageFit, ...]
+    doubts: tuple[str, ...] = ()
+    """What the runs lack, in sentences, where they could be fitted all the same."""
 
     @property
     def parameters(self) -> ParameterSet:
         """The fitted drive's parameters."""
         return self.stages[-1].parameters
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the last stage's optimum."""
+        return self.stages[-1].solution.interrupted
 
 
 def fit(
@@ -107,11 +115,13 @@ def fit(
     Raises
     ------
     InputError, ParameterError
-        If campaign and set-up do not fit each other.
+        If campaign and set-up do not fit each other, or no fit of these runs can mean anything
+        (`soundness`).
     DomainError
         If the model does not hold at the nominal values.
     """
     parameters, stages = smooth(nominal), []
+    doubts = refuse_unsound(check_sound(experiments, parameters, setup))
     for stage in setup.stages:
         problem = stage_problem(stage, parameters, experiments, threads=threads)
         begin: Array | None = None
@@ -134,7 +144,7 @@ def fit(
         stages.append(StageFit(stage, problem, solution, parameters, results))
         if solution.interrupted:
             break
-    return Fit(setup, nominal, tuple(stages))
+    return Fit(setup, nominal, tuple(stages), doubts)
 
 
 def refined(

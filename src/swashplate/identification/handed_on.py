@@ -54,7 +54,7 @@ def slopes_by_earlier(
 
     Notes
     -----
-    The later estimate makes J₂ᵀ r₂ = 0, so that to first order dθ₂/dθ₁ = -(J₂ᵀJ₂)⁻¹ J₂ᵀ ∂r₂/∂θ₁: the
+    The later estimate makes J₂ᵀ r₂ = 0, so to first order dθ₂/dθ₁ = -(J₂ᵀJ₂)⁻¹ J₂ᵀ ∂r₂/∂θ₁: the
     second step of a two-step estimate (Murphy and Topel 1985). Gauss-Newton's approximation, as
     everywhere here: second derivatives times residuals are left out.
     """

@@ -47,7 +47,7 @@ class Held:
 
 
 def minimiser(
-    problem: Problem, *, tolerance: float = 1e-8
+    problem: Problem, *, tolerance: float = 1e-8, max_evaluations: int = 60
 ) -> Callable[[int, float, Array], tuple[float, Array]]:
     """What `profiles.profile` asks for: the least cost with one unknown held."""
 
@@ -58,7 +58,7 @@ def minimiser(
             vector = np.array([number])
             return problem.cost(vector), vector
         held = Held(problem, index, number, others)
-        found = solve(held, others, tolerance=tolerance, max_evaluations=60)
+        found = solve(held, others, tolerance=tolerance, max_evaluations=max_evaluations)
         return found.cost, held.whole(found.vector)
 
     return minimise

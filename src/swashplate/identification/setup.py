@@ -9,11 +9,12 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 
 from swashplate.campaign.kinds import ChannelKind
-from swashplate.campaign.schema import Weight
+from swashplate.campaign.schema import NotNegative, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.errors import ParameterError
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
 Pair = tuple[Finite, Finite]
 
 
@@ -56,6 +57,23 @@ class GivenForces(Entry):
     relative: Pair = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
 
 
+class InputWeight(Window):
+    """A weight that depends on the size of the command."""
+
+    factors: tuple[tuple[NotNegative, NotNegative], ...] = Field(
+        min_length=2,
+        description="[|input|, factor on the squared error] pairs, a polyline: "
+        "[[3, 1], [10, 0.5]].",
+    )
+
+    @model_validator(mode="after")
+    def _increasing(self) -> InputWeight:
+        levels = [level for level, _ in self.factors]
+        if levels != sorted(set(levels)):
+            raise ValueError("the inputs of factors must increase")
+        return self
+
+
 class Stage(Entry):
     """One fit: a part of the drive against its channels."""
 
@@ -63,15 +81,38 @@ class Stage(Entry):
     part: Literal["card", "pump", "chain"]
     current: Literal["simulated", "measured"] = Field(
         "simulated",
-        description="What drives the pump alone: the fitted card's current, or the "
-        "input, where that is a current.",
+        description="What drives the pump alone: the fitted card's current, or what was measured: "
+        "the input, where that is a current, or else the channel of the current, an ammeter around "
+        "both leads with the command's sign.",
     )
+    current_scale: Positive = Field(1.0, description="Factor on the measured current.")
     channels: tuple[ChannelKind, ...] = Field((), description="Kinds to fit; all if empty.")
     free: dict[str, Free] = Field(min_length=1)
     forces: GivenForces | None = None
     weights: dict[ChannelKind, tuple[Weight, ...]] = Field(
         {}, description="Windows that count more or less, besides those of the campaign."
     )
+    weights_by_input: dict[ChannelKind, tuple[InputWeight, ...]] = Field(
+        {}, description="Weights by the size of the command, besides those of the campaign."
+    )
+    clock_offsets: dict[ChannelKind, Positive] = Field(
+        {},
+        description="Largest offset of a channel's clock against the input's, free and the same in "
+        "all runs [s].",
+    )
+    start_pressure: Positive | None = Field(
+        None,
+        description="Largest stroking pressure at the first sample, free in each run [Pa]; where "
+        "none is given, it is free in runs with start = 'estimated' alone.",
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Stage:
+        if self.current_scale != 1.0 and (self.part, self.current) != ("pump", "measured"):
+            raise ValueError("current_scale needs part = 'pump' and current = 'measured'")
+        if self.start_pressure is not None and self.part == "card":
+            raise ValueError("a card alone has no start_pressure")
+        return self
 
 
 class Setup(Entry):
@@ -86,17 +127,36 @@ class Setup(Entry):
         Raises
         ------
         ParameterError
-            If two stages free the same parameter.
+            If two stages free the same parameter, or one is driven by a scaled current, which no
+            chain makes.
         """
         free: dict[str, Free] = {}
         for stage in self.stages:
+            if stage.current_scale != 1.0:
+                raise ParameterError(
+                    f"The stage '{stage.name}' is driven by {stage.current_scale:g} times the "
+                    "measured current, so no joint fit through the card can stand for it."
+                )
             twice = sorted(set(free) & set(stage.free))
             if twice:
                 raise ParameterError(f"{twice[0]} is free in two stages; a joint fit needs one.")
             free |= stage.free
         forces = next((each.forces for each in self.stages if each.forces is not None), None)
-        weights = {kind: w for stage in self.stages for kind, w in stage.weights.items()}
-        stage = Stage(name="chain", part="chain", free=free, forces=forces, weights=weights)
+        pressures = [each.start_pressure for each in self.stages if each.start_pressure is not None]
+        stage = Stage(
+            name="chain",
+            part="chain",
+            free=free,
+            forces=forces,
+            weights={kind: w for each in self.stages for kind, w in each.weights.items()},
+            weights_by_input={
+                kind: w for each in self.stages for kind, w in each.weights_by_input.items()
+            },
+            clock_offsets={
+                kind: most for each in self.stages for kind, most in each.clock_offsets.items()
+            },
+            start_pressure=max(pressures, default=None),
+        )
         return Setup(title=self.title, stages=(stage,))
 
 

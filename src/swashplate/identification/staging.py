@@ -3,22 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.weighting import applying, inside
 from swashplate.errors import InputError, ParameterError
 from swashplate.identification.drive_model import CURRENTS, SIGNALS, DriveModel
-from swashplate.identification.drives import current_record, simulated_current
+from swashplate.identification.drives import simulated_current
 from swashplate.identification.executors import available_cores
 from swashplate.identification.forces import Forces
+from swashplate.identification.measured_current import measured_current
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
+from swashplate.identification.stage_weights import check_weights, weighted
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
 from swashplate.parameters.parameter_set import ParameterSet, find
 from swashplate.simulation.residuals import START_PRESSURE
+
+LARGEST_START_PRESSURE = 4e6
+"""Bound of a free pressure at the start where the set-up gives none. [Pa]"""
+
+
+@dataclass(frozen=True)
+class DriveProblem(Problem):
+    """The problem of a drive, which knows that more current makes more force."""
+
+    @property
+    def rising(self) -> tuple[tuple[int, ...], ...]:
+        """For each direction the places of the solenoids' forces, where all are unknown."""
+        assert isinstance(self.model, DriveModel)
+        names, known = self.unknowns.names, self.model.forces
+        if known is None:
+            return ()
+        groups = []
+        for side in ("plus", "minus"):
+            forces = [name for name in known.names if f"_{side}_" in name]
+            if all(name in names and self.unknowns[names.index(name)].log for name in forces):
+                groups.append(tuple(names.index(name) for name in forces))
+        return tuple(groups)
 
 
 def setup_of(campaign: Campaign, axis: str, name: str | None = None) -> Setup:
@@ -47,7 +71,7 @@ def stage_problem(
     experiments: Sequence[Experiment],
     *,
     threads: int | None = None,
-) -> Problem:
+) -> DriveProblem:
     """The problem of a stage.
 
     Parameters
@@ -64,19 +88,21 @@ def stage_problem(
     Raises
     ------
     InputError
-        If no experiment has a channel that the stage fits.
+        If no experiment has a channel that the stage fits, none that it weighs, or no current that
+        the stage asks for.
     ParameterError
         If a free parameter is unknown or its bounds are wrong.
     """
     channels = _channels(stage, experiments)
     runs = tuple(each for each in experiments if any(name in each.channels for name in channels))
+    check_weights(stage, runs, channels)
     forces = None
     if stage.forces is not None:
         forces = Forces(stage.forces.plus, stage.forces.minus)
     currents = {}
     if stage.part == "pump":
         currents = {
-            each.name: current_record(each)
+            each.name: measured_current(each, stage.current_scale)
             if stage.current == "measured" or each.input.kind == "current"
             else simulated_current(each, parameters)
             for each in runs
@@ -84,11 +110,12 @@ def stage_problem(
     unknowns = (
         *_parameters(stage.free, parameters),
         *_forces(stage, forces, parameters),
+        *_clocks(stage, runs, channels),
         *_own(stage, runs, channels),
     )
-    return Problem(
+    return DriveProblem(
         DriveModel(parameters, stage.part, currents, forces),
-        tuple(_weighted(each, stage) for each in runs),
+        tuple(weighted(each, stage) for each in runs),
         Unknowns(unknowns),
         channels,
         noise_scales(runs, channels),
@@ -151,6 +178,29 @@ def _forces(stage: Stage, forces: Forces | None, parameters: ParameterSet) -> li
     ]
 
 
+def _clocks(
+    stage: Stage, experiments: Sequence[Experiment], channels: Sequence[str]
+) -> list[Unknown]:
+    """Offsets of the channels' clocks, each the same in all runs."""
+    kinds = {
+        name: each.channels[name].kind
+        for each in experiments
+        for name in channels
+        if name in each.channels
+    }
+    idle = [kind for kind in stage.clock_offsets if kind not in kinds.values()]
+    if idle:
+        raise InputError(
+            f"The stage '{stage.name}' frees the clock of {', '.join(idle)}, but fits "
+            f"{', '.join(dict.fromkeys(kinds.values()))}."
+        )
+    return [
+        Unknown(f"clock {name}", 0.0, -stage.clock_offsets[kind], stage.clock_offsets[kind], "s")
+        for name, kind in kinds.items()
+        if kind in stage.clock_offsets
+    ]
+
+
 def _own(stage: Stage, experiments: Sequence[Experiment], channels: Sequence[str]) -> list[Unknown]:
     """Unknowns of single experiments: free zeros of positions, an estimated initial pressure."""
     unknowns = []
@@ -171,21 +221,7 @@ def _own(stage: Stage, experiments: Sequence[Experiment], channels: Sequence[str
                     run=each.name,
                 )
             )
-        if stage.part != "card" and each.start == "estimated":
-            unknowns.append(Unknown(START_PRESSURE, 0.0, -4e6, 4e6, "Pa", run=each.name))
+        if stage.part != "card" and (stage.start_pressure is not None or each.start == "estimated"):
+            most = stage.start_pressure or LARGEST_START_PRESSURE
+            unknowns.append(Unknown(START_PRESSURE, 0.0, -most, most, "Pa", run=each.name))
     return unknowns
-
-
-def _weighted(experiment: Experiment, stage: Stage) -> Experiment:
-    """The experiment with the stage's own weights multiplied in."""
-    from dataclasses import replace
-
-    if not stage.weights:
-        return experiment
-    channels = {}
-    for name, channel in experiment.channels.items():
-        weight = channel.weight.copy()
-        for window in applying(stage.weights.get(channel.kind, ()), experiment.maneuver):
-            weight[inside(window, channel.time)] *= window.factor
-        channels[name] = replace(channel, weight=weight)
-    return replace(experiment, channels=channels)

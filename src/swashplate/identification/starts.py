@@ -1,22 +1,27 @@
-"""Many starts: Sobol points over the bounds, each solved, kept on disk as it ends."""
+"""Many starts, each solved, kept on disk as it ends."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.errors import DomainError, FileError, InputError
+from swashplate.errors import DomainError, FileError
+from swashplate.identification.dormant import nominal_effects, woken
+from swashplate.identification.drawing import sobol_starts as sobol_starts
 from swashplate.identification.executors import Executor, Serial
+from swashplate.identification.rising import by_increments
 from swashplate.identification.solving import Method, Objective, Solution, solve
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
+WAKINGS = 2
+"""How often a search is begun again where it lost an unknown."""
 
 
 @dataclass(frozen=True)
@@ -45,45 +50,27 @@ class _Task(NamedTuple):
     max_evaluations: int
 
 
-def sobol_starts(objective: Objective, count: int, seed: int) -> Iterator[Array]:
-    """Points spread evenly over the bounds, those outside the model's domain left out.
+def time_left(finished: int, left: int, seconds: float) -> float | None:
+    """Time that the remaining starts are likely to take. [s]
 
     Parameters
     ----------
-    objective : Objective
-        Whose bounds and domain.
-    count : int
-        How many points.
-    seed : int
-        Of the scrambling: the same seed, the same points, however many are asked for.
+    finished : int
+        Starts that were solved since the search began; not those that were there already.
+    left : int
+        Starts that are not finished.
+    seconds : float
+        Since the search began. [s]
 
-    Raises
-    ------
-    InputError
-        If hardly any point lies in the domain.
+    Returns
+    -------
+    float or None
+        At the pace so far, however many run side by side. None before the first is finished. Short
+        searches end first, so that early values are somewhat low.
     """
-    from scipy.stats.qmc import Sobol
-
-    low, high = objective.bounds
-    sequence = Sobol(low.size, scramble=True, rng=np.random.default_rng(seed))
-    found, tried = 0, 0
-    while found < count:
-        for point in sequence.random(8):
-            tried += 1
-            vector = low + point * (high - low)
-            try:
-                objective.cost(vector)
-            except DomainError:
-                continue
-            yield vector
-            found += 1
-            if found == count:
-                return
-        if tried > 200 * (found + 1):
-            raise InputError(
-                f"Of {tried} starts within the bounds only {found} lie in the model's domain; "
-                "narrow the bounds of the solenoids' forces."
-            )
+    if finished <= 0:
+        return None
+    return seconds / finished * max(left, 0)
 
 
 def solve_from(
@@ -149,15 +136,11 @@ def solve_from(
 def _solve_one(objective: Objective, task: _Task) -> StartResult:
     start = np.array(task.start)
     try:
-        solution = solve(
-            objective,
-            start,
-            method=task.method,
-            tolerance=task.tolerance,
-            max_evaluations=task.max_evaluations,
-        )
+        solution = _search(objective, start, task)
     except DomainError as error:
         solution = Solution(start, np.inf, np.inf, 1, False, False, str(error), 0.0)
+    if solution.interrupted:
+        raise KeyboardInterrupt
     return StartResult(
         task.number,
         task.start,
@@ -169,6 +152,42 @@ def _solve_one(objective: Objective, task: _Task) -> StartResult:
         solution.message,
         solution.seconds,
     )
+
+
+def _search(objective: Objective, start: Array, task: _Task) -> Solution:
+    """From a start; on from where it ends as long as that has lost an unknown and it helps."""
+    best = _solved(objective, start, task, task.max_evaluations)
+    if task.method != "trf":
+        return best
+    nominal = nominal_effects(objective)
+    evaluations, seconds = best.evaluations + 1, best.seconds
+    for _ in range(WAKINGS):
+        left = task.max_evaluations - evaluations
+        if best.interrupted or left <= 0:
+            break
+        point, spent = woken(objective, best.vector, nominal)
+        evaluations += spent
+        if point is None or evaluations >= task.max_evaluations:
+            break
+        again = _solved(objective, point, task, task.max_evaluations - evaluations)
+        evaluations, seconds = evaluations + again.evaluations, seconds + again.seconds
+        if not again.cost < best.cost:
+            best = replace(best, interrupted=again.interrupted)
+            break
+        best = replace(again, start_cost=best.start_cost)
+    return replace(best, evaluations=evaluations, seconds=seconds)
+
+
+def _solved(objective: Objective, start: Array, task: _Task, most: int) -> Solution:
+    form = by_increments(objective, start)
+    solution = solve(
+        form,
+        form.to_search(start),
+        method=task.method,
+        tolerance=task.tolerance,
+        max_evaluations=most,
+    )
+    return replace(solution, vector=form.to_vector(solution.vector))
 
 
 def _keep(store: Path, fingerprint: str, result: StartResult) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft, rfftfreq
 from scipy.ndimage import median_filter
-from scipy.signal import welch
+from scipy.signal import hilbert, welch
 
 from swashplate.identification.autocorrelation import Grid, grid_of, unweighted
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
@@ -25,6 +25,8 @@ OUTSTANDING = 6.0
 """By how many of its standard deviations a peak must rise above it."""
 FLANK = 2.5
 """A tone's band goes on to where the spectrum rises by fewer."""
+CORE = 0.2
+"""Background over power below which a bin is taken for the line itself."""
 ROUNDS = 3
 """How often tones are sought: weaker ones show when the stronger are gone."""
 MUTE = 0.02
@@ -40,6 +42,10 @@ class Tone(NamedTuple):
     high: float
     share: float
     """Of the residuals' variance. [1]"""
+    frequencies: Array
+    """(n,) in the band. [Hz]"""
+    excess: Array
+    """(n,) share of the amplitude there that stands above the background. [1]"""
 
     @property
     def frequency(self) -> float:
@@ -54,7 +60,8 @@ class Separated(NamedTuple):
     """The fit with tones taken out of the residuals."""
     tones: tuple[Tone, ...]
     scores: Array
-    """(rank, rank) Σ s sᵀ over runs, s the tones' scores in orthonormal directions."""
+    """(rank, rank) covariance of the tones' scores in orthonormal directions, their phases being
+    chance."""
 
     @property
     def covariance(self) -> Array:
@@ -86,12 +93,11 @@ def separated(fit: LinearisedFit) -> Separated:
         bands: list[Tone] = []
         left = {m: unweighted(fit.runs[m]) for m in members}
         whole = sum(float(each @ each) for each in left.values())
+        grids = {m: grid_of(fit.runs[m].time) for m in members}
+        seen = {m: _powers(fit.runs[m], grids[m], fit.whitening) for m in members}
         for _ in range(ROUNDS):
-            grids = {m: grid_of(fit.runs[m].time) for m in members}
             more = _tones(channel, step, [grids[m].spread(left[m]) for m in members])
-            more = [
-                t for t in more if _mute(t, step, [fit.runs[m] for m in members], fit.whitening)
-            ]
+            more = [tone for tone in more if _mute(tone, grids, seen)]
             if not more:
                 break
             remain = sum(float(each @ each) for each in left.values())
@@ -105,8 +111,7 @@ def separated(fit: LinearisedFit) -> Separated:
             run = runs[m]
             part = unweighted(run) - left[m]
             weighted = part if run.weight is None else part * run.weight
-            score = (run.jacobian @ fit.whitening).T @ weighted
-            middle += np.outer(score, score)
+            middle += _any_phase(part, run, fit.whitening)
             runs[m] = run._replace(residual=run.residual - weighted)
     if not found:
         return Separated(fit, (), middle)
@@ -149,31 +154,55 @@ def _tones(channel: str, step: float, runs: Sequence[Array]) -> list[Tone]:
             low -= 1
         while high < power.size - 1 and above[high + 1] > FLANK:
             high += 1
-        share = float(power[low : high + 1].sum() / power.sum())
-        made.append(Tone(channel, float(frequencies[low]), float(frequencies[high]), share))
+        band = slice(low, high + 1)
+        share = float(power[band].sum() / power.sum())
+        level = background[band] / power[band]
+        # the line itself goes as a whole: a rest of it would be as long a correlation
+        excess = np.where(level < CORE, 1.0, 1.0 - np.sqrt(np.minimum(level, 1.0)))
+        ends = float(frequencies[low]), float(frequencies[high])
+        made.append(Tone(channel, *ends, share, frequencies[band], excess))
     return made
 
 
-def _mute(tone: Tone, step: float, runs: Sequence[LinearisedRun], whitening: Array) -> bool:
+def _powers(run: LinearisedRun, grid: Grid, whitening: Array) -> Array:
+    """(F, rank) power spectra of the derivatives in orthonormal directions."""
+    powers: Array = np.abs(rfft(grid.spread(run.jacobian @ whitening), axis=0)) ** 2
+    return powers
+
+
+def _mute(tone: Tone, grids: Mapping[int, Grid], powers: Mapping[int, Array]) -> bool:
     """Whether no direction's derivatives have more than little power in a tone's band."""
-    inside = np.zeros(whitening.shape[1])
-    total = np.zeros(whitening.shape[1])
-    for run in runs:
-        grid = grid_of(run.time)
-        power = np.abs(rfft(grid.spread(run.jacobian @ whitening), axis=0)) ** 2
-        band = _band(tone, grid.size, step)
-        inside += power[band].sum(axis=0)
-        total += power.sum(axis=0)
-    return bool((inside <= MUTE * total).all())
+    inside = sum(
+        powers[m][_band(tone, grid.size, grid.step)].sum(axis=0) for m, grid in grids.items()
+    )
+    total = sum(each.sum(axis=0) for each in powers.values())
+    return bool(np.all(inside <= MUTE * total))
+
+
+def _any_phase(tone: Array, run: LinearisedRun, whitening: Array) -> Array:
+    """(rank, rank) mean of s sᵀ over all phases of a tone (n,), s its score.
+
+    The score as it happened to be would be a sample of one.
+    """
+    weight = 1.0 if run.weight is None else run.weight
+    turned = hilbert(tone) * weight
+    score = (run.jacobian @ whitening).T @ turned
+    mean: Array = 0.5 * np.outer(score, score.conj()).real
+    return mean
 
 
 def _within(samples: Array, grid: Grid, tones: Sequence[Tone]) -> Array:
-    """(n,) the part of a run's samples that lies in the tones' bands."""
+    """(n,) what of a run's samples stands above the background in the tones' bands.
+
+    No more than that: a hole in the spectrum would be a long correlation again.
+    """
     spectrum = rfft(grid.spread(samples))
-    kept = np.zeros(spectrum.size, dtype=np.bool_)
+    frequencies = rfftfreq(grid.size, grid.step)
+    taken = np.zeros(spectrum.size)
     for tone in tones:
-        kept |= _band(tone, grid.size, grid.step)
-    part: Array = irfft(np.where(kept, spectrum, 0.0), grid.size)[grid.places]
+        band = _band(tone, grid.size, grid.step)
+        taken[band] = np.interp(frequencies[band], tone.frequencies, tone.excess)
+    part: Array = irfft(spectrum * taken, grid.size)[grid.places]
     return part
 
 

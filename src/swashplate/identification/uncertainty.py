@@ -23,7 +23,7 @@ from swashplate.identification.tones import Tone, separated
 
 Array = NDArray[np.float64]
 
-DEVIATIONS = 5.0
+DEVIATIONS = 2.0
 """By how many of its own standard deviations a HAC error must be larger to count as such. It is
 taken from squares of coloured residuals, of which three are exceeded in one campaign of eight."""
 

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from swashplate.parameters.parameter_set import CoulombSign, CardSwitch, PressureRoot, Status
+from swashplate.parameters.parameter_set import CardSwitch, CoulombSign, PressureRoot, Status
 
 TwoNumbers = Annotated[list[float], Field(min_length=2, max_length=2)]
 

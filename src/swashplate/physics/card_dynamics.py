@@ -52,7 +52,7 @@ def filtered_current(
     Returns
     -------
     float
-        I* at the next sample; Kruse eq. 3.6. Stable for ωh < 2 and ζωh < 1 + ω²h²/4 only. [A]
+        I* at the next sample; Kruse eq. 3.6. Stable for ωh < 2ζ and ζωh < 1 + ω²h²/4 only. [A]
     """
     w = omega * step
     friction = C * step * step * coulomb_sign(current - previous, step, literal)

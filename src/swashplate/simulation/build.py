@@ -103,26 +103,40 @@ def build_delay(tau: float, step: float) -> Delay:
     )
 
 
+MOST_SUBSTEPS = 1000
+"""Steps a sample that anyone would wait for."""
+
+
 def check_filter_stability(owner: str, zeta: float, omega: float, side: str, step: float) -> None:
     """Refuse a step at which the explicit filter would settle on wrong values without a word.
 
     Raises
     ------
     InputError
-        Unless ωh < 2 and ζωh < 1 + ω²h²/4; the sentence says how many steps a sample would do.
+        Unless ωh < 2ζ and ζωh < 1 + ω²h²/4; the sentence says how many steps a sample would do.
+
+    Notes
+    -----
+    Jury's criterion for z² - 2(1 - ζωh) z + 1 - 2ζωh + ω²h². The first condition is the stricter
+    one where damping is small: an explicit step adds to a swing what the damping has to take away.
     """
     if _stable(zeta, omega, step):
         return
+    if omega * step >= 2.0 * zeta * MOST_SUBSTEPS:
+        raise InputError(
+            f"{owner}: the current filter of the {side} channel (zeta = {zeta:g}) has so little "
+            f"damping that {MOST_SUBSTEPS} steps a sample would not do; raise zeta."
+        )
     substeps = 2
     while not _stable(zeta, omega, step / substeps):
         substeps += 1
     raise InputError(
         f"{owner}: the current filter of the {side} channel (zeta = {zeta:g}, omega = {omega:g} "
         f"rad/s) is unstable at a step of 1/{1.0 / step:g} s; simulate with substeps={substeps} "
-        "or more or at a higher rate, or lower zeta or omega."
+        "or more or at a higher rate, or lower omega."
     )
 
 
 def _stable(zeta: float, omega: float, step: float) -> bool:
     w = omega * step
-    return w < 2.0 and zeta * w < 1.0 + 0.25 * w * w
+    return w < 2.0 * zeta and zeta * w < 1.0 + 0.25 * w * w

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, get_args
+from typing import NamedTuple
 
-from swashplate.identification.error_tables import ErrorTable, error_table
-from swashplate.identification.exclusions import ComparedRun, Kind, Quantity
+from swashplate.identification.error_tables import ErrorTable
+from swashplate.identification.exclusions import Rule
+from swashplate.identification.validation import ChannelErrors, channel_errors
 from swashplate.report.fit_page.numbers import listed
-from swashplate.report.fit_page.runs import Shown, ShownRun
-
-DITHER_MEAN = 0.1
-"""Width of the moving mean over a current's differences, against the dither. [s]"""
+from swashplate.report.fit_page.runs import ShownRun
 
 
 class ErrorSection(NamedTuple):
@@ -25,73 +23,33 @@ class ErrorSection(NamedTuple):
     remarks: tuple[str, ...]
 
 
-def error_sections(runs: Sequence[ShownRun]) -> tuple[ErrorSection, ...]:
+def error_sections(runs: Sequence[ShownRun], rules: Sequence[Rule]) -> tuple[ErrorSection, ...]:
     """A table for each channel, of the fitted runs and of those held out."""
-    keys = dict.fromkeys(
-        (run.role, each.stage, each.quality.channel)
-        for run in runs
-        for each in run.channels
-        # a per cent of a position, whose zero is free, means nothing
-        if not each.channel.is_position
-    )
+    keys = dict.fromkeys((run.role, each.stage) for run in runs for each in run.channels)
     sections = []
-    for role, stage, channel in keys:
+    for role, stage in keys:
         alike = [
-            (run, each)
+            each.quality
             for run in runs
             for each in run.channels
-            if (run.role, each.stage, each.quality.channel) == (role, stage, channel)
+            if (run.role, each.stage) == (role, stage)
         ]
-        section = _section(role, channel, alike)
-        if section is not None:
-            sections.append(section)
+        sections += [
+            ErrorSection(found.channel, role, found.table, error_remarks(found))
+            for found in channel_errors(alike, rules)
+        ]
     return tuple(sections)
 
 
-def _section(role: str, name: str, alike: Sequence[tuple[ShownRun, Shown]]) -> ErrorSection | None:
-    compared, unjudged = [], []
-    for run, shown in alike:
-        made = _compared(run, shown)
-        if made is None:
-            unjudged.append(run.experiment.name)
-        else:
-            compared.append(made)
-    if not compared:
-        return None
-    channel = alike[0][1].channel
+def error_remarks(found: ChannelErrors) -> tuple[str, ...]:
+    """What must be known of a table besides its rules."""
     remarks = []
-    average = DITHER_MEAN if channel.unit == "A" else 0.0
-    if average:
-        remarks.append(f"Differences of currents are averaged over {average:g} s: they dither.")
-    if name.startswith("speed from "):
+    if found.average:
+        remarks.append(
+            f"Differences of currents are averaged over {found.average:g} s: they dither."
+        )
+    if found.channel.startswith("speed from "):
         remarks.append("Measured and simulated positions are filtered alike to become speeds.")
-    if unjudged:
-        remarks.append(f"Neither ramp, step nor sine, or too short: {listed(unjudged)}.")
-    table = error_table(compared, average=average)
-    return ErrorSection(name, role, table, tuple(remarks))
-
-
-def _compared(run: ShownRun, shown: Shown) -> ComparedRun | None:
-    """A run as the table takes it, None if it belongs to none of its kinds."""
-    recognised, channel = run.experiment.recognised, shown.channel
-    word = run.experiment.maneuver.split(" ")[0]
-    kind = next((each for each in get_args(Kind) if each == word), None)
-    if kind is None or channel.time.size < 8:
-        return None
-    quantity: Quantity = "other"
-    if channel.kind in ("rectified_current", "shaft_speed"):
-        quantity = "rectified_current" if channel.kind == "rectified_current" else "shaft_speed"
-    used = channel.used
-    if not used.any():
-        return None
-    time = channel.time[used]
-    return ComparedRun(
-        run.experiment.name,
-        kind,
-        quantity,
-        time,
-        run.experiment.input.at(time),
-        channel.values[used],
-        shown.quality.simulated[used],
-        recognised.frequency if recognised is not None else None,
-    )
+    if found.unjudged:
+        remarks.append(f"Neither ramp, step nor sine, or too short: {listed([*found.unjudged])}.")
+    return tuple(remarks)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -15,11 +15,17 @@ from swashplate.errors import FileError
 from swashplate.identification.assessment import Assessment, RunQuality, assess
 from swashplate.identification.fit import Fit
 from swashplate.identification.starts import StartResult
+from swashplate.identification.validation import ignored_windows
+from swashplate.identification.verdict import starts_of
 from swashplate.report.broken_lines import draw_broken
 from swashplate.report.display_units import display_unit
 from swashplate.report.files import save_figure
 from swashplate.report.fit_page.run_tables import quality_row
-from swashplate.report.fit_page.runs import ShownRun, ignored_windows, shown_runs
+from swashplate.report.fit_page.runs import (
+    ShownRun,
+    predicted_runs,
+    shown_runs,
+)
 from swashplate.report.style import (
     BLUE,
     FAINT,
@@ -73,28 +79,57 @@ def save_fit_figures(
     Returns
     -------
     tuple of Path
-        ``overlay-01-hoistr3.svg`` and so on, ``waterfall.svg`` last where there are several starts.
+        ``overlay-01-hoistr3.svg`` and so on, last ``waterfall-card.svg`` of each stage that had
+        several starts, or ``waterfall.svg`` of those given.
 
     Raises
     ------
     FileError
         If the folder cannot be made or a file cannot be written.
     """
-    place = Path(folder)
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(f"{place} cannot be made: {error.strerror or error}.") from None
     assessed = assess(fit.stages) if assessments is None else assessments
-    paths = []
-    for number, run in enumerate(shown_runs(assessed, validation), start=1):
-        path = place / f"overlay-{number:02d}-{_plain_name(run.experiment.name)}.{format}"
-        save_figure(plot_overlay(run, virtual=campaign.virtual), path)
-        paths.append(path)
-    if len(starts) > 1:
-        paths.append(place / f"waterfall.{format}")
-        save_figure(plot_waterfall(starts), paths[-1])
+    paths = list(_overlays(shown_runs(assessed, validation), campaign, Path(folder), format))
+    for stage, results in starts_of(assessed, starts).items():
+        name = f"waterfall-{_plain_name(stage)}" if stage else "waterfall"
+        paths.append(Path(folder) / f"{name}.{format}")
+        save_figure(plot_waterfall(results), paths[-1])
     return tuple(paths)
+
+
+def save_run_figures(
+    predicted: Sequence[RunQuality],
+    campaign: Campaign,
+    folder: str | Path,
+    format: Literal["svg", "pdf", "png"] = "svg",
+) -> tuple[Path, ...]:
+    """Save the overlay of each run that a drive was held against.
+
+    Parameters
+    ----------
+    predicted : sequence of RunQuality
+        As `validation.predict` gives them.
+    campaign, folder, format :
+        As of `save_fit_figures`.
+
+    Raises
+    ------
+    FileError
+        If the folder cannot be made or a file cannot be written.
+    """
+    return tuple(_overlays(predicted_runs(predicted), campaign, Path(folder), format))
+
+
+def _overlays(
+    runs: Sequence[ShownRun], campaign: Campaign, folder: Path, format: str
+) -> Iterator[Path]:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{folder} cannot be made: {error.strerror or error}.") from None
+    for number, run in enumerate(runs, start=1):
+        path = folder / f"overlay-{number:02d}-{_plain_name(run.experiment.name)}.{format}"
+        save_figure(plot_overlay(run, virtual=campaign.virtual), path)
+        yield path
 
 
 def plot_overlay(run: ShownRun, *, virtual: bool = False) -> Figure:
@@ -127,7 +162,7 @@ def plot_overlay(run: ShownRun, *, virtual: bool = False) -> Figure:
         draw_broken(upper, time, factor * shown.channel.values, GREY)
         draw_broken(upper, time, factor * shown.quality.simulated, VERMILION)
         draw_broken(lower, time, shown.small.factor * shown.quality.residual, BLUE)
-        for first, last in ignored_windows(run.experiment, shown.channel):
+        for first, last in ignored_windows(shown.channel):
             for ax in (upper, lower):
                 ax.axvspan(first, last, color=FAINT, alpha=0.35, linewidth=0.0)
     axes[-1].set_xlim(float(drive.time[0]), float(drive.time[-1]))

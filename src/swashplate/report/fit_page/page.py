@@ -2,36 +2,30 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
-
-from bokeh.resources import Resources
-from jinja2 import Environment, StrictUndefined
-from markupsafe import Markup
 
 from swashplate.campaign.campaign import Campaign
 from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment, RunQuality, assess
 from swashplate.identification.fit import Fit, StageFit
-from swashplate.identification.profiles import Profile
-from swashplate.identification.residual_tests import ResidualTest
+from swashplate.identification.fit_file import StageProfile as StageProfile
+from swashplate.identification.fold_results import CrossValidation
 from swashplate.identification.starts import StartResult
-from swashplate.report.fit_page.error_sections import error_sections
-from swashplate.report.fit_page.numbers import count, fixed, plain
-from swashplate.report.fit_page.parameter_tables import held_rows, parameter_table
-from swashplate.report.fit_page.run_data import run_data
-from swashplate.report.fit_page.run_plots import stack_item, stack_of, stacks_of
-from swashplate.report.fit_page.run_tables import data_rows, quality_row, quality_rows
-from swashplate.report.fit_page.runs import ShownRun, shown_runs
-from swashplate.report.fit_page.setup_tables import stage_rows
-from swashplate.report.fit_page.small_charts import (
-    SmallChart,
-    autocorrelation_chart,
-    cross_correlation_chart,
+from swashplate.identification.verdict import Verdict, starts_of, verdict
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.report.fit_page.excitation_tables import excitation_table
+from swashplate.report.fit_page.fold_tables import fold_tables
+from swashplate.report.fit_page.numbers import count
+from swashplate.report.fit_page.parameter_tables import (
+    ParameterTable,
+    held_rows,
+    parameter_table,
 )
+from swashplate.report.fit_page.rendering import Section, rendered, shared_content
+from swashplate.report.fit_page.runs import shown_runs
+from swashplate.report.fit_page.setup_tables import stage_rows
 from swashplate.report.fit_page.statistics_plots import (
     correlation_item,
     profile_item,
@@ -39,26 +33,16 @@ from swashplate.report.fit_page.statistics_plots import (
     singular_value_item,
     waterfall_item,
 )
-from swashplate.report.fit_page.verdict import uncertainty_sentences, verdict
+from swashplate.report.fit_page.truth import in_the_fits_scales
+from swashplate.report.fit_page.verdict import statements, uncertainty_sentences
 from swashplate.tables import write_text
 
 
-class StageProfile(NamedTuple):
-    """A profile, and the stage whose unknown it is of."""
+class TruthCount(NamedTuple):
+    """How many intervals hold the truth."""
 
-    stage: str
-    profile: Profile
-
-
-class ResidualRow(NamedTuple):
-    """The test of one channel's residuals in one run."""
-
-    run: str
-    role: str
-    channel: str
-    autocorrelation: SmallChart
-    cross_correlation: SmallChart
-    verdict: str
+    held: int
+    counted: int
 
 
 def write_fit_report(
@@ -70,6 +54,9 @@ def write_fit_report(
     validation: Sequence[RunQuality] = (),
     starts: Sequence[StartResult] = (),
     profiles: Sequence[StageProfile] = (),
+    folds: CrossValidation | None = None,
+    truth: ParameterSet | None = None,
+    judged: Verdict | None = None,
     notes: Mapping[str, str] | None = None,
 ) -> None:
     """Write the report of a fit: one HTML file, whole or not at all, that needs no network.
@@ -87,9 +74,15 @@ def write_fit_report(
     validation : sequence of RunQuality
         Of runs that were held out.
     starts : sequence of StartResult
-        Where several starts were tried.
+        Of a search that is not kept in the fit's stages.
     profiles : sequence of StageProfile
         Profiles that were computed.
+    folds : CrossValidation, optional
+        Of the same runs and set-up.
+    truth : ParameterSet, optional
+        What virtual tests were simulated with; it stands beside the estimates.
+    judged : Verdict, optional
+        The verdict; made here by default.
     notes : mapping of str to str, optional
         What belongs to the report besides: versions, seed, command.
 
@@ -105,77 +98,73 @@ def write_fit_report(
     Every sample is in the file, in single precision. A figure shows the lowest and the highest
     sample of each of 1,000 stretches of what is in view, and all of them up to 4,000.
     """
-    write_text(
-        fit_page(
-            fit,
-            campaign,
-            assessments=assessments,
-            validation=validation,
-            starts=starts,
-            profiles=profiles,
-            notes=notes,
-        ),
-        path,
-    )
-
-
-def fit_page(
-    fit: Fit,
-    campaign: Campaign,
-    *,
-    assessments: Sequence[Assessment] | None = None,
-    validation: Sequence[RunQuality] = (),
-    starts: Sequence[StartResult] = (),
-    profiles: Sequence[StageProfile] = (),
-    notes: Mapping[str, str] | None = None,
-) -> str:
-    """The report's HTML; see `write_fit_report`."""
     assessed = assess(fit.stages) if assessments is None else tuple(assessments)
     if [each.stage.stage.name for each in assessed] != [each.stage.name for each in fit.stages]:
         raise InputError("The report needs one assessment for each stage of the fit, in order.")
+    if judged is None:
+        planned = [each.name for each in fit.setup.stages]
+        judged = verdict(assessed, validation, starts=starts, planned=planned)
+    several = starts_of(assessed, starts)
     runs = shown_runs(assessed, validation)
-    axes = {run.experiment.axis for run in runs}
-    data = data_rows([each for each in campaign if each.axis in axes])
-    findings = sum(len(row.findings) for row in data)
-    stacks = stacks_of(runs)
-    items: dict[str, Any] = {name: stack_item(stack) for stack, name in stacks.items()}
-    items |= _stage_items(assessed)
-    if len(starts) > 1:
-        items["waterfall"] = waterfall_item(starts)
-    items |= {f"profile-{k}": _profile(fit, each) for k, each in enumerate(profiles)}
-    page: str = _template().render(
-        title=campaign.title,
-        virtual=campaign.virtual,
-        fit=fit,
-        campaign=campaign,
-        verdict=verdict(fit, assessed, runs, starts, findings),
-        tables=[parameter_table(each) for each in assessed],
-        held=held_rows(fit),
-        quality=quality_rows(runs),
-        runs=[
-            (run, stacks[stack_of(run)], [quality_row(run, each) for each in run.channels])
-            for run in runs
-        ],
-        errors=error_sections(runs),
-        residuals=_residual_rows(runs),
-        stages=[
+    content = shared_content(campaign, runs, fit.nominal)
+    content["items"] |= _stage_items(assessed)
+    content["items"] |= {
+        f"waterfall-{k}": waterfall_item(each) for k, each in enumerate(several.values())
+    }
+    content["items"] |= {f"profile-{k}": _profile(fit, each) for k, each in enumerate(profiles)}
+    scaled = None if truth is None else in_the_fits_scales(truth, fit)
+    tables = [parameter_table(each, scaled) for each in assessed]
+    held_out = sum(run.validates for run in runs)
+    stages = ", ".join(each.stage.name for each in fit.stages)
+    samples = sum(each.problem.samples for each in fit.stages)
+    content |= {
+        "what": "Fit",
+        "facts": f"{count(len(fit.stages), 'stage')}: {stages} · "
+        f"{count(len(runs) - held_out, 'run')} fitted, {held_out} held out · "
+        f"{count(samples, 'sample')} that count",
+        "judged": judged,
+        "verdict": statements(judged, assessed, runs, content["findings"]),
+        "tables": tables,
+        "truth": None if truth is None else _truth_count(tables),
+        "held": held_rows(fit, truth),
+        "excitation": [excitation_table(each) for each in assessed],
+        "stages": [
             (each.stage.stage.name, each.identifiability, uncertainty_sentences(each))
             for each in assessed
         ],
-        starts=starts,
-        profiles=[_profile_words(fit, each) for each in profiles],
-        data=data,
-        findings=findings,
-        setup=[stage_rows(each) for each in fit.stages],
-        notes=dict(notes or {}),
-        samples=sum(each.problem.samples for each in fit.stages),
-        items={name: _script_json(item) for name, item in items.items()},
-        run_data=[_script_json(run_data(run)) for run in runs],
-        bokeh=Markup(Resources(mode="inline", components=["bokeh"], log_level="warn").render()),
-        css=Markup(_text("page.css")),
-        js=Markup(_text("page.js")),
-    )
-    return page
+        "starts": several,
+        "profiles": [_profile_words(fit, each) for each in profiles],
+        "cross_validation": folds,
+        "folds": None if folds is None else fold_tables(folds, assessed),
+        "setup": [stage_rows(each) for each in fit.stages],
+        "setup_title": fit.setup.title,
+        "notes": dict(notes or {}),
+    }
+    write_text(rendered(_sections(content), content), path)
+
+
+def _sections(content: Mapping[str, Any]) -> list[Section]:
+    """Those that there is something for."""
+    return [
+        Section("verdict", "Verdict"),
+        Section("parameters", "Parameters"),
+        Section("agreement", "Agreement by run"),
+        Section("runs", "Overlays"),
+        Section("errors", "Errors by kind of test"),
+        Section("residuals", "Residuals"),
+        Section("excitation", "What exercises what"),
+        Section("identifiability", "Identifiability"),
+        *([Section("starts", "Starts")] if content["starts"] else []),
+        *([Section("profiles", "Profiles")] if content["profiles"] else []),
+        *([Section("folds", "Cross-validation")] if content["folds"] is not None else []),
+        Section("data", "Data quality"),
+        Section("setup", "Set-up and versions"),
+    ]
+
+
+def _truth_count(tables: Sequence[ParameterTable]) -> TruthCount:
+    rows = [row.holds for table in tables for row in table.rows if row.holds in ("yes", "no")]
+    return TruthCount(rows.count("yes"), len(rows))
 
 
 def _stage_items(assessments: Sequence[Assessment]) -> dict[str, Any]:
@@ -214,42 +203,3 @@ def _stage(fit: Fit, name: str) -> StageFit:
             return each
     known = ", ".join(each.stage.name for each in fit.stages)
     raise InputError(f"The profile of stage '{name}' belongs to no stage; there are {known}.")
-
-
-def _residual_rows(runs: Sequence[ShownRun]) -> list[ResidualRow]:
-    rows = []
-    for run in runs:
-        for each in run.channels:
-            test: ResidualTest | None = each.quality.test
-            if test is None:
-                continue
-            rows.append(
-                ResidualRow(
-                    run.experiment.name,
-                    run.role,
-                    each.quality.channel,
-                    autocorrelation_chart(test),
-                    cross_correlation_chart(test),
-                    test.verdict,
-                )
-            )
-    return rows
-
-
-def _script_json(content: Any) -> Markup:
-    """JSON that can stand in a script element: no text in it can end the element."""
-    text = json.dumps(content, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-    return Markup(text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
-
-
-def _template() -> Any:
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters |= {"plain": plain, "fixed": fixed}
-    environment.globals["count"] = count
-    return environment.from_string(_text("page.html"))
-
-
-def _text(name: str) -> str:
-    return files("swashplate.report.fit_page").joinpath(name).read_text("utf-8")

@@ -9,10 +9,13 @@ from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fit import Fit, StageFit
+from swashplate.identification.gauges import GAUGES
 from swashplate.identification.intervals import Estimate, estimates
 from swashplate.identification.unknowns import Unknown
 from swashplate.parameters.catalogue import CATALOGUE, COLUMNS
+from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_page.numbers import NONE, percent, plain, spread, unit_text
+from swashplate.report.fit_page.truth import SCALES, moved_columns, true_values
 from swashplate.simulation.residuals import START_PRESSURE
 
 
@@ -33,6 +36,10 @@ class ParameterRow(NamedTuple):
     white: str
     """The interval for white noise."""
     status: str
+    truth: str = ""
+    """Where it is known, in the scales that the fit held."""
+    holds: str = ""
+    """Whether the interval holds the truth."""
 
 
 class ParameterTable(NamedTuple):
@@ -56,12 +63,25 @@ class HeldRow(NamedTuple):
     meaning: str
     unit: str
     value: str
+    why: str
+    """As far as it is known."""
     source: str
+    truth: str = ""
+    """Where it is known."""
 
 
-def parameter_table(assessment: Assessment) -> ParameterTable:
-    """Table of a stage's unknowns."""
+def parameter_table(assessment: Assessment, truth: ParameterSet | None = None) -> ParameterTable:
+    """Table of a stage's unknowns.
+
+    Parameters
+    ----------
+    assessment : Assessment
+        Of the stage.
+    truth : ParameterSet, optional
+        Of virtual tests, in the scales that the fit held (`truth.in_the_fits_scales`).
+    """
     stage = assessment.stage
+    true = {} if truth is None else true_values(stage, truth)
     level = 0.95
     quoted: Sequence[Estimate | None]
     white: Sequence[Estimate | None]
@@ -79,6 +99,8 @@ def parameter_table(assessment: Assessment) -> ParameterTable:
         stage.problem.unknowns.names, stage.problem.unknowns, quoted, white, strict=True
     ):
         row = _row(stage, name, unknown, values[name], estimate, narrow, at_bounds.get(name))
+        if name in true:
+            row = row._replace(truth=plain(true[name]), holds=_holds(estimate, true[name]))
         (rows if unknown.run is None else own).append(row)
     return ParameterTable(
         stage.stage.name,
@@ -89,14 +111,17 @@ def parameter_table(assessment: Assessment) -> ParameterTable:
     )
 
 
-def held_rows(fit: Fit) -> tuple[HeldRow, ...]:
-    """The drive's parameters that no stage moved."""
-    moved: set[str] = set()
-    for each in fit.stages:
-        for unknown in each.problem.unknowns:
-            moved |= set(unknown.targets)
-        if isinstance(each.problem.model, DriveModel) and each.problem.model.forces is not None:
-            moved |= set(each.problem.model.forces.columns)
+def held_rows(fit: Fit, truth: ParameterSet | None = None) -> tuple[HeldRow, ...]:
+    """The drive's parameters that no stage moved.
+
+    Parameters
+    ----------
+    fit : Fit
+        What was fitted.
+    truth : ParameterSet, optional
+        As it is, in no other scales.
+    """
+    moved = moved_columns(fit)
     rows = []
     for column, symbol in COLUMNS.items():
         if column in moved:
@@ -108,10 +133,36 @@ def held_rows(fit: Fit) -> tuple[HeldRow, ...]:
                 meaning_of(column),
                 unit_text(parameter.unit),
                 plain(fit.parameters.numbers[column]),
+                _why_held(fit, column, symbol, moved),
                 parameter.source,
+                "" if truth is None else plain(truth.numbers[column]),
             )
         )
     return tuple(rows)
+
+
+def _why_held(fit: Fit, column: str, symbol: str, moved: set[str]) -> str:
+    """Why nothing was to be found out about a parameter, as far as that can be told."""
+    for gauge in GAUGES:
+        held = next((each for each in gauge.hold if not _is_moved(each, moved)), None)
+        others = [each for each in gauge.moves if each != symbol and _is_moved(each, moved)]
+        if gauge.name in SCALES and held == symbol and others:
+            return f"fixes the {gauge.name}: {gauge.determined}"
+    if fit.parameters[symbol].status == "inactive":
+        return "inactive: no test reaches it"
+    if fit.parameters.numbers[column] == 0.0:
+        return "0: this effect is left out"
+    return ""
+
+
+def _is_moved(symbol: str, moved: set[str]) -> bool:
+    return any(column in moved for column in (symbol, f"{symbol}_plus", f"{symbol}_minus"))
+
+
+def _holds(estimate: Estimate | None, truth: float) -> str:
+    if estimate is None or estimate.lower is None or estimate.upper is None:
+        return NONE
+    return "yes" if estimate.lower <= truth <= estimate.upper else "no"
 
 
 def meaning_of(name: str, stage: StageFit | None = None) -> str:

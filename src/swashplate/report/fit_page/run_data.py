@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.identification.validation import ignored_windows
 from swashplate.report.broken_lines import gap_rows
 from swashplate.report.display_units import display_unit
-from swashplate.report.fit_page.runs import Shown, ShownRun, ignored_windows
+from swashplate.report.fit_page.runs import Shown, ShownRun
 
 Array = NDArray[np.float64]
 FINE = 0.01
@@ -28,7 +29,7 @@ def run_data(run: ShownRun) -> dict[str, Any]:
     unit = display_unit(drive.unit, float(np.abs(drive.values).max(initial=0.0)))
     return {
         "input": _signals(clocks, drive.time, {"values": unit.factor * drive.values}),
-        "channels": [_channel(clocks, run, each) for each in run.channels],
+        "channels": [_channel(clocks, each) for each in run.channels],
         "held": drive.interpolation == "previous",
         "clocks": [packed(_broken(time, time, stamps=True), stamps=True) for time in clocks],
     }
@@ -53,7 +54,7 @@ def packed(values: Array, *, stamps: bool = False) -> dict[str, str]:
     }
 
 
-def _channel(clocks: list[Array], run: ShownRun, shown: Shown) -> dict[str, Any]:
+def _channel(clocks: list[Array], shown: Shown) -> dict[str, Any]:
     channel, factor = shown.channel, shown.unit.factor
     made = _signals(
         clocks,
@@ -64,7 +65,7 @@ def _channel(clocks: list[Array], run: ShownRun, shown: Shown) -> dict[str, Any]
             "residual": shown.small.factor * shown.quality.residual,
         },
     )
-    return {**made, "ignored": ignored_windows(run.experiment, channel)}
+    return {**made, "ignored": ignored_windows(channel)}
 
 
 def _signals(clocks: list[Array], time: Array, signals: dict[str, Array]) -> dict[str, Any]:

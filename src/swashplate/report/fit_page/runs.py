@@ -6,16 +6,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.identification.assessment import Assessment, RunQuality
-from swashplate.identification.measures import Measures, pooled_measures
+from swashplate.identification.validation import ignored_windows, with_speeds
 from swashplate.report.display_units import DisplayUnit, display_unit
 from swashplate.report.fit_page.numbers import listed, seconds
-from swashplate.report.fit_page.speeds import with_speeds
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +56,18 @@ def shown_runs(
     """
     found = [(each, a.stage.stage.name, False) for a in assessments for each in with_speeds(a.runs)]
     found += [(each, "", True) for each in with_speeds(validation)]
+    return _gathered(found)
+
+
+def predicted_runs(predicted: Sequence[RunQuality]) -> tuple[ShownRun, ...]:
+    """Runs that a drive was held against, those with the role 'validate' marked as such."""
+    return _gathered(
+        [(each, "", each.experiment.role == "validate") for each in with_speeds(predicted)]
+    )
+
+
+def _gathered(found: Sequence[tuple[RunQuality, str, bool]]) -> tuple[ShownRun, ...]:
+    """Run by run, from qualities with their stage and whether they were held out."""
     units = {
         channel: _units([each for each, _, _ in found if each.channel == channel])
         for channel in dict.fromkeys(each.channel for each, _, _ in found)
@@ -76,20 +84,6 @@ def shown_runs(
     return tuple(runs)
 
 
-def pooled(qualities: Iterable[RunQuality]) -> dict[str, Measures]:
-    """Measures over all runs of each channel."""
-    channels: dict[str, list[RunQuality]] = {}
-    for each in qualities:
-        channels.setdefault(each.channel, []).append(each)
-    made = {}
-    for name, alike in channels.items():
-        parts: list[tuple[Array, Array, Array | None]] = [
-            (q.experiment[name].values, q.simulated, q.experiment[name].weight) for q in alike
-        ]
-        made[name] = pooled_measures(parts)
-    return made
-
-
 def start_words(experiment: Experiment) -> str:
     """How the run's initial state comes about."""
     if experiment.start == "given" and experiment.start_pressure is not None:
@@ -102,20 +96,10 @@ def start_words(experiment: Experiment) -> str:
     }[experiment.start]
 
 
-def ignored_windows(experiment: Experiment, channel: Channel) -> tuple[tuple[float, float], ...]:
-    """First and last instant of each stretch of a channel that does not count. [s]"""
-    out = np.concatenate([[False], ~channel.used, [False]])
-    edges = np.flatnonzero(out[1:] != out[:-1])
-    return tuple(
-        (float(channel.time[first]), float(channel.time[after - 1]))
-        for first, after in zip(edges[::2], edges[1::2], strict=True)
-    )
-
-
 def ignored_words(experiment: Experiment, channel: Channel) -> str:
     """What of a channel does not count, and why as far as the campaign says."""
     said = []
-    for first, last in ignored_windows(experiment, channel):
+    for first, last in ignored_windows(channel):
         reasons = [why for a, b, why in experiment.ignored if why and a <= last and first <= b]
         why = f" ({listed(list(dict.fromkeys(reasons)))})" if reasons else ""
         said.append(f"{seconds(first)} to {seconds(last)} s{why}")

@@ -1,0 +1,235 @@
+"""Which limit costs a command how much: each is taken away in turn, and the command run again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.analysis.removals import REMOVALS, Removal
+from swashplate.analysis.tracking import tracking_error
+from swashplate.drive import Drive
+from swashplate.errors import DomainError, SwashplateError
+from swashplate.parameters.parameter_set import Change
+from swashplate.simulation.limits import Limit
+from swashplate.simulation.record import SOURCE_RATE, Interpolation
+from swashplate.simulation.result import Simulation
+from swashplate.simulation.run import Start, simulate_drive
+
+if TYPE_CHECKING:
+    import polars
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LimitShare:
+    """What one limit costs."""
+
+    limit: str
+    """In words."""
+    component: str
+    """What would have to change in the machine."""
+    changes: dict[str, Change]
+    """The changes that took it away, SI."""
+    time_share: float | None
+    """Share of the record's samples at which it acts, of the dead zone only those with a command
+    other than 0 V; None for what no flag marks."""
+    error: float | None
+    """Rms tracking error without it; None where there is none to be had, see `failure`. [rad/s]"""
+    error_share: float | None
+    """By how much of itself the rms error falls without it; negative if it grows. [1]"""
+    alone: float | None
+    """Rms tracking error with this limit and none of the others. [rad/s]"""
+    failure: str = ""
+    """Why a drive without it cannot be simulated."""
+
+
+@dataclass(frozen=True, eq=False)
+class LimitShares:
+    """What each limit of a drive costs under one command, the costliest first.
+
+    The shares need not add up to 1: where one limit hides another, taking either away alone helps
+    little, and where they take turns each helps on its own.
+    """
+
+    name: str
+    """Name of the drive."""
+    run: Simulation
+    """The drive as it is."""
+    wanted: Array
+    """Wanted speed, (n,). [rad/s]"""
+    error: float
+    """Rms tracking error of the drive as it is. [rad/s]"""
+    unlimited_error: float | None
+    """Rms tracking error with every limit taken away: 0 unless another speed was wanted than that
+    drive's. None where it cannot be simulated. [rad/s]"""
+    shares: tuple[LimitShare, ...]
+
+    @property
+    def first(self) -> LimitShare | None:
+        """The limit to change first; None if no single change makes the error smaller."""
+        best = self.shares[0] if self.shares else None
+        return best if best is not None and (best.error_share or 0.0) > 0.0 else None
+
+    def to_polars(self) -> polars.DataFrame:
+        """Table of the shares, SI, the costliest first."""
+        import polars as pl
+
+        floats = ("time_share", "error", "error_share", "alone")
+        words = ("limit", "component", "failure")
+        return pl.DataFrame(
+            {name: [getattr(each, name) for each in self.shares] for name in (*words, *floats)},
+            schema=dict.fromkeys(words, pl.String) | dict.fromkeys(floats, pl.Float64),
+        )
+
+    def write(self, path: str | Path) -> None:
+        """Write the table of `to_polars` as CSV or Parquet, by the path's ending."""
+        from swashplate.tables import write_table
+
+        write_table(self.to_polars(), path)
+
+
+def limit_shares(
+    drive: Drive,
+    voltage: ArrayLike,
+    rate: float = SOURCE_RATE,
+    *,
+    time: ArrayLike | None = None,
+    interpolation: Interpolation | None = None,
+    start: Start = "rest",
+    clip: bool = False,
+    wanted: ArrayLike | None = None,
+) -> LimitShares:
+    """Share of time and of error due to each limit of a drive under a command, ranked.
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive.
+    voltage, rate, time, interpolation, start, clip :
+        The command, as in `Drive.simulate`.
+    wanted : (n,) array_like, optional
+        Speed that was wanted at the samples; by default what the drive would do without any of its
+        limits. [rad/s]
+
+    Returns
+    -------
+    LimitShares
+        For each limit that the drive has: how often it acts, and by how much the rms error falls
+        without it.
+
+    Raises
+    ------
+    InputError
+        For a record that cannot be simulated.
+    DomainError
+        If the drive as it is leaves the model's domain, or the one without any limits does and no
+        speed is given as wanted. A limit whose removal breaks a rule of the parameters has a share
+        with a `failure`, and stays where all others are taken away.
+
+    Notes
+    -----
+    A counterfactual: one limit is taken away (the dead zone's V_dz and as much of Z17 as the card's
+    jump does not cover, lim1 and lim2, I_t2, tau, Z16, Z14, Z13, Z15, Z18), the command is
+    simulated again and compared with the same wanted speed. That, by default, still has the lags of
+    the card's filter and of the valve, so that only the limits make an error.
+    """
+    run = drive.simulate(
+        voltage, rate, time=time, interpolation=interpolation, start=start, clip=clip
+    )
+    removals = {each: each.of(drive) for each in REMOVALS}
+    present = {each: changes for each, changes in removals.items() if changes}
+    built = {each: _replaced(drive, changes) for each, changes in present.items()}
+    unlimited, removed = _unlimited(drive, built, present)
+    asked = np.array(
+        _free_speed(unlimited, run, start) if wanted is None else wanted, dtype=np.float64
+    )
+    error = tracking_error(run.shaft_speed, asked).rms
+
+    def error_of(other: Drive | str) -> tuple[float | None, str]:
+        """Its error over the same command, or why there is none."""
+        if isinstance(other, str):
+            return None, other
+        try:
+            again = simulate_drive(other.parameters, run.record, start)
+        except SwashplateError as refusal:
+            return None, str(refusal)
+        return tracking_error(again.shaft_speed, asked).rms, ""
+
+    shares = []
+    for removal, changes in present.items():
+        without, failure = error_of(built[removal])
+        others = [present[each] for each in removed if each is not removal]
+        alone, _ = error_of(_replaced(drive, _joined(others)))
+        shares.append(
+            LimitShare(
+                removal.limit,
+                removal.component,
+                changes,
+                _time_share(run, removal.flag),
+                without,
+                None if without is None else _fall(error, without),
+                alone,
+                failure,
+            )
+        )
+    shares.sort(key=lambda each: inf if each.error is None else each.error)
+    return LimitShares(drive.name, run, asked, error, error_of(unlimited)[0], tuple(shares))
+
+
+def _time_share(run: Simulation, flag: Limit | None) -> float | None:
+    if flag is None:
+        return None
+    acts = run.active(flag)
+    if flag == Limit.DEAD_ZONE:
+        assert run.voltage is not None
+        acts = acts & (run.voltage != 0.0)
+    return float(acts.mean())
+
+
+def _fall(before: float, after: float) -> float:
+    """By which part of itself an error falls; 0 where there was none."""
+    return (before - after) / before if before > 0.0 else 0.0
+
+
+def _joined(changes: Iterable[Mapping[str, Change]]) -> dict[str, Change]:
+    return {name: value for each in changes for name, value in each.items()}
+
+
+def _replaced(drive: Drive, changes: Mapping[str, Change]) -> Drive | str:
+    """The drive with changes, or why there is none such."""
+    try:
+        return drive.replace(**changes)
+    except SwashplateError as refusal:
+        return str(refusal)
+
+
+def _unlimited(
+    drive: Drive, built: Mapping[Removal, Drive | str], present: Mapping[Removal, dict[str, Change]]
+) -> tuple[Drive, list[Removal]]:
+    """The drive with as many limits taken away at once as the model's domain allows, and those."""
+    found, removed = drive, []
+    for removal, each in built.items():
+        if isinstance(each, str):
+            continue
+        more = _replaced(found, present[removal])
+        if not isinstance(more, str):
+            found = more
+            removed.append(removal)
+    return found, removed
+
+
+def _free_speed(unlimited: Drive, run: Simulation, start: Start) -> Array:
+    try:
+        return simulate_drive(unlimited.parameters, run.record, start).shaft_speed
+    except SwashplateError as refusal:
+        raise DomainError(
+            f"Without its limits the drive cannot be simulated, so that there is no speed to "
+            f"compare with; give the one that is wanted ({str(refusal).rstrip('.')})."
+        ) from None

@@ -1,0 +1,214 @@
+"""``swashplate excitation``: what a campaign's runs can tell of a set-up, before a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swashplate.cli.inputs import parameters_of
+from swashplate.cli.terminal import note, say, show, table, working
+from swashplate.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from swashplate.campaign.campaign import Campaign
+    from swashplate.identification.excitation import Outlook
+    from swashplate.identification.identifiability import Identifiability
+
+EXAMPLES = """\
+Examples:
+  swashplate excitation virtual/campaign.toml
+  swashplate excitation harbour/campaign.toml --setup mine.toml --from worn.toml
+  swashplate excitation harbour/campaign.toml --write fewer.toml --out runs.csv
+  swashplate fit harbour/campaign.toml --setup fewer.toml
+"""
+LEGEND = (
+    "Under 'runs', one letter a run: # tells much of what is known (20 % and more), + tells "
+    "something, o has what is needed but no sample that counts shows it, . has it not, - is not "
+    "fitted here. 's' is how long it happens in all runs, 'effect' how much 1 % of the value "
+    "changes all residuals together; 1 is one standard deviation of noise."
+)
+_LETTERS = {"most": "#", "some": "+", "unseen": "o", "none": "."}
+
+
+def excitation(
+    path: Annotated[
+        Path, typer.Argument(metavar="CAMPAIGN.toml", help="The campaign file, beside its logs.")
+    ] = Path("campaign.toml"),
+    axis: Annotated[
+        str | None,
+        typer.Option(help="The axis, where the campaign has several.", show_default=False),
+    ] = None,
+    setup: Annotated[
+        str | None,
+        typer.Option(
+            help="What is free: hoist, slew, luff, or your own TOML file; by default the one of "
+            "the axis's drive.",
+            metavar="NAME|FILE",
+            show_default=False,
+        ),
+    ] = None,
+    begin: Annotated[
+        str | None,
+        typer.Option(
+            "--from",
+            help="Judge at this drive's values instead of the campaign's drive.",
+            metavar="AXIS|SET.toml",
+            show_default=False,
+        ),
+    ] = None,
+    faint: Annotated[
+        bool, typer.Option("--faint", help="Propose to hold what is hardly told as well.")
+    ] = False,
+    write: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write a set-up with the proposal taken.", metavar="FILE", show_default=False
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the whole table, run by run, as .csv or .parquet.",
+            metavar="FILE",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Say before a fit what the runs can tell of each unknown, and what to hold.
+
+    Simulates the runs with the drive as it is: which thresholds and limits they
+    reach, how much each unknown changes what was measured, and which unknowns
+    can move together unseen. Proposes a set-up in which all is determined.
+    """
+    from swashplate.campaign.campaign import Campaign
+    from swashplate.identification.excitation import outlook
+    from swashplate.identification.fit import smooth
+    from swashplate.identification.reparameterise import propose, proposed_setup, setup_text
+    from swashplate.identification.soundness import check_sound, refuse_unsound
+    from swashplate.identification.staging import setup_of
+    from swashplate.tables import write_text
+
+    with working(f"Reading {path}"):
+        campaign = Campaign.from_toml(path)
+        chosen = axis_of(campaign, axis)
+        plan = setup_of(campaign, chosen, setup)
+        drive = parameters_of(begin) if begin is not None else campaign.drive(chosen).parameters
+        runs = campaign.select(axis=chosen, role="fit")
+    if not runs:
+        raise InputError(f"{path}: no run of the axis '{chosen}' has the role 'fit'.")
+    with working("Simulating"):
+        doubts = refuse_unsound(check_sound(runs, smooth(drive), plan, rank=False))
+        looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
+        proposals = [propose(each, faint=faint) for each in looks]
+        verdicts = [each.identifiability for each in looks]
+    if write is not None:
+        made = proposed_setup(plan, proposals)
+        write_text(setup_text(made, proposals), write)
+    if out is not None:
+        _written(looks, out)
+    for sentence in doubts:
+        say(f"! {sentence}")
+    names = [each.name for each in runs]
+    for look, verdict, proposal in zip(looks, verdicts, proposals, strict=True):
+        show(_table(look, names))
+        say(_singular_values(verdict))
+        for sentence in (*_said(verdict), *look.sentences()):
+            say(f"- {sentence}")
+        for sentence in proposal.sentences():
+            say(f"* {sentence}")
+    note("")
+    for number, name in enumerate(names, start=1):
+        note(f"run {number}: {name}")
+    say(LEGEND)
+    if not any(each.changes for each in proposals):
+        note("The set-up can stay as it is.")
+    elif write is not None:
+        note(f"Set-up: {write}")
+    elif any(each.proposed is not None for each in proposals):
+        note("With the starred lines (*) taken, the set-up is (--write FILE keeps it):")
+        note("")
+        note(setup_text(proposed_setup(plan, proposals), proposals).rstrip())
+    if out is not None:
+        note(f"Table: {out}")
+
+
+def axis_of(campaign: Campaign, axis: str | None) -> str:
+    """The axis named, or the only one that a campaign has.
+
+    Raises
+    ------
+    InputError
+        If there are several and none is named, or there is none of that name.
+    """
+    if axis is None:
+        if len(campaign.axes) > 1:
+            raise InputError(
+                f"{campaign.path} has the axes {', '.join(campaign.axes)}; name one with --axis."
+            )
+        return next(iter(campaign.axes))
+    campaign.select(axis=axis)
+    return axis
+
+
+def _table(look: Outlook, runs: Sequence[str]) -> Table:
+    made = table(
+        f"Stage {look.stage.name}", "unknown", "needs", ">s", ">effect", "runs", wrap="needs"
+    )
+    own = look.activation
+    for k, name in enumerate(own.names):
+        letters = dict(zip(own.runs, (_LETTERS[each] for each in look.marks(name)), strict=True))
+        made.add_row(
+            name,
+            own.needs[k],
+            f"{own.seconds[:, k].sum():.3g}",
+            f"{look.effect(name):.3g}",
+            "".join(letters.get(run, "-") for run in runs),
+        )
+    return made
+
+
+def _singular_values(verdict: Identifiability) -> str:
+    sizes = verdict.singular_values
+    if not sizes.size:
+        return "No unknown changes anything: there is no singular value."
+    said = ", ".join(f"{each:.2g}" for each in sizes[: verdict.rank] / sizes[0])
+    none = sizes.size - verdict.rank
+    more = f", and {none} of nothing" if none else ""
+    return f"Singular values of the scaled derivatives, over the largest: {said}{more}."
+
+
+def _said(verdict: Identifiability) -> tuple[str, ...]:
+    """The verdict without what no run exercises, which is said with its reason."""
+    from dataclasses import replace
+
+    return replace(verdict, unexcited=()).sentences()
+
+
+def _written(looks: Sequence[Outlook], out: Path) -> None:
+    import polars as pl
+
+    from swashplate.tables import write_table
+
+    rows = []
+    for look in looks:
+        own = look.activation
+        for k, name in enumerate(own.names):
+            share = look.shares[:, look.linearised.variables.index(name)]
+            rows += [
+                {
+                    "stage": look.stage.name,
+                    "unknown": name,
+                    "needs": own.needs[k],
+                    "run": run,
+                    "seconds": float(own.seconds[r, k]),
+                    "share": float(share[r]),
+                    "effect of 1 %": look.effect(name) * float(share[r]) ** 0.5,
+                }
+                for r, run in enumerate(own.runs)
+            ]
+    write_table(pl.DataFrame(rows), out)

@@ -1,0 +1,222 @@
+"""``swashplate limits``: what a drive can do, and what limits it under a command."""
+
+from __future__ import annotations
+
+from math import degrees
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swashplate.cli.inputs import (
+    Interpolation,
+    Options,
+    Start,
+    changes_said,
+    drive_of,
+    simulated,
+    title_of,
+)
+from swashplate.cli.limit_tables import envelope_table, share_table, sine_table
+from swashplate.cli.terminal import note, say, show, working
+from swashplate.errors import DomainError
+
+if TYPE_CHECKING:
+    from swashplate.analysis.limits import LimitShares
+    from swashplate.drive import Drive
+
+EXAMPLES = """\
+Examples:
+  swashplate limits hoist
+  swashplate limits hoist --plot envelope.png --error 0.05 --frequency 0.3
+  swashplate limits luff sine:9,0.1 --plot timeline.png
+  swashplate limits mine.toml log.csv --interpolation previous --out shares.csv
+"""
+FREQUENCIES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
+
+
+def limits(
+    drive: Annotated[
+        str,
+        typer.Argument(
+            metavar="AXIS|SET.toml",
+            help="A packaged drive (see 'swashplate axes') or your own TOML file.",
+            show_default=False,
+        ),
+    ],
+    command: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="MANEUVER|FILE",
+            help="A manoeuvre or a log, as in 'swashplate simulate': what limits the drive under "
+            "it. Without one, what the drive can do at all.",
+            show_default=False,
+        ),
+    ] = None,
+    error: Annotated[
+        float,
+        typer.Option(
+            help="Error within which a sine counts as followed, rms by rms, above 0 and below 1."
+        ),
+    ] = 0.1,
+    frequencies: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--frequency",
+            help="Frequency of a sine to follow, up to 64; may be repeated. By default 0.02 to 1.",
+            metavar="HZ",
+            show_default=False,
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the envelope, or with a command the shares of each limit, in SI, to a "
+            ".csv or .parquet file.",
+            metavar="FILE",
+        ),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            help="Draw the envelope, or with a command which limit acts when: .png, .svg or .pdf.",
+            metavar="FILE",
+        ),
+    ] = None,
+    values: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="As in 'swashplate simulate'.", metavar="NAME=VALUE"),
+    ] = None,
+    factors: Annotated[
+        list[str] | None,
+        typer.Option("--scale", help="As in 'swashplate simulate'.", metavar="NAME=FACTOR"),
+    ] = None,
+    rate: Annotated[
+        float, typer.Option(help="Samples a second of the command, 10 to 100000.", metavar="HZ")
+    ] = 512.0,
+    interpolation: Annotated[
+        Interpolation | None,
+        typer.Option(help="As in 'swashplate simulate'.", show_default=False),
+    ] = None,
+    start: Annotated[
+        Start, typer.Option(help="Start from rest at 0 V, or settled at the first voltage.")
+    ] = "rest",
+    clip: Annotated[
+        bool, typer.Option("--clip", help="Clip a voltage beyond ±10 V instead of refusing it.")
+    ] = False,
+    time_column: Annotated[
+        str, typer.Option(help="Column of the time in FILE.", metavar="NAME")
+    ] = "time",
+    column: Annotated[
+        str, typer.Option(help="Column of the voltage in FILE.", metavar="NAME")
+    ] = "voltage",
+) -> None:
+    """Say what a drive can do, or what limits it under a command.
+
+    Without a command: dead zone, gain, limits of speed and acceleration, rise
+    times, and the largest sine that it follows at each frequency. With one: how
+    often each limit acts, by how much the error falls without it, and so which
+    component to change first. The error is the rms of the speed less that of a
+    drive without limits. The shares need not add up to 100 %.
+    """
+    options = Options(rate, interpolation, start, clip, time_column, column)
+    chosen = drive_of(drive, values or (), factors or ())
+    title = title_of(drive, chosen)
+    if command is None:
+        _say_envelope(drive, chosen, title, error, tuple(frequencies or FREQUENCIES), out, plot)
+    else:
+        _say_shares(drive, chosen, title, command, options, out, plot)
+    if plot is not None:
+        note(f"Figure: {plot}")
+
+
+def _say_envelope(
+    word: str,
+    drive: Drive,
+    title: str,
+    error: float,
+    frequencies: tuple[float, ...],
+    out: Path | None,
+    plot: Path | None,
+) -> None:
+    with working("Measuring"):
+        from swashplate.analysis.envelope import envelope
+        from swashplate.analysis.largest_sine import largest_sine
+
+        found, refusal = envelope(drive), ""
+        tables = [envelope_table(found)]
+        try:
+            tables.append(sine_table(largest_sine(drive, frequencies, error)))
+        except DomainError as no_inverse:
+            refusal = f"No sine can be commanded: {no_inverse}"
+    if out is not None:
+        found.write(out)
+    if plot is not None:
+        with working(f"Drawing {plot}"):
+            from swashplate.report.envelope_view import plot_envelope
+            from swashplate.report.files import save_figure
+
+            save_figure(plot_envelope(found), plot)
+    note(f"{title}: what it can do")
+    for line in changes_said(word, drive):
+        note(line)
+    show(*tables)
+    if refusal:
+        say(refusal)
+    if out is not None:
+        note(f"Envelope, in SI: {out}")
+
+
+def _say_shares(
+    word: str,
+    drive: Drive,
+    title: str,
+    command: str,
+    options: Options,
+    out: Path | None,
+    plot: Path | None,
+) -> None:
+    with working("Simulating"):
+        from swashplate.analysis.limits import limit_shares
+
+        name, run = simulated(drive, command, options)
+        assert run.voltage is not None  # the command line simulates voltages only
+        found = limit_shares(
+            drive,
+            run.voltage,
+            run.record.rate,
+            interpolation=options.interpolation,
+            start=options.start,
+        )
+    if out is not None:
+        found.write(out)
+    if plot is not None:
+        with working(f"Drawing {plot}"):
+            from swashplate.report.files import save_figure
+            from swashplate.report.limit_timeline_view import plot_limit_timeline
+
+            figure = plot_limit_timeline(run, wanted=found.wanted, title=f"{title}, {name}")
+            save_figure(figure, plot)
+    note(f"{title}, {name}: {degrees(found.error):.3f} deg/s rms from a drive without limits")
+    for line in changes_said(word, drive):
+        note(line)
+    shares = share_table(found)
+    if shares.row_count:
+        show(shares)
+    _say_first(found)
+    if out is not None:
+        note(f"Shares of each limit, in SI: {out}")
+
+
+def _say_first(found: LimitShares) -> None:
+    first = found.first
+    if first is None or first.error is None or first.error_share is None:
+        say("No single change makes the error smaller.")
+    else:
+        say(
+            f"Change first: {first.component}. Without this limit the error falls by "
+            f"{100.0 * first.error_share:.1f} % to {degrees(first.error):.3f} deg/s rms."
+        )
+    for share in found.shares:
+        if share.failure:
+            say(f"Not without the {share.limit}: {share.failure}")

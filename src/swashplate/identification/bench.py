@@ -1,0 +1,239 @@
+"""What is known of a drive before the next test, and what a test would add to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Source
+from swashplate.campaign.kinds import KINDS
+from swashplate.drive import Drive
+from swashplate.errors import InputError
+from swashplate.identification.advice import Candidate
+from swashplate.identification.assessment import linearised_fit
+from swashplate.identification.autocorrelation import noise_colours
+from swashplate.identification.linearised import triangular_factor
+from swashplate.identification.problem import Problem
+from swashplate.identification.sensors import RATE, Sensor, default_sensors, measurable
+from swashplate.identification.setup import Free, Setup, Stage
+from swashplate.identification.staging import stage_problem
+from swashplate.identification.variables import Variables
+from swashplate.maneuvers import Maneuver, step
+from swashplate.parameters.catalogue import CATALOGUE
+from swashplate.parameters.parameter_set import ParameterSet, find
+
+Array = NDArray[np.float64]
+
+NOISELESS = 1e-9
+"""Residuals, over their channel's noise, that are rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A drive, what is to be found of it, and what is known so far: where candidates are tried."""
+
+    parameters: ParameterSet
+    stage: Stage
+    """All unknowns at once."""
+    variables: Variables
+    """The machine's unknowns."""
+    present: Array
+    """(m, K) what the runs made so far tell, in noise's deviations; no rows for none."""
+    sensors: tuple[Sensor, ...]
+    """Those of the campaign, or of a fresh plan."""
+
+    _tried: dict[tuple[str, Sensor], Array] = field(default_factory=dict, repr=False)
+
+    def rows(self, maneuver: Maneuver, sensor: Sensor) -> Array:
+        """(<= K, K) factor of what one sensor would tell in a test, its free zero spent."""
+        key = (maneuver.name, sensor)
+        if key not in self._tried:
+            experiment = _imagined(maneuver, sensor)
+            problem = stage_problem(_without_priors(self.stage), self.parameters, [experiment])
+            self._tried[key] = _machine_rows(problem, problem.start)
+        return self._tried[key]
+
+    def candidate(
+        self, maneuver: Maneuver, sensors: Sequence[Sensor], name: str | None = None
+    ) -> Candidate:
+        """A test with some sensors."""
+        rows = np.vstack([self.rows(maneuver, each) for each in sensors])
+        return Candidate(name or maneuver.name, rows, duration=maneuver.length)
+
+
+def bench(
+    parameters: ParameterSet,
+    setup: Setup,
+    experiments: Sequence[Experiment] = (),
+    *,
+    fitted: bool = False,
+    free: Sequence[str] = (),
+    sensors: Sequence[Sensor] = (),
+) -> Bench:
+    """What is known of a drive before the next test.
+
+    Parameters
+    ----------
+    parameters : ParameterSet
+        The drive, best a fitted one.
+    setup : Setup
+        What is free; its stages are taken together.
+    experiments : sequence of Experiment
+        Tests made so far; none for a fresh plan.
+    fitted : bool
+        Whether the drive is fitted to them: noise and its colour are then those of the residuals.
+        Else noise is as the campaign states it, correlated over `MEMORY`.
+    free : sequence of str
+        Symbols or columns that are held in the set-up and count as unknown here.
+    sensors : sequence of Sensor
+        Of a fresh plan; beside experiments they replace those of the same kind.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If set-up, runs and parameters do not fit each other.
+    """
+    stage = _together(setup, free, parameters)
+    if not experiments:
+        asked = {each.kind: each for each in sensors or default_sensors(Drive(parameters))}
+        chosen = tuple(asked[kind] for kind in measurable(stage.part, list(asked)))
+        if not chosen:
+            raise InputError(
+                f"A {stage.part} shows nothing to {', '.join(asked)}: name another sensor."
+            )
+        problem = stage_problem(stage, parameters, [_imagined(step(1.0), chosen[0])])
+        variables, machine = _machine(problem)
+        _, prior = problem.unknowns.prior_rows(problem.start)
+        return Bench(parameters, stage, variables, prior[:, machine], chosen)
+    problem = stage_problem(stage, parameters, experiments)
+    variables, _ = _machine(problem)
+    known = _measured(problem, fitted)
+    own = {each.kind: each for each in sensors}
+    named = {}
+    for name, sensor in known.items():
+        named[name] = own.pop(sensor.kind, sensor)
+    # an independent sample every so often: the others are worth nothing
+    scales = {
+        name: sensor.noise * float(np.sqrt(max(sensor.memory / _interval(problem, name), 1.0)))
+        for name, sensor in named.items()
+    }
+    present = _machine_rows(replace(problem, scales=scales), problem.start)
+    kept = {sensor.kind: sensor for sensor in named.values()}
+    return Bench(parameters, stage, variables, present, (*kept.values(), *own.values()))
+
+
+def _together(setup: Setup, free: Sequence[str], parameters: ParameterSet) -> Stage:
+    """One stage of all unknowns, through the whole chain unless they belong to one part of it."""
+    (stage,) = setup.joint().stages
+    parts = {each.part for each in setup.stages}
+    if len(parts) == 1:
+        stage = stage.model_copy(update={"part": parts.pop()})
+    more: dict[str, Free] = {}
+    for name in free:
+        symbol = find(name).symbol
+        if {name, symbol} & set(stage.free) or (
+            stage.forces is not None and symbol in ("Z19", "Z20", "Z21", "Z22")
+        ):
+            raise InputError(f"{name} is free in the set-up already.")
+        columns = CATALOGUE[symbol].columns if name == symbol else (name,)
+        if any(not np.isfinite(parameters.numbers[column]) for column in columns):
+            raise InputError(f"{name} is off in the drive, so that no test can tell it.")
+        positive = all(parameters.numbers[column] > 0.0 for column in columns)
+        zero = any(parameters.numbers[column] == 0.0 for column in columns)
+        more[name] = Free(bounds=(-1.0, 1.0)) if zero else Free(relative=(0.5, 2.0), log=positive)
+    return stage.model_copy(update={"free": {**stage.free, **more}})
+
+
+def _without_priors(stage: Stage) -> Stage:
+    """What is known beforehand counts once, not once a test."""
+    free = {name: each.model_copy(update={"prior": None}) for name, each in stage.free.items()}
+    return stage.model_copy(update={"free": free})
+
+
+def _imagined(maneuver: Maneuver, sensor: Sensor) -> Experiment:
+    """A test that has not been made: only its stamps count, not its values."""
+    time = maneuver.time(RATE)
+    source = Source(Path("none"), sensor.kind)
+    channel = Channel(
+        sensor.kind,
+        sensor.kind,
+        KINDS[sensor.kind].units[0],
+        time,
+        np.zeros_like(time),
+        np.ones_like(time),
+        source,
+        noise=sensor.deviation,
+    )
+    command = InputSignal("voltage", "V", time, maneuver.sample(RATE), "linear", source)
+    name = maneuver.name
+    return Experiment(name, "", name, "fit", "rest", None, command, {sensor.kind: channel})
+
+
+def _machine(problem: Problem) -> tuple[Variables, list[int]]:
+    """The unknowns that are no run's own, and their places."""
+    places = [k for k, each in enumerate(problem.unknowns) if each.run is None]
+    ours = [problem.unknowns[k] for k in places]
+    variables = Variables.of(
+        [each.name for each in ours],
+        [each.start for each in ours],
+        scales=[each.scale for each in ours],
+        logarithmic=[each.log for each in ours],
+    )
+    return variables, places
+
+
+def _machine_rows(problem: Problem, vector: Array) -> Array:
+    """(<= K, K) factor of the derivatives by the machine's unknowns, those of single runs spent."""
+    derivatives = problem.evaluate(vector).jacobian
+    _, machine = _machine(problem)
+    own = [k for k in range(derivatives.shape[1]) if k not in machine]
+    factor = triangular_factor(np.column_stack([derivatives[:, own], derivatives[:, machine]]))
+    return np.asarray(factor[len(own) :, len(own) :])
+
+
+def _measured(problem: Problem, fitted: bool) -> dict[str, Sensor]:
+    """The campaign's own sensors, by channel."""
+    kinds = {
+        name: each[name].kind
+        for each in problem.experiments
+        for name in problem.channels
+        if name in each.channels
+    }
+    if not fitted:
+        return {
+            name: Sensor(kind, problem.scales[name], origin="as in the campaign")
+            for name, kind in kinds.items()
+        }
+    fit = linearised_fit(problem, problem.start)
+    made = {}
+    for name, kind in kinds.items():
+        ours = [run for run in fit.runs if run.channel == name]
+        residual = np.concatenate([run.residual for run in ours])
+        deviation = float(np.sqrt(np.mean(residual**2)))
+        if not deviation > NOISELESS:
+            raise InputError(
+                f"The residuals of '{name}' are as good as zero: without noise any test is perfect."
+            )
+        colours = [each for each in noise_colours(fit) if each.channel == name]
+        memory = max(each.inflation * each.step for each in colours)
+        made[name] = Sensor(kind, problem.scales[name] * deviation, memory, "residuals of the fit")
+    return made
+
+
+def _interval(problem: Problem, channel: str) -> float:
+    """Median interval between samples of a channel. [s]"""
+    return float(
+        np.median(
+            np.concatenate(
+                [
+                    np.diff(each[channel].time)
+                    for each in problem.experiments
+                    if channel in each.channels and each[channel].time.size > 1
+                ]
+            )
+        )
+    )

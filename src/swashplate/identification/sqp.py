@@ -1,0 +1,93 @@
+"""Sequential quadratic programming with difference gradients: how the source fitted its models."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.errors import DomainError
+from swashplate.identification.solving import (
+    REFUSED,
+    SPENT,
+    Loss,
+    Objective,
+    Progress,
+    Solution,
+    interrupted,
+)
+
+Array = NDArray[np.float64]
+
+
+class _SpentError(Exception):
+    """All evaluations are spent."""
+
+
+def slsqp(
+    objective: Objective,
+    start: Array,
+    loss: Loss,
+    tolerance: float,
+    max_evaluations: int,
+    watch: Callable[[Progress], None] | None,
+) -> Solution:
+    """Minimise as `solving.solve` does, which checks and explains the arguments."""
+    from scipy.optimize import Bounds, minimize
+
+    if loss != "linear":
+        raise ValueError("SLSQP minimises squares; take trf for a robust loss.")
+    begun = perf_counter()
+    evaluations, iteration = 0, 0
+    start_cost = objective.cost(start)
+    best = (start_cost, start.copy())
+
+    def cost(vector: Array) -> float:
+        nonlocal evaluations, best
+        if evaluations >= max_evaluations:
+            raise _SpentError
+        evaluations += 1
+        try:
+            value = objective.cost(vector)
+        except DomainError:
+            return REFUSED * start_cost
+        if value < best[0]:
+            best = (value, vector.copy())
+        return value
+
+    def told(vector: Array) -> None:
+        nonlocal iteration
+        iteration += 1
+        if watch is not None:
+            seconds = perf_counter() - begun
+            watch(
+                Progress(iteration, best[0], best[1].copy(), seconds, evaluations, max_evaluations)
+            )
+
+    low, high = objective.bounds
+    try:
+        found = minimize(
+            cost,
+            start,
+            method="SLSQP",
+            bounds=Bounds(low, high, keep_feasible=True),
+            callback=told,
+            options={"maxiter": max_evaluations, "ftol": tolerance},
+        )
+        converged, message = bool(found.success), str(found.message)
+    except _SpentError:
+        converged, message = False, SPENT
+    except KeyboardInterrupt:
+        return interrupted(best[1], best[0], start_cost, evaluations, perf_counter() - begun)
+    return Solution(
+        best[1],
+        best[0],
+        start_cost,
+        evaluations,
+        converged,
+        False,
+        message,
+        perf_counter() - begun,
+    )

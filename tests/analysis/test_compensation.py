@@ -1,0 +1,217 @@
+"""The inverse steady-state map: exact at its points, monotone, the same after a file."""
+
+import numpy as np
+import polars as pl
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swashplate import DomainError, Drive, FileError, InputError, ParameterError
+from swashplate.analysis.compensation import InverseMap, inverse_map
+
+MAPS = {name: inverse_map(Drive.preset(name)) for name in ("hoist", "slew", "luff", "neutral")}
+
+
+@pytest.mark.parametrize(
+    ("name", "volts", "speed_deg_s"),
+    [
+        ("hoist", 1.0, 22.25),
+        ("hoist", 4.0, 97.75),
+        ("hoist", 6.5, 161.67),
+        ("hoist", -1.0, -22.16),
+        ("hoist", -4.0, -85.72),
+        ("hoist", -6.5, -153.98),
+        ("slew", 1.0, 0.88),
+        ("slew", 4.0, 3.23),
+        ("slew", -1.0, -0.76),
+        ("slew", -4.0, -3.06),
+    ],
+)
+def test_static_table_backwards(name: str, volts: float, speed_deg_s: float) -> None:
+    """The model description's table, good to half a digit: 0.005 deg/s over the slope there."""
+    slope = 20.0 if name == "hoist" else 0.75
+    found = float(MAPS[name].voltage(np.radians(speed_deg_s)))
+    assert found == pytest.approx(volts, abs=0.0051 / slope + 2e-4)
+
+
+def test_limits_and_gap() -> None:
+    hoist = MAPS["hoist"]
+    assert np.degrees(hoist.limits) == pytest.approx([-185.0, 196.0], abs=0.05)
+    assert float(hoist.voltage(hoist.limits[1])) == pytest.approx(7.87, abs=0.005)
+    assert float(hoist.voltage(hoist.limits[0])) == pytest.approx(-7.41, abs=0.005)
+    assert np.degrees(hoist.creep) == pytest.approx(3.09, abs=0.005)
+    assert np.degrees(hoist.acceleration) == pytest.approx([136.8, 177.8], abs=0.05)
+    assert np.degrees(hoist.gap) == pytest.approx([-3.29, 3.09], abs=0.005)
+
+
+@pytest.mark.parametrize("name", MAPS)
+@given(share=st.floats(0.0, 1.0))
+def test_the_drive_settles_where_it_should(name: str, share: float) -> None:
+    drive, inverse = Drive.preset(name), MAPS[name]
+    low, high = inverse.limits
+    speed = low + share * (high - low)
+    below, above = inverse.gap
+    settled = drive.steady_speed(float(inverse.voltage(speed)))
+    if below < speed <= above:
+        # the nearest of what can be held
+        reachable = np.array([below, inverse.creep, above])
+        assert abs(settled - speed) == pytest.approx(np.abs(reachable - speed).min(), abs=1e-9)
+    else:
+        # the error is taken half way between points, where a parabola is worst
+        assert settled == pytest.approx(speed, abs=1.2 * inverse.error + 1e-9)
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_monotone_and_in_range(name: str) -> None:
+    inverse = MAPS[name]
+    volts = inverse.voltage(np.linspace(*inverse.limits, 20_001))
+    assert (np.diff(volts) >= 0.0).all()
+    assert np.abs(volts).max() <= 10.0
+    assert np.isfinite(volts).all()
+
+
+def test_more_points_make_it_better(hoist: Drive) -> None:
+    errors = [inverse_map(hoist, points).error for points in (11, 21, 41)]
+    # half the distance is a quarter of the error, short of where the curvature is greatest
+    assert errors[0] > 3.0 * errors[1] > 9.0 * errors[2] > 0.0
+
+
+def test_shapes() -> None:
+    hoist = MAPS["hoist"]
+    assert hoist.voltage(1.0).shape == ()
+    assert hoist.voltage([[0.5, 1.0], [1.5, 2.0]]).shape == (2, 2)
+    assert hoist.voltage([]).size == 0
+    assert "101 + 101 points" in repr(hoist)
+
+
+def test_standstill_is_0_volts() -> None:
+    for inverse in MAPS.values():
+        assert float(inverse.voltage(inverse.creep)) == 0.0
+    assert float(MAPS["hoist"].voltage(0.0)) == 0.0  # the creep is nearer than the slowest return
+
+
+@pytest.mark.parametrize("speed", [4.0, -4.0, [0.0, 4.0]])
+def test_beyond_the_limit(speed) -> None:
+    hoist = MAPS["hoist"]
+    with pytest.raises(
+        InputError, match="hoist cannot settle at -?229.183 deg/s: its speeds reach"
+    ):
+        hoist.voltage(speed)
+    worst = speed if isinstance(speed, float) else speed[1]
+    clipped = float(np.ravel(hoist.voltage(speed, clip=True))[-1])
+    assert clipped == pytest.approx(7.8726 if worst > 0.0 else -7.4067, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("speed", "said"), [(np.nan, "finite"), ([1.0, np.inf], "finite"), ("fast", "a number")]
+)
+def test_no_speed(speed, said) -> None:
+    with pytest.raises(InputError, match=said):
+        MAPS["hoist"].voltage(speed)
+
+
+def test_command_runs_ahead(hoist: Drive) -> None:
+    inverse = MAPS["hoist"]
+    ramp = np.linspace(0.5, 2.0, 513)  # 1.5 rad/s²
+    np.testing.assert_allclose(
+        inverse.command(ramp, 512.0, lead=0.1), inverse.voltage(ramp + 0.15), rtol=1e-12
+    )
+    np.testing.assert_array_equal(inverse.command(ramp, 512.0, lead=0.0), inverse.voltage(ramp))
+    np.testing.assert_array_equal(
+        inverse.command(ramp, 512.0), inverse.command(ramp, 512.0, lead=inverse.lag)
+    )
+    # a drive that has settled on the ramp is late by its lag
+    run = hoist.simulate(inverse.voltage(ramp), start="steady")
+    late = (ramp - run.shaft_speed)[400:] / 1.5
+    assert late == pytest.approx(np.full(113, inverse.lag), abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("speed", "rate", "lead", "said"),
+    [
+        ([1.0], 512.0, None, "two or more samples"),
+        ([[1.0, 1.0]], 512.0, None, "two or more samples"),
+        ([1.0, 1.0], 0.0, None, "a rate above 0 Hz"),
+        ([1.0, 1.0], 512.0, -1.0, "a lead of 0 s or more"),
+        ([1.0, 9.0], 512.0, None, "cannot settle at"),
+    ],
+)
+def test_commands_that_cannot_be(speed, rate, lead, said) -> None:
+    with pytest.raises(InputError, match=said):
+        MAPS["hoist"].command(speed, rate, lead=lead)
+
+
+def test_reachable_speeds_keep_the_limits() -> None:
+    inverse = MAPS["hoist"]
+    wanted = np.concatenate([np.zeros(10), np.full(1024, 9.0), np.full(1024, -9.0)])
+    held = inverse.reachable(wanted, 512.0)
+    rates = np.diff(held) * 512.0
+    up, down = inverse.acceleration
+    assert rates.max() == pytest.approx(up, rel=1e-9)
+    assert rates.min() == pytest.approx(-down, rel=1e-9)
+    assert held.max() == pytest.approx(inverse.limits[1])
+    slow = 0.1 * np.sin(np.arange(1024) / 512.0)
+    np.testing.assert_array_equal(inverse.reachable(slow, 512.0), slow)
+    with pytest.raises(InputError, match="one row of numbers"):
+        inverse.reachable(wanted, 0.0)
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_toml_gives_the_same_map(name: str, tmp_path) -> None:
+    inverse = MAPS[name]
+    inverse.to_toml(tmp_path / "map.toml")
+    back = InverseMap.from_toml(tmp_path / "map.toml")
+    speed = np.linspace(*inverse.limits, 999)
+    np.testing.assert_array_equal(back.voltage(speed), inverse.voltage(speed))
+    for field in ("name", "creep", "acceleration", "lag", "error"):
+        assert getattr(back, field) == getattr(inverse, field)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("format = 1", "format = 2", "format is 2"),
+        ('speed_unit = "rad/s"', 'speed_unit = "deg/s"', "speed_unit is 'deg/s'"),
+        ("lag = ", "leg = ", "needs an entry 'lag'"),
+        ("[rest]\nspeed = ", "[rest]\nspeed = 9", "the speed at rest must lie between"),
+        ("[rest]\nspeed = ", "[rest]\nspeed = nan #", "finite number"),
+        ("voltage = [-", "voltage = [-1", "the voltage must stay within"),
+        ("[plus]\nspeed = [", "[plus]\nspeed = [9.0, ", "must rise from each to the next"),
+        ("[plus]\nspeed = [", "[plus]\nspeed = [0.0, ", "speed has 4 numbers and voltage 3"),
+    ],
+)
+def test_a_bad_file(hoist: Drive, tmp_path, old: str, new: str, said: str) -> None:
+    path = tmp_path / "map.toml"
+    inverse_map(hoist, 3).to_toml(path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(ParameterError, match=said):
+        InverseMap.from_toml(path)
+
+
+def test_files(tmp_path) -> None:
+    hoist = MAPS["hoist"]
+    hoist.write(tmp_path / "map.csv")
+    table = pl.read_csv(tmp_path / "map.csv")
+    assert table.columns == ["speed", "voltage"]
+    assert table.height == 203
+    assert table["voltage"].is_sorted()
+    assert table["speed"].is_sorted()
+    hoist.write(tmp_path / "map.toml")
+    assert InverseMap.from_toml(tmp_path / "map.toml").name == "hoist"
+    with pytest.raises(FileError, match="written as .toml, .csv or .parquet"):
+        hoist.write(tmp_path / "map.txt")
+    with pytest.raises(FileError, match="There is no file"):
+        InverseMap.from_toml(tmp_path / "none.toml")
+
+
+def test_drives_without_an_inverse(hoist: Drive) -> None:
+    with pytest.raises(DomainError, match="No positive command up to 10 V moves hoist"):
+        inverse_map(hoist.replace(Z17=5.0))
+    bent = hoist.replace(G1=0.1, G2=-0.006, G3=0.0, Z13=1.0)
+    with pytest.raises(DomainError, match="does not rise from .* to .* V"):
+        inverse_map(bent)
+    for points in (1, 10_002):
+        with pytest.raises(InputError, match="takes 2 to 10001 points"):
+            inverse_map(hoist, points)

@@ -1,0 +1,205 @@
+"""What a drive can do: the source's limits, closed forms, and the simulation itself."""
+
+from math import sqrt
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swashplate import Drive, FileError, InputError
+from swashplate.analysis.acceleration import acceleration_curve, speed_limits
+from swashplate.analysis.compensation import inverse_map
+from swashplate.analysis.envelope import Envelope, envelope
+from swashplate.analysis.largest_sine import largest_sine, sine_errors
+from swashplate.analysis.steady_edges import Edge, edge
+
+
+@pytest.fixture(scope="module")
+def found() -> dict[str, Envelope]:
+    return {name: envelope(Drive.preset(name)) for name in ("hoist", "slew", "luff", "neutral")}
+
+
+@pytest.mark.parametrize(
+    ("name", "up", "down", "digit"),
+    [("hoist", 196.0, -185.0, 0.05), ("slew", 4.242, -4.292, 5e-4), ("luff", 155.9, -190.8, 0.05)],
+)
+def test_speed_limits(found, name, up, down, digit) -> None:
+    each = found[name]
+    assert np.degrees(each.plus.speed_limit) == pytest.approx(up, abs=digit)
+    assert np.degrees(each.minus.speed_limit) == pytest.approx(down, abs=digit)
+    assert speed_limits(Drive.preset(name)) == (each.minus.speed_limit, each.plus.speed_limit)
+
+
+@pytest.mark.parametrize(
+    ("name", "up", "down"), [("hoist", 7.87, -7.41), ("slew", 5.30, -5.62), ("luff", None, None)]
+)
+def test_saturation_voltages(found, name, up, down) -> None:
+    for way, expected in ((found[name].plus, up), (found[name].minus, down)):
+        if expected is None:
+            assert way.saturation_voltage is None
+        else:
+            assert way.saturation_voltage == pytest.approx(expected, abs=0.005)
+            assert way.top_speed == way.speed_limit
+
+
+@pytest.mark.parametrize(
+    ("name", "up", "down", "digit"),
+    [("hoist", 136.8, 177.8, 0.05), ("slew", 5.81, 5.87, 0.005), ("luff", 35.9, 88.9, 0.05)],
+)
+def test_acceleration_at_rest(found, name, up, down, digit) -> None:
+    each, Z = found[name], Drive.preset(name).parameters.numbers
+    assert np.degrees(each.plus.acceleration) == pytest.approx(up, abs=digit)
+    assert np.degrees(each.minus.acceleration) == pytest.approx(-down, abs=digit)
+    assert each.plus.accelerated_by == each.minus.accelerated_by == "orifice"
+    closed = Z["Z10"] * Z["Z1"] * Z["Z8"] * sqrt(Z["Z9"] / 2.0) / (1.0 + Z["Z6"])
+    assert each.plus.acceleration == pytest.approx(closed * Z["Z16_plus"], rel=1e-12)
+    assert each.minus.acceleration == pytest.approx(-closed * Z["Z16_minus"], rel=1e-12)
+
+
+def test_creep(found) -> None:
+    assert np.degrees(found["hoist"].creep) == pytest.approx(3.09, abs=0.005)
+    assert found["slew"].creep == found["luff"].creep == 0.0
+
+
+def test_dead_zone(found, hoist: Drive) -> None:
+    """V_dz where the jump is larger than Z17, otherwise where the current has grown to Z17."""
+    Z = hoist.parameters.numbers
+    assert found["hoist"].minus.dead_zone == -Z["V_dz_minus"]
+    missing = Z["J_plus"] - Z["Z17"]
+    roots = np.roots([Z["G3_plus"], Z["G2_plus"], Z["G1_plus"], missing])
+    (d,) = (root.real for root in roots if abs(root.imag) < 1e-12 and 0.0 < root.real < 1.0)
+    assert found["hoist"].plus.dead_zone == pytest.approx(Z["V_dz_plus"] + d, abs=1e-9)
+    # force sets in without a jump, so the drive begins at its creep
+    assert found["hoist"].plus.smallest_speed == pytest.approx(found["hoist"].creep, abs=1e-9)
+    # model.md's currents at the jump of the luff axis: 31.3 deg/s at once
+    assert np.degrees(found["luff"].plus.smallest_speed) == pytest.approx(31.33, abs=0.01)
+
+
+def test_gain_lies_between_those_of_the_static_table(found) -> None:
+    """From 22.25 deg/s at 1 V to 161.67 at 6.5 V: 25.35 (deg/s)/V."""
+    way = found["hoist"].plus
+    low, high = np.degrees(way.gain_range)
+    assert low < 25.35 < high
+    whole = (196.0 - 3.09) / (7.87 - 0.206)
+    assert np.degrees(way.gain) == pytest.approx(whole, abs=0.03)
+
+
+def test_times_are_those_of_a_step(found, hoist: Drive) -> None:
+    creep, top = found["hoist"].creep, found["hoist"].plus.top_speed
+    rising = hoist.simulate(np.concatenate([[0.0], np.full(2048, 10.0)]), start="steady")
+    falling = hoist.simulate(np.concatenate([[10.0], np.zeros(2048)]), start="steady")
+    for run, times, first, last in (
+        (rising, found["hoist"].plus.starting, creep, top),
+        (falling, found["hoist"].plus.stopping, top, creep),
+    ):
+        at = {}
+        for part in (0.1, 0.9):
+            level = first + part * (last - first)
+            order = 1 if last > first else -1
+            at[part] = np.interp(order * level, order * run.shaft_speed, run.time)
+        assert times.reach == pytest.approx(at[0.9], abs=1.01 / 512)
+        assert times.rise == pytest.approx(at[0.9] - at[0.1], abs=1.01 / 512)
+
+
+def test_accelerations_are_those_of_a_simulation(hoist: Drive) -> None:
+    """Under a held current the speed grows by acceleration times step."""
+    run = hoist.simulate_current(np.full(700, hoist.steady_current(10.0)))
+    curve = acceleration_curve(hoist, 10.0, points=2001)
+    middle = 0.5 * (run.shaft_speed[1:] + run.shaft_speed[:-1])
+    found = np.interp(middle, curve.speed, curve.acceleration)
+    moving = (middle < 0.99 * curve.speed[-1]) & (middle > 0.0)
+    np.testing.assert_allclose(found[moving], 512.0 * np.diff(run.shaft_speed)[moving], rtol=2e-4)
+    assert set(curve.by) == {"orifice"}
+
+
+def test_what_sets_the_acceleration(hoist: Drive) -> None:
+    wide = hoist.replace(Z16=np.inf)
+    assert envelope(wide.replace(Z14=1e-4)).plus.accelerated_by == "spool stop"
+    assert envelope(wide.replace(Z14=np.inf)).plus.accelerated_by == "valve"
+    let_go = acceleration_curve(hoist, 0.0)
+    assert let_go.by[0] == "orifice"
+    assert "valve" in let_go.by  # near standstill the feedback has almost closed it
+
+
+def test_relief_limits_the_speed(hoist: Drive) -> None:
+    weak = hoist.replace(Z15=0.3e6)
+    Z = weak.parameters.numbers
+    limit = Z["Z10"] * np.arctan(Z["Z1"] * 0.3e6)
+    assert envelope(weak).plus.speed_limit == pytest.approx(limit, rel=1e-9)
+
+
+def test_a_drive_that_never_leaves_its_dead_zone(hoist: Drive) -> None:
+    dead = envelope(hoist.replace(Z17=5.0))
+    for way in (dead.plus, dead.minus):
+        assert abs(way.dead_zone) == 10.0
+        assert way.gain is way.saturation_voltage is way.starting is None
+        assert way.top_speed == dead.creep
+
+
+def test_table(found, tmp_path) -> None:
+    table = found["luff"].to_polars()
+    row = table.row(by_predicate=pl.col("quantity") == "acceleration", named=True)
+    assert row["unit"] == "rad/s^2"
+    assert np.degrees(row["minus"]) == pytest.approx(-88.9, abs=0.05)
+    row = table.row(by_predicate=pl.col("quantity") == "saturation_voltage", named=True)
+    assert row["plus"] is None
+    found["luff"].write(tmp_path / "luff.csv")
+    assert pl.read_csv(tmp_path / "luff.csv").height == table.height
+    with pytest.raises(FileError, match=".csv or .parquet"):
+        found["luff"].write(tmp_path / "luff.txt")
+
+
+def test_edges() -> None:
+    """The last place at which something holds, on the way from zero."""
+    found = edge(lambda volts: np.abs(volts) <= np.pi, -10.0)
+    assert found.inside == pytest.approx(-np.pi, abs=2e-12)
+    assert found.outside < -np.pi <= found.inside
+    assert edge(lambda volts: volts == volts, 10.0) == Edge(10.0, None)
+    assert edge(lambda volts: volts < -1.0, 10.0) == Edge(0.0, 0.0)
+
+
+def test_sines_of_a_linear_drive() -> None:
+    """Without limits the error is |H - 1| of the linear model, whatever the amplitude."""
+    drive = Drive.preset("neutral")
+    model, inverse = drive.linearize(0.0).discrete(1.0 / 512.0), inverse_map(drive)
+    for frequency in (0.05, 0.2, 1.0):
+        ratio = complex(model.response([frequency])[0, 0]) / model.gain
+        forgiven, counted = sine_errors(drive, inverse, 0.1, frequency, 4.0)
+        assert forgiven == pytest.approx(abs(abs(ratio) - 1.0), abs=1e-5)
+        assert counted == pytest.approx(abs(ratio - 1.0), abs=1e-5)
+    found = largest_sine(drive, [0.05, 0.5], error=0.1)
+    top = envelope(drive).plus.top_speed
+    assert found.in_time[0] == found.shifted[0] == pytest.approx(top, rel=1e-9)
+    assert found.in_time[1] == 0.0
+
+
+def test_the_orifice_bounds_fast_sines(hoist: Drive) -> None:
+    """A triangle of the orifice's slopes is as much as a fast sine can become."""
+    found = largest_sine(hoist, [0.05, 0.3, 0.5, 2.0], error=0.1)
+    slope = min(map(abs, (2.3869, -3.1034)))
+    for frequency, amplitude in zip(found.frequencies[1:3], found.shifted[1:3], strict=True):
+        # a sine of this amplitude is steepest at standstill, 2πfA, which it may exceed a little
+        assert 0.5 * slope < 2.0 * np.pi * frequency * amplitude < 1.6 * slope
+    assert found.shifted[0] == pytest.approx(np.radians(185.0), abs=1e-3)
+    assert (found.in_time <= found.shifted).all()
+    assert found.shifted[3] == 0.0
+    assert largest_sine(hoist, 0.3, error=0.3).shifted[0] > found.shifted[1]
+    assert found.to_polars().columns == ["frequency", "shifted", "in_time"]
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "error", "said"),
+    [
+        ([0.3], 0.0, "The error is 0, but must be above 0 and below 1"),
+        ([0.3], 1.0, "The error is 1, but"),
+        ([0.3], float("nan"), "The error is nan"),
+        ([300.0], 0.1, "from 0.001 to 64 Hz"),
+        ([0.0], 0.1, "from 0.001 to 64 Hz"),
+        ([float("nan")], 0.1, "from 0.001 to 64 Hz"),
+        ([], 0.1, "from 0.001 to 64 Hz"),
+        ("fast", 0.1, "sequence of numbers"),
+    ],
+)
+def test_sines_that_cannot_be(hoist: Drive, frequencies, error, said) -> None:
+    with pytest.raises(InputError, match=said):
+        largest_sine(hoist, frequencies, error)

@@ -1,0 +1,172 @@
+"""Each limit's share: drives with a single one, and the axes of the source."""
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swashplate import DomainError, Drive, InputError, Limit, maneuvers
+from swashplate.analysis.limits import limit_shares
+from swashplate.analysis.removals import REMOVALS
+
+SINE = maneuvers.sine(9.0, 0.1).sample()
+
+
+def rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+@pytest.mark.parametrize(
+    ("limit", "changes"),
+    [
+        ("dead zone", {"V_dz": 0.5}),
+        ("dead zone", {"Z17": 0.5}),
+        ("current rate", {"lim1": 4.0, "lim2": 4.0, "I_t1": 1e-3}),
+        ("final decay", {"I_t2": 5.0, "a": 2.0, "I_t1": 6.0}),
+        ("delay", {"tau": 0.3}),
+        ("orifice", {"Z16": 2e-5}),
+        ("spool stop", {"Z14": 2e-5}),
+        ("swash stop", {"Z13": 5e-4}),
+        ("relief valve", {"Z15": 5.0}),
+        ("plussing", {"Z18": 1e-4}),
+    ],
+)
+def test_a_single_limit_has_all_of_the_error(limit: str, changes: dict[str, float]) -> None:
+    ideal = Drive.preset("neutral")
+    drive = ideal.replace(**changes)
+    found = limit_shares(drive, SINE)
+    first = found.first
+    assert first is not None, found.shares
+    assert first.limit == limit
+    assert found.unlimited_error == 0.0
+    assert first.error == pytest.approx(0.0, abs=1e-12)
+    assert first.error_share == pytest.approx(1.0)
+    assert first.alone == pytest.approx(found.error, rel=1e-12)
+    # independently: the ideal drive itself is the one without limits
+    expected = drive.simulate(SINE).shaft_speed - ideal.simulate(SINE).shaft_speed
+    assert found.error == pytest.approx(rms(expected), rel=1e-9)
+
+
+def test_no_limit_at_all() -> None:
+    found = limit_shares(Drive.preset("neutral"), SINE)
+    assert found.error == 0.0
+    assert found.first is None
+    assert all(share.error_share == 0.0 for share in found.shares)
+
+
+@pytest.mark.parametrize(
+    ("name", "command", "limit"),
+    [
+        ("hoist", "sine:9,0.1", "swash stop"),
+        ("hoist", "step:9", "orifice"),
+        ("hoist", "sine:1,0.3", "dead zone"),
+        ("luff", "sine:9,0.1", "orifice"),
+    ],
+)
+def test_what_to_change_first(name: str, command: str, limit: str) -> None:
+    found = limit_shares(Drive.preset(name), maneuvers.parse(command).sample())
+    assert found.first is not None
+    assert found.first.limit == limit
+    errors = [share.error for share in found.shares]
+    assert errors == sorted(errors)
+    assert {share.limit for share in found.shares} <= {each.limit for each in REMOVALS}
+
+
+def test_shares_are_what_a_changed_drive_gains(hoist: Drive) -> None:
+    found = limit_shares(hoist, SINE)
+    by = {share.limit: share for share in found.shares}
+    ideal = hoist.replace(
+        V_dz=0.0,
+        Z17=hoist["J"].value.plus,
+        lim1=np.inf,
+        lim2=np.inf,
+        I_t2=0.0,
+        tau=0.0,
+        Z16=np.inf,
+        Z14=np.inf,
+        Z15=np.inf,
+        Z18=0.0,
+        Z13=by["swash stop"].changes["Z13_plus"],
+    )
+    wanted = ideal.simulate(SINE).shaft_speed
+    np.testing.assert_array_equal(found.wanted, wanted)
+    error = rms(hoist.simulate(SINE).shaft_speed - wanted)
+    assert found.error == pytest.approx(error, rel=1e-12)
+    without = rms(hoist.replace(tau=0.0).simulate(SINE).shaft_speed - wanted)
+    assert by["delay"].error == pytest.approx(without, rel=1e-12)
+    assert by["delay"].error_share == pytest.approx(1.0 - without / error, rel=1e-9)
+    only = ideal.replace(tau=0.014).simulate(SINE).shaft_speed - wanted
+    assert by["delay"].alone == pytest.approx(rms(only), rel=1e-12)
+
+
+def test_shares_of_time(hoist: Drive) -> None:
+    found = limit_shares(hoist, SINE)
+    by = {share.limit: share for share in found.shares}
+    run = hoist.simulate(SINE)
+    assert by["swash stop"].time_share == run.active(Limit.SWASH_STOP).mean()
+    assert by["delay"].time_share is None
+    asked = run.active(Limit.DEAD_ZONE) & (SINE != 0.0)  # at rest nobody misses anything
+    assert by["dead zone"].time_share == asked.mean() < run.active(Limit.DEAD_ZONE).mean()
+
+
+def test_a_speed_that_was_wanted(hoist: Drive) -> None:
+    wanted = hoist.simulate(SINE).shaft_speed
+    assert limit_shares(hoist, SINE, wanted=wanted).error == 0.0
+    still = limit_shares(hoist, SINE, wanted=np.zeros(SINE.size))
+    assert still.error == pytest.approx(rms(wanted))
+    assert still.unlimited_error is not None
+    assert still.unlimited_error > still.error
+    with pytest.raises(InputError, match="both must be one row"):
+        limit_shares(hoist, SINE, wanted=np.zeros(3))
+
+
+def overpowered() -> Drive:
+    """Without the solenoids' dead zone of this drive they would overpower the spring."""
+    drive = Drive.preset("neutral").replace(Z17=0.5)
+    Z = drive.parameters.numbers
+    full = drive.steady_current(10.0)
+    k = 0.99 * Z["Z4"] ** 0.5 / Z["Z5"] / (full - 0.5)
+    assert k * full * Z["Z5"] / Z["Z4"] ** 0.5 > 1.0
+    return drive.replace(Z19=k, Z20=0.0, Z21=0.0, Z22=0.0, Z16=2e-4)
+
+
+def test_a_removal_outside_the_domain_is_said() -> None:
+    found = limit_shares(overpowered(), maneuvers.sine(4.0, 0.1).sample())
+    (share,) = (each for each in found.shares if each.limit == "dead zone")
+    assert share.error is share.error_share is None
+    assert "the solenoid would overpower the feedback spring" in share.failure
+    assert found.shares[-1] is share
+    assert found.first is not None
+    assert found.first.limit == "orifice"
+
+
+def test_a_command_outside_the_domain_is_refused() -> None:
+    """With little damping the filter overshoots, and the solenoid with it."""
+    drive = Drive.preset("neutral")
+    Z = drive.parameters.numbers
+    k = 0.95 * Z["Z4"] ** 0.5 / Z["Z5"] / drive.steady_current(10.0)
+    nervous = drive.replace(Z19=k, Z20=0.0, Z21=0.0, Z22=0.0, zeta=0.6, lim1=1.0, I_t1=1e-3)
+    step = maneuvers.step(10.0).sample()
+    nervous.simulate(step)  # its ramp keeps it from overshooting
+    with pytest.raises(DomainError, match="Without its limits the drive cannot be simulated"):
+        limit_shares(nervous, step)
+    found = limit_shares(nervous, step, wanted=np.zeros(step.size))
+    assert found.unlimited_error is None
+    (share,) = (each for each in found.shares if each.limit == "current rate")
+    assert share.error is None
+    assert "overpowers the feedback spring" in share.failure
+
+
+def test_records_with_stamps_and_starts(hoist: Drive) -> None:
+    time, volts = np.array([0.0, 1.0, 3.0]), np.array([2.0, 9.0, 2.0])
+    found = limit_shares(hoist, volts, 256.0, time=time, interpolation="previous", start="steady")
+    expected = hoist.simulate(volts, 256.0, time=time, interpolation="previous", start="steady")
+    np.testing.assert_array_equal(found.run.shaft_speed, expected.shaft_speed)
+    assert found.wanted.size == expected.time.size
+
+
+def test_table(hoist: Drive, tmp_path) -> None:
+    found = limit_shares(hoist, SINE)
+    found.write(tmp_path / "shares.csv")
+    table = pl.read_csv(tmp_path / "shares.csv")
+    assert table["limit"][0] == "swash stop"
+    assert table["error"][0] == pytest.approx(found.shares[0].error)

@@ -1,0 +1,251 @@
+"""Draws from a covariance made by hand, and from a fit of a virtual hoist."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swashplate import Drive, InputError, ParameterError, maneuvers
+from swashplate.analysis.bands import bands
+from swashplate.analysis.draws import independent_drives
+from swashplate.analysis.monte_carlo import Deviations, draw_deviations, drives
+from swashplate.analysis.stored_draws import stored_draws
+from swashplate.campaign import rig
+from swashplate.campaign.campaign import Campaign
+from swashplate.errors import FileError
+from swashplate.identification.assessment import assess
+from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.fit import fit
+from swashplate.identification.setup import Free, Setup, load_setup
+from swashplate.identification.storing import save_fit
+from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.maneuvers import source_tests
+
+VOLTAGE = maneuvers.step(9.0, stop=4.0, length=5.0).sample()
+
+
+def test_stages_are_drawn_together():
+    """By hand: cov δ₂ = S C₁ Sᵀ + C₂ and cov(δ₂, δ₁) = S C₁."""
+    first = np.array([[4.0, 1.0], [1.0, 2.0]])
+    own, slopes = np.array([[1.0]]), np.array([[0.5, -1.0]])
+    random = np.random.default_rng(1)
+    stages = [Deviations(first), Deviations(own, {0: slopes})]
+    drawn = np.array([np.concatenate(draw_deviations(stages, random)) for _ in range(20_000)])
+    expected = np.array([[4.0, 1.0, 1.0], [1.0, 2.0, -1.5], [1.0, -1.5, 3.0]])
+    # 20,000 draws are good to about 4 √(2/20,000) of the largest variance
+    np.testing.assert_allclose(np.cov(drawn.T), expected, atol=0.15)
+    np.testing.assert_allclose(drawn.mean(axis=0), 0.0, atol=0.05)
+
+
+def assessment(
+    drive: Drive, unknowns: Unknowns, covariance: np.ndarray, determined: list[bool] | None = None
+) -> SimpleNamespace:
+    """What the Monte Carlo reads of one."""
+    known = np.ones(len(unknowns), bool) if determined is None else np.array(determined)
+    problem = SimpleNamespace(unknowns=unknowns, model=DriveModel(drive.parameters))
+    own = SimpleNamespace(matrix=covariance, determined=known)
+    return SimpleNamespace(
+        stage=SimpleNamespace(problem=problem, solution=SimpleNamespace(vector=unknowns.start)),
+        uncertainty=SimpleNamespace(own=own, quoted=own, handed=()),
+    )
+
+
+def test_a_covariance_made_by_hand_becomes_that_of_the_drives(hoist):
+    """Pump 1 % and orifice 2 % with a correlation of 0.5, the orifice by its logarithm."""
+    numbers = hoist.parameters.numbers
+    unknowns = Unknowns(
+        (
+            Unknown("Z10", numbers["Z10"], 6.0, 24.0),
+            Unknown("Z16_plus", numbers["Z16_plus"], 1e-5, 1e-3, log=True),
+        )
+    )
+    covariance = np.array([[1e-4, 1e-4], [1e-4, 4e-4]])
+    drawn = drives([assessment(hoist, unknowns, covariance)], 2000, seed=2)
+    columns = drawn.columns
+    vectors = np.array(
+        [columns["Z10"] / numbers["Z10"], np.log(columns["Z16_plus"] / numbers["Z16_plus"])]
+    )
+    # 2000 draws are good to about 4 √(2/2000) of a variance
+    np.testing.assert_allclose(np.cov(vectors), covariance, rtol=0.13)
+    assert (columns["Z16_minus"] == numbers["Z16_minus"]).all()
+    assert (drawn.redrawn, drawn.held, drawn.sentences()) == (0, (), ())
+
+
+def test_a_seed_gives_the_same_drives(hoist):
+    unknowns = Unknowns((Unknown("Z10", 12.396, 6.0, 24.0),))
+    given = [assessment(hoist, unknowns, np.array([[1e-4]]))]
+    first, again, other = (drives(given, 5, seed=seed) for seed in (3, 3, 4))
+    np.testing.assert_array_equal(first.columns["Z10"], again.columns["Z10"])
+    assert (first.columns["Z10"] != other.columns["Z10"]).all()
+
+
+def test_draws_outside_the_bounds_are_drawn_again(hoist):
+    """A normal deviation of 2 % above a bound 2 % away: one in six is outside."""
+    unknowns = Unknowns((Unknown("Z10", 12.396, 12.396 * 0.98, 24.0),))
+    drawn = drives([assessment(hoist, unknowns, np.array([[4e-4]]))], 300, seed=1)
+    assert drawn.columns["Z10"].min() >= 12.396 * 0.98
+    assert drawn.redrawn / (300 + drawn.redrawn) == pytest.approx(0.159, abs=0.06)
+    assert f"{drawn.redrawn} draws lay outside" in drawn.sentences()[-1]
+
+
+def test_what_is_not_determined_stays_as_fitted(hoist):
+    unknowns = Unknowns((Unknown("Z10", 12.396, 6.0, 24.0), Unknown("Z18", 2.1667e-5, 0.0, 1e-4)))
+    covariance = np.array([[1e-4, 0.0], [0.0, 0.0]])
+    drawn = drives([assessment(hoist, unknowns, covariance, [True, False])], 3)
+    assert drawn.held == ("Z18",)
+    assert (drawn.columns["Z18"] == 2.1667e-5).all()
+    assert "Not drawn, as fitted in all drives: Z18" in drawn.sentences()[0]
+
+
+def test_errors_that_leave_nothing(hoist):
+    unknowns = Unknowns((Unknown("Z10", 12.396, 12.3, 12.5),))
+    with pytest.raises(InputError, match="the errors are too large for a Monte Carlo"):
+        drives([assessment(hoist, unknowns, np.array([[1e10]]))], 10)
+
+
+def test_standard_errors_alone(hoist):
+    drawn = independent_drives(hoist, {"Z10": 0.12396, "Z16": 1e-6}, 1000, seed=1)
+    columns = drawn.columns
+    assert columns["Z10"].std() == pytest.approx(0.12396, rel=0.1)
+    both = [
+        columns[f"Z16_{side}"] - hoist.parameters.numbers[f"Z16_{side}"]
+        for side in ("plus", "minus")
+    ]
+    np.testing.assert_allclose(both[0], both[1], atol=1e-18)
+    assert not drawn.correlated
+    assert "Correlations ignored" in drawn.sentences()[0]
+
+
+def test_a_band_by_hand(hoist):
+    """The speed at the stop goes with the pump: its band is that of the drawn factors."""
+    drawn = independent_drives(hoist, {"Z10": 0.3}, 101, seed=1)
+    band = bands(drawn, VOLTAGE, level=0.9)
+    held = int(3.9 * 512)
+    angle = hoist.parameters.numbers["Z13_plus"]
+    ordered = np.sort(drawn.columns["Z10"]) * angle
+    # of 101 values the quantiles 0.05, 0.5 and 0.95 are the 6th, 51st and 96th
+    found = [band.lower[held], band.median[held], band.upper[held]]
+    np.testing.assert_allclose(found, ordered[[5, 50, 95]], rtol=1e-9)
+    width, when = band.widest
+    assert width == pytest.approx(ordered[95] - ordered[5], rel=1e-6)
+    assert 2.0 < when < 4.2
+    assert (band.level, band.draws, band.time[-1]) == (0.9, 101, 5.0)
+
+
+def test_levers_on_drawn_drives(hoist):
+    drawn = independent_drives(hoist, {"Z10": 0.1}, 3)
+    moved = drawn.pulled({"pump": 1.5})
+    np.testing.assert_allclose(moved.columns["Z10"], 1.5 * drawn.columns["Z10"], rtol=1e-15)
+
+
+def test_refusals(hoist):
+    with pytest.raises(InputError, match="at least one stage"):
+        drives([])
+    with pytest.raises(InputError, match="at least one draw, not 0"):
+        independent_drives(hoist, {"Z10": 0.1}, 0)
+    with pytest.raises(InputError, match="standard error of Z10 is nan"):
+        independent_drives(hoist, {"Z10": np.nan})
+    with pytest.raises(InputError, match="at least one parameter"):
+        independent_drives(hoist, {})
+    with pytest.raises(ParameterError, match="Z99"):
+        independent_drives(hoist, {"Z99": 0.1})
+    drawn = independent_drives(hoist, {"Z10": 0.1}, 2)
+    with pytest.raises(InputError, match="level 1 of a band"):
+        bands(drawn, VOLTAGE, level=1.0)
+    with pytest.raises(InputError, match="takes too much memory: draw 1 drives at most"):
+        bands(drawn, np.zeros(100_000_000))
+
+
+def small_setup() -> Setup:
+    """A card's gain and pump's size, two stages: the hoist's set-up with little that is free."""
+    card, pump = load_setup("hoist").stages
+    kept = {name: card.free[name] for name in ("J", "G1")}
+    return Setup(
+        stages=(
+            card.model_copy(update={"free": kept}),
+            pump.model_copy(update={"free": {"Z10": Free(relative=(0.5, 2.0))}, "forces": None}),
+        )
+    )
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder as `swashplate fit` writes it, of a virtual hoist, with its campaign beside it."""
+    place = tmp_path_factory.mktemp("fit")
+    tests = source_tests("hoist")
+    names = ("step +4 V", "step -4 V", "step +9 V")
+    virtual = rig.run("hoist", {name: tests[name] for name in names}, seed=3)
+    path = rig.write(virtual, place / "virtual")
+    campaign = Campaign.from_toml(path)
+    result = fit(campaign.experiments, Drive.preset("hoist").parameters, small_setup())
+    save_fit(result, campaign.experiments, place / "fit.json", campaign=path)
+    return place
+
+
+def test_a_stored_fit_gives_drives_of_its_quoted_errors(fitted):
+    drawn = stored_draws(fitted, draws=400, seed=1)
+    campaign = Campaign.from_toml(fitted / "virtual" / "campaign.toml")
+    result = fit(campaign.experiments, Drive.preset("hoist").parameters, small_setup())
+    columns = drawn.columns
+    for each in assess(result.stages):
+        for estimate in each.uncertainty.estimates:
+            if estimate.name in columns:
+                assert estimate.standard_error is not None
+                # 400 draws are good to 4/√800 of a standard error
+                assert columns[estimate.name].std() == pytest.approx(
+                    estimate.standard_error, rel=0.15
+                )
+                assert columns[estimate.name].mean() == pytest.approx(
+                    estimate.value, abs=0.25 * estimate.standard_error
+                )
+    assert drawn.correlated
+    # what the card's stage does not know moves the pump along, by the slopes that are quoted
+    card, pump = assess(result.stages)
+    (handed,) = pump.uncertainty.handed
+    joint = handed.slopes @ handed.covariance.matrix
+    spread = np.outer(pump.uncertainty.quoted.standard_errors, handed.covariance.standard_errors)
+    names = card.stage.problem.unknowns.names
+    drawn_correlations = [np.corrcoef(columns["Z10"], columns[name])[0, 1] for name in names]
+    np.testing.assert_allclose(drawn_correlations, (joint / spread)[0], atol=0.15)
+
+
+def test_the_campaign_may_have_moved(fitted, tmp_path):
+    text = (fitted / "fit.json").read_text("utf-8")
+    old = fitted / "virtual" / "campaign.toml"
+    (tmp_path / "fit.json").write_text(text.replace(str(old), "elsewhere.toml"), "utf-8")
+    with pytest.raises(InputError, match="was fitted to elsewhere.toml, which is not there"):
+        stored_draws(tmp_path)
+    drawn = stored_draws(tmp_path, campaign=old, draws=2)
+    assert len(drawn.drives) == 2
+
+
+def test_estimates_alone(hoist, tmp_path):
+    hoist.to_toml(tmp_path / "drive.toml")
+    table = {
+        "unknown": ["Z10", "Z16_plus", "force_plus_1", "offset counts (run 3)", "Z18"],
+        "standard error": [0.1, 1e-6, 0.2, 0.1, None],
+    }
+    pl.DataFrame(table).write_csv(tmp_path / "estimates.csv")
+    drawn = stored_draws(tmp_path, draws=50, seed=1)
+    assert drawn.held == ("force_plus_1", "Z18")
+    assert drawn.columns["Z10"].std() == pytest.approx(0.1, rel=0.3)
+    assert (drawn.columns["Z18"] == hoist.parameters.numbers["Z18"]).all()
+    assert "Correlations ignored" in drawn.sentences()[0]
+
+
+def test_folders_that_are_none(tmp_path, hoist):
+    with pytest.raises(InputError, match="holds neither fit.json nor estimates.csv"):
+        stored_draws(tmp_path)
+    (tmp_path / "fit.json").write_text("{}", "utf-8")
+    with pytest.raises(FileError, match="is no stored fit"):
+        stored_draws(tmp_path)
+    (tmp_path / "fit.json").unlink()
+    hoist.to_toml(tmp_path / "drive.toml")
+    (tmp_path / "estimates.csv").write_text("unknown,value\nZ10,1\n", "utf-8")
+    with pytest.raises(FileError, match="has no column 'standard error'"):
+        stored_draws(tmp_path)
+    (tmp_path / "estimates.csv").write_text("unknown,standard error\nZ10,wide\n", "utf-8")
+    with pytest.raises(FileError, match="row 2: the standard error 'wide' is no number"):
+        stored_draws(tmp_path)

@@ -1,0 +1,145 @@
+import numpy as np
+import pytest
+
+from swashplate import Drive, InputError, maneuvers
+from swashplate.analysis import sizing
+from swashplate.analysis.performance import Performance, command_for, performance, wanted
+from swashplate.analysis.search import smallest_alone, smallest_change
+from swashplate.analysis.sizing import WIDEST, Requirements, size
+from swashplate.analysis.trial import proportional_speed
+
+BOX = np.full(2, 0.5), np.full(2, 2.0)
+
+
+def test_the_least_change_of_a_product_is_shared_equally():
+    """a b = 2 with the least (a - 1)² + (b - 1)²: a = b = √2."""
+    found = smallest_change(lambda x: np.array([x[0] * x[1] - 2.0]), *BOX)
+    assert found is not None
+    np.testing.assert_allclose(found, np.sqrt(2.0), rtol=1e-4)
+    assert found[0] * found[1] >= 2.0
+
+
+def test_two_inequalities_that_pull_apart():
+    """a ≥ 1.5 and a + b ≤ 2: the corner a = 1.5, b = 0.5 within a box that ends at 0.5."""
+    found = smallest_change(lambda x: np.array([x[0] - 1.5, 2.0 - x[0] - x[1]]), *BOX)
+    assert found is not None
+    np.testing.assert_allclose(found, [1.5, 0.5], atol=1e-6)
+
+
+def test_a_narrow_place_between_the_scanned_points_is_found():
+    """A ring of ± 0.001 about a circle that no scanned point hits."""
+
+    def slack(x: np.ndarray) -> np.ndarray:
+        radius = np.hypot(x[0] - 1.6, x[1] - 1.5)
+        return np.array([0.001 - abs(radius - 0.05)])
+
+    found = smallest_change(slack, *BOX)
+    assert found is not None
+    assert slack(found)[0] >= 0.0
+
+
+def test_nothing_to_change_and_nothing_to_find():
+    assert smallest_change(lambda x: np.array([1.0]), *BOX) == pytest.approx([1.0, 1.0])
+    assert smallest_change(lambda x: np.array([x[0] - 3.0]), *BOX) is None
+
+
+@pytest.mark.parametrize(
+    ("limit", "expected"), [(lambda x: x[1] - 1.25, 1.25), (lambda x: 0.8 - x[1], 0.8)]
+)
+def test_one_factor_alone(limit, expected):
+    found = smallest_alone(lambda x: np.array([limit(x)]), *BOX, 1)
+    assert found == pytest.approx(expected, rel=1e-8)
+    assert smallest_alone(lambda x: np.array([limit(x)]), *BOX, 0) is None
+
+
+def test_what_the_hoist_can_do(hoist):
+    """Reference numbers: limits of 196.0 and 185.0 deg/s, 136.8 and 177.8 deg/s² at rest."""
+    found = np.degrees(performance(hoist)[:2])
+    assert found[0] == pytest.approx(185.0, abs=0.05)
+    # the plate is moved on while the current is still rising, from a little below rest on
+    assert found[1] == pytest.approx(136.8, rel=2e-3)
+    up = performance(hoist, direction="positive")
+    assert np.degrees(up.speed) == pytest.approx(196.0, abs=0.05)
+
+
+def test_a_larger_pump_is_given_less_voltage(hoist):
+    voltage = maneuvers.sine(6.0, 0.1).sample()
+    follow = wanted(proportional_speed(hoist, voltage))
+    np.testing.assert_allclose(command_for(hoist, follow), voltage, atol=1e-6)
+    larger = hoist.scale(Z10=1.5)
+    np.testing.assert_allclose(command_for(larger, follow), voltage / 1.5, atol=1e-6)
+
+
+def test_a_speed_is_met_by_the_pump_in_proportion(hoist):
+    required = Requirements(speed=np.radians(250.0))
+    found = size(hoist, required, {"pump": WIDEST})
+    expected = 250.0 / np.degrees(12.396 * 0.26047)  # Z10 times the minus stop
+    assert found.factors["pump"] == pytest.approx(expected, rel=1e-6)
+    assert found.alone["pump"] == pytest.approx(expected, rel=1e-6)
+    assert found.after.speed >= required.speed
+    assert found.drive["Z10"].value == pytest.approx(12.396 * expected, rel=1e-6)
+
+
+def test_an_acceleration_is_shared_by_orifice_and_pump(hoist):
+    """It goes with their product: equal factors, the root of the ratio."""
+    required = Requirements(acceleration=np.radians(200.0))
+    found = size(hoist, required, {"orifice": WIDEST, "pump": WIDEST})
+    ratio = np.radians(200.0) / found.before.acceleration
+    assert list(found.factors.values()) == pytest.approx([np.sqrt(ratio)] * 2, rel=2e-3)
+    assert found.alone["orifice"] == pytest.approx(ratio, rel=2e-3)
+    assert found.change == pytest.approx(np.sqrt(2.0) * (np.sqrt(ratio) - 1.0), rel=5e-3)
+    assert found.after.acceleration >= required.acceleration
+
+
+def test_a_tracking_error(hoist):
+    follow = wanted(proportional_speed(hoist, maneuvers.sine(9.0, 0.1).sample()))
+    required = Requirements(tracking_error=np.radians(18.0))
+    found = size(hoist, required, {"pump": WIDEST}, follow=follow)
+    assert found.before.tracking_error > required.tracking_error >= found.after.tracking_error
+    less = hoist.scale(Z10=1.0 + 0.99 * (found.factors["pump"] - 1.0))
+    assert performance(less, follow).tracking_error > required.tracking_error
+
+
+def test_a_drive_that_meets_it_stays_as_it_is(hoist):
+    found = size(hoist, Requirements(speed=np.radians(180.0)), {"pump": WIDEST})
+    assert found.factors == {"pump": 1.0}
+    assert found.change == 0.0
+
+
+def test_what_cannot_be_met_says_what_can(hoist):
+    with pytest.raises(InputError) as error:
+        size(hoist, Requirements(speed=np.radians(500.0)), {"orifice": WIDEST, "pump": WIDEST})
+    assert str(error.value) == (
+        "Within orifice x 0.5 to 2, pump x 0.5 to 2 the hoist reaches a speed of 370 deg/s "
+        "(required 500)."
+    )
+
+
+def test_requirements_that_exclude_each_other(hoist, monkeypatch):
+    """A made-up drive whose tracking error grows with its pump."""
+
+    def made_up(drive: Drive, *_: object, **__: object) -> Performance:
+        pump = float(drive["Z10"].value) / 12.396
+        return Performance(np.radians(200.0 * pump), 1.0, np.radians(10.0 * pump))
+
+    monkeypatch.setattr(sizing, "performance", made_up)
+    required = Requirements(speed=np.radians(300.0), tracking_error=np.radians(12.0))
+    follow = wanted([0.0, 1.0])
+    with pytest.raises(InputError, match="meets each requirement, but not all at once: nearest"):
+        size(hoist, required, {"pump": WIDEST}, follow=follow)
+
+
+def test_refusals(hoist):
+    with pytest.raises(InputError, match="Require at least one"):
+        Requirements()
+    with pytest.raises(InputError, match="required speed is -1, but must be positive"):
+        Requirements(speed=-1.0)
+    required = Requirements(speed=1.0)
+    with pytest.raises(InputError, match="Name at least one lever"):
+        size(hoist, required, {})
+    with pytest.raises(InputError, match="must reach from at most 1 to at least 1"):
+        size(hoist, required, {"pump": (1.2, 2.0)})
+    with pytest.raises(InputError, match="only be required with a speed to follow"):
+        size(hoist, Requirements(tracking_error=0.1), {"pump": WIDEST})
+    with pytest.raises(InputError, match="two finite numbers or more"):
+        wanted([1.0])

@@ -1,0 +1,45 @@
+import pytest
+
+from swashplate import Drive
+
+
+def test_speed_and_acceleration(done, number, tmp_path):
+    words = ("--speed-deg-s", "200", "--acceleration-deg-s2", "200", "--out", "larger.toml")
+    text = done("size", "hoist", *words)
+    # both go with the pump, the acceleration with the orifice too
+    assert number(text, "pump") == pytest.approx(1.2094, abs=2e-3)
+    assert number(text, "orifice") == pytest.approx(1.2094, abs=2e-3)
+    (line,) = [line for line in text.splitlines() if line.startswith("acceleration")]
+    assert line.split()[:3] == ["acceleration", ">=", "200.00"]
+    assert "See it over a command: swashplate whatif hoist --scale orifice=1.2" in text
+    pump = Drive.from_toml(tmp_path / "larger.toml")["Z10"].value
+    assert pump == pytest.approx(12.396 * 1.2094, rel=2e-3)
+
+
+def test_a_tracking_error(done, number):
+    words = ("--tracking-deg-s", "18", "--maneuver", "sine:9,0.1", "--lever", "pump=1/1.5")
+    text = done("size", "hoist", *words)
+    assert 1.0 < number(text, "pump") < 1.5
+    (line,) = [line for line in text.splitlines() if line.startswith("tracking error")]
+    assert line.split()[2:4] == ["<=", "18.00"]
+
+
+def test_nothing_to_change(done):
+    text = done("size", "hoist", "--speed-deg-s", "190", "--direction", "positive")
+    assert "nothing needs to be changed" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "Require at least one of a speed"),
+        (("--speed-deg-s", "500"), "the hoist reaches a speed of 370 deg/s (required 500)"),
+        (("--speed-deg-s", "-5"), "must be positive"),
+        (("--tracking-deg-s", "5"), "--tracking-deg-s and --maneuver belong together"),
+        (("--speed-deg-s", "250", "--maneuver", "step:9"), "belong together"),
+        (("--speed-deg-s", "250", "--lever", "pomp"), "no lever 'pomp' (did you mean pump?)"),
+        (("--speed-deg-s", "250", "--lever", "pump=1.2/2"), "must reach from at most 1"),
+    ],
+)
+def test_refusals(refused, words, said):
+    assert said in refused("size", "hoist", *words)

@@ -1,0 +1,222 @@
+"""Tests that could be made next: which fill the gap that the ones made so far left."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate import Channel, Drive, Experiment, InputError, maneuvers
+from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.identification.advice import Candidate, advise
+from swashplate.identification.bench import bench
+from swashplate.identification.candidates import (
+    best_for_each,
+    default_maneuvers,
+    in_turn,
+    judge_sensors,
+)
+from swashplate.identification.fit import smooth
+from swashplate.identification.sensors import (
+    MEMORY,
+    Sensor,
+    assumed_sensors,
+    default_sensors,
+    measurable,
+)
+from swashplate.identification.setup import Free, GivenPrior, Setup, Stage
+from swashplate.identification.variables import Variables
+
+HOIST = Drive(smooth(Drive.preset("hoist").parameters))
+SOURCE = Source(Path("log.csv"), "speed")
+FACTOR = Free(relative=(0.5, 2.0), log=True)
+SPEED = Sensor("shaft_speed", 0.01)
+
+
+def setup(*names: str) -> Setup:
+    return Setup(stages=(Stage(name="pump", part="pump", free=dict.fromkeys(names, FACTOR)),))
+
+
+def run(name: str, volts: float, noise: float = 0.0) -> Experiment:
+    command = maneuvers.step(volts, start=0.5, stop=2.5, length=4.0).sample(512.0)
+    simulated = HOIST.simulate(command)
+    signal = InputSignal("voltage", "V", simulated.time, command, "linear", SOURCE)
+    speed = simulated.shaft_speed
+    speed = speed + noise * np.random.default_rng(1).normal(size=speed.size)
+    channel = Channel(
+        "speed",
+        "shaft_speed",
+        "rad/s",
+        simulated.time,
+        speed,
+        np.ones(speed.size),
+        SOURCE,
+        noise=0.01,
+    )
+    return Experiment(name, "hoist", name, "fit", "rest", None, signal, {"speed": channel})
+
+
+SMALL = (run("up 1 V", 1.0), run("up 2 V", 2.0))
+"""A campaign of small positive steps."""
+
+
+def judged(names: Sequence[str], *tests: maneuvers.Maneuver):
+    known = bench(HOIST.parameters, setup(*names), SMALL)
+    candidates = [known.candidate(each, known.sensors) for each in tests]
+    return advise(known.present, candidates, known.variables)
+
+
+def test_stops_need_tests_that_reach_them_both_ways() -> None:
+    tests = [maneuvers.step(volts) for volts in (2.0, -2.0, 5.0, -5.0, 9.0, -9.0)]
+    found = judged(("Z13", "Z10"), *tests)
+    assert {each.candidate for each in found[:2]} == {"step 9 V", "step -9 V"}
+    by_test = {each.candidate: each.newly_determined for each in found}
+    assert by_test["step 9 V"] == ("Z13_plus",)
+    assert by_test["step -9 V"] == ("Z13_minus",)
+    assert by_test["step 5 V"] == by_test["step -5 V"] == by_test["step 2 V"] == ()
+    best = best_for_each(found)
+    assert best["Z13_plus"][0] == "step 9 V"
+    assert best["Z13_minus"][0] == "step -9 V"
+
+
+def test_the_negative_direction_needs_a_negative_test() -> None:
+    found = judged(("Z19",), maneuvers.step(9.0), maneuvers.step(-2.0), maneuvers.sine(2.0, 0.1))
+    by_test = {each.candidate: each.newly_determined for each in found}
+    assert by_test["step 9 V"] == ()
+    assert by_test["step -2 V"] == by_test["sine 2 V 0.1 Hz"] == ("Z19_minus",)
+    assert found[-1].candidate == "step 9 V"
+
+
+def test_a_plan_takes_both_stops_in_turn() -> None:
+    known = bench(HOIST.parameters, setup("Z13", "Z10"), SMALL)
+    tests = [maneuvers.step(volts) for volts in (2.0, 9.0, -9.0)]
+    candidates = [known.candidate(each, known.sensors) for each in tests]
+    plan = in_turn(known.present, candidates, known.variables, 2)
+    assert sorted(each.candidate for each in plan) == ["step -9 V", "step 9 V"]
+    assert all(len(each.newly_determined) == 1 for each in plan)
+    # each test at most once
+    assert len(in_turn(known.present, candidates, known.variables, 9)) <= 3
+
+
+def test_a_plan_by_hand() -> None:
+    """After the first choice its like is worth little: the plan turns to the other unknown."""
+    variables = Variables.of("ab", np.ones(2))
+    rows = {"a": [[10.0, 0.0]], "a again": [[9.0, 0.0]], "b": [[0.0, 1.0]], "rest": [[0.0, 0.0]]}
+    candidates = [Candidate(name, np.array(row)) for name, row in rows.items()]
+    plan = in_turn(np.diag([1.0, 1.0]), candidates, variables, 4)
+    assert [each.candidate for each in plan] == ["a", "b", "a again"]
+    # 1/√(1 + 100), and 1/√(1 + 100 + 81)
+    assert plan[0].gains[0].after == pytest.approx(101.0**-0.5)
+    assert plan[2].gains[0].before == pytest.approx(101.0**-0.5)
+    assert plan[2].gains[0].after == pytest.approx(182.0**-0.5)
+    best = best_for_each(advise(np.diag([1.0, 1.0]), candidates, variables))
+    assert {name: test for name, (test, _) in best.items()} == {"a": "a", "b": "b"}
+
+
+def test_errors_are_those_of_least_squares_by_hand() -> None:
+    """The speed is Z10 times an angle: the error of ln Z10 is noise over the speed's length."""
+    known = bench(HOIST.parameters, setup("Z10"))
+    test = maneuvers.step(4.0, start=0.5, stop=2.5, length=4.0)
+    (found,) = advise(known.present, [known.candidate(test, [SPEED])], known.variables)
+    speed = HOIST.simulate(test.sample(512.0)).shaft_speed
+    independent = MEMORY * 512.0
+    expected = 0.01 * np.sqrt(independent) / np.linalg.norm(speed)
+    assert found.gains[0].before == np.inf
+    assert found.gains[0].after == pytest.approx(expected)
+
+
+def test_the_free_zero_of_an_encoder_costs_what_it_must() -> None:
+    """Position is Z10 times the angle's integral, from an unknown zero: only its scatter counts."""
+    known = bench(HOIST.parameters, setup("Z10"))
+    test = maneuvers.step(4.0, start=0.5, stop=2.5, length=4.0)
+    encoder = Sensor("encoder_counts", 0.001, memory=1.0 / 512.0)
+    (found,) = advise(known.present, [known.candidate(test, [encoder])], known.variables)
+    position = HOIST.simulate(test.sample(512.0)).shaft_position
+    assert found.gains[0].after == pytest.approx(0.001 / np.linalg.norm(position - position.mean()))
+
+
+def test_what_is_known_counts_once() -> None:
+    prior = Free(relative=(0.5, 2.0), log=True, prior=GivenPrior(mean=11.4, deviation=0.2))
+    plan = Setup(stages=(Stage(name="pump", part="pump", free={"Z10": prior}),))
+    known = bench(HOIST.parameters, plan)
+    np.testing.assert_allclose(np.abs(known.present), [[5.0]])
+    rest = known.candidate(maneuvers.step(4.0), [Sensor("shaft_speed", 1e6)])
+    (found,) = advise(known.present, [rest], known.variables)
+    assert found.gains[0].after == pytest.approx(0.2, rel=1e-6)
+
+
+def test_an_added_sensor_breaks_a_gauge() -> None:
+    """No speed tells the scale of the pressure; a pressure sensor does."""
+    known = bench(HOIST.parameters, setup("Z1", "Z8"), SMALL, free=["Z9"])
+    (pressure,) = assumed_sensors(HOIST, ["stroker_pressure"])
+    found = judge_sensors(known, [maneuvers.step(5.0)], [pressure, SPEED])
+    by_kind = {each.sensor.kind: each.advice for each in found}
+    assert by_kind["stroker_pressure"].ranks == 1
+    assert set(by_kind["stroker_pressure"].newly_determined) == {"Z1", "Z8", "Z9"}
+    assert by_kind["shaft_speed"].ranks == 0
+
+
+def test_residuals_of_a_fit_tell_the_noise() -> None:
+    noisy = [run("up", 5.0, 0.04), run("down", -5.0, 0.04)]
+    stated = bench(HOIST.parameters, setup("Z10"), noisy)
+    fitted = bench(HOIST.parameters, setup("Z10"), noisy, fitted=True)
+    assert stated.sensors[0].noise == 0.01
+    assert stated.sensors[0].memory == MEMORY
+    assert fitted.sensors[0].noise == pytest.approx(0.04, rel=0.05)
+    # white: each sample counts
+    assert fitted.sensors[0].memory == pytest.approx(1.0 / 512.0)
+    with pytest.raises(InputError, match="residuals of 'speed' are as good as zero"):
+        bench(HOIST.parameters, setup("Z10"), [run("exact", 5.0)], fitted=True)
+
+
+def test_a_stated_noise_replaces_the_campaigns() -> None:
+    ten = bench(HOIST.parameters, setup("Z10"), SMALL, sensors=[Sensor("shaft_speed", 0.1)])
+    one = bench(HOIST.parameters, setup("Z10"), SMALL)
+    np.testing.assert_allclose(np.abs(ten.present) * 10.0, np.abs(one.present))
+
+
+def test_sensors_of_a_fresh_plan() -> None:
+    current, encoder = default_sensors(HOIST)
+    assert (current.kind, encoder.kind) == ("rectified_current", "encoder_counts")
+    # 2526.3 counts a turn, rounded to whole ones
+    assert encoder.noise == pytest.approx(2.0 * np.pi / 2526.3 / np.sqrt(12.0), rel=1e-4)
+    # half a per cent of the current at 10 V
+    full = max(abs(HOIST.steady_current(10.0)), abs(HOIST.steady_current(-10.0)))
+    assert current.noise == pytest.approx(0.005 * full, rel=1e-3)
+    own = default_sensors(HOIST.renamed("mine"))
+    assert [each.kind for each in own] == ["rectified_current", "shaft_speed"]
+    assert measurable("card", ("current_plus", "swash_angle")) == ("current_plus",)
+
+
+def test_the_usual_tests_differ() -> None:
+    names = [each.name for each in default_maneuvers()]
+    assert len(set(names)) == len(names)
+    assert any("-9" in name for name in names)
+    assert not any("-0 V" in name for name in names)
+
+
+def test_wrong_wishes_are_refused() -> None:
+    with pytest.raises(InputError, match="Z10 is free in the set-up already"):
+        bench(HOIST.parameters, setup("Z10"), free=["Z10"])
+    off = HOIST.replace(Z16=(np.inf, np.inf))
+    with pytest.raises(InputError, match="Z16_plus is off in the drive"):
+        bench(off.parameters, setup("Z10"), free=["Z16_plus"])
+    with pytest.raises(InputError, match="no sensor 'other'"):
+        assumed_sensors(HOIST, ["other"])
+
+
+def test_runs_driven_by_a_current_are_counted() -> None:
+    driven = replace(
+        run("by current", 4.0),
+        input=InputSignal(
+            "current", "A", np.arange(2049) / 512.0, np.full(2049, 0.5), "linear", SOURCE
+        ),
+    )
+    known = bench(HOIST.parameters, setup("Z10"), [driven])
+    speed = HOIST.simulate_current(np.full(2049, 0.5)).shaft_speed
+    expected = np.linalg.norm(speed) / (0.01 * np.sqrt(MEMORY * 512.0))
+    np.testing.assert_allclose(np.abs(known.present), [[expected]])
+    current = Sensor("rectified_current", 0.01)
+    with pytest.raises(InputError, match="A pump shows nothing to rectified_current"):
+        bench(HOIST.parameters, setup("Z10"), sensors=[current])

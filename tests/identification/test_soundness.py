@@ -1,0 +1,332 @@
+"""Campaigns that cannot be fitted get a verdict before the solver; sound ones get none."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from swashplate import Channel, Drive, Experiment, InputError, maneuvers
+from swashplate.campaign import rig
+from swashplate.campaign.campaign import Campaign
+from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.cli import app
+from swashplate.identification.fit import smooth
+from swashplate.identification.setup import Free, Setup, Stage, load_setup
+from swashplate.identification.soundness import Finding, check_sound, refuse_unsound
+from swashplate.identification.unmoved import time_constant
+
+NOMINAL = smooth(Drive.preset("hoist").parameters)
+TRUTH = Drive(NOMINAL).scale(Z10=1.1)
+SOURCE = Source(Path("log.csv"), "speed")
+FACTOR = Free(relative=(0.5, 2.0))
+PUMP = Setup(stages=(Stage(name="pump", part="pump", free={"Z8": FACTOR, "Z10": FACTOR}),))
+Change = Callable[[np.ndarray], np.ndarray]
+
+
+def held(volts: float) -> np.ndarray:
+    return maneuvers.step(volts, start=0.5, stop=2.5, length=4.0).sample(512.0)
+
+
+def run(
+    name: str,
+    command: np.ndarray,
+    change: Change = lambda speed: speed,
+    *,
+    start: str = "rest",
+    weight: float = 1.0,
+) -> Experiment:
+    """A run of the true drive with noise of 0.6 deg/s; `change` is what goes wrong."""
+    simulated = TRUTH.simulate(command, start=start)
+    time = np.arange(command.size) / 512.0
+    noise = np.random.default_rng(7).normal(0.0, 0.01, command.size)
+    channel = Channel(
+        "speed",
+        "shaft_speed",
+        "rad/s",
+        time,
+        change(simulated.shaft_speed + noise),
+        np.full(command.size, weight),
+        SOURCE,
+        noise=0.01,
+    )
+    signal = InputSignal("voltage", "V", time, command, "linear", SOURCE)
+    return Experiment(name, "hoist", name, "fit", start, None, signal, {"speed": channel})
+
+
+GOOD = (run("up", held(8.0)), run("down", held(-8.0)), run("low", held(3.0)))
+
+
+def findings(*runs: Experiment, setup: Setup = PUMP) -> tuple[Finding, ...]:
+    return check_sound(runs, NOMINAL, setup)
+
+
+def refused(*runs: Experiment, setup: Setup = PUMP) -> str:
+    with pytest.raises(InputError) as caught:
+        refuse_unsound(findings(*runs, setup=setup))
+    said = str(caught.value)
+    assert said.count("\n") == 0
+    return said
+
+
+def warned(*runs: Experiment, setup: Setup = PUMP) -> tuple[str, ...]:
+    return refuse_unsound(findings(*runs, setup=setup))
+
+
+def test_a_sound_campaign_has_no_finding() -> None:
+    assert findings(*GOOD) == ()
+
+
+@pytest.mark.parametrize("axis", ["hoist", "slew", "luff"])
+def test_the_sources_campaigns_are_sound(axis: str, tmp_path: Path) -> None:
+    tests = rig.run(axis, perturb=0.1, seed=3)
+    campaign = Campaign.from_toml(rig.write(tests, tmp_path / "virtual"))
+    nominal = smooth(campaign.drive(axis).parameters)
+    found = check_sound(campaign.select(role="fit"), nominal, load_setup(axis))
+    assert found == ()
+
+
+# --- contradictory runs ---------------------------------------------------------------------------
+
+
+def test_a_run_of_the_wrong_sign() -> None:
+    said = refused(*GOOD, run("again", held(8.0), lambda speed: -speed))
+    assert said.startswith("In again 'speed' goes against the command, in the other runs with it")
+    assert "sign = -1" in said
+
+
+def test_all_runs_of_the_wrong_sign_are_one_finding() -> None:
+    runs = [run(f"run {v:g}", held(v), lambda speed: -speed) for v in (8.0, -3.0, 2.0)]
+    (found,) = findings(*runs)
+    assert found.severity == "refuse"
+    assert found.run is None
+    assert found.sentence.startswith("In all 3 runs 'speed' goes against the command")
+
+
+def test_twins_of_another_scale() -> None:
+    said = refused(*GOOD, run("again", held(8.0), lambda speed: 2.0 * speed))
+    assert "up and again have the same command, but 'speed' moves 2 times as far" in said
+    # the odd one is named second wherever it stands
+    said = refused(run("first", held(8.0), lambda speed: 2.0 * speed), *GOOD)
+    assert "up and first have the same command" in said
+
+
+def test_twins_that_differ_a_little_are_asked_about() -> None:
+    (said,) = warned(*GOOD, run("again", held(8.0), lambda speed: 1.25 * speed))
+    assert "'speed' moves 1.25 times as far in the second: was the load" in said
+    assert warned(*GOOD, run("again", held(8.0), lambda speed: 1.05 * speed)) == ()
+
+
+def test_twins_that_have_nothing_in_common() -> None:
+    other = TRUTH.simulate(held(8.0)[::-1].copy()).shaft_speed
+    late = run("again", held(8.0), lambda speed: np.where(np.arange(speed.size) < 1700, 0.0, other))
+    assert "'speed' has nothing in common" in refused(*GOOD, late)
+
+
+def test_a_scale_without_a_twin() -> None:
+    (said,) = warned(*GOOD, run("again", held(5.0), lambda speed: 4.0 * speed))
+    assert said.startswith("In again 'speed' moves 4.4 times as far as in the nominal drive")
+    assert "in the other runs 1.1 times" in said
+
+
+def test_positions_are_compared_by_their_speeds() -> None:
+    """Wherever a position drifts to in the end, and wherever it begins."""
+
+    def position(experiment: Experiment, sign: float = 1.0) -> Experiment:
+        speed = experiment["speed"]
+        angle = 40.0 + sign * np.cumsum(speed.values) / 512.0
+        moved = replace(speed, kind="position", unit="rad", values=angle)
+        return replace(experiment, channels={"speed": moved})
+
+    runs = [position(each) for each in GOOD]
+    swing = maneuvers.sine(6.0, 0.25, length=10.0).sample(512.0)
+    assert warned(*runs, position(run("swing", swing))) == ()
+    said = refused(*runs, position(run("swing", swing), sign=-1.0))
+    assert said.startswith("In swing 'speed' goes against the command")
+
+
+def test_degrees_taken_for_radians() -> None:
+    (said,) = warned(*(run(each.name, each.input.values, np.degrees) for each in GOOD))
+    assert said.startswith("'speed' moves 63 times as far as in the nominal drive: check its unit")
+
+
+# --- too short, unexcited, constant ---------------------------------------------------------------
+
+
+def test_the_time_constant_is_that_of_a_step() -> None:
+    lag = time_constant(NOMINAL)
+    assert lag is not None
+    speed = Drive(NOMINAL).simulate(np.full(2049, 5.0)).shaft_speed
+    settled = Drive(NOMINAL).steady_speed(5.0)
+    assert np.interp(lag, np.arange(2049) / 512.0, speed) == pytest.approx(
+        0.632 * settled, rel=0.02
+    )
+    current = time_constant(NOMINAL, of_current=True)
+    assert current is not None
+    assert current < 0.2 < lag
+
+
+def test_runs_that_end_before_the_answer() -> None:
+    blink = maneuvers.step(8.0, start=0.0, stop=0.05, length=0.0625).sample(512.0)
+    said = refused(run("blink", blink))
+    assert said.startswith("No run lasts: the longest, blink, ends 0.0625 s after its command")
+    (said,) = warned(*GOOD, run("blink", blink))
+    assert said.startswith("blink ends 0.0625 s after its command begins")
+
+
+def test_fewer_samples_than_unknowns() -> None:
+    few = run("few", held(8.0))
+    thin = np.zeros(few.input.values.size)
+    thin[[600, 1200]] = 1.0
+    few = replace(few, channels={"speed": replace(few["speed"], weight=thin)})
+    more = Setup(stages=(Stage(name="pump", part="pump", free={"Z8": FACTOR, "Z16": FACTOR}),))
+    assert "Stage pump: 2 samples cannot determine 3 unknowns" in refused(few, setup=more)
+
+
+def test_commands_within_the_dead_zone() -> None:
+    said = refused(run("timid", held(0.1)), run("shy", held(-0.05)))
+    assert said.startswith("timid: its command stays between 0 and 0.1 V, within the dead zone")
+    assert "and so it is in all other runs; a drive that is not moved tells nothing" in said
+    assert "-0.0979 to 0.127 V" in said
+    (said,) = warned(*GOOD, run("timid", held(0.1)))
+    assert said.endswith("it tells of the drive at rest alone.")
+
+
+def test_constant_commands() -> None:
+    five = np.full(2049, 5.0)
+    assert 'starts "steady": nothing moves' in refused(run("five", five, start="steady"))
+    settled = replace(run("five", five, start="steady"), start="rest")
+    assert "runs from the first sample on" in refused(*GOOD, settled)
+    (said,) = warned(*GOOD, run("five", five))
+    assert "counts as a step at the first sample" in said
+    (said,) = warned(*GOOD, run("five", five, start="steady"))
+    assert "nothing moves" in said
+
+
+# --- sensors --------------------------------------------------------------------------------------
+
+
+def test_a_sensor_that_stands_still() -> None:
+    said = refused(*GOOD, run("dead", held(8.0), np.zeros_like))
+    assert said.startswith("dead: 'speed' never changes, though the drive should move it by about")
+
+
+def test_a_channel_without_a_number() -> None:
+    empty = run("empty", held(8.0), lambda speed: np.full_like(speed, np.nan))
+    assert refused(*GOOD, empty).startswith("empty: 'speed' has no finite value at all")
+
+    def holed(speed: np.ndarray) -> np.ndarray:
+        return np.where(np.arange(speed.size) == 512, np.nan, speed)
+
+    assert "not finite in 1 sample, the first at 1 s" in refused(run("holed", held(8.0), holed))
+    # what is ignored may be anything
+    ignored = run("ignored", held(8.0), lambda speed: np.full_like(speed, np.nan), weight=0.0)
+    assert warned(*GOOD, ignored) == ()
+
+
+def test_an_input_that_is_no_number() -> None:
+    broken = run("broken", held(8.0))
+    values = broken.input.values.copy()
+    values[3] = np.inf
+    broken = replace(broken, input=replace(broken.input, values=values))
+    assert refused(*GOOD, broken).startswith("broken: its input is not finite at sample 3")
+
+
+def test_a_run_of_one_sample() -> None:
+    one = run("one", held(8.0))
+    short = replace(one.input, time=one.input.time[:1], values=one.input.values[:1])
+    assert "one: its input has 1 sample;" in refused(*GOOD, replace(one, input=short))
+    speed = one["speed"]
+    single = replace(speed, time=speed.time[:1], values=speed.values[:1], weight=speed.weight[:1])
+    said = refused(*GOOD, replace(one, channels={"speed": single}))
+    assert said.startswith("one: 'speed' has 1 sample that can count")
+
+
+def test_how_many_more_are_refused_is_said() -> None:
+    said = refused(
+        *GOOD,
+        run("a", held(8.0), lambda speed: -speed),
+        run("b", held(5.0), lambda speed: -speed),
+    )
+    assert said.endswith("(1 more finding of this weight.)")
+
+
+# --- set-ups --------------------------------------------------------------------------------------
+
+
+def test_a_set_up_that_nothing_depends_on() -> None:
+    free = {"Z14": FACTOR, "Z15": FACTOR}
+    setup = Setup(stages=(Stage(name="pump", part="pump", free=free),))
+    said = refused(*GOOD, setup=setup)
+    assert said.startswith("Stage pump: no run depends on any of Z14, Z15")
+
+
+def test_a_set_up_of_deficient_rank() -> None:
+    free = {"Z1": FACTOR, "Z8": FACTOR, "Z9": FACTOR, "Z14": FACTOR}
+    setup = Setup(stages=(Stage(name="pump", part="pump", free=free),))
+    first, second = warned(*GOOD, setup=setup)
+    assert "no run exercises Z14, which stays where the fit begins" in first
+    assert "Z1, Z8 and Z9 can move together unseen (scale of pressure)" in second
+
+
+# --- through the command line ---------------------------------------------------------------------
+
+CAMPAIGN = """
+[axes.hoist]
+drive = "hoist"
+time = { column = "time", unit = "s" }
+[axes.hoist.input]
+column = "voltage"
+interpolation = "linear"
+[axes.hoist.channels.speed]
+kind = "shaft_speed"
+column = "speed"
+missing = "drop"
+"""
+
+
+def written(folder: Path, *runs: Experiment) -> Path:
+    """Logs and a campaign file."""
+    text = CAMPAIGN
+    for each in runs:
+        rows = np.column_stack([each.input.time, each.input.values, each["speed"].values])
+        lines = [",".join("" if np.isnan(x) else repr(float(x)) for x in row) for row in rows]
+        log = folder / f"{each.name}.csv"
+        log.write_text("time,voltage,speed\n" + "\n".join(lines) + "\n", "utf-8")
+        text += f'[[runs]]\nfile = "{log.name}"\n'
+    path = folder / "campaign.toml"
+    path.write_text(text, "utf-8")
+    setup = '[[stages]]\nname = "pump"\npart = "pump"\nfree.Z10 = { relative = [0.5, 2.0] }\n'
+    (folder / "setup.toml").write_text(setup, "utf-8")
+    return path
+
+
+def nothing(speed: np.ndarray) -> np.ndarray:
+    return np.full_like(speed, np.nan)
+
+
+@pytest.mark.parametrize("command", ["excitation", "fit"])
+@pytest.mark.parametrize(
+    ("runs", "said"),
+    [
+        ((*GOOD, run("again", held(8.0), lambda speed: -speed)), "In again 'speed' goes against"),
+        ((*GOOD, run("again", held(8.0), lambda speed: 2.0 * speed)), "both cannot be right"),
+        ((run("timid", held(0.1)),), "timid: its command stays between 0 and 0.1 V"),
+        ((run("flat", np.zeros(1025)),), "flat: its command stays between 0 and 0 V"),
+        ((run("short", np.full(33, 8.0)),), "No run lasts: the longest, short"),
+        ((*GOOD, run("dead", held(8.0), np.zeros_like)), "dead: 'speed' never changes"),
+        ((*GOOD, run("empty", held(8.0), nothing)), "0 samples that can be used"),
+        ((*GOOD, run("one", np.zeros(1))), "1 samples that can be used"),
+    ],
+)
+def test_the_command_line_refuses(
+    tmp_path: Path, runs: tuple[Experiment, ...], said: str, command: str
+) -> None:
+    path = written(tmp_path, *runs)
+    words = [command, str(path), "--setup", str(tmp_path / "setup.toml")]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert result.stderr.count("\n") == 1

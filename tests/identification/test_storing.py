@@ -1,0 +1,161 @@
+"""A fit on disk is the fit, and is refused where it no longer belongs to its campaign."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate import Campaign, Drive, FileError, InputError, ParameterError, maneuvers
+from swashplate.campaign import rig
+from swashplate.identification.assessment import assess
+from swashplate.identification.fit import Fit, fit
+from swashplate.identification.fit_file import StageProfile
+from swashplate.identification.fold_results import CrossValidation, Fold, FoldEstimate, HeldRun
+from swashplate.identification.measures import Measures
+from swashplate.identification.profile_side import Point
+from swashplate.identification.profiles import Profile, Threshold
+from swashplate.identification.setup import Setup
+from swashplate.identification.starts import StartResult
+from swashplate.identification.storing import fingerprint, load_fit, save_fit
+
+SETUP = Setup.model_validate(
+    {
+        "title": "two stages",
+        "stages": [
+            {
+                "name": "card",
+                "part": "card",
+                "free": {"J": {"relative": (0.5, 2.0)}},
+                "weights": {"rectified_current": [{"from": 1.0, "to": 1.2, "factor": 10.0}]},
+            },
+            {
+                "name": "pump",
+                "part": "pump",
+                "free": {"Z10": {"relative": (0.8, 1.25), "log": True}},
+            },
+        ],
+    }
+)
+STARTS = (
+    StartResult(0, (0.1, 0.2), (0.3, 0.4), 9.0, 3.0, 10, True, "done", 0.1),
+    StartResult(1, (0.1, 0.3), (0.1, 0.3), float("inf"), float("inf"), 1, False, "left", 0.0),
+)
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    commands = [maneuvers.step(level, start=0.5, stop=2.5, length=4.0) for level in (4.0, -4.0)]
+    truth = Drive.preset("hoist").replace(J=(0.26, 0.31), Z10=13.0)
+    tests = rig.run("hoist", commands, seed=2, truth=truth, severity="clean")
+    return Campaign.from_toml(rig.write(tests, tmp_path_factory.mktemp("rig") / "tests"))
+
+
+@pytest.fixture(scope="module")
+def fitted(campaign: Campaign) -> Fit:
+    found = fit(campaign.experiments, Drive.preset("hoist").parameters, SETUP)
+    first, second = found.stages
+    return replace(found, stages=(replace(first, starts=STARTS), second))
+
+
+@pytest.fixture
+def path(campaign: Campaign, fitted: Fit, tmp_path: Path) -> Path:
+    save_fit(fitted, campaign.experiments, tmp_path / "fit.json", campaign=campaign.path)
+    return tmp_path / "fit.json"
+
+
+def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit) -> None:
+    stored = load_fit(path, campaign)
+    assert stored.axis == "hoist"
+    assert stored.experiments == campaign.experiments
+    assert stored.fit.setup == fitted.setup
+    assert stored.fit.nominal == fitted.nominal
+    assert stored.fit.parameters == fitted.parameters
+    for ours, theirs in zip(stored.fit.stages, fitted.stages, strict=True):
+        assert ours.stage == theirs.stage
+        assert ours.starts == theirs.starts
+        assert ours.values == theirs.values
+        assert ours.problem.cost(ours.solution.vector) == theirs.problem.cost(
+            theirs.solution.vector
+        )
+        assert replace(ours.solution, vector=np.zeros(0)).__dict__.keys() == (
+            theirs.solution.__dict__.keys()
+        )
+        for name, value in theirs.solution.__dict__.items():
+            assert np.array_equal(getattr(ours.solution, name), value), name
+
+
+def test_what_is_judged_of_it_is_the_same(path: Path, campaign: Campaign, fitted: Fit) -> None:
+    ours, theirs = (assess(each.stages) for each in (load_fit(path, campaign).fit, fitted))
+    for one, other in zip(ours, theirs, strict=True):
+        assert one.uncertainty.estimates == other.uncertainty.estimates
+        assert one.identifiability.sentences() == other.identifiability.sentences()
+
+
+def test_profiles_folds_and_notes_come_back(
+    tmp_path: Path, campaign: Campaign, fitted: Fit
+) -> None:
+    points = tuple(Point(x, 3.0 + x * x, np.array([x, 0.5])) for x in (-0.1, 0.0, 0.1))
+    profile = Profile(
+        0, 3.0, points, Threshold(1.0, 0.95, 2.0), -0.1, None, ("crossed", "bound"), points[0]
+    )
+    held = HeldRun("a", "step +4 V", "current", "A", Measures(10, 0.1, 0.5), 0.2)
+    fold = Fold(0, ("a",), (FoldEstimate("card", "J", "A", 0.3),), ("J",), (held,), True, "")
+    folds = CrossValidation(3, 2, (fold,))
+    path = tmp_path / "fit.json"
+    save_fit(
+        fitted,
+        campaign.experiments,
+        path,
+        profiles=[StageProfile("card", profile)],
+        folds=folds,
+        notes={"seed": "3"},
+    )
+    stored = load_fit(path, campaign)
+    assert stored.folds == folds
+    assert stored.notes == {"seed": "3"}
+    (back,) = stored.profiles
+    assert back.stage == "card"
+    assert back.profile.threshold == profile.threshold
+    assert (back.profile.lower, back.profile.upper) == (-0.1, None)
+    assert [each.cost for each in back.profile.points] == [each.cost for each in points]
+    assert np.array_equal(back.profile.points[2].vector, points[2].vector)
+    assert back.profile.better is not None
+
+
+def test_the_file_is_json_that_others_read(path: Path) -> None:
+    content = json.loads(path.read_text("utf-8"), parse_constant=lambda word: pytest.fail(word))
+    assert content["stages"][0]["starts"][1]["cost"] == "Infinity"
+
+
+def test_another_campaign_is_refused(path: Path, campaign: Campaign) -> None:
+    first, second = campaign.experiments
+    alone = replace(campaign, experiments=(first,))
+    with pytest.raises(InputError, match="was fitted to the run '.*', which .* has not"):
+        load_fit(path, alone)
+    channel = second["current"]
+    weight = channel.weight.copy()
+    weight[:10] = 0.0
+    ignored = replace(
+        second, channels={**second.channels, "current": replace(channel, weight=weight)}
+    )
+    assert fingerprint(ignored) != fingerprint(second)
+    changed = replace(campaign, experiments=(first, ignored))
+    with pytest.raises(InputError, match="is not as it was when .* was fitted"):
+        load_fit(path, changed)
+
+
+def test_a_damaged_file_is_refused(path: Path, campaign: Campaign, tmp_path: Path) -> None:
+    text = path.read_text("utf-8")
+    with pytest.raises(FileError, match="There is no file"):
+        load_fit(tmp_path / "none.json", campaign)
+    path.write_text(text[:-100], "utf-8")
+    with pytest.raises(FileError, match="is no stored fit"):
+        load_fit(path, campaign)
+    path.write_text(text.replace('"axis"', '"ax"'), "utf-8")
+    with pytest.raises(ParameterError, match="fit.json"):
+        load_fit(path, campaign)
+    path.write_text(text.replace('"Z10"', '"Z9"', 1), "utf-8")
+    with pytest.raises(FileError, match="stage pump has other unknowns .* fit again"):
+        load_fit(path, campaign)

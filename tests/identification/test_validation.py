@@ -1,0 +1,144 @@
+"""Runs predicted from the command alone, and the numbers that they are judged by."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate import Campaign, Channel, Drive, Experiment, InputError, maneuvers
+from swashplate.campaign import rig
+from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.identification.assessment import compared
+from swashplate.identification.validation import (
+    channel_errors,
+    ignored_windows,
+    pooled,
+    predict,
+    source_rules,
+    with_speeds,
+)
+
+TIME = np.arange(0.0, 10.0, 0.01)
+SOURCE = Source(Path("log.csv"), "column")
+
+
+def step_of(name: str, maneuver: str, current: np.ndarray) -> Experiment:
+    """A command of 4 V from 1 s to 6 s, and a current."""
+    voltage = np.where((TIME >= 1.0) & (TIME < 6.0), 4.0, 0.0)
+    drive = InputSignal("voltage", "V", TIME, voltage, "previous", SOURCE)
+    channel = Channel(
+        "current", "rectified_current", "A", TIME, current, np.ones(TIME.size), SOURCE
+    )
+    return Experiment(
+        name, "hoist", name, "validate", "rest", None, drive, {"current": channel}, maneuver
+    )
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    tests = rig.run("hoist", [maneuvers.step(4.0)], seed=1, severity="clean")
+    return Campaign.from_toml(rig.write(tests, tmp_path_factory.mktemp("rig") / "tests"))
+
+
+def test_a_prediction_is_the_simulation_of_the_command(campaign: Campaign) -> None:
+    drive = Drive.preset("hoist")
+    (run,) = campaign
+    found = {each.channel: each for each in predict(drive.parameters, [run])}
+    simulated = drive.simulate(
+        run.input.values, time=run.input.time, interpolation=run.input.interpolation
+    )
+    assert simulated.card is not None
+    both = simulated.card.current_positive + simulated.card.current_negative
+    expected = np.interp(run["current"].time, simulated.time, both)
+    assert found["current"].simulated == pytest.approx(expected, abs=2e-3)
+    assert found["current"].measures.fit_percent > 95.0
+
+
+def test_the_zero_of_a_position_is_free(campaign: Campaign) -> None:
+    (run,) = campaign
+    channel = run["counts"]
+    moved = replace(channel, values=channel.values + 100.0)
+    parameters = Drive.preset("hoist").parameters
+    shifted = replace(run, channels={"counts": moved})
+    first, second = (
+        {each.channel: each.measures for each in predict(parameters, [each])}
+        for each in (run, shifted)
+    )
+    assert second["counts"].rmse == pytest.approx(first["counts"].rmse, rel=1e-6)
+
+
+def test_a_speed_stands_beside_its_position(campaign: Campaign) -> None:
+    (run,) = campaign
+    channel = run["counts"]
+    qualities = with_speeds([compared(run, "counts", channel.values + 3.0)])
+    assert [each.channel for each in qualities] == ["counts", "speed from counts"]
+    assert qualities[0].measures.rmse == pytest.approx(3.0)
+    # a constant has no speed
+    assert qualities[1].measures.rmse == pytest.approx(0.0, abs=1e-9)
+    assert qualities[1].experiment["speed from counts"].unit == "rad/s"
+
+
+def test_measures_of_several_runs_are_those_of_all_samples() -> None:
+    first, second = np.full(TIME.size, 1.0), np.full(TIME.size, 3.0)
+    qualities = [
+        compared(step_of("a", "step", first), "current", first + 1.0),
+        compared(step_of("b", "step", second), "current", second - 2.0),
+    ]
+    found = pooled(qualities)["current"]
+    # errors of 1 and 2 in halves; values 1 and 3 about 2
+    assert found.rmse == pytest.approx(np.sqrt(2.5))
+    assert found.spread == pytest.approx(1.0)
+
+
+def test_windows_that_do_not_count() -> None:
+    run = step_of("a", "step", np.ones(TIME.size))
+    weight = np.where((TIME < 0.495) | (TIME > 9.0), 0.0, 1.0)
+    channel = replace(run["current"], weight=weight)
+    first, second = ignored_windows(channel)
+    assert first == pytest.approx((0.0, 0.49))
+    assert second == pytest.approx((9.01, 9.99))
+    assert ignored_windows(run["current"]) == ()
+
+
+def test_the_sources_table_of_a_channel() -> None:
+    current = np.where((TIME >= 1.0) & (TIME < 6.0), 0.5, 0.0)
+    # 5 % too large throughout, 40 % within the overshoot's window that is left out
+    simulated = current * np.where((TIME >= 1.0) & (TIME < 2.0), 1.4, 1.05)
+    step = step_of("a", "step +4 V", current)
+    free = step_of("b", "free", current)
+    found = channel_errors(
+        [compared(step, "current", simulated), compared(free, "current", current)]
+    )
+    assert [each.channel for each in found] == ["current"]
+    (row,) = found[0].table.rows
+    assert (row.kind, row.run) == ("step", "a")
+    assert row.percent == pytest.approx(5.0, rel=1e-6)
+    assert found[0].unjudged == ("b",)
+    assert found[0].average == 0.1
+
+
+def test_slew_leaves_out_all_steps(experiment: Callable[..., Experiment]) -> None:
+    assert [each.name for each in source_rules("slew")][-1] == "steps"
+    assert "steps" not in [each.name for each in source_rules("hoist")]
+    current = np.where(TIME >= 1.0, 0.5, 0.0)
+    found = channel_errors(
+        [compared(step_of("a", "step +4 V", current), "current", current)], source_rules("slew")
+    )
+    assert found[0].table.rows[0].percent is None
+
+
+def test_positions_have_no_per_cent(campaign: Campaign) -> None:
+    (run,) = campaign
+    qualities = with_speeds(predict(Drive.preset("hoist").parameters, [run]))
+    assert [each.channel for each in channel_errors(qualities)] == [
+        "current",
+        "speed from counts",
+    ]
+
+
+def test_a_run_that_no_drive_simulates_is_refused(experiment: Callable[..., Experiment]) -> None:
+    run = experiment("bench", 1.0, np.zeros(81))
+    with pytest.raises(InputError, match="bench has no channel that a drive has"):
+        predict(Drive.preset("hoist").parameters, [run])

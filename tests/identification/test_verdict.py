@@ -1,0 +1,215 @@
+"""The verdict: what is hopeless is called that, what is good has numbers."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swashplate import Drive, Experiment
+from swashplate.campaign.experiment import InputSignal
+from swashplate.identification.assessment import Assessment, RunQuality, compared
+from swashplate.identification.fit import StageFit
+from swashplate.identification.judgements import Statement, listed, percent
+from swashplate.identification.problem import Problem
+from swashplate.identification.setup import Stage
+from swashplate.identification.solving import solve
+from swashplate.identification.starts import StartResult
+from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.verdict import Verdict, part_of_range, verdict
+
+TIME = np.linspace(0.0, 4.0, 81)
+WAVE = 10.0 * np.sin(2.0 * np.pi * TIME[:-1] / 4.0)
+WAVE = np.append(WAVE, 0.0)
+SWAP = np.where(np.arange(81) % 2, 1.0, -1.0)
+"""Noise that has no relation to anything slow."""
+
+Make = Callable[..., RunQuality]
+
+
+@pytest.fixture
+def quality(experiment: Callable[..., Experiment]) -> Make:
+    """A wave of ±10 as measured, under an input of the same shape."""
+
+    def make(simulated: np.ndarray, name: str = "a", measured: np.ndarray = WAVE) -> RunQuality:
+        run = experiment(name, 1.0, measured)
+        drive = InputSignal("other", "1", TIME, WAVE, "previous", run.input.source)
+        return compared(replace(run, input=drive), "y", simulated)
+
+    return make
+
+
+def statement(found: Verdict, subject: str) -> Statement:
+    return next(each for each in found.statements if each.subject == subject)
+
+
+def test_a_good_prediction_has_its_numbers(quality: Make) -> None:
+    found = verdict((), [quality(WAVE + 0.24 * SWAP)])
+    # 0.24 of a range of 20
+    assert found.headline == "Predicts y to 1.2 % of its range over 1 run."
+    assert found.usable
+    assert statement(found, "Agreement").weight == "good"
+
+
+def test_the_range_is_that_of_all_runs(quality: Make) -> None:
+    runs = [quality(WAVE + 0.3, "a"), quality(WAVE + 30.3, "b", WAVE + 30.0)]
+    # from -10 to 40
+    assert part_of_range(runs, "y") == pytest.approx(0.3 / 50.0)
+    constant = quality(np.ones(81), "c", np.zeros(81))
+    assert part_of_range([constant], "y") is None
+    found = verdict((), [constant])
+    assert "never moves" in " ".join(found.sentences)
+    assert found.headline == "Predicts channels that never move over 1 run."
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (-1.0, "no better than by its mean in the predicted runs (fit -100 %)"),
+        (0.4, "misses at least half of the movement in the predicted runs (fit 40 %)"),
+    ],
+)
+def test_a_drive_that_hardly_simulates_is_not_usable(
+    quality: Make, factor: float, words: str
+) -> None:
+    found = verdict((), [quality(factor * WAVE)])
+    assert not found.usable
+    assert found.headline.startswith("Not usable: y ")
+    assert words in found.headline
+    assert statement(found, "Agreement").weight == "bad"
+
+
+def test_one_run_that_contradicts_the_others_is_named(quality: Make) -> None:
+    runs = [quality(WAVE + 0.1 * SWAP, f"run {k}") for k in range(20)]
+    found = verdict((), [*runs, quality(-WAVE, "turned")])
+    assert found.usable
+    agreement = statement(found, "Agreement")
+    assert agreement.weight == "look"
+    assert "mean in turned: contradicts the other runs" in agreement.sentences[0]
+
+
+def test_large_residuals_that_follow_the_input_are_a_model_error(quality: Make) -> None:
+    found = verdict((), [quality(0.7 * WAVE)])
+    assert not found.usable
+    assert "the residuals of y follow the input and are 30 % of its movement" in found.headline
+    small = verdict((), [quality(0.95 * WAVE)])
+    assert small.usable
+    assert statement(small, "Residuals").weight == "look"
+    assert "1 of 1 runs follow the input (correlation up to -1.00)" in small.sentences[-1]
+
+
+@pytest.fixture
+def stage(experiment: Callable[..., Experiment], rise, measured) -> Callable[..., StageFit]:
+    """An exponential rise fitted to two runs, with ±0.02 that nothing explains."""
+
+    def make(
+        bounds: tuple[float, float] = (0.1, 10.0), lags: tuple[float, float] = (0.1, 5.0)
+    ) -> StageFit:
+        runs = tuple(
+            experiment(f"rise {level:g}", level, measured(level, 2.0, 0.8) + 0.02 * SWAP)
+            for level in (1.0, 2.0)
+        )
+        unknowns = Unknowns(
+            (
+                Unknown("gain", 0.5 * sum(bounds), *bounds),
+                Unknown("lag", 0.5 * sum(lags), *lags),
+            )
+        )
+        problem = Problem(rise, runs, unknowns, ("y",), {"y": 0.02})
+        given = Stage.model_validate(
+            {"name": "rise", "part": "chain", "free": {"Z1": {"relative": [0.5, 2.0]}}}
+        )
+        solution = solve(problem, problem.start)
+        return StageFit(given, problem, solution, Drive.preset("hoist").parameters)
+
+    return make
+
+
+def held_out(experiment: Callable[..., Experiment], measured, error: np.ndarray) -> RunQuality:
+    truth = measured(1.5, 2.0, 0.8)
+    return compared(experiment("held", 1.5, truth + 0.02 * SWAP), "y", truth + error)
+
+
+def test_a_fit_that_carries_over_is_usable(experiment, measured, stage) -> None:
+    found = verdict([Assessment(stage())], [held_out(experiment, measured, 0.0 * TIME)])
+    assert found.usable, found.headline
+    # 0.02 of what 1.5 · 2 · (1 - exp(-5)) with the noise comes to
+    assert found.headline == "Usable: predicts held-out y to 0.66 % of its range."
+    validation = statement(found, "Validation")
+    assert validation.weight == "good"
+    assert "the fit carries over" in validation.sentences[0]
+
+
+def test_a_fit_without_runs_held_out_says_so(stage) -> None:
+    found = verdict([Assessment(stage())], [])
+    assert found.usable
+    assert found.headline.endswith("no run was held out.")
+    assert statement(found, "Validation").weight == "look"
+
+
+def test_a_fit_that_does_not_carry_over_is_not_usable(experiment, measured, stage) -> None:
+    spoiled = 0.25 * np.std(measured(1.5, 2.0, 0.8)) * SWAP
+    found = verdict([Assessment(stage())], [held_out(experiment, measured, spoiled)])
+    assert not found.usable
+    assert "times the RMSE of the fitted runs" in found.headline
+    # ten times the noise, but small for the movement: usable all the same
+    slightly = verdict([Assessment(stage())], [held_out(experiment, measured, 0.08 * SWAP)])
+    assert slightly.usable
+    assert statement(slightly, "Validation").weight == "look"
+
+
+def test_most_unknowns_at_bounds_is_hopeless(experiment, measured, stage) -> None:
+    fitted = stage(bounds=(0.1, 1.5), lags=(1.2, 5.0))
+    held = held_out(experiment, measured, 0.0 * TIME)
+    found = verdict([Assessment(fitted)], [held])
+    assert not found.usable
+    assert "2 of 2 unknowns stand at a bound or are not determined" in found.headline
+
+
+def test_an_interrupted_fit_is_not_usable(experiment, measured, stage) -> None:
+    whole = stage()
+    cut = replace(whole, solution=replace(whole.solution, interrupted=True, converged=False))
+    held = held_out(experiment, measured, 0.0 * TIME)
+    found = verdict([Assessment(cut)], [held], planned=["rise", "brake"])
+    assert not found.usable
+    assert "stage rise was interrupted" in found.headline
+    assert "brake was never fitted" in found.headline
+    unfinished = replace(
+        whole, solution=replace(whole.solution, converged=False, message="too many evaluations")
+    )
+    found = verdict([Assessment(unfinished)], [held])
+    assert found.usable
+    assert "not converged (too many evaluations)" in " ".join(found.sentences)
+
+
+def start(cost: float) -> StartResult:
+    return StartResult(0, (0.0,), (0.0,), 9.0, cost, 10, True, "done", 0.1)
+
+
+def test_starts_that_agree_and_starts_that_do_not(stage) -> None:
+    fitted = stage()
+    alone = replace(fitted, starts=(start(1.0), start(2.0), start(float("inf"))))
+    found = statement(verdict([Assessment(alone)], []), "Starts")
+    assert found.weight == "look"
+    assert found.sentences == ("rise: 1 of 3 starts reached the best cost, 1.",)
+    given = [start(1.0), start(1.0 + 1e-9)]
+    found = statement(verdict([Assessment(fitted)], [], starts=given), "Starts")
+    assert found.weight == "good"
+    hopeless = [start(float("inf"))] * 2
+    found = statement(verdict([Assessment(fitted)], [], starts=hopeless), "Starts")
+    assert found.sentences == ("No start ended with a finite cost.",)
+
+
+def test_words() -> None:
+    assert [percent(each) for each in (0.0012, 0.012, 0.0996, 1.5)] == [
+        "0.12 %",
+        "1.2 %",
+        "10 %",
+        "150 %",
+    ]
+    assert [listed(each) for each in ([], ["a"], ["a", "b"], ["a", "b", "c"])] == [
+        "",
+        "a",
+        "a and b",
+        "a, b and c",
+    ]
