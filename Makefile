@@ -13,7 +13,7 @@ export PIP_BUILD_CONSTRAINT := constraints.txt
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test lint bench cluster fuzz tools browser format clean
+.PHONY: help .venv demo test lint bench cluster fuzz tools browser calibration format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[.a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
@@ -55,6 +55,9 @@ fuzz: $(STAMP) ## read damaged files for MINUTES=3: each must end in a sentence
 cluster: $(STAMP) ## many starts on a local Dask cluster that loses a worker
 	@$(BIN)/pip install -qq -c constraints.txt -e '.[dask]'
 	@$(BIN)/python benchmarks/cluster.py
+
+calibration: $(STAMP) ## how often intervals hold the truth, over 400 virtual campaigns (half an hour)
+	@$(BIN)/python benchmarks/calibration.py
 
 tools: ## make sure that there is a C compiler, for bench
 	@if command -v cc >/dev/null; then :; \

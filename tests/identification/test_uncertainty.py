@@ -102,7 +102,7 @@ def test_noise_that_differs_within_runs_gets_the_wider_interval() -> None:
     found = uncertainty(LinearisedFit.of(runs, Variables.of("abc", np.ones(3))))
     assert "a" in found.uneven
     assert found.quoted.standard_errors[0] > 1.5 * found.coloured.standard_errors[0]
-    assert any("the wider HAC interval is quoted" in each for each in found.sentences())
+    assert any("wider intervals for it" in each for each in found.sentences())
 
 
 def test_white_residuals_are_called_white() -> None:

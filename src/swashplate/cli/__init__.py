@@ -64,6 +64,8 @@ Examples:
   swashplate campaign init logs/*.csv                 tests of your machine
   swashplate rig hoist --out virtual                  tests of a virtual one
   swashplate fit virtual/campaign.toml                the drive behind them
+  swashplate limits fitted/drive.toml step:9          what limits it
+  swashplate whatif hoist --scale orifice=1.5 --maneuver step:9
   swashplate demo                                     everything at once
 
 Files are written in SI, whole or not at all. What is wrong is said in one
@@ -114,26 +116,34 @@ def options(
     """Options before the command."""
 
 
-app.command("simulate", epilog=simulate.EXAMPLES)(simulate.simulate)
-app.command("compare", epilog=compare.EXAMPLES)(compare.compare)
-app.command("linearize", epilog=linearize.EXAMPLES)(linearize.linearize)
-app.command("bode", epilog=bode.EXAMPLES)(bode.bode)
-app.command("limits", epilog=limits.EXAMPLES)(limits.limits)
-app.command("compensate", epilog=compensate.EXAMPLES)(compensate.compensate)
-app.command("whatif", epilog=whatif.EXAMPLES)(whatif.whatif)
-app.command("sensitivity", epilog=sensitivity.EXAMPLES)(sensitivity.sensitivity)
-app.command("size", epilog=size.EXAMPLES)(size.size)
-app.command("axes", epilog=parameters.AXES_EXAMPLES)(parameters.axes)
-app.command("show", epilog=parameters.SHOW_EXAMPLES)(parameters.show_parameters)
-app.add_typer(campaign.app, name="campaign")
-app.command("rig", epilog=rig.EXAMPLES)(rig.rig)
-app.command("excitation", epilog=excite.EXAMPLES)(excite.excitation)
-app.command("advise", epilog=advise.EXAMPLES)(advise.advise)
-app.command("fit", epilog=fit.EXAMPLES)(fit.fit)
-app.command("validate", epilog=validate.EXAMPLES)(validate.validate)
-app.command("report", epilog=report.EXAMPLES)(report.report)
-app.command("tour", epilog=tour.EXAMPLES)(tour.tour)
-app.command("demo", epilog=demo.EXAMPLES)(demo.demo)
+app.command("demo", epilog=demo.EXAMPLES, rich_help_panel="Everything at once")(demo.demo)
+app.command("tour", epilog=tour.EXAMPLES, rich_help_panel="Everything at once")(tour.tour)
+app.command("simulate", epilog=simulate.EXAMPLES, rich_help_panel="Simulate")(simulate.simulate)
+app.command("compare", epilog=compare.EXAMPLES, rich_help_panel="Simulate")(compare.compare)
+app.command("axes", epilog=parameters.AXES_EXAMPLES, rich_help_panel="Simulate")(parameters.axes)
+app.command("show", epilog=parameters.SHOW_EXAMPLES, rich_help_panel="Simulate")(
+    parameters.show_parameters
+)
+app.command("rig", epilog=rig.EXAMPLES, rich_help_panel="Test")(rig.rig)
+app.add_typer(campaign.app, name="campaign", rich_help_panel="Test")
+app.command("excitation", epilog=excite.EXAMPLES, rich_help_panel="Identify")(excite.excitation)
+app.command("fit", epilog=fit.EXAMPLES, rich_help_panel="Identify")(fit.fit)
+app.command("validate", epilog=validate.EXAMPLES, rich_help_panel="Identify")(validate.validate)
+app.command("advise", epilog=advise.EXAMPLES, rich_help_panel="Identify")(advise.advise)
+app.command("report", epilog=report.EXAMPLES, rich_help_panel="Identify")(report.report)
+app.command("limits", epilog=limits.EXAMPLES, rich_help_panel="Understand")(limits.limits)
+app.command("whatif", epilog=whatif.EXAMPLES, rich_help_panel="Understand")(whatif.whatif)
+app.command("size", epilog=size.EXAMPLES, rich_help_panel="Understand")(size.size)
+app.command("sensitivity", epilog=sensitivity.EXAMPLES, rich_help_panel="Understand")(
+    sensitivity.sensitivity
+)
+app.command("compensate", epilog=compensate.EXAMPLES, rich_help_panel="Understand")(
+    compensate.compensate
+)
+app.command("linearize", epilog=linearize.EXAMPLES, rich_help_panel="Understand")(
+    linearize.linearize
+)
+app.command("bode", epilog=bode.EXAMPLES, rich_help_panel="Understand")(bode.bode)
 
 
 def main() -> None:

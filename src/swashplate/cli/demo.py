@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swashplate.cli.fit_output import quality_table, written
-from swashplate.cli.judging import Wanted, judged_fit
+from swashplate.cli.judging import Judged, Wanted, judged_fit
 from swashplate.cli.terminal import note, progress, say, show, table
 
 if TYPE_CHECKING:
@@ -66,6 +66,7 @@ def demo(
         begin("writing the report")
         lines = [*written(result, found.assessments, out), found.stored(out)]
         lines.append(found.reported(out, truth.parameters))
+        lines.append(_drawn(found, truth, out))
     note(f"Campaign:  {path}")
     show(*(made for made, _, _ in shown))
     inside, counted = (sum(each) for each in zip(*(pair[1:] for pair in shown), strict=True))
@@ -75,6 +76,30 @@ def demo(
     note(f"Fitted in {seconds:.2f} s, compiling included where it was the first time.")
     for line in lines:
         note(line)
+
+
+def _drawn(found: Judged, truth: Drive, out: Path) -> str:
+    """Draw a predicted run and the estimates beside the truth; a line that says so."""
+    from swashplate.identification.drive_model import DriveModel
+    from swashplate.identification.known_truth import true_value
+    from swashplate.identification.validation import with_speeds
+    from swashplate.report.figures import plot_fit, save_figure
+
+    speeds = [
+        each
+        for each in with_speeds(found.predicted)
+        if each.experiment[each.channel].kind == "shaft_speed"
+    ]
+    values = {}
+    for assessment in found.assessments:
+        model = assessment.stage.problem.model
+        assert isinstance(model, DriveModel)
+        for unknown in assessment.stage.problem.unknowns:
+            value = true_value(unknown, model, truth.parameters)
+            if value is not None:
+                values[unknown.name] = value
+    save_figure(plot_fit(speeds[-1], found.assessments, values), out / "result.png")
+    return f"Figure:    {out / 'result.png'}"
 
 
 def _truth_beside_estimate(

@@ -22,7 +22,7 @@ from swashplate.identification.linearised import LinearisedFit
 from swashplate.identification.variables import Variables
 
 Array = NDArray[np.float64]
-Noise = Literal["white", "coloured", "HAC", "by run"]
+Noise = Literal["white", "coloured", "swelling", "HAC", "by run"]
 
 BANDWIDTH = 4.0
 """Longest lag of the HAC estimate, in correlation lengths: Parzen's window there keeps 0.72 of the
@@ -34,6 +34,7 @@ PARZEN_ENERGY = 151.0 / 280.0
 LABELS: Mapping[Noise, str] = {
     "white": "white noise (too small for coloured residuals)",
     "coloured": "coloured noise, alike in all runs of a channel",
+    "swelling": "noise that swells and fades along the runs",
     "HAC": "heteroskedasticity and autocorrelation consistent",
     "by run": "clusters, one for each run",
 }

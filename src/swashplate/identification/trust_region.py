@@ -27,10 +27,11 @@ LEG = 30
 as a step that just reaches the swash plate's stop, it shrinks to nothing."""
 GAINED = 1e-6
 """Relative gain of a leg from which another one is worth it."""
+UNCHANGED = 2
 _ENDINGS = {
     0: SPENT,
     1: "the gradient vanished",
-    2: "the cost no longer changed",
+    UNCHANGED: "the cost no longer changed",
     3: "the parameters no longer changed",
     4: "neither cost nor parameters changed any more",
 }
@@ -103,7 +104,7 @@ def trust_region(
                 )
             )
 
-    vector, before = start, np.inf
+    vector, before, spent = start, np.inf, 0
     try:
         while True:
             found = least_squares(
@@ -117,14 +118,17 @@ def trust_region(
                 ftol=tolerance,
                 xtol=tolerance,
                 gtol=1e-14,
-                max_nfev=min(LEG, max(max_evaluations - memory.evaluations, 1)),
+                max_nfev=min(LEG, max_evaluations - spent),
                 callback=told,
             )
-            gained = before - found.cost > GAINED * found.cost
-            first, before = np.isinf(before), found.cost
-            vector = found.x
-            converged = found.status > 0 and (first or not gained)
-            if converged or memory.evaluations >= max_evaluations:
+            first, gained = spent == 0, before - found.cost > GAINED * found.cost
+            # steps that round to nothing are counted by SciPy alone
+            spent += int(found.nfev)
+            vector, before, ending = found.x, float(found.cost), int(found.status)
+            if not first and not gained:
+                ending = ending or UNCHANGED
+                break
+            if (first and ending > 0) or spent >= max_evaluations:
                 break
     except KeyboardInterrupt:
         if memory.best is None:
@@ -136,8 +140,8 @@ def trust_region(
         float(found.cost),
         start_cost,
         memory.evaluations,
-        bool(found.status > 0),
+        ending > 0,
         False,
-        _ENDINGS.get(int(found.status), str(found.message)),
+        _ENDINGS.get(ending, str(found.message)),
         perf_counter() - begun,
     )

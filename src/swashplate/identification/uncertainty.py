@@ -19,16 +19,14 @@ from swashplate.identification.covariance import (
 from swashplate.identification.handed_on import Handed, with_handed
 from swashplate.identification.intervals import Estimate, estimates, reach
 from swashplate.identification.linearised import LinearisedFit
+from swashplate.identification.swelling_noise import swelling_noise_covariance
 from swashplate.identification.tones import Tone, separated
 
 Array = NDArray[np.float64]
 
-DEVIATIONS = 2.0
-"""By how many of its own standard deviations a HAC error must be larger to count as such. It is
-taken from squares of coloured residuals, of which three are exceeded in one campaign of eight."""
-
-TRUSTED = 10.0
-"""Independent stretches from which a HAC variance is held against the other one."""
+NOTABLE = 1.2
+"""Ratio of the errors under noise that differs along the runs to those under stationary noise from
+which it is said that they differ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +36,11 @@ class Uncertainty:
     quoted: Covariance
     """That of the stage's own noise with what earlier stages handed on."""
     own: Covariance
-    """Stationary coloured noise, or HAC for unknowns where that is significantly larger."""
+    """The larger one, unknown by unknown, of the next two."""
     coloured: Covariance
+    """Stationary coloured noise."""
+    swelling: Covariance
+    """Noise that differs along the runs."""
     hac: Covariance
     white: Covariance
     """Too small where residuals are coloured; to stand beside the others."""
@@ -47,7 +48,7 @@ class Uncertainty:
     samples: tuple[tuple[str, int, float], ...]
     """For each run its label, samples, and the independent samples that they are worth."""
     uneven: tuple[str, ...]
-    """Unknowns whose HAC error is significantly larger: the noise is not alike everywhere."""
+    """Unknowns whose error is notably larger because the noise is not alike everywhere."""
     noisy: bool
     """Whether there are any residuals at all."""
     level: float
@@ -115,8 +116,8 @@ class Uncertainty:
             )
         if self.uneven:
             said.append(
-                f"The noise is not alike in all parts of the runs: for {', '.join(self.uneven)} "
-                "the wider HAC interval is quoted."
+                f"The noise is not alike in all parts of the runs: {', '.join(self.uneven)} "
+                f"{'has' if len(self.uneven) == 1 else 'have'} wider intervals for it."
             )
         for end in self.ends:
             side, name = "upper" if end.upper else "lower", self.own.variables.names[end.number]
@@ -184,12 +185,14 @@ def uncertainty(
     colours = noise_colours(clean.fit)
     coloured = _with(coloured_noise_covariance(clean.fit, colours=colours), clean.covariance)
     hac = _with(hac_covariance(clean.fit), clean.covariance)
-    own, uneven = _wider(coloured, hac)
+    swelling = swelling_noise_covariance(fit)
+    own, uneven = _wider(coloured, swelling)
     worth = {m: colour for colour in colours for m in colour.members}
     made = Uncertainty(
         with_handed(own, handed),
         own,
         coloured,
+        swelling,
         hac,
         white_noise_covariance(fit),
         colours,
@@ -212,24 +215,19 @@ def _with(covariance: Covariance, added: Array) -> Covariance:
     return replace(covariance, matrix=covariance.matrix + np.where(known, added, 0.0))
 
 
-def _wider(coloured: Covariance, hac: Covariance) -> tuple[Covariance, tuple[str, ...]]:
-    """Where HAC errors are larger by more than five of their own standard deviations, those."""
-    freedom = hac.degrees_of_freedom
+def _wider(coloured: Covariance, swelling: Covariance) -> tuple[Covariance, tuple[str, ...]]:
+    """The larger of two errors, unknown by unknown, and where the second is notably larger."""
     narrow = np.where(coloured.determined, coloured.standard_errors, 1.0)
-    ratio = np.where(coloured.determined, hac.standard_errors, 0.0) / np.where(
+    ratio = np.where(coloured.determined, swelling.standard_errors, 0.0) / np.where(
         narrow > 0.0, narrow, 1.0
     )
-    # the relative standard deviation of an error with ν degrees of freedom is 1/√(2ν)
-    larger = (freedom >= TRUSTED) & (ratio > 1.0 + DEVIATIONS / np.sqrt(2.0 * freedom))
-    if not larger.any():
-        return coloured, ()
-    stretch = np.where(larger, ratio, 1.0)
+    stretch = np.maximum(ratio, 1.0)
     quoted = Covariance(
         "coloured",
         coloured.variables,
         coloured.matrix * np.outer(stretch, stretch),
         coloured.determined,
-        np.where(larger, freedom, coloured.degrees_of_freedom),
+        np.where(ratio > 1.0, swelling.degrees_of_freedom, coloured.degrees_of_freedom),
     )
-    names: Sequence[str] = coloured.variables.names
-    return quoted, tuple(name for name, more in zip(names, larger, strict=True) if more)
+    names = np.array(coloured.variables.names)
+    return quoted, tuple(names[ratio > NOTABLE])
