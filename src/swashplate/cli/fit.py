@@ -17,15 +17,14 @@ from swashplate.cli.fit_output import (
 )
 from swashplate.cli.inputs import parameters_of
 from swashplate.cli.judging import Wanted, judged_fit
-from swashplate.cli.terminal import note, say, show, side, working
+from swashplate.cli.terminal import Shown, long_work, note, say, show, side, waiting, working
 from swashplate.cli.validate import chosen_axis
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
-    from rich.status import Status
-
     from swashplate.identification.fit import Search
     from swashplate.identification.solving import Progress
+    from swashplate.identification.starts import StartResult
 
 EXAMPLES = """\
 Examples:
@@ -129,6 +128,7 @@ def fit(
     from swashplate.identification.executors import Dask, Processes
     from swashplate.identification.fit import fit as fitted
     from swashplate.identification.fit import refined
+    from swashplate.identification.solving import longest_left
     from swashplate.identification.staging import setup_of
 
     if 0 < bootstrap < FEWEST_DRAWS:
@@ -146,14 +146,15 @@ def fit(
             raise InputError(f"{path}: no run of the axis '{chosen}' has the role 'fit'.")
     executor = Dask(dask) if dask is not None else Processes(jobs or None)
     begun = perf_counter()
-    with working("Fitting") as status:
+    with long_work("Fitting") as shown:
 
         def watch(stage: str, now: Progress) -> None:
-            status.update(
-                f"{stage}: iteration {now.iteration}, cost {now.cost:.6g}, {now.seconds:.1f} s"
+            shown(
+                f"{stage}: iteration {now.iteration}, cost {now.cost:.6g}",
+                left=waiting(longest_left(now), "at most"),
             )
 
-        search = _search(starts, seed, executor, out, resume, status) if starts else None
+        search = _search(starts, seed, executor, out, resume, shown) if starts else None
         result = fitted(runs, nominal, plan, method=method, loss=loss, search=search, watch=watch)
         if joint and len(plan.stages) > 1 and not result.interrupted:
             result = refined(result, runs, watch=watch)
@@ -199,19 +200,23 @@ def fit(
 
 
 def _search(
-    starts: int, seed: int, executor: object, out: Path, resume: bool, status: Status
+    starts: int, seed: int, executor: object, out: Path, resume: bool, shown: Shown
 ) -> Search:
     from swashplate.identification.executors import Dask, Processes
     from swashplate.identification.fit import Search
+    from swashplate.identification.starts import time_left
 
     assert isinstance(executor, Processes | Dask)
-    return Search(
-        starts,
-        seed,
-        executor,
-        out / "starts",
-        resume,
-        lambda stage, result, done: status.update(
-            f"{stage}: {done} of {starts + 1} starts, the last to cost {result.cost:.6g}"
-        ),
-    )
+    begun: dict[str, tuple[float, int]] = {}
+
+    def watch(stage: str, result: StartResult, done: int) -> None:
+        # results of an earlier run come all at once: the pace counts from the first new one
+        first, kept = begun.setdefault(stage, (perf_counter(), done))
+        left = time_left(done - kept, starts + 1 - done, perf_counter() - first)
+        shown(
+            f"{stage}: {done} of {starts + 1} starts, the last to cost {result.cost:.6g}",
+            done / (starts + 1),
+            waiting(left),
+        )
+
+    return Search(starts, seed, executor, out / "starts", resume, watch)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from typing import Protocol
 
 from rich import box
 from rich.console import Console
@@ -87,3 +88,42 @@ def progress(steps: int) -> Iterator[Callable[[str], None]]:
             begun += 1
 
         yield begin
+
+
+class Shown(Protocol):
+    """Says how far a long piece of work is."""
+
+    def __call__(self, what: str, share: float | None = None, left: str = "") -> None:
+        """Show what is done now, the share that is done if it is known, and the time left."""
+        ...
+
+
+@contextmanager
+def long_work(text: str) -> Iterator[Shown]:
+    """A bar with what is done now and the time left; nothing in a pipe."""
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+
+    columns = (
+        SpinnerColumn(),
+        BarColumn(bar_width=20),
+        TextColumn("{task.description}", markup=False),
+        TextColumn("{task.fields[left]}", markup=False),
+    )
+    bar = Progress(*columns, console=side, transient=True, disable=not side.is_terminal)
+    with bar:
+        task = bar.add_task(text, total=None, left="")
+
+        def show(what: str, share: float | None = None, left: str = "") -> None:
+            total = None if share is None else 1.0
+            bar.update(task, description=what, total=total, completed=share or 0.0, left=left)
+
+        yield show
+
+
+def waiting(seconds: float | None, sort: str = "about") -> str:
+    """A time left in words a person takes in at once: ``"about 12 s left"``."""
+    if seconds is None:
+        return ""
+    if seconds < 90.0:
+        return f"{sort} {max(seconds, 0.0):.0f} s left"
+    return f"{sort} {seconds / 60.0:.0f} min left"
