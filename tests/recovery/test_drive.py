@@ -61,7 +61,7 @@ def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Pat
     truth = drawn(axis, setup, seed)
     campaign = measured(axis, truth, tmp_path / "virtual")
     plan = setup.joint() if joint else setup
-    # at 1e-14 the cost of slew's seed 4, 6e-15 already, creeps on along the stop that is not reached
+    # at 1e-14 the cost of slew, seed 4, 6e-15 already, creeps on along a stop that is not reached
     result = fit(campaign.experiments, campaign.drive(axis).parameters, plan, tolerance=1e-12)
     expected = dict(truth.parameters.numbers)
     for stage in result.stages:
