@@ -16,9 +16,9 @@ from swashplate.cli.advice_tables import (
     unknowns_table,
     write_advice,
 )
-from swashplate.cli.excite import axis_of
 from swashplate.cli.inputs import maneuver_of, parameters_of
 from swashplate.cli.terminal import note, say, show, working
+from swashplate.cli.validate import chosen_axis
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
@@ -181,7 +181,7 @@ def _bench(
         plan = load_setup(setup or parameters.name)
         return bench(smooth(parameters), plan, free=free, sensors=_noises(noise, fresh=parameters))
     campaign = Campaign.from_toml(word)
-    chosen = axis_of(campaign, axis)
+    chosen = chosen_axis(campaign, axis)
     plan = setup_of(campaign, chosen, setup)
     runs = campaign.select(axis=chosen, role="fit")
     if not runs:

@@ -10,12 +10,12 @@ import typer
 
 from swashplate.cli.inputs import parameters_of
 from swashplate.cli.terminal import note, say, show, table, working
+from swashplate.cli.validate import chosen_axis
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swashplate.campaign.campaign import Campaign
     from swashplate.identification.excitation import Outlook
     from swashplate.identification.identifiability import Identifiability
 
@@ -95,7 +95,7 @@ def excitation(
 
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
-        chosen = axis_of(campaign, axis)
+        chosen = chosen_axis(campaign, axis)
         plan = setup_of(campaign, chosen, setup)
         drive = parameters_of(begin) if begin is not None else campaign.drive(chosen).parameters
         runs = campaign.select(axis=chosen, role="fit")
@@ -135,24 +135,6 @@ def excitation(
         note(setup_text(proposed_setup(plan, proposals), proposals).rstrip())
     if out is not None:
         note(f"Table: {out}")
-
-
-def axis_of(campaign: Campaign, axis: str | None) -> str:
-    """The axis named, or the only one that a campaign has.
-
-    Raises
-    ------
-    InputError
-        If there are several and none is named, or there is none of that name.
-    """
-    if axis is None:
-        if len(campaign.axes) > 1:
-            raise InputError(
-                f"{campaign.path} has the axes {', '.join(campaign.axes)}; name one with --axis."
-            )
-        return next(iter(campaign.axes))
-    campaign.select(axis=axis)
-    return axis
 
 
 def _table(look: Outlook, runs: Sequence[str]) -> Table:
