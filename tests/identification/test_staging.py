@@ -1,0 +1,95 @@
+"""From a set-up to its problem: the source's weights, clocks and pressures that are free."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swashplate import Campaign, Drive
+from swashplate.campaign import rig
+from swashplate.identification.fit import fit, smooth
+from swashplate.identification.setup import Free, Setup, Stage, load_setup, setup_names
+from swashplate.identification.staging import stage_problem
+from swashplate.maneuvers import source_tests
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    tests = source_tests("hoist")
+    chosen = {name: tests[name] for name in ("step +4 V", "sine 9 V 0.3 Hz", "ramp +1 V/s")}
+    virtual = rig.run(
+        "hoist", chosen, severity="clean", channels=("rectified_current", "shaft_speed")
+    )
+    return Campaign.from_toml(rig.write(virtual, tmp_path_factory.mktemp("t") / "virtual"))
+
+
+def test_the_packaged_set_ups() -> None:
+    assert set(setup_names()) >= {
+        "hoist",
+        "slew",
+        "luff",
+        "hoist-source",
+        "slew-source",
+        "luff-source",
+    }
+    for name in setup_names():
+        assert load_setup(name).stages
+
+
+def test_the_sources_weights_of_the_pump(campaign: Campaign) -> None:
+    """campaign.md: 400 samples ignored; 4 V steps 64.4, ten times that on 1.0-1.8 and 6.0-6.7 s;
+    0.3 Hz sines 0.1; ramps 2."""
+    stage = load_setup("hoist-source").stages[-1]
+    problem = stage_problem(stage, smooth(Drive.preset("hoist").parameters), campaign.experiments)
+    weight = (
+        {
+            each.maneuver: dict(zip(each["speed"].time.round(3), each["speed"].weight, strict=True))
+            for each in problem.experiments
+        }
+        if "speed" in problem.channels
+        else {
+            each.maneuver: dict(
+                zip(
+                    each[problem.channels[0]].time.round(3),
+                    each[problem.channels[0]].weight,
+                    strict=True,
+                )
+            )
+            for each in problem.experiments
+        }
+    )
+    step, sine, ramp = (weight[name] for name in ("step +4 V", "sine 9 V 0.3 Hz", "ramp +1 V/s"))
+    assert (step[0.5], step[0.875], step[1.5], step[3.0], step[6.5], step[8.0]) == pytest.approx(
+        (0.0, 64.4, 644.0, 64.4, 644.0, 64.4)
+    )
+    assert (sine[0.5], sine[5.0]) == pytest.approx((0.0, 0.1))
+    assert (ramp[0.5], ramp[5.0]) == pytest.approx((0.0, 2.0))
+
+
+def test_a_clock_that_is_late_is_found(campaign: Campaign) -> None:
+    """The speed's clock moved by 20 ms in one run: its offset is free, and found."""
+    late = [
+        replace(
+            each,
+            channels={
+                name: replace(channel, time=channel.time + 0.02)
+                if channel.kind == "shaft_speed"
+                else channel
+                for name, channel in each.channels.items()
+            },
+        )
+        if each.maneuver == "step +4 V"
+        else each
+        for each in campaign.experiments
+    ]
+    stage = Stage(
+        name="pump",
+        part="pump",
+        free={"Z8": Free(relative=(0.5, 2.0), log=True)},
+        clock_offsets={"shaft_speed": 0.05},
+    )
+    found = fit(late, Drive.preset("hoist").parameters, Setup(stages=(stage,))).stages[-1].values
+    offsets = {name: value for name, value in found.items() if name.startswith("clock")}
+    assert len(offsets) == 3
+    sizes = sorted(abs(value) for value in offsets.values())
+    np.testing.assert_allclose(sizes, [0.0, 0.0, 0.02], atol=2e-4)
