@@ -13,7 +13,7 @@ from swashplate.identification.starts import sobol_starts, solve_from, time_left
 
 @dataclass(frozen=True)
 class Forces:
-    """Three logarithms of numbers that rise, and one number, with a quadratic cost about a truth."""
+    """Three logarithms of numbers that rise, and a number; quadratic about a truth."""
 
     rising: tuple[tuple[int, ...], ...] = ((0, 1, 2),)
     forbidden: float = np.inf
