@@ -20,6 +20,8 @@ from swashplate.identification.solving import (
 )
 
 Array = NDArray[np.float64]
+OF_START = 1e-6
+"""The tolerance refers to the cost at the end, which is as much smaller than at the start."""
 
 
 class _SpentError(Exception):
@@ -43,6 +45,8 @@ def slsqp(
     evaluations, iteration = 0, 0
     start_cost = objective.cost(start)
     best = (start_cost, start.copy())
+    # SLSQP takes numbers of the order of 1 for granted, in its steps and in where it stops
+    unit = start_cost or 1.0
 
     def cost(vector: Array) -> float:
         nonlocal evaluations, best
@@ -52,10 +56,10 @@ def slsqp(
         try:
             value = objective.cost(vector)
         except DomainError:
-            return REFUSED * start_cost
+            return REFUSED
         if value < best[0]:
             best = (value, vector.copy())
-        return value
+        return value / unit
 
     def told(vector: Array) -> None:
         nonlocal iteration
@@ -74,7 +78,7 @@ def slsqp(
             method="SLSQP",
             bounds=Bounds(low, high, keep_feasible=True),
             callback=told,
-            options={"maxiter": max_evaluations, "ftol": tolerance},
+            options={"maxiter": max_evaluations, "ftol": OF_START * tolerance},
         )
         converged, message = bool(found.success), str(found.message)
     except _SpentError:

@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 from swashplate.errors import DomainError, FileError
 from swashplate.identification.dormant import nominal_effects, woken
 from swashplate.identification.drawing import sobol_starts as sobol_starts
+from swashplate.identification.edges import past_edge
 from swashplate.identification.executors import Executor, Serial
 from swashplate.identification.rising import by_increments
 from swashplate.identification.solving import Method, Objective, Solution, solve
+from swashplate.identification.trust_region import LEG
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
-WAKINGS = 2
-"""How often a search is begun again where it lost an unknown."""
+WAKINGS = 3
+"""How often a search is taken back from where it lost an unknown."""
 
 
 @dataclass(frozen=True)
@@ -155,27 +157,35 @@ def _solve_one(objective: Objective, task: _Task) -> StartResult:
 
 
 def _search(objective: Objective, start: Array, task: _Task) -> Solution:
-    """From a start; on from where it ends as long as that has lost an unknown and it helps."""
-    best = _solved(objective, start, task, task.max_evaluations)
+    """Leg after leg, past edges of the cost and back from where an unknown has lost its effect."""
     if task.method != "trf":
-        return best
+        return _solved(objective, start, task, task.max_evaluations)
     nominal = nominal_effects(objective)
-    evaluations, seconds = best.evaluations + 1, best.seconds
-    for _ in range(WAKINGS):
-        left = task.max_evaluations - evaluations
-        if best.interrupted or left <= 0:
+    best = leg = _solved(objective, start, task, min(LEG, task.max_evaluations))
+    spent, seconds, wakings = 1 + leg.evaluations, leg.seconds, 0
+    while not leg.interrupted and spent < task.max_evaluations:
+        point, trials = None, 0
+        if wakings < WAKINGS:
+            point, trials = woken(objective, leg.vector, nominal)
+            wakings += point is not None
+        if point is None:
+            form = by_increments(objective, leg.vector)
+            search, more = past_edge(form, form.to_search(leg.vector), best.start_cost)
+            point, trials = None if search is None else form.to_vector(search), trials + more
+        spent += trials
+        if point is None and leg.converged:
             break
-        point, spent = woken(objective, best.vector, nominal)
-        evaluations += spent
-        if point is None or evaluations >= task.max_evaluations:
+        left = task.max_evaluations - spent
+        if left <= 0:
             break
-        again = _solved(objective, point, task, task.max_evaluations - evaluations)
-        evaluations, seconds = evaluations + again.evaluations, seconds + again.seconds
-        if not again.cost < best.cost:
-            best = replace(best, interrupted=again.interrupted)
+        try:
+            leg = _solved(objective, leg.vector if point is None else point, task, min(LEG, left))
+        except DomainError:  # a point that was woken outside the domain
             break
-        best = replace(again, start_cost=best.start_cost)
-    return replace(best, evaluations=evaluations, seconds=seconds)
+        spent, seconds = spent + leg.evaluations, seconds + leg.seconds
+        if leg.cost < best.cost:
+            best = replace(leg, start_cost=best.start_cost)
+    return replace(best, evaluations=spent, seconds=seconds, interrupted=leg.interrupted)
 
 
 def _solved(objective: Objective, start: Array, task: _Task, most: int) -> Solution:
