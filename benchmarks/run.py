@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import fits
 import processes
 import rows
+import studies
 import table
 from rich.console import Console
 
@@ -21,6 +22,9 @@ def measured() -> Iterator[table.Row]:
     yield from rows.sensitivity_rows(marches)
     yield from fits.fit_rows()
     yield from rows.batch_rows(marches)
+    yield from studies.fit_study_rows()
+    yield from studies.full_order_rows()
+    yield from studies.sobol_rows()
     yield from processes.memory_rows()
     yield from processes.hour_rows()
     yield from processes.command_rows()

@@ -1,0 +1,94 @@
+"""Rows of the table for whole studies: a fit, its report, a full-order run, Sobol indices."""
+
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from statistics import median
+
+from processes import limited, work
+from table import Row, duration, size
+
+from swashplate import Campaign, maneuvers
+from swashplate.campaign import rig
+from swashplate.full_order.drive import FullOrderDrive
+from swashplate.identification.assessment import assess
+from swashplate.identification.executors import Processes
+from swashplate.identification.fit import fit
+from swashplate.identification.refits import bootstraps_of
+from swashplate.identification.setup import load_setup
+from swashplate.identification.validation import predict
+from swashplate.report.fit_page import write_fit_report
+
+ROUNDS = 5
+REFITS = 1000
+FIT, REPORT, REFITTED = 2.0, 3.0, 300.0
+MARCHED, SOLVED, STUDIED = 0.1, 5.0, 5.0
+"""Targets. [s]"""
+
+
+def fit_study_rows() -> Iterator[Row]:
+    """The hoist's set-up on a realistic virtual campaign: fit, judging, report, refits."""
+    with tempfile.TemporaryDirectory() as folder:
+        tests = rig.run("hoist", seed=1, perturb=0.1)
+        campaign = Campaign.from_toml(rig.write(tests, Path(folder) / "virtual"))
+        nominal, setup = campaign.drive("hoist").parameters, load_setup("hoist")
+        runs, held = campaign.select(role="fit"), campaign.select(role="validate")
+        fitted, judged, written = [], [], []
+        # the first round is not counted: it compiles, or loads what was compiled
+        for _ in range(ROUNDS + 1):
+            begin = time.perf_counter()
+            result = fit(runs, nominal, setup)
+            fitted.append(time.perf_counter() - begin)
+            begin = time.perf_counter()
+            assessed = assess(result.stages)
+            for each in assessed:
+                # what a stage says is computed where it is asked for
+                each.identifiability, each.uncertainty, each.runs  # noqa: B018
+            predicted = predict(result.parameters, held)
+            judged.append(time.perf_counter() - begin)
+            begin = time.perf_counter()
+            page = Path(folder) / "report.html"
+            write_fit_report(result, campaign, page, assessments=assessed, validation=predicted)
+            written.append(time.perf_counter() - begin)
+        yield _limited("complete staged fit of a virtual hoist", median(fitted[1:]), FIT)
+        yield Row("what the fit is worth: intervals, tests", duration(median(judged[1:])))
+        yield _limited("its report", median(written[1:]), REPORT)
+        begin = time.perf_counter()
+        bootstraps_of(assessed, REFITS, seed=0, executor=Processes())
+        spent = time.perf_counter() - begin
+        yield _limited(f"{REFITS:,} bootstrap refits of both stages, all cores", spent, REFITTED)
+
+
+def full_order_rows() -> Iterator[Row]:
+    """30 s of the five-state model, by the compiled march and by SciPy's Radau."""
+    hoist = FullOrderDrive.preset("hoist")
+    command = maneuvers.sine(6.5, 0.1, length=30.0).sample(512.0)
+    current = hoist.drive.simulate(command).current
+    march = _median_of(9, lambda: hoist.simulate_current(current, method="march"))
+    yield _limited("full-order model, compiled march", march, MARCHED)
+    radau = _median_of(3, lambda: hoist.simulate_current(current, method="radau"))
+    yield _limited("full-order model, SciPy Radau", radau, SOLVED)
+
+
+def sobol_rows() -> Iterator[Row]:
+    """Sobol's indices of eight levers and five outcomes over a 10 s manoeuvre."""
+    found = work("sobol")
+    for name in ("quarter", "all"):
+        what = f"Sobol analysis of 10 s, {found[f'{name} runs']:,} runs, two threads"
+        yield _limited(what, found[f"{name} seconds"], STUDIED)
+        yield Row(f"its memory, of {found[f'{name} runs']:,} runs", size(found[f"{name} growth"]))
+
+
+def _limited(what: str, found: float, limit: float) -> Row:
+    return limited(what, found, limit, duration(found), f"< {duration(limit)}")
+
+
+def _median_of(rounds: int, run: Callable[[], object]) -> float:
+    run()
+    found = []
+    for _ in range(rounds):
+        begin = time.perf_counter()
+        run()
+        found.append(time.perf_counter() - begin)
+    return median(found)
