@@ -191,6 +191,21 @@ DAMAGED = [
     ("two.csv", rows("0.25,1.5.2"), "'voltage' holds '1.5.2', ... in data row 3"),
     ("date.csv", rows("2024-01-01,1"), "'time' holds '2024-01-01', ... in data row 3"),
     (
+        "american.csv",
+        text("time,u\n03/04/2026 10:00:00,1\n03/04/2026 10:00:01,2\n"),
+        "'time' holds '03/04/2026 10:00:00', which is no number, in data row 1",
+    ),
+    (
+        "mixed.csv",
+        text("time,u\n10:00:00,1\n11,2\n"),
+        "'time' holds '11', which is no date like the first one, in data row 2 (line 3)",
+    ),
+    (
+        "late.csv",
+        text("time,u\n" + "10:00:00.5,1\n" * 200_000 + "7,1\n8,1\n"),
+        "'time' holds '7', which is no date like the first one, in data row 200001 (line 200002)",
+    ),
+    (
         "long_cell.csv",
         rows("0.25," + "9x" * 500),
         "'voltage' holds '9x9x9x9x9x9x9x9x9x9x9x9x9x9x9x9x9x9x9... data row 3",

@@ -13,6 +13,7 @@ from swashplate.errors import FileError
 from swashplate.logs.damage import printable
 from swashplate.logs.log import Column
 from swashplate.logs.lookup import split_unit
+from swashplate.logs.text.dates import is_date
 from swashplate.logs.text.layout import Layout
 from swashplate.logs.text.numbers import is_number
 from swashplate.logs.text.options import TextOptions
@@ -95,6 +96,11 @@ def read_heading(
         notes.append(f"Taken as text above the table: line {numbers}.")
     units = units or labview_units([line.text for line in preamble], layout.width)
     columns = _columns(names, units, layout, plain[first])
+    cells = layout.split(plain[first].text)
+    for place, (column, cell) in enumerate(zip(columns, cells, strict=False)):
+        if is_date(cell):
+            columns = (*columns[:place], column._replace(unit="s"), *columns[place + 1 :])
+            notes.append(f"'{column.name}' holds dates, read as seconds since the first.")
     if any(count > 1 for count in Counter(names).values()):
         notes.append("Columns of the same name are numbered: 'name #1', 'name #2'.")
     told = sorted([*preamble, *said])[:_KEPT]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from swashplate.errors import FileError
 from swashplate.logs.damage import printable
+from swashplate.logs.text.dates import microseconds_of
 from swashplate.logs.text.encoding import TextSource
 from swashplate.logs.text.header import Heading
 from swashplate.logs.text.layout import Layout
@@ -72,8 +73,10 @@ class RowReader:
         """
         found: list[list[Array]] = [[] for _ in positions]
         count = 0
+        first: dict[int, int] = {}
         for rows in self._pieces():
-            for pieces, numbers in zip(found, self._numbers(rows, positions, count), strict=True):
+            read = self._numbers(rows, positions, count, first)
+            for pieces, numbers in zip(found, read, strict=True):
                 pieces.append(numbers)
             count += len(rows.lines)
         arrays = []
@@ -174,13 +177,16 @@ class RowReader:
             has = f"has {fields} field" + "s" * (fields > 1)
             raise FileError(f"{self.source.path}: {where} {has} instead of {width}.")
 
-    def _numbers(self, rows: _Rows, positions: Sequence[int], count: int) -> list[Array]:
+    def _numbers(
+        self, rows: _Rows, positions: Sequence[int], count: int, first: dict[int, int]
+    ) -> list[Array]:
+        """Columns of a piece; `first` keeps the first date [µs] of those that hold dates."""
         import polars as pl
 
         if rows.cells:
             texts = [pl.Series([row[position] for row in rows.cells]) for position in positions]
         else:
-            if self.layout.decimal == "." or b"." not in rows.text:
+            if not first and (self.layout.decimal == "." or b"." not in rows.text):
                 try:
                     table = self._table(rows.text, positions, pl.Float64())
                     return [table[str(position)].to_numpy() for position in positions]
@@ -191,18 +197,32 @@ class RowReader:
         arrays = []
         for position, text in zip(positions, texts, strict=True):
             numbers = numbers_of(text, self.layout.decimal)
+            kind = "number"
+            if position in first or (count == 0 and isinstance(numbers, NoNumber)):
+                stamps = microseconds_of(text, due=position in first)
+                if isinstance(stamps, pl.Series):
+                    if position not in first:
+                        first[position] = int(stamps.drop_nulls()[0])
+                    arrays.append(1e-6 * (stamps - first[position]).cast(pl.Float64).to_numpy())
+                    continue
+                if stamps is not None:
+                    numbers, kind = stamps, "date like the first one"
             if isinstance(numbers, NoNumber):
-                name = self.heading.columns[position].name
-                other = "," if self.layout.decimal == "." else "."
-                but = "comma" if other == "." else "point"
-                hint = f" with a decimal {but}" if is_number(numbers.cell.strip(), other) else ""
-                where = f"data row {count + numbers.row + 1} (line {rows.lines[numbers.row]})"
-                raise FileError(
-                    f"{self.source.path}: column '{name}' holds '{shown(numbers.cell)}', which is "
-                    f"no number{hint}, in {where}."
-                )
+                line = rows.lines[numbers.row]
+                raise self._refusal(position, numbers, kind, count + numbers.row + 1, line)
             arrays.append(numbers)
         return arrays
+
+    def _refusal(self, position: int, found: NoNumber, kind: str, row: int, line: int) -> FileError:
+        """What is said of a cell that is not what it should be."""
+        name, hint = self.heading.columns[position].name, ""
+        other = "," if self.layout.decimal == "." else "."
+        if kind == "number" and is_number(found.cell.strip(), other):
+            hint = f" with a decimal {'comma' if other == '.' else 'point'}"
+        return FileError(
+            f"{self.source.path}: column '{name}' holds '{shown(found.cell)}', which is no "
+            f"{kind}{hint}, in data row {row} (line {line})."
+        )
 
     def _table(
         self, text: bytes, positions: Sequence[int], kind: polars.DataType
