@@ -13,7 +13,8 @@ export PIP_BUILD_CONSTRAINT := constraints.txt
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test lint bench cluster fuzz tools browser calibration format clean
+.PHONY: help .venv demo test lint docs figures bench cluster fuzz tools browser calibration coverage dist \
+  format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[.a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
@@ -43,6 +44,14 @@ lint: $(STAMP) ## style, format, types and the direction of imports
 	@echo; echo "== Format";  $(BIN)/ruff format --check .
 	@echo; echo "== Types";   $(BIN)/mypy
 	@echo; echo "== Imports"; $(BIN)/lint-imports --no-logo
+	@echo; echo "== Spelling"; $(BIN)/codespell
+
+docs: $(STAMP) ## build the documentation into docs/_build/html; warnings are errors
+	@$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
+	@echo "Open docs/_build/html/index.html"
+
+figures: $(STAMP) ## make all figures of README and documentation again
+	@$(BIN)/python docs/figures.py
 
 bench: $(STAMP) tools ## measure the speed against C (needs a C compiler)
 	@$(BIN)/python benchmarks/run.py
@@ -58,6 +67,21 @@ cluster: $(STAMP) ## many starts on a local Dask cluster that loses a worker
 
 calibration: $(STAMP) ## how often intervals hold the truth, over 400 virtual campaigns (half an hour)
 	@$(BIN)/python benchmarks/calibration.py
+
+coverage: $(STAMP) ## which lines of src no test reaches; the kernels interpreted (ten minutes)
+	@$(BIN)/coverage erase
+	@$(BIN)/coverage run -m pytest -n 2
+	@NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -m interpreted
+	@$(BIN)/coverage combine -q
+	@$(BIN)/coverage report
+
+dist: $(STAMP) ## build wheel and sdist, and run the demo from the wheel in an environment of its own
+	@rm -rf dist build/clean
+	@$(BIN)/python -m build --no-isolation --outdir dist . >/dev/null
+	@ls dist
+	@$(PYTHON) -m venv build/clean
+	@build/clean/bin/pip install -qq -c constraints.txt dist/*.whl
+	@cd build && clean/bin/swashplate demo --out clean/demo
 
 tools: ## make sure that there is a C compiler, for bench
 	@if command -v cc >/dev/null; then :; \
@@ -83,6 +107,6 @@ format: $(STAMP) ## sort the imports, mend what can be mended, format
 	@$(BIN)/ruff format .
 
 clean: ## remove the environment, caches and everything made
-	rm -rf .venv demo benchmarks/build build dist htmlcov .coverage .coverage.* .hypothesis \
+	rm -rf .venv demo benchmarks/build build dist docs/_build docs/generated htmlcov .coverage .coverage.* .hypothesis \
 	  .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find . -name .git -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -23,6 +23,7 @@ from swashplate.identification.problem import Problem
 from swashplate.identification.starts import sobol_starts, solve_from
 from swashplate.identification.unknowns import Unknown, Unknowns
 
+# %% What is given
 CAMPAIGN = Path(__file__).with_name("actuator.toml")
 TRAINING = 512
 PUBLISHED = {"recurrent Gaussian process": 0.773, "online Gaussian-process state space": 1.048}
@@ -61,6 +62,7 @@ UNKNOWNS = Unknowns(
 )
 
 
+# %% The equations
 @njit(cache=True)
 def orifice(drop):
     """Square root of a pressure drop, with its sign; straight close to 0, where flow is laminar."""
@@ -94,6 +96,7 @@ def free_run(opening, numbers):
     return pressure
 
 
+# %% The model, as a fit sees it
 class Actuator:
     """A valve that feeds oil to a load: what a fit needs is this one method."""
 
@@ -114,6 +117,7 @@ def fitted(training: Experiment) -> dict[str, float]:
     return UNKNOWNS.values(np.array(best.vector))
 
 
+# %% A linear model to compare with
 def arx(opening: np.ndarray, pressure: np.ndarray, order: int = 10) -> np.ndarray:
     """Free run of a linear model over the test.
 
@@ -147,6 +151,7 @@ def split_error(training: Experiment, part: np.ndarray) -> float:
     return rmse(simulated[~seen], channel.values[~seen])
 
 
+# %% The data, and the run
 def load(folder: Path) -> Campaign:
     """The two runs of a folder, which need not be writable: the campaign file stays here."""
     text = CAMPAIGN.read_text("utf-8")

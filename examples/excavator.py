@@ -34,6 +34,7 @@ from swashplate.identification.solving import solve
 from swashplate.identification.starts import sobol_starts
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns
 
+# %% What is given
 CAMPAIGN = Path(__file__).with_name("excavator.toml")
 ANCHOR = 5.0  # what is predicted is set to the measured position this often [s]
 NOISE = 0.003  # what one unit of residual is [m]
@@ -74,6 +75,7 @@ VALVE = Unknowns(
 )
 
 
+# %% The valve
 @njit(cache=True)
 def flow(opening: float, overlap: float, width: float) -> float:
     """Share of the full flow [1]: none within the overlap, then more, up to what the pump has."""
@@ -130,6 +132,7 @@ def mean_command(command: InputSignal, edges: np.ndarray) -> np.ndarray:
     return np.diff(integral) / np.diff(edges)
 
 
+# %% Fitted to some trials, scored on another
 class Score(NamedTuple):
     """What two models make of a trial that neither was fitted to."""
 
@@ -187,6 +190,7 @@ def scores(tests: Campaign) -> Iterator[Score]:
             yield Score(axis, left_out.run, float(np.sqrt(np.mean(moved**2))), *rmse)
 
 
+# %% The figure
 def draw(tests: Campaign, trial: str, path: Path) -> None:
     """Draw what the valve, fitted to the other trials, makes of one."""
     figure = Figure(figsize=(11, 8), layout="constrained")
@@ -207,6 +211,7 @@ def draw(tests: Campaign, trial: str, path: Path) -> None:
     figure.savefig(path, dpi=150)
 
 
+# %% The data, and the run
 def load(folder: Path) -> Campaign:
     """The trials of a folder, which need not be writable: the campaign file stays here."""
     text = CAMPAIGN.read_text("utf-8")

@@ -20,7 +20,7 @@ from swashplate.parameters.files import dump_set, load_preset, load_set
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.batch import Batch, SquaredError, simulate_many
-from swashplate.simulation.build import build_channel, build_pump
+from swashplate.simulation.build import build_channel
 from swashplate.simulation.gradients import (
     Sensitivities,
     drive_sensitivities,
@@ -33,6 +33,12 @@ from swashplate.simulation.record import (
     check_voltage,
     record_of,
 )
+from swashplate.simulation.refined import (
+    build_steady,
+    simulate_refined_drive,
+    simulate_refined_pump,
+)
+from swashplate.simulation.refined_stepper import RefinedStepper
 from swashplate.simulation.result import Simulation
 from swashplate.simulation.run import Start, simulate_drive, simulate_pump
 from swashplate.simulation.steady import steady_states
@@ -128,6 +134,12 @@ class Drive:
         kept = self.parameters.title if title is None else title
         return Drive(replace(self.parameters, name=name, title=kept))
 
+    @property
+    def plain(self) -> Drive:
+        """The drive without refinements, itself if it has none."""
+        plain = self.parameters.plain
+        return self if plain is self.parameters else Drive(plain)
+
     def simulate(
         self,
         voltage: ArrayLike,
@@ -161,7 +173,8 @@ class Drive:
         Returns
         -------
         Simulation
-            All signals of the chain.
+            All signals of the chain; a `RefinedSimulation`, which has the motor's torque and
+            pressure drop as well, where a refinement is on.
 
         Raises
         ------
@@ -171,7 +184,8 @@ class Drive:
             If the solenoid overpowers the feedback spring.
         """
         record = _voltage_record(voltage, rate, time, interpolation, clip, substeps)
-        return simulate_drive(self.parameters, record, start)
+        simulate = simulate_refined_drive if self.parameters.refinements else simulate_drive
+        return simulate(self.parameters, record, start)
 
     def simulate_current(
         self,
@@ -192,7 +206,8 @@ class Drive:
             interpolation=interpolation,
             substeps=substeps,
         )
-        return simulate_pump(self.parameters, record, start)
+        simulate = simulate_refined_pump if self.parameters.refinements else simulate_pump
+        return simulate(self.parameters, record, start)
 
     def sensitivities(
         self,
@@ -216,6 +231,7 @@ class Drive:
         voltage, rate, time, interpolation, start, clip, substeps :
             As in `simulate`.
         """
+        self.parameters.refuse_refinements("Sensitivities")
         record = _voltage_record(voltage, rate, time, interpolation, clip, substeps)
         return drive_sensitivities(self.parameters, record, start, parameters)
 
@@ -231,6 +247,7 @@ class Drive:
         substeps: int | None = None,
     ) -> Sensitivities:
         """The same for pump and motor alone over a signed current. [A]"""
+        self.parameters.refuse_refinements("Sensitivities")
         record = record_of(
             current,
             rate,
@@ -271,6 +288,7 @@ class Drive:
         threads : int, optional
             By default one a core. The numbers do not depend on it.
         """
+        self.parameters.refuse_refinements("Many sets at once")
         if (voltage is None) == (current is None):
             raise InputError("A batch needs either a voltage or a current.")
         if current is None:
@@ -304,7 +322,8 @@ class Drive:
         interpolation, start :
             As in `simulate`.
         """
-        return Stepper(self.parameters, h, interpolation, start)
+        made = RefinedStepper if self.parameters.refinements else Stepper
+        return made(self.parameters, h, interpolation, start)
 
     def linearize(
         self,
@@ -346,6 +365,7 @@ class Drive:
         DomainError
             Where the gain is 0: in a dead zone or at a stop.
         """
+        self.parameters.refuse_refinements("Linear models")
         return linearize(
             self.parameters,
             voltage=at,
@@ -395,6 +415,7 @@ class Drive:
         DomainError
             If nothing moves at all, or the answer does not come to repeat itself.
         """
+        self.parameters.refuse_refinements("Frequency responses")
         return frequency_response(
             self.parameters,
             frequencies,
@@ -411,7 +432,11 @@ class Drive:
     @overload
     def steady_speed(self, voltage: Sequence[float] | Array) -> Array: ...
     def steady_speed(self, voltage: float | Sequence[float] | Array) -> float | Array:
-        """Speed that the drive settles at under constant commands [V → rad/s]."""
+        """Speed that the drive settles at under constant commands [V → rad/s].
+
+        With refinements it is the mean of a turn, in the middle of what friction and hysteresis
+        leave open, under the load.
+        """
         return self._steady(voltage)[1]
 
     @overload
@@ -430,7 +455,7 @@ class Drive:
         plus, minus = (
             build_channel(self.parameters, side, 1.0 / SOURCE_RATE) for side in ("plus", "minus")
         )
-        pump = build_pump(self.parameters)
+        pump = build_steady(self.parameters)
         steady_states(volts.reshape(-1), plus, minus, pump, current, speed)
         if np.ndim(voltage) == 0:
             return float(current[0]), float(speed[0])

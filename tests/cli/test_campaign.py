@@ -28,7 +28,14 @@ def test_from_logs_to_a_check(done: Done, logs: list[str], tmp_path: Path) -> No
     said = done("campaign", "check")
     assert "2 experiments (2 to fit)" in said
     assert "step +4 V" in said
-    assert "Nothing to look into." in said
+    # the logs are made up: a hoist turns at 98 deg/s, these counts at 252
+    assert "'encoder_counts' moves" in " ".join(said.split())
+    assert "1 findings" in said
+
+
+def test_a_check_without_findings(done: Done, logs: list[str]) -> None:
+    done("campaign", "init", *logs, *COUNTS)
+    assert "Nothing to look into." in done("campaign", "check")
 
 
 def test_a_draft_replaces_no_file(done: Done, refused: Callable[..., str], logs: list[str]) -> None:

@@ -1,7 +1,7 @@
 """One's own equations on the actuator's benchmark; the data lie beside the checkout, if at all."""
 
-import importlib.util
 import re
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -18,14 +18,8 @@ NUMBERS = np.array([3.9, 0.05, 0.08, 3.0, 2.1, 0.87, 0.49, 12.8, 0.084, 1.24])
 
 
 @pytest.fixture(scope="module")
-def actuator() -> ModuleType:
-    path = ROOT / "examples" / "actuator.py"
-    spec = importlib.util.spec_from_file_location("actuator", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def actuator(load_example: Callable[[str], ModuleType]) -> ModuleType:
+    return load_example("actuator")
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,8 @@
 """The excavator's cylinders, end to end; the logs lie beside the checkout, if at all."""
 
-import importlib.util
 import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -20,14 +20,8 @@ logs = pytest.mark.skipif(
 
 
 @pytest.fixture(scope="module")
-def excavator() -> ModuleType:
-    path = ROOT / "examples" / "excavator.py"
-    spec = importlib.util.spec_from_file_location("excavator", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def excavator(load_example: Callable[[str], ModuleType]) -> ModuleType:
+    return load_example("excavator")
 
 
 def rod(excavator: ModuleType, command: float, slope: float = 0.0, seconds: float = 2.0) -> float:

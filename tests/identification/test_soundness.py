@@ -15,7 +15,12 @@ from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.cli import app
 from swashplate.identification.fit import smooth
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
-from swashplate.identification.soundness import Finding, check_sound, refuse_unsound
+from swashplate.identification.soundness import (
+    Finding,
+    check_runs,
+    check_sound,
+    refuse_unsound,
+)
 from swashplate.identification.unmoved import time_constant
 
 NOMINAL = smooth(Drive.preset("hoist").parameters)
@@ -330,3 +335,27 @@ def test_the_command_line_refuses(
     assert result.exit_code == 2
     assert said in result.stderr
     assert result.stderr.count("\n") == 1
+
+
+def test_a_position_that_freezes_while_the_drive_runs() -> None:
+    """An encoder that hangs from 1.2 to 2.6 s of a step that lasts from 0.5 to 2.5 s."""
+    time = np.arange(GOOD[0].input.values.size) / 512.0
+    hung = (time > 1.2) & (time < 2.6)
+
+    def turned(run: Experiment, freeze: bool) -> Experiment:
+        angle = np.cumsum(TRUTH.simulate(run.input.values).shaft_speed) / 512.0
+        if freeze:
+            angle[hung] = angle[hung][0]
+        channel = Channel(
+            "angle", "position", "rad", time, angle, np.ones(time.size), SOURCE, noise=0.001
+        )
+        return replace(run, channels={"angle": channel})
+
+    good = [turned(each, freeze=False) for each in GOOD]
+    assert check_runs(good, NOMINAL) == []
+    found = check_runs([turned(GOOD[0], freeze=True), *good[1:]], NOMINAL)
+    (said,) = [each.sentence for each in found if "stands still" in each.sentence]
+    first, last = (float(each) for each in said.partition("from ")[2].split()[:3:2])
+    assert 1.2 <= first <= 1.4
+    assert 2.4 <= last <= 2.6
+    assert said.startswith("up: 'angle' stands still from ")

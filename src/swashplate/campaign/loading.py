@@ -96,9 +96,21 @@ def _axes_of(place: _Place, number: int, file: schema.CampaignFile) -> dict[str,
         if name in run.axes:
             content = axis.model_dump(by_alias=True, exclude_unset=True)
             origin = f"{place.file}: run {number + 1} ({run.file}): axes.{name}"
+            _check_channels(origin, run.axes[name], axis)
             axis = validated(_merged(content, run.axes[name]), schema.Axis, origin)
         axes[name] = axis
     return axes
+
+
+def _check_channels(origin: str, changes: Mapping[str, Any], axis: schema.Axis) -> None:
+    """Refuse a change of a channel that there is not; a whole new one says its kind."""
+    channels = changes.get("channels")
+    for name, change in channels.items() if isinstance(channels, Mapping) else ():
+        if name not in axis.channels and isinstance(change, Mapping) and "kind" not in change:
+            raise InputError(
+                f"{origin} changes the channel '{name}', but the axis has "
+                f"{', '.join(axis.channels)}; a new channel needs its kind and column."
+            )
 
 
 def _merged(content: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -19,12 +19,14 @@ from swashplate.cli import (
     compare,
     compensate,
     demo,
+    doctor,
     excite,
     fit,
     limits,
     linearize,
     parameters,
     report,
+    reproduce,
     rig,
     sensitivity,
     simulate,
@@ -118,6 +120,9 @@ def options(
 
 app.command("demo", epilog=demo.EXAMPLES, rich_help_panel="Everything at once")(demo.demo)
 app.command("tour", epilog=tour.EXAMPLES, rich_help_panel="Everything at once")(tour.tour)
+app.command("reproduce", epilog=reproduce.EXAMPLES, rich_help_panel="Everything at once")(
+    reproduce.reproduce
+)
 app.command("simulate", epilog=simulate.EXAMPLES, rich_help_panel="Simulate")(simulate.simulate)
 app.command("compare", epilog=compare.EXAMPLES, rich_help_panel="Simulate")(compare.compare)
 app.command("axes", epilog=parameters.AXES_EXAMPLES, rich_help_panel="Simulate")(parameters.axes)
@@ -144,6 +149,7 @@ app.command("linearize", epilog=linearize.EXAMPLES, rich_help_panel="Understand"
     linearize.linearize
 )
 app.command("bode", epilog=bode.EXAMPLES, rich_help_panel="Understand")(bode.bode)
+app.command("doctor", epilog=doctor.EXAMPLES, rich_help_panel="This installation")(doctor.doctor)
 
 
 def main() -> None:

@@ -111,17 +111,17 @@ def check(
 
     Each signal's rate, jitter, longest interval, range, clipping and lost
     counts, the manoeuvre recognised from the voltage, and below the table
-    whatever someone should look into.
+    whatever someone should look into: also windows that no run takes, and runs
+    that are far from what the axis's drive would do.
     """
     from swashplate.campaign.campaign import Campaign
     from swashplate.campaign.quality import examine
+    from swashplate.campaign.unused_windows import unused_windows
 
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
         qualities = {each.name: examine(each) for each in campaign}
-        for name, axis in campaign.axes.items():
-            if axis.drive is not None:
-                campaign.drive(name)  # a drive that there is not is better known now
+        of_file = (*unused_windows(campaign), *_beside_the_drives(campaign))
     note(heading(campaign))
     for number, experiment in enumerate(campaign):
         found = qualities[experiment.name]
@@ -130,12 +130,33 @@ def check(
             for text in each.findings:
                 say(f"! {each.signal}: {text}.")
     note(LEGEND)
+    for text in of_file:
+        say(f"! {text}.")
     findings = sum(len(each.findings) for found in qualities.values() for each in found)
+    findings += len(of_file)
     if not campaign.select(role="fit"):
         note("No run has the role 'fit'.")
     note("Nothing to look into." if not findings else f"{findings} findings, marked by '!'.")
     if strict and findings:
         raise typer.Exit(1)
+
+
+def _beside_the_drives(campaign: Campaign) -> list[str]:
+    """What stands out when each axis's drive is simulated under the runs' commands."""
+    from swashplate.identification.fit import smooth
+    from swashplate.identification.soundness import check_runs
+
+    found = []
+    for name, axis in campaign.axes.items():
+        if axis.drive is None:
+            continue
+        nominal = smooth(campaign.drive(name).parameters)
+        runs = [each for each in campaign.select(axis=name) if each.role != "ignore"]
+        # a drive that is made up says nothing of what a machine does
+        made_up = all(each.status == "assumed" for each in nominal.values())
+        if runs and not made_up and all(each.input.kind != "other" for each in runs):
+            found += [each.sentence.rstrip(".") for each in check_runs(runs, nominal)]
+    return found
 
 
 @app.command("plot", epilog=PLOT_EXAMPLES)

@@ -77,6 +77,8 @@ def show_parameters(
         _block(parameters, "control_card", f"Control card {parameters.card}"),
         _block(parameters, "pump_motor", "Pump and motor"),
     )
+    if any(each.definition.block == "refinements" for each in parameters.values()):
+        show(_block(parameters, "refinements", "Refinements"))
     roots, sign = parameters.pressure_root, parameters.coulomb_sign
     decay = parameters.card_switch
     say(

@@ -21,8 +21,10 @@ from swashplate.identification.forces import Forces
 from swashplate.identification.unknowns import Unknown
 from swashplate.parameters.catalogue import CATALOGUE, COLUMNS
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.refinements import REFINEMENTS
 from swashplate.physics.card_dynamics import decay_factor
 from swashplate.simulation.limits import Limit
+from swashplate.simulation.refined import simulate_refined_drive, simulate_refined_pump
 from swashplate.simulation.result import Simulation
 from swashplate.simulation.run import Start, simulate_drive, simulate_pump
 
@@ -65,11 +67,12 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
         If the model does not hold under it.
     """
     start: Start = "steady" if experiment.start == "steady" else "rest"
+    refined = bool(parameters.refinements)
     if experiment.input.kind == "current":
-        return simulate_pump(
-            parameters, current_record(experiment), start, experiment.start_pressure
-        )
-    return simulate_drive(parameters, voltage_record(experiment), start, experiment.start_pressure)
+        march = simulate_refined_pump if refined else simulate_pump
+        return march(parameters, current_record(experiment), start, experiment.start_pressure)
+    drive = simulate_refined_drive if refined else simulate_drive
+    return drive(parameters, voltage_record(experiment), start, experiment.start_pressure)
 
 
 def acting(simulation: Simulation, parameters: ParameterSet) -> dict[str, float]:
@@ -101,7 +104,7 @@ def acting(simulation: Simulation, parameters: ParameterSet) -> dict[str, float]
         if definition.block == "pump_motor" and not definition.directional and symbol != "Z17":
             mask = rest.get(symbol, tilted)
             found[symbol] = float(np.count_nonzero(mask)) / simulation.record.rate
-    return found
+    return {**found, **dict.fromkeys(REFINEMENTS, found["Z1"])}
 
 
 def _of_pump(simulation: Simulation, sign: float, Z17: float) -> dict[str, Mask]:

@@ -15,8 +15,10 @@ from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.drives import voltage_record
 from swashplate.identification.forces import Forces
 from swashplate.identification.model import Linearised, Reduced
+from swashplate.identification.refined_model import Differences, is_refined, refined_outputs
 from swashplate.parameters.catalogue import COLUMNS
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.refinements import REFINEMENTS
 from swashplate.simulation.observation import Observation, ObservedRecord, Own, Signal
 from swashplate.simulation.record import Record
 from swashplate.simulation.residuals import START_PRESSURE, jacobian, residuals, triangle
@@ -55,6 +57,8 @@ class DriveModel:
     Besides columns it knows ``"force_plus_1"`` ... (see `Forces`), ``"start_pressure"`` of an
     experiment [Pa], and of each channel ``"offset NAME"`` (its free zero) and ``"clock NAME"``
     (by how much the input's clock is ahead of the channel's [s]).
+
+    Derivatives are exact, unless the set has refinements: then they are differences.
     """
 
     parameters: ParameterSet
@@ -64,6 +68,8 @@ class DriveModel:
     """For the pump alone, the signed current of each experiment by its name. [A]"""
     forces: Forces | None = None
     """The forces that stand for the solenoids' coefficients."""
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    """What counts as a change of an unknown whose value may be 0, for differences."""
     _observed: dict[_Key, tuple[Mapping[str, Array | None], ObservedRecord]] = field(
         default_factory=dict, repr=False
     )
@@ -80,6 +86,9 @@ class DriveModel:
         """Simulate the measured channels; see `model.Model`."""
         names = self._channels(experiment)
         observed = self._record(experiment, dict.fromkeys(names), ())
+        if is_refined(self.parameters, values):
+            by_steps = self._differences(observed, names)
+            return by_steps.split(by_steps.outputs(values))
         flat = self._computed(residuals, values, observed, self._own(values, names))
         return {name: flat[observed.rows_of(k)] for k, name in enumerate(names)}
 
@@ -89,6 +98,8 @@ class DriveModel:
         """Simulate with derivatives; see `model.Differentiable`."""
         channels = self._channels(experiment)
         observed = self._record(experiment, dict.fromkeys(channels), tuple(names))
+        if is_refined(self.parameters, values):
+            return self._differences(observed, channels).linearise(values, names)
         columns, chain = self._chain(names, channels, observed)
         found = self._computed(
             lambda p, o, own: jacobian(p, o, columns, own),
@@ -114,6 +125,8 @@ class DriveModel:
         observed = self._record(
             experiment, {name: weights[name] for name in channels}, tuple(names)
         )
+        if is_refined(self.parameters, values):
+            return self._differences(observed, channels).reduce(values, names)
         columns, chain = self._chain(names, channels, observed)
         found = self._computed(
             lambda p, o, own: triangle(p, o, columns, own),
@@ -137,7 +150,7 @@ class DriveModel:
         last = self._last.get("set")
         if last is not None and last[0] == key:
             return last[1]
-        changes = {name: value for name, value in own.items() if name in COLUMNS}
+        changes = {name: v for name, v in own.items() if name in COLUMNS or name in REFINEMENTS}
         if self.forces is not None:
             changes |= self.forces.coefficients(own, self.parameters)
         try:
@@ -148,7 +161,19 @@ class DriveModel:
         return made
 
     def _is_parameter(self, name: str) -> bool:
-        return name in COLUMNS or (self.forces is not None and name in self.forces.names)
+        known = name in COLUMNS or name in REFINEMENTS
+        return known or (self.forces is not None and name in self.forces.names)
+
+    def _differences(self, observed: ObservedRecord, channels: Sequence[str]) -> Differences:
+        """What answers for a set with refinements."""
+        return Differences(
+            lambda values: self._computed(
+                refined_outputs, values, observed, self._own(values, channels)
+            ),
+            observed,
+            channels,
+            self.sizes,
+        )
 
     def _computed(
         self,

@@ -38,7 +38,8 @@ def simulated_current(experiment: Experiment, parameters: ParameterSet) -> Recor
     """The signed current that a card makes of an experiment's command."""
     record = voltage_record(experiment)
     start: Start = "steady" if experiment.start == "steady" else "rest"
-    run = simulate_drive(parameters, record, start)
+    # refinements begin behind the card
+    run = simulate_drive(parameters.plain, record, start)
     assert run.card is not None
     current = run.card.current_positive - run.card.current_negative
     return Record(current, record.start, record.rate, record.substeps)

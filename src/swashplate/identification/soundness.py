@@ -20,6 +20,7 @@ from swashplate.identification.staging import stage_problem
 from swashplate.identification.unknowns import Unknowns
 from swashplate.identification.unmoved import (
     constant_commands,
+    frozen_positions,
     idle_commands,
     short_runs,
     still_sensors,
@@ -67,21 +68,38 @@ def check_sound(
     DomainError
         If the model does not hold at the nominal values.
     """
-    found = [finding for each in experiments for finding in _samples(each)]
+    found = check_runs(experiments, nominal)
     if not _refused(found):
-        found += idle_commands(experiments, nominal)
-    if not _refused(found):
-        simulations = {each.name: simulated_run(each, nominal) for each in experiments}
-        of_channels = motions(experiments, simulations)
-        found += constant_commands(experiments, of_channels)
-        of_channels = _without(of_channels, found)
-        found += still_sensors(of_channels)
-        found += contradictions(_without(of_channels, found))
         card = all(stage.part == "card" for stage in setup.stages)
         found += short_runs(experiments, nominal, of_current=card)
     if rank and not _refused(found):
         found += _rank(experiments, nominal, setup)
     return tuple(sorted(found, key=lambda each: each.severity != "refuse"))
+
+
+def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list[Finding]:
+    """What is wrong with runs beside each other and beside the nominal drive.
+
+    Raises
+    ------
+    InputError
+        If an input is neither a voltage nor a current, or cannot be simulated.
+    DomainError
+        If the model does not hold at the nominal values.
+    """
+    found = [finding for each in experiments for finding in _samples(each)]
+    if not _refused(found):
+        found += idle_commands(experiments, nominal)
+    if _refused(found):
+        return found
+    simulations = {each.name: simulated_run(each, nominal) for each in experiments}
+    of_channels = motions(experiments, simulations)
+    found += constant_commands(experiments, of_channels)
+    of_channels = _without(of_channels, found)
+    found += still_sensors(of_channels)
+    found += frozen_positions(_without(of_channels, found))
+    found += contradictions(_without(of_channels, found))
+    return found
 
 
 def refuse_unsound(findings: Sequence[Finding]) -> tuple[str, ...]:

@@ -114,7 +114,13 @@ def stage_problem(
         *_own(stage, runs, channels),
     )
     return DriveProblem(
-        DriveModel(parameters, stage.part, currents, forces),
+        DriveModel(
+            parameters,
+            stage.part,
+            currents,
+            forces,
+            {target: each.scale for each in unknowns for target in each.targets},
+        ),
         tuple(weighted(each, stage) for each in runs),
         Unknowns(unknowns),
         channels,
@@ -154,7 +160,7 @@ def _parameters(free: Mapping[str, Free], parameters: ParameterSet) -> list[Unkn
         unknowns += [
             bounded(
                 name if entry.tied else group[0],
-                float(np.mean([parameters.numbers[column] for column in group])),
+                float(np.mean([_nominal(parameters, column) for column in group])),
                 relative=entry.relative,
                 absolute=entry.bounds,
                 unit=definition.unit,
@@ -167,6 +173,13 @@ def _parameters(free: Mapping[str, Free], parameters: ParameterSet) -> list[Unkn
             for group in groups
         ]
     return unknowns
+
+
+def _nominal(parameters: ParameterSet, column: str) -> float:
+    """Where a parameter begins: a refinement that the set does not give, where it is off."""
+    if column in parameters.numbers:
+        return parameters.numbers[column]
+    return parameters[column].values[0]
 
 
 def _forces(stage: Stage, forces: Forces | None, parameters: ParameterSet) -> list[Unknown]:

@@ -24,6 +24,8 @@ TRIAL = 5.0
 """Command of the step from which the drive's time constant is taken. [V]"""
 RISEN = 1.0 - float(np.exp(-1.0))
 """Part of the settled value that is reached after one time constant."""
+FROZEN = 1.0
+"""Time for which no position stands still while its drive runs. [s]"""
 DEAD = 0.2
 """Part of a channel's largest simulated range that a run must have for a still sensor to be
 broken."""
@@ -76,6 +78,31 @@ def still_sensors(of_channels: Mapping[str, Sequence[Motion]]) -> list[Finding]:
                     "in this run."
                 )
                 found.append(Finding("refuse", run, name, said))
+    return found
+
+
+def frozen_positions(of_channels: Mapping[str, Sequence[Motion]]) -> list[Finding]:
+    """Positions that stay the same to the last count for a while in which the drive runs."""
+    found = []
+    for name, ours in of_channels.items():
+        fastest = max((float(np.abs(each.simulated).max()) for each in ours), default=0.0)
+        for each in ours:
+            if not each.channel.is_position:
+                continue
+            frozen = (each.measured == 0.0) & (np.abs(each.simulated) > DEAD * fastest)
+            edges = np.flatnonzero(np.diff(np.concatenate([[False], frozen, [False]])))
+            windows = 0.5 * float(np.median(np.diff(each.time)))
+            for first, stop in zip(edges[::2], edges[1::2], strict=True):
+                begin, end = each.time[first] - windows, each.time[stop - 1] + windows
+                if end - begin > FROZEN:
+                    run = each.experiment.name
+                    said = (
+                        f"{run}: '{name}' stands still from {begin:.4g} to {end:.4g} s, though the "
+                        "drive should move it; look at the sensor and at the machine's stops, and "
+                        "ignore that window."
+                    )
+                    found.append(Finding("warn", run, name, said))
+                    break
     return found
 
 

@@ -1,14 +1,15 @@
 """Every parameter of the model: symbol, plain name, unit, range.
 
 The symbols are those of Kruse (2001). A directional parameter has a plus and a minus value, chosen
-by the sign of the signal it acts on; both are stored as magnitudes.
+by the sign of the signal it acts on; both are stored as magnitudes. Those of the refinements, which
+no published set has, stand apart in `swashplate.parameters.refinements`.
 """
 
 from dataclasses import dataclass
 from math import inf, pi
 from typing import Literal
 
-Block = Literal["control_card", "pump_motor"]
+Block = Literal["control_card", "pump_motor", "refinements"]
 
 
 @dataclass(frozen=True)

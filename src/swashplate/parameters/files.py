@@ -7,7 +7,7 @@ from pathlib import Path
 
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.errors import InputError, ParameterError
-from swashplate.parameters.catalogue import CATALOGUE, Block
+from swashplate.parameters.catalogue import Block
 from swashplate.parameters.parameter_set import Pair, Parameter, ParameterSet, find
 from swashplate.parameters.schema import CardFile, Entry, SetFile
 from swashplate.units import to_si
@@ -62,6 +62,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
     parameters = {
         **_parameters(entries, "control_card", origin),
         **_parameters(contents.pump_motor, "pump_motor", origin),
+        **_parameters(contents.refinements, "refinements", origin),
     }
     return ParameterSet(
         contents.name,
@@ -89,7 +90,9 @@ def dump_set(parameters: ParameterSet) -> str:
     options.add("coulomb_sign", parameters.coulomb_sign)
     options.add("card_switch", parameters.card_switch)
     text.add("model", options)
-    for block in ("control_card", "pump_motor"):
+    for block in ("control_card", "pump_motor", "refinements"):
+        if all(parameter.definition.block != block for parameter in parameters.values()):
+            continue
         entries = table()
         for parameter in parameters.values():
             if parameter.definition.block != block:
@@ -132,7 +135,7 @@ def _parameters(entries: Mapping[str, Entry], block: Block, origin: str) -> dict
 def _parameter(symbol: str, entry: Entry, block: Block, origin: str) -> Parameter:
     try:
         definition = find(symbol)
-        if symbol not in CATALOGUE or definition.block != block:
+        if symbol != definition.symbol or definition.block != block:
             raise ParameterError(f"[{block}] has no parameter '{symbol}'.")
         what = f"{symbol} ({definition.name})"
         pair = isinstance(entry.value, list)

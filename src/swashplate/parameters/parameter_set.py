@@ -2,12 +2,15 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
-from swashplate.errors import ParameterError
-from swashplate.parameters.catalogue import CATALOGUE, COLUMNS, Definition
+from swashplate.errors import InputError, ParameterError
+from swashplate.parameters.catalogue import CATALOGUE, Definition
+from swashplate.parameters.names import columns_of as columns_of
+from swashplate.parameters.names import find as find
+from swashplate.parameters.names import unknown_parameter as unknown_parameter
+from swashplate.parameters.refinements import REFINEMENTS
 from swashplate.parameters.rules import check_bounds, check_rules
 
 PressureRoot = Literal["published", "symmetric"]
@@ -68,7 +71,9 @@ class Parameter:
 
 @dataclass(frozen=True)
 class ParameterSet(Mapping[str, Parameter]):
-    """All parameters of a drive, by symbol.
+    """All parameters of a drive, by symbol; of the refinements those that are given.
+
+    A refinement that is not given can be asked for by its symbol all the same, and is off.
 
     Raises
     ------
@@ -92,6 +97,7 @@ class ParameterSet(Mapping[str, Parameter]):
         if missing:
             raise ParameterError(f"{self.name}: no value for {', '.join(missing)}.")
         ordered = {symbol: self.parameters[symbol] for symbol in CATALOGUE}
+        ordered |= {each: self.parameters[each] for each in REFINEMENTS if each in self.parameters}
         numbers = {}
         for parameter in ordered.values():
             for column, value in zip(parameter.definition.columns, parameter.values, strict=True):
@@ -108,10 +114,12 @@ class ParameterSet(Mapping[str, Parameter]):
         return f"ParameterSet({self.name!r}, {len(self)} parameters)"
 
     def __getitem__(self, symbol: str) -> Parameter:
-        try:
+        if symbol in self.parameters:
             return self.parameters[symbol]
-        except KeyError:
-            raise unknown_parameter(symbol) from None
+        if symbol in REFINEMENTS:
+            definition = REFINEMENTS[symbol]
+            return Parameter(definition, definition.default, status="inactive")
+        raise unknown_parameter(symbol)
 
     def __contains__(self, symbol: object) -> bool:
         return symbol in self.parameters
@@ -137,6 +145,43 @@ class ParameterSet(Mapping[str, Parameter]):
             self.card_switch,
         )
 
+    @property
+    def refinements(self) -> tuple[str, ...]:
+        """Symbols of the refinements that are on."""
+        return tuple(
+            symbol
+            for symbol, definition in REFINEMENTS.items()
+            if definition.switch and self.numbers.get(symbol, 0.0) != 0.0
+        )
+
+    @property
+    def plain(self) -> "ParameterSet":
+        """The set without refinements, itself if it has none."""
+        if REFINEMENTS.keys().isdisjoint(self.parameters):
+            return self
+        return replace(self, parameters={symbol: self.parameters[symbol] for symbol in CATALOGUE})
+
+    def refuse_refinements(self, what: str) -> None:
+        """Refuse the set where a computation knows the source's equations alone.
+
+        Parameters
+        ----------
+        what : str
+            The computation, plural, as a sentence begins: ``"Sensitivities"``.
+
+        Raises
+        ------
+        InputError
+            If a refinement is on.
+        """
+        if self.refinements:
+            listed = ", ".join(self.refinements)
+            raise InputError(
+                f"{self.name}: {what} do not know refinements, but {listed} "
+                f"{'are' if len(self.refinements) > 1 else 'is'} on; take the drive without them "
+                "(its .plain), or simulate it."
+            )
+
     def replace(self, changes: Mapping[str, Change]) -> "ParameterSet":
         """Copy with other values, marked as the user's.
 
@@ -153,7 +198,7 @@ class ParameterSet(Mapping[str, Parameter]):
         parameters = dict(self.parameters)
         for name, change in changes.items():
             definition = find(name)
-            old = parameters[definition.symbol]
+            old = parameters.get(definition.symbol, self[definition.symbol])
             parameters[definition.symbol] = replace(
                 old, value=_changed(name, definition, old, change), source="", status="user"
             )
@@ -163,14 +208,15 @@ class ParameterSet(Mapping[str, Parameter]):
         """Copy with values multiplied by factors; names as in `replace`."""
         changes: dict[str, Change] = {}
         for name, factor in factors.items():
-            old = self.parameters[find(name).symbol]
-            if name in CATALOGUE and isinstance(old.value, Pair):
+            old = self[find(name).symbol]
+            if name == old.symbol and isinstance(old.value, Pair):
                 plus, minus = factor if isinstance(factor, tuple) else (factor, factor)
                 changes[name] = Pair(old.value.plus * plus, old.value.minus * minus)
             elif isinstance(factor, tuple):
                 raise ParameterError(f"{name} has one value, so it takes one factor, not two.")
             else:
-                changes[name] = self.numbers[name] * factor
+                value = self.numbers[name] if name in self.numbers else old.values[0]
+                changes[name] = value * factor
         return self.replace(changes)
 
 
@@ -195,38 +241,3 @@ def _changed(name: str, definition: Definition, old: Parameter, change: Change) 
         return Pair(number, number)
     side = name.removeprefix(definition.symbol + "_")
     return old.value._replace(**{side: number})
-
-
-def find(name: str) -> Definition:
-    """Definition of a symbol (``Z16``) or column (``Z16_plus``).
-
-    Raises
-    ------
-    ParameterError
-        If there is none of that name; the sentence lists the right ones.
-    """
-    if name in CATALOGUE:
-        return CATALOGUE[name]
-    if name in COLUMNS:
-        return CATALOGUE[COLUMNS[name]]
-    raise unknown_parameter(name)
-
-
-def unknown_parameter(name: str) -> ParameterError:
-    """Error for a name that no parameter has."""
-    close = get_close_matches(name, [*CATALOGUE, *COLUMNS], n=1)
-    hint = f" (did you mean {close[0]}?)" if close else ""
-    return ParameterError(
-        f"There is no parameter '{name}'{hint}; the parameters are {', '.join(CATALOGUE)}, "
-        "those with two directions also as e.g. Z16_plus and Z16_minus."
-    )
-
-
-def columns_of(names: Mapping[str, object] | tuple[str, ...] | list[str]) -> list[str]:
-    """Columns that a list of symbols and columns stands for, in its order."""
-    columns: list[str] = []
-    for name in names:
-        definition = find(name)
-        wanted = definition.columns if name == definition.symbol else (name,)
-        columns.extend(column for column in wanted if column not in columns)
-    return columns

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from swashplate.errors import ParameterError
 from swashplate.parameters.catalogue import CATALOGUE, COLUMNS, Definition
+from swashplate.parameters.refinements import REFINEMENTS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -66,11 +67,15 @@ def broken_rules(numbers: Mapping[str, Array]) -> Iterator[Broken]:
         Every value by column, one element a set.
     """
     for column, values in numbers.items():
-        definition = CATALOGUE[COLUMNS[column]]
+        definition = REFINEMENTS[column] if column in REFINEMENTS else CATALOGUE[COLUMNS[column]]
         yield (
             _out_of_range(definition, values),
             partial(_range_sentence, column, definition, values),
         )
+    if not REFINEMENTS.keys().isdisjoint(numbers):
+        yield _dither(numbers)
+        yield _line(numbers)
+        yield _cam_ring(numbers)
     yield _rest(numbers)
     for side in ("plus", "minus"):
         yield _thresholds(numbers, side)
@@ -96,6 +101,48 @@ def _range_sentence(column: str, definition: Definition, values: Array, i: int) 
         f"{column} ({definition.name}) is {value:g} {definition.unit}, but must be "
         f"{definition.range}{hint}."
     )
+
+
+def _dither(numbers: Mapping[str, Array]) -> Broken:
+    friction, travel = (_refinement(numbers, s) for s in ("spool_friction", "spool_presliding"))
+    time = _refinement(numbers, "dither_time")
+    return (
+        (friction > 0.0) & np.isfinite(time) & (travel == 0.0),
+        lambda i: (
+            f"dither_time is {time[i]:g} s, but spool_presliding is 0: dither frees a spool that "
+            "friction lets give a little; give that travel, of the order of 5e-5 m."
+        ),
+    )
+
+
+def _line(numbers: Mapping[str, Array]) -> Broken:
+    stiffness, inertia = (_refinement(numbers, s) for s in ("line_stiffness", "load_inertia"))
+    return (
+        (stiffness > 0.0) & (inertia == 0.0),
+        lambda i: (
+            f"line_stiffness is {stiffness[i]:g} N m/rad, but load_inertia is 0: give the inertia "
+            "that the line has to turn, in kg m^2 at the shaft."
+        ),
+    )
+
+
+def _cam_ring(numbers: Mapping[str, Array]) -> Broken:
+    torque = np.abs(_refinement(numbers, "load_torque"))
+    depth = _refinement(numbers, "cam_ripple")
+    depth = depth + _refinement(numbers, "cam_ripple_per_torque") * torque
+    return (
+        depth >= 1.0,
+        lambda i: (
+            f"cam_ripple + cam_ripple_per_torque·|load_torque| is {depth[i]:.4g}, but must be "
+            "below 1: a motor whose displacement vanishes somewhere would run away."
+        ),
+    )
+
+
+def _refinement(numbers: Mapping[str, Array], symbol: str) -> Array:
+    """A refinement's values, of all sets, or what it is where none is given."""
+    size = next(iter(numbers.values())).size
+    return numbers.get(symbol, np.full(size, REFINEMENTS[symbol].default))
 
 
 def _rest(numbers: Mapping[str, Array]) -> Broken:

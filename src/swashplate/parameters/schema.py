@@ -55,3 +55,5 @@ class SetFile(BaseModel):
     """Name of a card that is given by its own table."""
     pump_motor: dict[str, Entry]
     model: ModelOptions = ModelOptions()
+    refinements: dict[str, Entry] = {}
+    """What goes beyond the source's equations; all of it is off where it is not given."""

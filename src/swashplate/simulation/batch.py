@@ -70,6 +70,7 @@ def simulate_many(
     threads: int | None,
 ) -> Batch:
     """March many sets over one record; see `Drive.simulate_many`."""
+    parameters.refuse_refinements("Many sets at once")
     numbers, count = _columns(parameters, changes)
     failures = _failures(parameters.name, numbers, record.step, by_voltage)
     observed = _observed(cost.output if cost is not None else output)

@@ -71,7 +71,14 @@ def build_channel(parameters: ParameterSet, side: str, step: float) -> Channel:
 
 
 def build_pump(parameters: ParameterSet) -> Pump:
-    """Pump and motor, whatever the step."""
+    """Pump and motor, whatever the step.
+
+    Raises
+    ------
+    InputError
+        If the set has refinements, which the equations of the source leave out.
+    """
+    parameters.refuse_refinements("The source's plain equations")
     numbers = parameters.numbers
     Z13 = (numbers["Z13_plus"], numbers["Z13_minus"])
     limits = uncompiled(pressure_limits)(numbers["Z1"], numbers["Z2"], *Z13, numbers["Z15"])

@@ -1,0 +1,54 @@
+"""Make all figures of README and documentation again: `make figures`.
+
+Each is what the commands beside its name leave behind; nothing is drawn by hand.
+"""
+
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+IMAGES = Path(__file__).parent / "images"
+FIGURES = {
+    "hoist-step.png": ("simulate hoist step:9 --plot hoist-step.png",),
+    "envelope.png": ("limits hoist --plot envelope.png",),
+    "limit-timeline.png": ("limits hoist step:9 --plot limit-timeline.png",),
+    "inverse-map.png": ("compensate hoist sine:4,0.1 --plot inverse-map.png",),
+    "bode.png": ("bode hoist --linear-at 4 --plot bode.png",),
+    "what-if.png": (
+        "whatif hoist --scale orifice=1.5 --scale pump=1.5 --maneuver sine:9,0.1 "
+        "--plot what-if.png",
+    ),
+    "encoder.png": (
+        "rig hoist --out virtual",
+        "campaign plot virtual/campaign.toml --run hoist_sine_4_V_0.1_Hz --channel counts "
+        "--from 5.9 --to 6.6 --out encoder.png",
+    ),
+    "main-job.png": ("demo --out demo", "demo/result.png"),
+}
+"""Commands of swashplate for each figure; a last word that is a file is the figure made by them."""
+
+
+def make(name: str) -> None:
+    """Run a figure's commands in a folder of their own and keep the figure."""
+    with TemporaryDirectory() as folder:
+        made = Path(folder) / name
+        for words in map(shlex.split, FIGURES[name]):
+            if len(words) == 1:
+                made = Path(folder) / words[0]
+                continue
+            subprocess.run(
+                [sys.executable, "-m", "swashplate", *words],
+                cwd=folder,
+                check=True,
+                stdout=subprocess.DEVNULL,
+            )
+        shutil.copyfile(made, IMAGES / name)
+
+
+if __name__ == "__main__":
+    for each in sys.argv[1:] or FIGURES:
+        print(each, flush=True)
+        make(each)

@@ -1,0 +1,256 @@
+"""The pages that teach are run as they stand: what they show is what happens.
+
+A page is run from top to bottom in an empty folder:
+
+- ``python`` blocks in one namespace; a ``text`` block right after one is what it printed;
+- ``console`` blocks line by line: ``$ swashplate ...`` is run, 80 columns wide, and the lines below
+  it must be what it printed, ``...`` standing for lines left out;
+- ``toml`` and ``csv`` blocks that begin with ``# name`` are that file, other ``toml`` a fragment;
+- ``diff`` blocks change a file: ``--- name``, then lines kept, taken out and put in;
+- another ``text`` block is a drawing, told by its lines and arrows.
+
+A block of any other kind fails: nothing is skipped unseen. Lines are compared without regard to the
+width of spaces and rules. Numbers of a fit differ a little between machines, so a number may be off
+by 2 % or by one unit of its last digit; numbers within a name, and all other text, are equal.
+"""
+
+import io
+import re
+import shlex
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from swashplate.cli import app
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PATTERNS = (
+    "start.md",
+    "how-to/*.md",
+    "comparison.md",
+    "refinements.md",
+    "reproduction.md",
+    "theory/*.md",
+)
+PAGES = sorted(path for pattern in PATTERNS for path in DOCS.glob(pattern))
+LONG = {"start.md"}
+
+BLOCK = re.compile(r"^```([^\n`]*)\n(.*?)^```[ \t]*$", re.MULTILINE | re.DOTALL)
+NUMBER = re.compile(r"(?<![\w.+−-])[-+−]?\d+(?:,\d{3})*(\.\d+)?(e[-+]?\d+)?(?![\w.]*_)")
+TARGETS = set(re.findall(r"^([.a-z]+):.*##", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
+NOT_RUN = (
+    r"git clone \S+ swashplate",
+    r"(cd|mkdir) \S+",
+    r"source \.venv/bin/activate",
+    r"export LC_COLLATE=C",
+    r"dask (scheduler|worker) .*",
+)
+
+
+def blocks(text: str) -> list[tuple[str, str]]:
+    """Language and content of each fenced block."""
+    left = BLOCK.sub("", text)
+    assert "```" not in left, "a fence that opens or closes no block at the margin"
+    assert not re.search(r"^    +(\$|>>>|swashplate|import|from) ", left, re.MULTILINE), (
+        "an indented block of code, which would not be run: fence it"
+    )
+    return [(language.strip(), content) for language, content in BLOCK.findall(text)]
+
+
+def close(shown: re.Match[str], printed: re.Match[str]) -> bool:
+    """Whether two numbers agree to 2 % or one unit of the last digit that is shown."""
+    a, b = (float(each[0].replace(",", "").replace("−", "-")) for each in (shown, printed))
+    unit = 10.0 ** (int((shown[2] or "e0")[1:]) - max(len(shown[1] or "") - 1, 0))
+    return abs(a - b) <= max(0.02 * abs(a), 1.001 * unit)
+
+
+def same(shown: str, printed: str) -> bool:
+    """Whether a line that is shown is the one that was printed."""
+    if NUMBER.sub("0", shown) != NUMBER.sub("0", printed):
+        return False
+    return all(map(close, NUMBER.finditer(shown), NUMBER.finditer(printed)))
+
+
+def lines(text: str) -> list[str]:
+    """Its lines that are not empty, spaces and rules shortened."""
+    words = (" ".join(re.sub("─+", "─", line).split()) for line in text.splitlines())
+    return [line for line in words if line]
+
+
+def check_shown(shown: str, printed: str, by: str) -> None:
+    """Fail unless the lines shown are the lines printed, ``...`` for any that are left out."""
+    rest, free = lines(printed), False
+    for line in lines(shown):
+        if line == "...":
+            free = True
+            continue
+        found = next((k for k, each in enumerate(rest) if same(line, each)), None)
+        at_once = f"\nprinted {rest[0]}" if rest and not free else ""
+        assert found is not None, f"{by}\nshows   {line}{at_once}\n\n{printed}"
+        assert free or found == 0, f"{by}\nshows   {line}{at_once}\n\n{printed}"
+        rest, free = rest[found + 1 :], False
+    assert free or not rest, f"{by}\nprinted more: {rest[0]}"
+
+
+@contextmanager
+def scheduler(words: list[str]) -> Iterator[list[str]]:
+    """The words of a command with the address of a cluster that there is."""
+    if "--dask" not in words:
+        yield words
+        return
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=1, processes=False, dashboard_address=None) as cluster:
+        at = words.index("--dask") + 1
+        yield [*words[:at], cluster.scheduler_address, *words[at + 1 :]]
+
+
+def run_command(command: str, shown: str) -> None:
+    """Run a line of a console block and compare what it printed."""
+    program, *arguments = shlex.split(command, comments=True)
+    if program == "make":
+        assert set(arguments) <= TARGETS, command
+    elif program != "swashplate":
+        assert any(re.fullmatch(each, command) for each in NOT_RUN), (
+            f"cannot be run here: {command}"
+        )
+    else:
+        arguments, _, file = (
+            (arguments[:-2], ">", arguments[-1]) if ">" in arguments else (arguments, "", "")
+        )
+        if "--dask" in arguments and find_spec("distributed") is None:
+            return  # the extra is not installed: the others of this page's commands are run
+        words = [
+            name
+            for word in arguments
+            for name in (sorted(map(str, Path().glob(word))) if "*" in word else [word])
+        ]
+        with scheduler(words) as given:
+            result = CliRunner().invoke(app, given)
+        code = {"Error:": 2, "Not usable:": 1}
+        wanted = max((code.get(line[: line.find(":") + 1], 0) for line in lines(shown)), default=0)
+        assert result.exit_code == wanted, f"{command}\n{result.output}\n{result.exception!r}"
+        if file:
+            Path(file).write_text(result.stdout, "utf-8")
+        if shown.strip():
+            check_shown(shown, result.output, command)
+
+
+def run_console(content: str) -> None:
+    """Run the lines that begin with ``$``, which a backslash continues."""
+    content = content.replace("\\\n", " ")
+    assert content.startswith("$ "), f"a console block begins with a command: {content}"
+    for part in re.split(r"^\$ ", content, flags=re.MULTILINE)[1:]:
+        command, _, shown = part.partition("\n")
+        run_command(command, shown)
+
+
+def write_file(language: str, content: str) -> None:
+    """Write a block that begins with its file's name; a fragment of TOML is only read."""
+    if language == "toml":
+        tomllib.loads(content)
+    named = re.match(r"# (\S+\.\w+)\n", content)
+    assert named or language == "toml", f"which file is this?\n{content}"
+    if named:
+        Path(named[1]).parent.mkdir(parents=True, exist_ok=True)
+        Path(named[1]).write_text(content, "utf-8")
+
+
+def change_file(content: str) -> None:
+    """Change a file as a diff says; what is kept and taken out stands in it once."""
+    header, *rows = content.splitlines()
+    path = Path(header.removeprefix("--- "))
+    old = "\n".join(row[1:].strip() for row in rows if row[:1] in (" ", "-"))
+    new = "\n".join(row[1:].strip() for row in rows if row[:1] in (" ", "+"))
+    text = path.read_text("utf-8")
+    assert text.count(old) == 1, f"{path} does not hold these lines once:\n{old}"
+    path.write_text(text.replace(old, new), "utf-8")
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(
+            path,
+            id=str(path.relative_to(DOCS)),
+            marks=[pytest.mark.slow] if path.name in LONG else [],
+        )
+        for path in PAGES
+    ],
+)
+def test_a_page_does_what_it_shows(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    names: dict[str, object] = {"__name__": page.stem}
+    printed: str | None = None  # by the Python block before
+    for language, content in blocks(page.read_text("utf-8")):
+        before, printed = printed, None
+        match language:
+            case "text" if before is not None:
+                check_shown(content, before, "the Python before")
+            case "text":
+                assert re.search("[─│►▼]", content), f"what printed this?\n{content}"
+            case "python":
+                with redirect_stdout(io.StringIO()) as out:
+                    exec(compile(content, page.name, "exec"), names)
+                printed = out.getvalue()
+            case "console":
+                run_console(content)
+            case "toml" | "csv":
+                write_file(language, content)
+            case "diff":
+                change_file(content)
+            case "{toctree}":
+                for entry in re.findall(r"^[^:\n].*$", content, re.MULTILINE):
+                    assert (page.parent / f"{entry}.md").exists(), entry
+            case "{math}":
+                assert content.strip()
+            case _:
+                pytest.fail(f"a block of an unknown kind, '{language}':\n{content}")
+
+
+def anchors(path: Path) -> set[str]:
+    """The headings of a page as they are linked."""
+    titles = re.findall(r"^#+ (.*)$", BLOCK.sub("", path.read_text("utf-8")), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(DOCS)))
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)\s]+)\)", BLOCK.sub("", page.read_text("utf-8"))):
+        if target.startswith("https://"):
+            continue
+        name, _, anchor = target.partition("#")
+        path = (page.parent / name).resolve() if name else page
+        assert path.exists(), target
+        assert not anchor or anchor in anchors(path), target
+
+
+def test_every_recipe_is_in_the_list() -> None:
+    index = DOCS / "how-to" / "index.md"
+    ((_, listed),) = [each for each in blocks(index.read_text("utf-8")) if each[0] == "{toctree}"]
+    recipes = {path.stem for path in index.parent.glob("*.md")} - {"index"}
+    assert set(re.findall(r"^[^:\n].*$", listed, re.MULTILINE)) == recipes
+    for recipe in recipes:
+        assert f"({recipe}.md)" in index.read_text("utf-8")
+
+
+def test_lines_are_compared_as_promised() -> None:
+    assert same("speed 205.25 deg/s", "speed 205.3 deg/s")
+    assert same("Z13_plus -0.6 %", "Z13_plus -0.65 %")
+    assert not same("speed 205.25 deg/s", "speed 211.0 deg/s")
+    assert not same("hoist_step_+4_V 1", "hoist_step_+5_V 1")
+    assert not same("Z10 12.3", "Z11 12.3")
+    check_shown("a\n...\nd", "a\nb\nc\nd\n", "all but two")
+    with pytest.raises(AssertionError, match="printed more: b"):
+        check_shown("a", "a\nb\n", "one too few")
+    with pytest.raises(AssertionError, match="shows   c"):
+        check_shown("a\nc", "a\nb\nc\n", "one between")

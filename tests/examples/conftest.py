@@ -1,0 +1,84 @@
+"""Examples as a user runs them: as scripts, each in a folder of its own."""
+
+import contextlib
+import importlib.util
+import io
+import re
+import runpy
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "examples.md"
+
+
+class Run(NamedTuple):
+    """What an example left behind."""
+
+    names: dict[str, Any]
+    printed: str
+    folder: Path
+
+
+@pytest.fixture(scope="module")
+def run_example(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Run]:
+    def run(name: str, *arguments: str) -> Run:
+        path = ROOT / "examples" / f"{name}.py"
+        folder, printed = tmp_path_factory.mktemp(name), io.StringIO()
+        with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
+            patch.chdir(folder)
+            patch.setattr(sys, "argv", [str(path), *arguments])
+            names = runpy.run_path(str(path), run_name="__main__")
+        return Run(names, printed.getvalue(), folder)
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def load_example() -> Iterator[Callable[[str], ModuleType]]:
+    """Import an example as a module, to call its functions.
+
+    Numba stores with what it compiles which module it belongs to, and imports that when it loads
+    it again: the module has to be known by its name, in the next session as in this one.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+
+        def load(name: str) -> ModuleType:
+            path = ROOT / "examples" / f"{name}.py"
+            spec = importlib.util.spec_from_file_location(name, path)
+            assert spec is not None
+            assert spec.loader is not None
+            module = importlib.util.module_from_spec(spec)
+            patch.setitem(sys.modules, name, module)
+            spec.loader.exec_module(module)
+            return module
+
+        yield load
+
+
+def stated(name: str) -> str:
+    """What the page says that an example prints."""
+    text = PAGE.read_text("utf-8")
+    (found,) = re.findall(rf"examples/{name}\.py\n.*?```text\n(.*?)```", text, re.DOTALL)
+    return found
+
+
+def same(printed: str, said: str) -> None:
+    """Equal words, and numbers that differ by what another processor may round."""
+    number = re.compile(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
+    assert number.sub("#", printed).split() == number.sub("#", said).split()
+    for ours, theirs in zip(number.findall(printed), number.findall(said), strict=True):
+        mantissa, _, exponent = theirs.partition("e")
+        decimals = len(mantissa.partition(".")[2])
+        last = 10.0 ** (int(exponent or 0) - decimals) if decimals else 1.0
+        assert float(ours) == pytest.approx(float(theirs), abs=1.01 * last), (ours, theirs)
+
+
+@pytest.fixture
+def matches_page() -> Callable[[str, str], None]:
+    return lambda name, printed: same(printed, stated(name))

@@ -1,0 +1,64 @@
+"""examples/simulate.py: what it prints is what the source's numbers and equations say."""
+
+import re
+from collections.abc import Callable
+from math import asin, atan, degrees, sin, sqrt, tau
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swashplate import Drive
+
+
+@pytest.fixture(scope="module")
+def run(run_example: Callable[..., Any]) -> Any:
+    return run_example("simulate", "--figure", "simulate.png")
+
+
+def test_the_page(run: Any, matches_page: Callable[[str, str], None]) -> None:
+    matches_page("simulate", run.printed)
+
+
+def test_steady_speeds_are_the_source_s(run: Any) -> None:
+    rows = re.findall(r"^(\w+)\s+at .*?V:(.*) deg/s$", run.printed, re.MULTILINE)
+    speeds = {name: [float(each) for each in row.split()] for name, row in rows}
+    # at -9, -4, 4 and 9 V; the middle is the creep
+    assert speeds["hoist"] == [-185.0, -85.72, 3.09, 97.75, 196.0]
+    assert speeds["slew"] == [-4.29, -3.06, 0.0, 3.23, 4.24]
+
+
+def test_without_its_stop_the_plate_is_where_the_spool_balances(run: Any) -> None:
+    p = Drive.preset("hoist").parameters.numbers
+    i = 0.7452 - p["Z17"]  # the current at 9 V
+    force = sum(p[f"Z{18 + k}_plus"] * i**k for k in (1, 2, 3, 4))
+    angle = asin(p["Z5"] * force / sqrt(p["Z4"])) + atan(p["Z18"] / p["Z5"])
+    speed = degrees(p["Z10"] * atan(sin(angle) / p["Z3"]))
+    shown = re.search(r"without swash stop +([\d.]+) deg/s", run.printed)
+    assert shown is not None
+    assert float(shown[1]) == pytest.approx(speed, abs=0.1)
+
+
+def test_the_orifice_sets_the_acceleration(run: Any) -> None:
+    assert "orifice and pump + 50 %: 294.0 deg/s" in run.printed  # as in the source's figure 9.1
+    found = dict(re.findall(r"orifice x ([\d.]+): +([\d.]+) deg/s half", run.printed))
+    soon = {float(factor): float(speed) - 3.09 for factor, speed in found.items()}
+    # 136.8 deg/s² from when the delay of 14 ms and the card's filter are through
+    assert 0.44 < soon[1.0] / 136.8 < 0.486
+    for factor, speed in soon.items():
+        assert speed / soon[1.0] == pytest.approx(factor, rel=0.02)
+
+
+def test_the_stepper_stops_where_the_simulation_does(run: Any) -> None:
+    hoist = Drive.preset("hoist")
+    pulled = hoist.simulate(np.concatenate([[0.0], np.full(4096, 6.5)]))
+    turned = int(np.argmax(pulled.shaft_position >= tau))
+    whole = hoist.simulate(np.concatenate([[0.0], np.full(turned, 6.5), np.zeros(4096)]))
+    slow = np.flatnonzero(whole.shaft_speed[turned:] <= 0.1)[0] + turned
+    shown = re.search(r"stands at ([\d.]+) deg", run.printed)
+    assert shown is not None
+    assert float(shown[1]) == pytest.approx(degrees(whole.shaft_position[slow]), abs=0.06)
+
+
+def test_the_figure(run: Any) -> None:
+    assert (run.folder / "simulate.png").stat().st_size > 20_000

@@ -1,0 +1,149 @@
+"""The page and the PDF: whole, self-contained, labelled, the same every time."""
+
+import re
+from base64 import b64decode
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from matplotlib.text import Text
+
+from swashplate.errors import FileError
+from swashplate.report.reproduction import write_page, write_pdf
+from swashplate.report.reproduction.drawing import own_canvas
+from swashplate.report.reproduction.wording import as_html, as_mathtext, length_of
+from swashplate.reproduction.content import Cell, Curve, Figure, Panel, Reproduction, Table
+
+
+class Page(HTMLParser):
+    """What a page's elements refer to."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.sources: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        self.ids += [found["id"]] if found.get("id") else []
+        self.links += [found["href"]] if tag == "a" and found.get("href") else []
+        self.sources += [found["src"]] if found.get("src") else []
+
+
+@pytest.fixture(scope="module")
+def text(small: Reproduction, tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("page") / "reproduction.html"
+    write_page(small, path)
+    return path.read_text("utf-8")
+
+
+def test_the_page_needs_nothing_else(text: str) -> None:
+    page = Page(text)
+    assert len(page.sources) == 7
+    for source in page.sources:
+        picture = b64decode(source.removeprefix("data:image/svg+xml;base64,"))
+        assert picture.startswith(b"<?xml")
+        assert b"NaN" not in picture
+    assert not re.search(r"(src|href)=\"(https?:)?//", text)
+    assert "<script" not in text
+
+
+def test_every_link_has_its_place(text: str, small: Reproduction) -> None:
+    page = Page(text)
+    assert len(set(page.ids)) == len(page.ids)
+    assert {each.removeprefix("#") for each in page.links} <= set(page.ids)
+    for each in (*small.figures, *small.tables):
+        assert f"#{each.anchor}" in page.links
+        assert each.anchor in page.ids
+
+
+def test_what_is_virtual_says_so(text: str) -> None:
+    assert "Nothing here was measured." in text
+    figures = re.findall(r"<figure id=\"figure-([\d-]+)\".*?</figure>", text, re.DOTALL)
+    marked = re.findall(
+        r"<figure id=\"figure-([\d-]+)\"(?:(?!</figure>).)*virtual-badge", text, re.DOTALL
+    )
+    assert set(marked) == {"7-2", "7-22"}
+    assert len(figures) == 7
+
+
+def test_errata_and_provenance_stand_at_the_end(text: str) -> None:
+    assert text.index('id="errata"') < text.index('id="provenance"')
+    assert "seed 1" in text
+    assert re.search(r"swashplate \d+\.\d+", text)
+    assert "table 8.2, for the same card" in text
+    assert "0.13 deg/s" in text
+
+
+def test_the_same_bytes_again(small: Reproduction, text: str, tmp_path: Path) -> None:
+    write_page(small, tmp_path / "again.html")
+    assert (tmp_path / "again.html").read_text("utf-8") == text
+    told = list[str]()
+    for name in ("one.pdf", "two.pdf"):
+        write_pdf(small, tmp_path / name, begin=told.append)
+    first, second = ((tmp_path / name).read_bytes() for name in ("one.pdf", "two.pdf"))
+    assert first == second
+    assert first.startswith(b"%PDF")
+    assert told[:2] == ["printing figure 4.1", "printing figure 4.4"]
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["again.html", "one.pdf", "two.pdf"]
+
+
+def test_a_place_that_cannot_be_written(small: Reproduction, tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"no/page\.pdf cannot be written: No such file"):
+        write_pdf(small, tmp_path / "no" / "page.pdf")
+
+
+def test_texts_stay_within_their_figure(small: Reproduction) -> None:
+    for figure in small.figures:
+        canvas = own_canvas(figure)
+        canvas.draw_without_rendering()
+        for text in canvas.findobj(Text):
+            if not text.get_visible() or not text.get_text().strip():
+                continue
+            if text in [label for ax in canvas.axes for label in _ticks(ax)]:
+                continue
+            box = text.get_window_extent()
+            assert text.get_fontsize() >= 8.0, (figure.number, text)
+            assert canvas.bbox.x0 <= box.x0 < box.x1 <= canvas.bbox.x1, (figure.number, text)
+            assert canvas.bbox.y0 <= box.y0 < box.y1 <= canvas.bbox.y1, (figure.number, text)
+
+
+def _ticks(ax) -> list[Text]:
+    return [
+        label
+        for axis in (ax.xaxis, ax.yaxis)
+        for tick in axis.get_major_ticks()
+        for label in (tick.label1, tick.label2)
+    ]
+
+
+def test_foreign_words_are_escaped(tmp_path: Path) -> None:
+    import numpy as np
+
+    time = np.array([0.0, 1.0])
+    panel = Panel("<b>", (Curve("a & b", time, time, "simulated"),))
+    figure = Figure("4.3", "<script>", "1 < 2", (panel,))
+    table = Table("4.1", "a & b", ("", "x"), ((Cell("V_{<}"), Cell("1")),))
+    made = Reproduction((figure,), (table,), 1, (("seed", "<1>"),))
+    write_page(made, tmp_path / "page.html")
+    text = (tmp_path / "page.html").read_text("utf-8")
+    assert "<script>" not in text
+    assert "V<sub>&lt;</sub>" in text
+
+
+def test_subscripts() -> None:
+    assert as_html("V_{dz} (V)") == "V<sub>dz</sub> (V)"
+    assert as_mathtext("V_{dz} (V)") == r"V$_{\mathrm{dz}}$ (V)"
+    assert length_of("V_{dz}") == 3
+
+
+@pytest.mark.slow
+def test_all_of_it(everything: Reproduction, tmp_path: Path) -> None:
+    write_page(everything, tmp_path / "page.html")
+    page = Page((tmp_path / "page.html").read_text("utf-8"))
+    assert len(page.sources) == 46
+    assert {each.removeprefix("#") for each in page.links} <= set(page.ids)
+    write_pdf(everything, tmp_path / "page.pdf")
+    assert (tmp_path / "page.pdf").stat().st_size > 100_000

@@ -1,0 +1,71 @@
+"""The card's cost (eq. 4.10) and what its tables mean (errata 5, 32)."""
+
+import numpy as np
+import pytest
+
+from swashplate import Drive, maneuvers
+from swashplate.simulation.batch import SquaredError
+
+HOIST_MINUS = {"V_dz": 0.097857, "J": 0.2951, "G1": 0.054706, "G2": 0.00042879, "G3": -9.7369e-05}
+
+
+def test_eq_4_10_cost_is_a_sum_of_squares_over_the_tests(hoist: Drive) -> None:
+    """J = Σ J_i, each the squared error of one test: of currents 1 mA and 2 mA off, by hand."""
+    total = 0.0
+    for volts, off in ((4.0, 1e-3), (-6.5, 2e-3)):
+        voltage = maneuvers.step(volts).sample(512.0)
+        measured = hoist.simulate(voltage).current + off
+        cost = SquaredError(measured, output="current")
+        batch = hoist.simulate_many({"J_plus": [0.27473]}, voltage=voltage, cost=cost)
+        assert batch.cost is not None
+        total += float(batch.cost[0])
+    assert total == pytest.approx(5121 * (1e-6 + 4e-6), rel=1e-9)
+
+
+def test_ammeter_reads_the_sum_of_both_magnitudes(hoist: Drive) -> None:
+    """Chapter 4: both leads go through one ammeter, which rectifies what the pump model keeps."""
+    run = hoist.simulate(maneuvers.sine(6.0, 0.3, length=8.0).sample(512.0))
+    reading = run.current_positive + run.current_negative
+    assert reading.min() >= 0.0
+    alone = np.minimum(run.current_positive, run.current_negative) == 0.0
+    np.testing.assert_array_equal(reading[alone], np.abs(run.current[alone]))
+
+
+@pytest.mark.parametrize("volts", [1.0, 4.0, 6.5, 9.0])
+def test_erratum_05_negative_channel_takes_magnitudes(hoist: Drive, volts: float) -> None:
+    """3.3 with table 4.3's own signs would keep the even power's: 13 mA off at -4 V."""
+    p = HOIST_MINUS
+    d = volts - p["V_dz"]
+    magnitude = p["J"] + p["G1"] * d + p["G2"] * d**2 + p["G3"] * d**3
+    assert hoist.steady_current(-volts) == pytest.approx(-magnitude, rel=1e-12)
+    literal = -p["J"] - p["G1"] * d + p["G2"] * d**2 - p["G3"] * d**3
+    assert literal + magnitude == pytest.approx(2.0 * p["G2"] * d**2, rel=1e-12)
+    if volts == 4.0:
+        assert literal + magnitude == pytest.approx(0.013, abs=0.0005)
+
+
+def test_erratum_05_decay_of_table_4_4_would_grow() -> None:
+    """exp(-a t) with the printed -21.379 doubles every 32 ms."""
+    assert np.log(2.0) / 21.379 == pytest.approx(0.032, abs=0.0005)
+    assert min(Drive.preset("hoist")["a"].values) > 0.0
+
+
+def test_erratum_32_multiples_of_zero_do_not_move(hoist: Drive) -> None:
+    for symbol in ("C", "Z2", "Z7", "Z11", "Z12"):
+        assert set(hoist[symbol].values) == {0.0}
+        assert set(hoist.scale(**{symbol: 2.0})[symbol].values) == {0.0}
+
+
+def test_section_1_2_counts_14_and_22_parameters(hoist: Drive) -> None:
+    """Of the card, each channel counted once, and of pump and motor."""
+    symbols = list(hoist.parameters)
+    assert len([each for each in symbols if each[0] != "Z"]) == 14
+    assert [each for each in symbols if each[0] == "Z"] == [f"Z{n}" for n in range(1, 23)]
+
+
+def test_slew_and_luff_have_one_card() -> None:
+    """Table 1.1 and section 7.5: MDSD-1K-2x/4, with the hoist's rising and falling limits."""
+    slew, luff, hoist = (Drive.preset(name) for name in ("slew", "luff", "hoist"))
+    assert slew.parameters.card == luff.parameters.card != hoist.parameters.card
+    for symbol in ("V_dz", "J", "G1", "zeta", "omega", "C", "lim1", "lim2", "I_t1", "I_t2", "a"):
+        assert slew[symbol].values == luff[symbol].values

@@ -1,0 +1,160 @@
+"""Encoders and filters (eqs. 7.1-7.7), and what speed tells (section 7.5)."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from swashplate import Drive, maneuvers
+from swashplate.campaign.encoder import interpolate_counts, shaft_angle
+from swashplate.campaign.filters import (
+    DIFFERENTIATOR,
+    LOW_PASS,
+    matched_speed,
+    path_delay,
+    speed_from_angle,
+)
+from swashplate.simulation.batch import SquaredError
+
+H = 1.0 / 512.0
+HOIST_TURN = 400.0 * 120.0 / 19.0
+
+
+def test_eq_7_1_cost_is_a_sum_of_squares_over_the_tests(hoist: Drive) -> None:
+    total = 0.0
+    for volts, off in ((4.0, 0.01), (-6.5, 0.02)):
+        voltage = maneuvers.step(volts).sample(512.0)
+        cost = SquaredError(hoist.simulate(voltage).shaft_speed + off)
+        batch = hoist.simulate_many({"Z10": [12.396]}, voltage=voltage, cost=cost)
+        assert batch.cost is not None
+        total += float(batch.cost[0])
+    assert total == pytest.approx(5121 * (1e-4 + 4e-4), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("axis", "counts_per_turn", "gear_ratio", "turn"),
+    [
+        ("slew", 81_000.0, 7.0, 567_000.0),
+        ("luff as printed", 4 * 100.0, 120.0 / 19.0, 2526.3),
+        ("hoist as printed", 4 * 635.0, 1.0, 2540.0),
+    ],
+)
+def test_eq_7_2_to_7_4_counts_of_a_turn(
+    axis: str, counts_per_turn: float, gear_ratio: float, turn: float
+) -> None:
+    angle = shaft_angle([0.0, turn], counts_per_turn=counts_per_turn, gear_ratio=gear_ratio)
+    assert angle[1] == pytest.approx(2.0 * np.pi, rel=2e-5), axis
+
+
+def test_erratum_24_the_factor_2_pi_is_missing() -> None:
+    """7.2 to 7.4 give turns per second; the model's speed, and the tables', are rad/s."""
+    time = np.arange(2048) * H
+    turns = 0.25 * time  # a quarter turn per second
+    speed = speed_from_angle(time, shaft_angle(turns * HOIST_TURN, counts_per_turn=HOIST_TURN))
+    assert speed[-1] == pytest.approx(2.0 * np.pi * 0.25, rel=1e-9)
+
+
+def test_erratum_24_quadrature_is_data() -> None:
+    """81,000 'with quadrature' and still times 4 in 7.2: either reading can be said."""
+    once, again = (
+        shaft_angle([1.0], counts_per_turn=each, gear_ratio=7.0)[0] for each in (81e3, 324e3)
+    )
+    assert once / again == pytest.approx(4.0)
+
+
+def test_eq_7_5_and_erratum_30_slew_motor() -> None:
+    """Turret to motor 3150.1: at the speed limit of 4.24 deg/s the motor would run at 2227 rpm."""
+    turret = np.rad2deg(Drive.preset("slew").steady_speed(10.0))
+    assert turret * 3150.1 / 6.0 == pytest.approx(2227.0, abs=1.5)
+
+
+@pytest.mark.parametrize(("deg_s", "shared"), [(1.0, True), (50.0, True), (100.0, False)])
+def test_erratum_25_eq_7_6_has_its_inequality_reversed(deg_s: float, shared: bool) -> None:
+    """Samples share a count while h < 2π/(N ω); 7.6 prints h < N ω/(2π), which holds for all."""
+    speed = np.deg2rad(deg_s)
+    counts = np.floor(HOIST_TURN * speed / (2.0 * np.pi) * H * np.arange(5000) + 0.37)
+    assert bool(np.any(np.diff(counts) == 0.0)) == shared
+    assert (2.0 * np.pi / (HOIST_TURN * speed) > H) == shared
+    assert HOIST_TURN * speed / (2.0 * np.pi) > H
+
+
+def test_section_7_2_interpolates_between_changes_of_the_count() -> None:
+    time = np.arange(8) * H
+    filled = interpolate_counts(time, [0, 0, 0, 3, 3, 5, 5, 5])
+    assert filled == pytest.approx([0, 1, 2, 3, 4, 5, 5, 5])
+
+
+def test_eq_7_7_cut_offs() -> None:
+    assert pytest.approx((10.0, 30.0)) == (LOW_PASS / (2 * np.pi), DIFFERENTIATOR / (2 * np.pi))
+
+
+def test_figures_7_3_and_7_4_have_the_same_low_passes() -> None:
+    """a/(s + a) and b/(s + b), the measured path with an s: a slow ramp comes 1/a + 1/b late."""
+    late = 1.0 / (20.0 * np.pi) + 1.0 / (60.0 * np.pi)
+    assert path_delay(H, form="exact") == pytest.approx(late, rel=2e-3)
+    assert path_delay(H) == pytest.approx(late - 0.5 * H, rel=1e-9)
+
+
+def test_erratum_33_simulated_speed_comes_half_a_sample_late() -> None:
+    """Measured path over simulated path in the z-domain: a phase of ωh/2 at every frequency."""
+    w, step, a, b = sp.symbols("omega h a b", positive=True)
+    z = sp.exp(sp.I * w * step)
+    low = a * step / z / (1 - (1 - a * step) / z)
+    differentiator = b * (1 - 1 / z) / (1 - (1 - b * step) / z)
+    without_zero = b * step / z / (1 - (1 - b * step) / z)
+    ratio = low * differentiator / (sp.I * w) / (low * without_zero)
+    for hertz in (0.3, 5.0, 50.0):
+        numbers = {w: 2 * sp.pi * hertz, step: sp.Rational(1, 512), a: 20 * sp.pi, b: 60 * sp.pi}
+        assert float(sp.arg(sp.N(ratio.subs(numbers), 30))) == pytest.approx(
+            2 * np.pi * hertz * H / 2.0, rel=1e-9
+        )
+
+
+@pytest.mark.parametrize(("aligned", "half_samples"), [(True, 0.0), (False, 1.0)])
+def test_erratum_33_the_package_aligns_both(aligned: bool, half_samples: float) -> None:
+    """On a ramp of speed a delay is a constant difference: 100 rad/s² times it."""
+    time = np.arange(4096) * H
+    measured = speed_from_angle(time, 50.0 * time**2)
+    simulated = matched_speed(time, 100.0 * time, aligned=aligned)
+    late = (measured[-1] - simulated[-1]) / 100.0
+    assert late == pytest.approx(half_samples * 0.5 * H, abs=1e-12)
+
+
+def test_erratum_27_what_a_speed_below_its_limit_does_not_show() -> None:
+    """Section 7.5 calls Z10 unobservable; the limit is Z10·Z13, and it is Z13 that never counts."""
+    luff = Drive.preset("luff")
+    voltage = maneuvers.source_tests("luff")["sine 4 V 0.1 Hz"].sample(512.0)
+    found = luff.sensitivities(voltage, parameters=["Z10", "Z13"])
+    by = dict(zip(found.names, np.abs(found.shaft_speed).max(axis=0), strict=True))
+    assert by["Z13_plus"] == by["Z13_minus"] == 0.0
+    assert by["Z10"] > 0.01
+    hard = luff.simulate_current(np.repeat([1.0, -1.0], [5000, 9000])).shaft_speed
+    limits = [luff["Z10"].value * each for each in luff["Z13"].values]
+    assert (hard.max(), -hard.min()) == pytest.approx(limits, rel=1e-12)
+
+
+@pytest.mark.parametrize(("axis", "settle"), [("hoist", 2.5), ("slew", 4.5), ("luff", 2.5)])
+def test_sections_7_3_to_7_5_tests_end_by_a_cubic(axis: str, settle: float) -> None:
+    """The return takes 2.5 s, on slew 4.5 s, and meets the command and its slope at both ends."""
+    runs = maneuvers.source_tests(axis)
+    run = runs["ramp +1 V/s"]
+    end, begin = run.length, run.length - settle
+    before = begin - 1e-6
+    assert run(begin) == pytest.approx(run(before), abs=1e-5)
+    assert run.slope(begin) == pytest.approx(run.slope(before), abs=1e-4)
+    assert (run(end), run.slope(end)) == pytest.approx((0.0, 0.0), abs=1e-12)
+    inside = run(np.linspace(begin, end, 9))
+    assert np.diff(inside, 4) == pytest.approx(np.zeros(5), abs=1e-9)  # a cubic's fourth difference
+
+
+@pytest.mark.parametrize(
+    ("axis", "volts", "hertz"),
+    [
+        ("hoist", {4.0, 6.5, 9.0}, {0.1, 0.3}),
+        ("slew", {4.0, 6.0}, {0.05, 0.1}),
+        ("luff", {4.0, 6.5, 9.0}, {0.05, 0.1}),
+    ],
+)
+def test_figures_7_5_to_7_27_list_the_tests(axis: str, volts: set, hertz: set) -> None:
+    sines = [each.split() for each in maneuvers.source_tests(axis) if each.startswith("sine")]
+    assert {float(each[1]) for each in sines} == volts
+    assert {float(each[3]) for each in sines} == hertz
