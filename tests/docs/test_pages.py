@@ -101,7 +101,7 @@ def check_shown(shown: str, printed: str, by: str) -> None:
 @contextmanager
 def scheduler(words: list[str]) -> Iterator[list[str]]:
     """The words of a command with the address of a cluster that there is."""
-    if "--dask" not in words:
+    if "--dask" not in words or find_spec("distributed") is None:
         yield words
         return
     from distributed import LocalCluster
@@ -111,35 +111,41 @@ def scheduler(words: list[str]) -> Iterator[list[str]]:
         yield [*words[:at], cluster.scheduler_address, *words[at + 1 :]]
 
 
+def expanded(words: list[str]) -> list[str]:
+    """The words of a command with the files of a pattern in its place, as a shell has it."""
+    return [
+        name
+        for word in words
+        for name in (sorted(map(str, Path().glob(word))) if "*" in word else [word])
+    ]
+
+
+def run_swashplate(command: str, words: list[str], shown: str) -> None:
+    """Run a command of swashplate and compare what it printed."""
+    words, file = (words[:-2], words[-1]) if words[-2:-1] == [">"] else (words, None)
+    if "--dask" in words and find_spec("distributed") is None:
+        shown = "Error: A cluster needs Dask: install swashplate with its extra 'dask'."
+    with scheduler(expanded(words)) as given:
+        result = CliRunner().invoke(app, given)
+    codes = {"Error": 2, "Not usable": 1}
+    wanted = max((codes.get(line.partition(":")[0], 0) for line in lines(shown)), default=0)
+    assert result.exit_code == wanted, f"{command}\n{result.output}\n{result.exception!r}"
+    if file is not None:
+        Path(file).write_text(result.stdout, "utf-8")
+    if shown.strip():
+        check_shown(shown, result.output, command)
+
+
 def run_command(command: str, shown: str) -> None:
-    """Run a line of a console block and compare what it printed."""
-    program, *arguments = shlex.split(command, comments=True)
-    if program == "make":
-        assert set(arguments) <= TARGETS, command
-    elif program != "swashplate":
-        assert any(re.fullmatch(each, command) for each in NOT_RUN), (
-            f"cannot be run here: {command}"
-        )
+    """Run a line of a console block, or see that it is one which only a person can run."""
+    program, *words = shlex.split(command, comments=True)
+    if program == "swashplate":
+        run_swashplate(command, words, shown)
+    elif program == "make":
+        assert set(words) <= TARGETS, command
     else:
-        arguments, _, file = (
-            (arguments[:-2], ">", arguments[-1]) if ">" in arguments else (arguments, "", "")
-        )
-        if "--dask" in arguments and find_spec("distributed") is None:
-            return  # the extra is not installed: the others of this page's commands are run
-        words = [
-            name
-            for word in arguments
-            for name in (sorted(map(str, Path().glob(word))) if "*" in word else [word])
-        ]
-        with scheduler(words) as given:
-            result = CliRunner().invoke(app, given)
-        code = {"Error:": 2, "Not usable:": 1}
-        wanted = max((code.get(line[: line.find(":") + 1], 0) for line in lines(shown)), default=0)
-        assert result.exit_code == wanted, f"{command}\n{result.output}\n{result.exception!r}"
-        if file:
-            Path(file).write_text(result.stdout, "utf-8")
-        if shown.strip():
-            check_shown(shown, result.output, command)
+        known = any(re.fullmatch(each, command) for each in NOT_RUN)
+        assert known, f"this cannot be run here: {command}"
 
 
 def run_console(content: str) -> None:
