@@ -49,3 +49,12 @@ def test_sobol(done, tmp_path):
 )
 def test_refusals(refused, words, said):
     assert said in refused("sensitivity", "hoist", *words)
+
+
+def test_a_log_is_a_command(done, tmp_path):
+    done("simulate", "hoist", "step:9,stop=4,length=5", "--out", "log.csv")
+    words = ("--lever", "pump", "--outcome", "final_speed", "--maneuver", "log.csv")
+    text = done("sensitivity", "hoist", *words, "--interpolation", "linear")
+    assert "hoist, log.csv" in text
+    (line,) = [line for line in text.splitlines() if line.startswith("pump ")]
+    assert line.split() == ["pump", "0.9", "1.1", "176.40", "215.60", "20.0", "%"]

@@ -75,3 +75,16 @@ def test_degrees_at_the_edge(done, number):
     text = done("whatif", "luff", "--scale", "pump=1.2", "--maneuver", "step:9")
     expected = np.degrees(Drive.preset("luff").steady_speed(9.0))
     assert number(text, "final speed") == pytest.approx(expected, abs=0.02)
+
+
+def test_a_log_is_a_command_like_a_manoeuvre(done, tmp_path, number):
+    """A step to 6 V at 2 s, held until the next row, as the manoeuvre would be."""
+    rows = "\n".join(f"{t / 512},{6000 if 512 * 2 <= t < 512 * 5 else 0}" for t in range(512 * 8))
+    (tmp_path / "log.csv").write_text(f"time [s],stick [mV]\n{rows}\n")
+    words = ("--scale", "orifice=1.5", "--column", "stick", "--interpolation", "linear")
+    text = done("whatif", "hoist", "--maneuver", "log.csv", *words)
+    assert "hoist, log.csv" in text
+    assert "±" not in text  # no bands were asked for
+    same = done("whatif", "hoist", "--maneuver", "step:6,start=2,stop=5,length=8", *words[:2])
+    for outcome in ("final speed", "rise time", "tracking error", "travel"):
+        assert number(text, outcome) == pytest.approx(number(same, outcome), rel=2e-3)

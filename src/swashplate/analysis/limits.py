@@ -35,6 +35,10 @@ class LimitShare:
     """In words."""
     component: str
     """What would have to change in the machine."""
+    lever: str
+    """The same as a lever of `what_if`, or a parameter's symbol."""
+    eases: float
+    """A factor on the lever that eases the limit, to try."""
     changes: dict[str, Change]
     """The changes that took it away, SI."""
     time_share: float | None
@@ -82,7 +86,7 @@ class LimitShares:
         import polars as pl
 
         floats = ("time_share", "error", "error_share", "alone")
-        words = ("limit", "component", "failure")
+        words = ("limit", "component", "lever", "failure")
         return pl.DataFrame(
             {name: [getattr(each, name) for each in self.shares] for name in (*words, *floats)},
             schema=dict.fromkeys(words, pl.String) | dict.fromkeys(floats, pl.Float64),
@@ -171,6 +175,8 @@ def limit_shares(
             LimitShare(
                 removal.limit,
                 removal.component,
+                removal.lever,
+                removal.eases,
                 changes,
                 _time_share(run, removal.flag),
                 without,

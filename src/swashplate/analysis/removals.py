@@ -25,6 +25,10 @@ class Removal:
     """In words."""
     component: str
     """What would have to change in the machine."""
+    lever: str
+    """The same as a lever of `whatif`, or a parameter's symbol."""
+    eases: float
+    """A factor on the lever that eases the limit."""
     changes: Callable[[Drive], Mapping[str, Change]]
     flag: Limit | None = None
     """How a simulation marks it, None for what acts always or is not marked."""
@@ -61,37 +65,72 @@ REMOVALS = (
     Removal(
         "dead zone",
         "card: dead-zone compensation (V_dz, or an inverse map)",
+        "dead_zone",
+        0.0,
         _dead_zone,
         Limit.DEAD_ZONE,
     ),
     Removal(
         "current rate",
         "card: faster ramp (lim1, lim2)",
+        "rate_limits",
+        1.5,
         lambda _: {"lim1": inf, "lim2": inf},
         Limit.CURRENT_RATE,
     ),
-    Removal("final decay", "card: no decay of the current (I_t2)", lambda _: {"I_t2": 0.0}),
-    Removal("delay", "card: shorter delay (tau)", lambda _: {"tau": 0.0}),
+    Removal(
+        "final decay",
+        "card: no decay of the current (I_t2)",
+        "I_t2",
+        0.5,
+        lambda _: {"I_t2": 0.0},
+    ),
+    Removal(
+        "delay",
+        "card: shorter delay (tau)",
+        "tau",
+        0.5,
+        lambda _: {"tau": 0.0},
+    ),
     Removal(
         "orifice",
         "in-line orifice: larger bore (Z16)",
+        "orifice",
+        1.5,
         lambda _: {"Z16": inf},
         Limit.ORIFICE,
     ),
-    Removal("spool stop", "spool: longer stroke (Z14)", lambda _: {"Z14": inf}, Limit.SPOOL),
+    Removal(
+        "spool stop",
+        "spool: longer stroke (Z14)",
+        "spool_stroke",
+        1.5,
+        lambda _: {"Z14": inf},
+        Limit.SPOOL,
+    ),
     Removal(
         "swash stop",
         "pump: larger, or a smaller motor (Z10, Z13)",
+        "pump",
+        1.5,
         _swash_stop,
         Limit.SWASH_STOP,
     ),
     Removal(
         "relief valve",
         "relief valve: higher setting (Z15)",
+        "relief",
+        1.5,
         lambda _: {"Z15": inf},
         Limit.RELIEF,
     ),
-    Removal("plussing", "spool: centred at rest (Z18)", lambda _: {"Z18": 0.0}),
+    Removal(
+        "plussing",
+        "spool: centred at rest (Z18)",
+        "plussing",
+        0.0,
+        lambda _: {"Z18": 0.0},
+    ),
 )
 """What can be taken away, in the order of the chain; the plussing, which no force limits, because
 the creep that it makes is an error, too."""

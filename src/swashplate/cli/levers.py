@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from swashplate.cli.inputs import Options, simulated
 from swashplate.cli.terminal import show, table
 from swashplate.errors import InputError
 
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
     from swashplate.analysis.sensitivity import Range
     from swashplate.analysis.trial import Trial
     from swashplate.drive import Drive
-    from swashplate.maneuvers import Maneuver
 
 
 def list_levers(asked: bool) -> None:
@@ -55,13 +55,13 @@ def factors_of(words: Sequence[str]) -> dict[str, float]:
     return factors
 
 
-def trial_of(drive: Drive, command: Maneuver, rate: float) -> Trial:
-    """A trial of a manoeuvre; a rate out of range is refused before anything is sampled."""
+def trial_of(drive: Drive, command: str, options: Options) -> tuple[str, Trial]:
+    """Name of a command, a manoeuvre or a log, and the trial that it makes."""
     from swashplate.analysis.trial import trial
-    from swashplate.simulation.record import least_substeps
 
-    least_substeps(rate)
-    return trial(drive, command.sample(rate), rate)
+    name, run = simulated(drive, command, options)
+    assert run.voltage is not None  # the command line simulates voltages only
+    return name, trial(drive, run.voltage, options.rate)
 
 
 def ranges_from(words: Sequence[str], usual: Range) -> dict[str, Range]:

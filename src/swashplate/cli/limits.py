@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,7 +23,7 @@ from swashplate.cli.terminal import note, say, show, working
 from swashplate.errors import DomainError
 
 if TYPE_CHECKING:
-    from swashplate.analysis.limits import LimitShares
+    from swashplate.analysis.limits import LimitShare, LimitShares
     from swashplate.drive import Drive
 
 EXAMPLES = """\
@@ -204,8 +205,27 @@ def _say_shares(
     if shares.row_count:
         show(shares)
     _say_first(found)
+    if found.first is not None and not changes_said(word, drive):
+        _say_try(word, command, options, found.first)
     if out is not None:
         note(f"Shares of each limit, in SI: {out}")
+
+
+def _say_try(word: str, command: str, options: Options, first: LimitShare) -> None:
+    """The command that shows what a change of the first limit buys, where there is one."""
+    if options.start != "rest" or options.clip:
+        return
+    words = ["swashplate", "whatif", word, "--scale", f"{first.lever}={first.eases:g}"]
+    words += ["--maneuver", command]
+    for option, given, usual in (
+        ("--rate", f"{options.rate:g}", "512"),
+        ("--interpolation", options.interpolation, None),
+        ("--time-column", options.time_column, "time"),
+        ("--column", options.column, "voltage"),
+    ):
+        if given is not None and given != usual:
+            words += [option, given]
+    note(f"To try: {shlex.join(words)}")
 
 
 def _say_first(found: LimitShares) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swashplate.cli.inputs import drive_of, maneuver_of, title_of
+from swashplate.cli.inputs import Interpolation, Options, drive_of, title_of
 from swashplate.cli.levers import ranges_from, trial_of
 from swashplate.cli.terminal import note, say, show, table, working
 from swashplate.errors import InputError
@@ -72,11 +72,25 @@ def sensitivity(
         ),
     ] = None,
     maneuver: Annotated[
-        str, typer.Option(help='Manoeuvre, such as step:9 or "step +9 V".', metavar="NAME")
+        str,
+        typer.Option(
+            help='Command: a manoeuvre such as step:9 or "step +9 V", or a log.',
+            metavar="NAME|FILE",
+        ),
     ] = "step:9",
     rate: Annotated[
         float, typer.Option(help="Samples a second, 10 to 100000.", metavar="HZ")
     ] = 512.0,
+    interpolation: Annotated[
+        Interpolation | None,
+        typer.Option(help="Of a FILE, as in 'swashplate simulate'.", show_default=False),
+    ] = None,
+    time_column: Annotated[
+        str, typer.Option(help="Column of the time in FILE.", metavar="NAME")
+    ] = "time",
+    column: Annotated[
+        str, typer.Option(help="Column of the voltage in FILE.", metavar="NAME")
+    ] = "voltage",
     samples: Annotated[
         int | None,
         typer.Option(
@@ -112,13 +126,13 @@ def sensitivity(
     indices = None
     with working("Simulating"):
         chosen = drive_of(drive)
-        command = maneuver_of(maneuver, chosen)
-        trial = trial_of(chosen, command, rate)
+        options = Options(rate, interpolation, "rest", False, time_column, column)
+        name, trial = trial_of(chosen, maneuver, options)
         ranges = ranges_from(levers or LEVERS, (1.0 - _span(span), 1.0 + span))
         single = one_at_a_time(chosen, ranges, trial, outcomes=wanted)
         if samples is not None:
             indices = sobol(chosen, ranges, trial, outcomes=wanted, samples=samples, seed=seed)
-    title = f"{title_of(drive, chosen)}, {command.name}"
+    title = f"{title_of(drive, chosen)}, {name}"
     if out is not None:
         _write(single, indices, out)
     if plot is not None:

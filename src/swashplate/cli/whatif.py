@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swashplate.cli.inputs import drive_of, maneuver_of, title_of
+from swashplate.cli.inputs import Interpolation, Options, drive_of, title_of
 from swashplate.cli.levers import factors_of, list_levers, trial_of
 from swashplate.cli.terminal import note, say, show, table, working
 from swashplate.errors import InputError
@@ -25,6 +25,7 @@ Examples:
   swashplate whatif hoist --scale orifice=1.5 --scale pump=1.5
   swashplate whatif slew --scale orifice_diameter=1.2 --maneuver step:6 --plot w.png
   swashplate whatif fitted --scale dead_zone=0 --uncertainty fitted
+  swashplate whatif mine.toml --scale pump=1.2 --maneuver log.csv --interpolation previous
   swashplate whatif --levers
 """
 LEVEL = 0.95
@@ -53,11 +54,24 @@ def whatif(
     ],
     maneuver: Annotated[
         str,
-        typer.Option(help='Manoeuvre for both, such as step:9 or "step +9 V".', metavar="NAME"),
+        typer.Option(
+            help='Command for both: a manoeuvre such as step:9 or "step +9 V", or a log.',
+            metavar="NAME|FILE",
+        ),
     ] = "sine:9,0.1",
     rate: Annotated[
         float, typer.Option(help="Samples a second, 10 to 100000.", metavar="HZ")
     ] = 512.0,
+    interpolation: Annotated[
+        Interpolation | None,
+        typer.Option(help="Of a FILE, as in 'swashplate simulate'.", show_default=False),
+    ] = None,
+    time_column: Annotated[
+        str, typer.Option(help="Column of the time in FILE.", metavar="NAME")
+    ] = "time",
+    column: Annotated[
+        str, typer.Option(help="Column of the voltage in FILE.", metavar="NAME")
+    ] = "voltage",
     uncertainty: Annotated[
         Path | None,
         typer.Option(
@@ -106,8 +120,8 @@ def whatif(
     word = drive_file(drive)
     with working("Simulating"):
         chosen = drive_of(word)
-        command = maneuver_of(maneuver, chosen)
-        trial = trial_of(chosen, command, rate)
+        options = Options(rate, interpolation, "rest", False, time_column, column)
+        name, trial = trial_of(chosen, maneuver, options)
         result = what_if(chosen, moved, trial, outcomes=CHOSEN)
     drawn: Mapping[str, Draws] = {}
     if uncertainty is not None:
@@ -122,7 +136,7 @@ def whatif(
     with working("Writing"):
         made = _before_and_after(result, drawn)
         bands = _bands(result, drawn)
-        title = f"{title_of(word, chosen)}, {command.name}"
+        title = f"{title_of(word, chosen)}, {name}"
         if out is not None:
             result.after.drive.to_toml(out)
         if plot is not None:
@@ -210,6 +224,9 @@ def _bands(result: WhatIf, drawn: Mapping[str, Draws]) -> dict[str, Bands]:
 def _band_sentences(drawn: Mapping[str, Draws], bands: Mapping[str, Bands]) -> list[str]:
     import numpy as np
 
+    first = next(iter(drawn.values()), None)
+    if first is None:
+        return []
     said = [f"± is half of the interval that holds {100.0 * LEVEL:g} % of the drives."]
     for name, band in bands.items():
         width, when = band.widest
@@ -217,5 +234,4 @@ def _band_sentences(drawn: Mapping[str, Draws], bands: Mapping[str, Bands]) -> l
             f"Band of {band.draws} drives, {name}: at most {np.degrees(width):.3g} deg/s wide, at "
             f"{when:.3g} s."
         )
-    first = next(iter(drawn.values()), None)
-    return said if first is None else [*said, *first.sentences()]
+    return [*said, *first.sentences()]
