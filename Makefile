@@ -37,7 +37,7 @@ test: lint ## lint, then all tests: compiled, and a part of them interpreted
 	@echo; echo "== Tests, compiled"
 	@$(BIN)/pytest -n 2
 	@echo; echo "== Tests marked 'interpreted', without the JIT"
-	@NUMBA_DISABLE_JIT=1 $(BIN)/pytest -m interpreted
+	@NUMBA_DISABLE_JIT=1 $(BIN)/pytest -n 2 -m interpreted
 
 lint: $(STAMP) ## style, format, types and the direction of imports
 	@echo "== Style";   $(BIN)/ruff check .
@@ -71,7 +71,7 @@ calibration: $(STAMP) ## how often intervals hold the truth, over 400 virtual ca
 coverage: $(STAMP) ## which lines of src no test reaches; the kernels interpreted (ten minutes)
 	@$(BIN)/coverage erase
 	@$(BIN)/coverage run -m pytest -n 2
-	@NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -m interpreted
+	@NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -n 2 -m 'interpreted or traced'
 	@$(BIN)/coverage combine -q
 	@$(BIN)/coverage report
 

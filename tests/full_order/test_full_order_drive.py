@@ -30,6 +30,7 @@ def marched(hoist: FullOrderDrive, step: np.ndarray) -> FullOrderSimulation:
     return hoist.simulate(step)
 
 
+@pytest.mark.traced
 @pytest.mark.parametrize("method", ["radau", "lsoda"])
 def test_march_agrees_with_stiff_solver(
     hoist: FullOrderDrive, step: np.ndarray, marched: FullOrderSimulation, method: str
@@ -58,6 +59,7 @@ def test_stop_is_not_passed_and_nothing_chatters(
     assert marched.stroker_pressure.max() == pytest.approx(limit / n["piston_area"], rel=1e-12)
 
 
+@pytest.mark.traced
 @pytest.mark.parametrize("name", ["hoist", "slew", "luff"])
 @pytest.mark.parametrize("frequency", [0.3, 1.0])
 def test_every_axis_at_both_stops(name: str, frequency: float) -> None:
@@ -73,6 +75,7 @@ def test_every_axis_at_both_stops(name: str, frequency: float) -> None:
     assert np.isfinite(run.rows).all()
 
 
+@pytest.mark.traced
 def test_balances_close(
     hoist: FullOrderDrive, step: np.ndarray, marched: FullOrderSimulation
 ) -> None:
@@ -85,6 +88,7 @@ def test_balances_close(
     assert marched.losses[-1, 1] > 0.0
 
 
+@pytest.mark.traced
 def test_balances_with_everything_on(hoist: FullOrderDrive, step: np.ndarray) -> None:
     loaded = hoist.replace(
         load_torque=3e3, motor_leakage=1e-6, piston_leakage=1e-12, relief_pressure=3e5
@@ -98,6 +102,7 @@ def test_balances_with_everything_on(hoist: FullOrderDrive, step: np.ndarray) ->
         assert run.account("relief_volume").max() > 0.0
 
 
+@pytest.mark.traced
 def test_spool_at_its_stroke(hoist: FullOrderDrive, step: np.ndarray) -> None:
     short = hoist.replace(spool_stroke=1e-4)
     run = short.simulate(step)
@@ -122,6 +127,7 @@ def test_modes_stand_where_the_source_says(hoist: FullOrderDrive) -> None:
     assert np.all(hoist.eigenvalues().real < 0.0)
 
 
+@pytest.mark.traced
 def test_modes_against_differences_of_the_rates(hoist: FullOrderDrive) -> None:
     """The Jacobian that solvers and modes use, against differences through the whole model."""
     from swashplate.full_order.march import N_STATES, jacobian_at, rates_at
@@ -144,6 +150,7 @@ def test_modes_against_differences_of_the_rates(hoist: FullOrderDrive) -> None:
         assert jacobian[:N_STATES, k] == pytest.approx(expected, rel=1e-5, abs=1e-4)
 
 
+@pytest.mark.traced
 def test_load_acts_through_the_motors_pressure(hoist: FullOrderDrive, step: np.ndarray) -> None:
     n = hoist.physical.numbers
     heavy = hoist.replace(load_torque=4e3, load_inertia=600.0).simulate(step)
@@ -160,6 +167,7 @@ def test_load_acts_through_the_motors_pressure(hoist: FullOrderDrive, step: np.n
     assert np.all(light.motor_pressure_drop == 0.0)
 
 
+@pytest.mark.traced
 def test_steady_start_stays(hoist: FullOrderDrive) -> None:
     level = np.full(513, 4.0)
     run = hoist.replace(load_torque=2e3).simulate(level, start="steady")
@@ -170,6 +178,7 @@ def test_steady_start_stays(hoist: FullOrderDrive) -> None:
     assert full.swash_angle[-1] == hoist.physical.numbers["swash_stop_plus"]
 
 
+@pytest.mark.traced
 def test_rest_is_rest_until_the_valve_opens() -> None:
     slew = FullOrderDrive.preset("slew")  # no plussing
     run = slew.simulate(np.zeros(512))
@@ -193,6 +202,7 @@ def test_symmetric_root_is_taken_from_the_drive(hoist: FullOrderDrive, step: np.
     assert np.abs(change - expected).max() < 0.2
 
 
+@pytest.mark.traced
 def test_records(hoist: FullOrderDrive) -> None:
     current = np.zeros(257)
     current[26:] = 0.5
@@ -205,6 +215,7 @@ def test_records(hoist: FullOrderDrive) -> None:
     assert slow.shaft_speed[-1] == pytest.approx(held.shaft_speed[-1], rel=0.02)
 
 
+@pytest.mark.traced
 def test_table(marched: FullOrderSimulation, tmp_path: Path) -> None:
     marched.write(tmp_path / "run.parquet")
     table = pl.read_parquet(tmp_path / "run.parquet")
@@ -252,6 +263,7 @@ def test_limits_that_come_and_go_within_a_step(hoist: FullOrderDrive) -> None:
     assert np.abs(marched.shaft_speed - exact.shaft_speed).max() < 1e-4 * top
 
 
+@pytest.mark.traced
 def test_a_pulse_of_one_sample_is_seen(hoist: FullOrderDrive) -> None:
     current = np.zeros(400)
     current[201] = 0.8
@@ -261,6 +273,7 @@ def test_a_pulse_of_one_sample_is_seen(hoist: FullOrderDrive) -> None:
         assert np.abs(run.shaft_speed - calm).max() > 0.01
 
 
+@pytest.mark.traced
 def test_one_sample(hoist: FullOrderDrive) -> None:
     for method in ("march", "radau"):
         run = hoist.simulate_current([0.4], method=method)

@@ -6,6 +6,7 @@ import pytest
 from swashplate import Drive, InputError, ParameterError, SquaredError
 
 
+@pytest.mark.traced
 def test_bad_sets_do_not_stop_the_others(hoist: Drive) -> None:
     voltage = np.full(300, 5.0)
     changes = {"Z16_plus": [1.2e-4, -1.0, 1.3e-4], "Z19_plus": [12.0, 12.0, 1200.0]}
@@ -27,6 +28,7 @@ def test_a_current_beyond_the_domain_fails_only_its_set(hoist: Drive) -> None:
     assert np.isfinite(batch.output[0]).all()
 
 
+@pytest.mark.traced
 def test_an_unstable_filter_fails_only_its_set(hoist: Drive) -> None:
     batch = hoist.simulate_many({"omega": [56.0, 1100.0]}, voltage=np.ones(50))
     assert list(batch.failures) == [1]
@@ -60,6 +62,7 @@ def test_bad_batches_are_refused(hoist: Drive, changes, options, sentence) -> No
         hoist.simulate_many(changes, **options)
 
 
+@pytest.mark.traced
 def test_samples_without_weight_may_be_missing(hoist: Drive) -> None:
     cost = SquaredError([0.0, np.nan, 1.0], [1.0, 0.0, 1.0])
     batch = hoist.simulate_many({"Z10": [12.396]}, voltage=[0.0, 0.0, 0.0], cost=cost)

@@ -7,6 +7,8 @@ from swashplate import InputError
 from swashplate.simulation.observation import Observation, ObservedRecord, Own
 from swashplate.simulation.record import Record, record_of
 
+pytestmark = pytest.mark.traced
+
 TIME = np.array([0.0, 1.0, 2.0])
 VALUES = np.array([1.0, 2.0, 3.0])
 

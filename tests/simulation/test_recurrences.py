@@ -6,6 +6,8 @@ from scipy.signal import lfilter
 
 from swashplate.simulation.recurrences import follow, follow_second_order, integrate_row, settle
 
+pytestmark = pytest.mark.traced
+
 ROWS, COUNT = 6, 37
 CHOSEN = np.array([4, 0, 1, 5])
 """Row 5 is the idle one."""

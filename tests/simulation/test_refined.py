@@ -14,6 +14,8 @@ from swashplate.simulation.refined import simulate_refined_drive, simulate_refin
 from swashplate.simulation.refined_result import RefinedSimulation
 from swashplate.simulation.result import SIGNALS
 
+pytestmark = pytest.mark.traced
+
 Array = NDArray[np.float64]
 
 RATE = 512.0

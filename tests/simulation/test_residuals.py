@@ -67,6 +67,7 @@ def simulated(run, signal: str) -> np.ndarray:
     return getattr(run, signal)
 
 
+@pytest.mark.traced
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
 def test_signals_are_those_of_a_simulation_to_the_last_bit(scene) -> None:
     command, changes, start = scene
@@ -77,6 +78,7 @@ def test_signals_are_those_of_a_simulation_to_the_last_bit(scene) -> None:
         assert np.array_equal(found[observed.rows_of(number)], simulated(run, signal)), signal
 
 
+@pytest.mark.traced
 def test_a_current_drives_the_pump_alone(hoist: Drive) -> None:
     run = hoist.simulate(2.0 * SWING)
     current = np.array(run.current)
@@ -105,6 +107,7 @@ def close(found: np.ndarray, expected: np.ndarray, tolerance: float = 1e-11) -> 
     assert (error <= tolerance * scale).all(), (error / np.where(scale > 0.0, scale, 1.0)).max()
 
 
+@pytest.mark.traced
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
 def test_derivatives_are_those_of_the_readable_form(scene) -> None:
     command, changes, start = scene
@@ -207,6 +210,7 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
     assert moved > 40
 
 
+@pytest.mark.traced
 @pytest.mark.parametrize("start", ["rest", "steady"])
 def test_a_start_pressure_is_that_of_a_simulation(hoist: Drive, start: str) -> None:
     observed, own = observed_at_samples(3.0 + SWING, start), Own(start_pressure=-5e4)
@@ -217,6 +221,7 @@ def test_a_start_pressure_is_that_of_a_simulation(hoist: Drive, start: str) -> N
         assert np.array_equal(found[observed.rows_of(number)], simulated(run, signal)), signal
 
 
+@pytest.mark.traced
 def test_low_passes_are_scipys(hoist: Drive) -> None:
     run = hoist.simulate(HARD)
     time, poles, delay = run.time[10:-10], (62.8, 188.5), 0.5 / RATE
@@ -234,6 +239,7 @@ def test_low_passes_are_scipys(hoist: Drive) -> None:
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-13 * np.abs(expected).max())
 
 
+@pytest.mark.traced
 def test_slope_by_the_clock_on_the_grid_is_the_mean_of_both_sides(hoist: Drive) -> None:
     run = hoist.simulate(HARD)
     observed = ObservedRecord(
@@ -253,6 +259,7 @@ def test_slope_by_the_clock_on_the_grid_is_the_mean_of_both_sides(hoist: Drive) 
     np.testing.assert_allclose(found[:, 0], 1.5 * RATE * (padded[2:] - padded[:-2]), atol=1e-10)
 
 
+@pytest.mark.traced
 def test_other_rates_are_compared_on_the_marchs_grid(hoist: Drive) -> None:
     command = maneuvers.sine(3.0, 0.8, start=0.1, length=3.0, settle=0.4).sample(100.0)
     run = hoist.simulate(command, 100.0)
@@ -293,6 +300,7 @@ def test_triangle_is_the_qr_of_the_jacobian(name: str, columns: tuple) -> None:
     np.testing.assert_allclose(whole.squares, squares, rtol=1e-13)
 
 
+@pytest.mark.traced
 def test_steps_of_a_fit_are_those_of_the_jacobian(hoist: Drive) -> None:
     run = hoist.simulate(HARD)
     observed = ObservedRecord(
@@ -309,6 +317,7 @@ def test_steps_of_a_fit_are_those_of_the_jacobian(hoist: Drive) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-10)
 
 
+@pytest.mark.traced
 def test_gauges_are_null_directions_of_the_triangle(hoist: Drive) -> None:
     observed = observed_at_samples(HARD, signals=["shaft_speed"])
     numbers = hoist.parameters.numbers
@@ -329,6 +338,7 @@ def test_gauges_are_null_directions_of_the_triangle(hoist: Drive) -> None:
 FORCES = ("Z19", "Z20", "Z21", "Z22")
 
 
+@pytest.mark.traced
 @pytest.mark.parametrize("block", [2, 3, 64, 511])
 def test_blocks_of_any_size_give_the_same(hoist: Drive, block: int) -> None:
     observed = everything_observed(HARD)
@@ -347,6 +357,7 @@ def test_blocks_of_any_size_give_the_same(hoist: Drive, block: int) -> None:
     np.testing.assert_allclose(other / size, factor / size, rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.traced
 def test_records_of_a_few_samples(hoist: Drive) -> None:
     for samples in (1, 2, 3):
         observed = observed_at_samples(np.full(samples, 5.0), "steady")
@@ -357,6 +368,7 @@ def test_records_of_a_few_samples(hoist: Drive) -> None:
         triangle(hoist.parameters, observed, ["Z8"])
 
 
+@pytest.mark.traced
 def test_experiments_combine(hoist: Drive) -> None:
     columns = ["Z8", "Z10", "G1", "Z16"]
     parts = [observed_at_samples(each, signals=["shaft_speed"]) for each in (HARD, 2.0 * SWING)]
@@ -392,6 +404,7 @@ def test_threads_do_not_disturb_each_other(hoist: Drive) -> None:
         assert all(np.array_equal(a, b) for a, b in zip(found, 20 * alone, strict=True))
 
 
+@pytest.mark.traced
 def test_memory_is_written_where_the_caller_says(hoist: Drive) -> None:
     observed = observed_at_samples(HARD, signals=["shaft_speed", "current"])
     first = jacobian(hoist.parameters, observed, ["Z8", "Z14"])

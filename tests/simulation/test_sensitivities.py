@@ -130,6 +130,7 @@ def test_every_parameter(scene: Scene) -> None:
             assert np.abs(by.current[:, by.names.index(name)]).max() > 0.05
 
 
+@pytest.mark.traced
 def test_coulomb_term_has_a_one_sided_derivative_at_zero(hoist: Drive) -> None:
     voltage = 2.0 * SWING
     by = hoist.sensitivities(voltage, parameters=["C"])
@@ -147,6 +148,7 @@ def test_a_list_of_names_is_needed(hoist: Drive, names) -> None:
         hoist.sensitivities([0.0], parameters=names)
 
 
+@pytest.mark.traced
 def test_columns_are_those_asked_for(hoist: Drive) -> None:
     voltage = 2.0 * SWING
     everything = hoist.sensitivities(voltage)
@@ -160,6 +162,7 @@ def test_columns_are_those_asked_for(hoist: Drive) -> None:
         assert np.array_equal(some.current[:, j], everything.current[:, k])
 
 
+@pytest.mark.traced
 def test_pump_alone_has_the_same_columns(hoist: Drive) -> None:
     whole = hoist.sensitivities(2.0 * SWING, parameters=list(PUMP_PARAMETERS))
     pump = hoist.sensitivities_current(whole.simulation.current)
@@ -169,6 +172,7 @@ def test_pump_alone_has_the_same_columns(hoist: Drive) -> None:
         hoist.sensitivities_current([0.1, 0.2], parameters=["tau"])
 
 
+@pytest.mark.traced
 def test_other_rates_have_sensitivities_at_their_own_samples(
     hoist: Drive, derivative: Callable[..., float]
 ) -> None:
@@ -185,6 +189,7 @@ def test_other_rates_have_sensitivities_at_their_own_samples(
     assert by.shaft_speed[:, 0] == pytest.approx(run.swash_angle, rel=1e-12, abs=1e-15)
 
 
+@pytest.mark.traced
 def test_sensitivities_at_other_stamps(hoist: Drive) -> None:
     by = hoist.sensitivities(SWING, parameters=["Z10", "Z8"])
     stamps = np.array([0.5, 1.0, 1.0009765625])

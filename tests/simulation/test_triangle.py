@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from swashplate import InputError
 from swashplate.simulation.triangle import ROWS, combine
 
+pytestmark = pytest.mark.traced
+
 
 def numbers(rows: int, columns: int, seed: int = 0) -> np.ndarray:
     """Columns of very different size, as derivatives by parameters in SI are."""

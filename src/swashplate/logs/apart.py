@@ -29,6 +29,8 @@ from swashplate.logs.log import Array, Column, Log
 _PATIENCE = 30.0
 """How long a small file may take [s]."""
 _PATIENCE_PER_MEGABYTE = 1.0
+_LEAVE = 1.0
+"""How long the other process has to end by itself, once it is asked no more [s]."""
 _START = "import sys; sys.path[:] = {path!r}; from swashplate.logs.serve import serve; serve()"
 
 
@@ -156,10 +158,13 @@ class _Other:
 
 
 def _ended(process: subprocess.Popen[bytes], errors: IO[bytes]) -> None:
-    process.kill()
-    process.wait()
     for pipe in (process.stdin, process.stdout):
         if pipe is not None:
             with suppress(BrokenPipeError):  # a question that was never read
                 pipe.close()
+    try:
+        process.wait(_LEAVE)  # without more questions it ends by itself
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
     errors.close()
