@@ -26,6 +26,7 @@ exclude_patterns = ["_build"]
 # $ and $$ for equations; headings can be linked as page.md#heading
 myst_enable_extensions = ["amsmath", "colon_fence", "dollarmath"]
 myst_heading_anchors = 3
+smartquotes_action = "qe"  # quotes and dots, but no dashes: --out is an option
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings give shapes and units, which say more

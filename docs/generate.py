@@ -130,7 +130,7 @@ def option_row(parameter: Any, command: Any) -> str:
 
 def cell(text: str) -> str:
     """Text that cannot end a cell, or pass for markup."""
-    return text.replace("|", "\\|").replace("<", "&lt;").replace("[", "\\[")
+    return text.replace("|", "\\|").replace("<", "&lt;")
 
 
 def schema_page(title: str, model: type[BaseModel], text: str) -> str:

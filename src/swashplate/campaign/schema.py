@@ -142,8 +142,10 @@ class Axis(Entry):
         None, description="A packaged drive, or a parameter file beside this one."
     )
     time: Clock = Field(description="Clock of all its signals that have none of their own.")
-    input: Input
-    channels: dict[str, Channel] = Field(min_length=1)
+    input: Input = Field(description="What commands it.")
+    channels: dict[str, Channel] = Field(
+        min_length=1, description="What was measured, by a name of your choice."
+    )
     start: InitialState = Field("rest", description="State at the first sample.")
     ignore: tuple[Window, ...] = Field((), description="Windows left out of every channel.")
 
@@ -183,5 +185,5 @@ class CampaignFile(Entry):
     format: TextOptions = Field(
         TextOptions(), description="How text logs are written, where that cannot be told."
     )
-    axes: dict[str, Axis] = Field(min_length=1)
-    runs: tuple[Run, ...] = Field(min_length=1)
+    axes: dict[str, Axis] = Field(min_length=1, description="The drives, by name.")
+    runs: tuple[Run, ...] = Field(min_length=1, description="Their tests, a log each.")
