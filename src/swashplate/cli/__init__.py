@@ -22,6 +22,7 @@ from swashplate.cli import (
     doctor,
     excite,
     fit,
+    full_order,
     limits,
     linearize,
     parameters,
@@ -149,6 +150,9 @@ app.command("linearize", epilog=linearize.EXAMPLES, rich_help_panel="Understand"
     linearize.linearize
 )
 app.command("bode", epilog=bode.EXAMPLES, rich_help_panel="Understand")(bode.bode)
+app.command("full-order", epilog=full_order.EXAMPLES, rich_help_panel="Understand")(
+    full_order.full_order
+)
 app.command("doctor", epilog=doctor.EXAMPLES, rich_help_panel="This installation")(doctor.doctor)
 
 

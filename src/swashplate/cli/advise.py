@@ -16,6 +16,7 @@ from swashplate.cli.advice_tables import (
     unknowns_table,
     write_advice,
 )
+from swashplate.cli.arguments import AxisName
 from swashplate.cli.inputs import maneuver_of, parameters_of
 from swashplate.cli.terminal import note, say, show, working
 from swashplate.cli.validate import chosen_axis
@@ -53,10 +54,7 @@ def advise(
             show_default=False,
         ),
     ] = None,
-    axis: Annotated[
-        str | None,
-        typer.Option(help="The axis, where the campaign has several.", show_default=False),
-    ] = None,
+    axis: AxisName = None,
     setup: Annotated[
         str | None,
         typer.Option(

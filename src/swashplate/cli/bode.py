@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swashplate.cli.arguments import DriveWord, Factors, Figure, Values
 from swashplate.cli.inputs import changes_said, drive_of, title_of
 from swashplate.cli.terminal import note, show, table, working
 from swashplate.errors import InputError
@@ -27,14 +28,7 @@ AMPLITUDES = (1.0, 4.0, 6.5, 9.0)
 
 
 def bode(
-    drive: Annotated[
-        str,
-        typer.Argument(
-            metavar="AXIS|SET.toml",
-            help="A packaged drive (see 'swashplate axes') or your own TOML file.",
-            show_default=False,
-        ),
-    ],
+    drive: DriveWord,
     amplitudes: Annotated[
         list[float] | None,
         typer.Option(
@@ -61,9 +55,7 @@ def bode(
             show_default=False,
         ),
     ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(help="Draw a figure: .png, .svg or .pdf.", metavar="FILE")
-    ] = None,
+    plot: Figure = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -71,14 +63,8 @@ def bode(
             metavar="FILE",
         ),
     ] = None,
-    values: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="As in 'swashplate simulate'.", metavar="NAME=VALUE"),
-    ] = None,
-    factors: Annotated[
-        list[str] | None,
-        typer.Option("--scale", help="As in 'swashplate simulate'.", metavar="NAME=FACTOR"),
-    ] = None,
+    values: Values = None,
+    factors: Factors = None,
 ) -> None:
     """Sweep sines of several amplitudes through a drive.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swashplate.cli.arguments import Rate
 from swashplate.cli.inputs import drive_of, maneuver_of
 from swashplate.cli.terminal import note, show, table, working
 
@@ -36,9 +37,7 @@ def compare(
         str,
         typer.Option(help='Manoeuvre for both, such as step:9 or "step +9 V".', metavar="NAME"),
     ] = "step:9",
-    rate: Annotated[
-        float, typer.Option(help="Samples a second, 10 to 100000.", metavar="HZ")
-    ] = 512.0,
+    rate: Rate = 512.0,
     plot: Annotated[
         Path | None, typer.Option(help="Draw both speeds: .png, .svg or .pdf.", metavar="FILE")
     ] = None,

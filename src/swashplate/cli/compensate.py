@@ -8,8 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swashplate.cli.arguments import (
+    DriveWord,
+    Factors,
+    FileInterpolation,
+    Rate,
+    TimeColumn,
+    Values,
+    VoltageColumn,
+)
 from swashplate.cli.inputs import (
-    Interpolation,
     Options,
     changes_said,
     drive_of,
@@ -36,14 +44,7 @@ PRINTED = 5
 
 
 def compensate(
-    drive: Annotated[
-        str,
-        typer.Argument(
-            metavar="AXIS|SET.toml",
-            help="A packaged drive (see 'swashplate axes') or your own TOML file.",
-            show_default=False,
-        ),
-    ],
+    drive: DriveWord,
     stick: Annotated[
         str | None,
         typer.Argument(
@@ -79,27 +80,12 @@ def compensate(
             metavar="FILE",
         ),
     ] = None,
-    values: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="As in 'swashplate simulate'.", metavar="NAME=VALUE"),
-    ] = None,
-    factors: Annotated[
-        list[str] | None,
-        typer.Option("--scale", help="As in 'swashplate simulate'.", metavar="NAME=FACTOR"),
-    ] = None,
-    rate: Annotated[
-        float, typer.Option(help="Samples a second of the command, 10 to 100000.", metavar="HZ")
-    ] = 512.0,
-    interpolation: Annotated[
-        Interpolation | None,
-        typer.Option(help="As in 'swashplate simulate'.", show_default=False),
-    ] = None,
-    time_column: Annotated[
-        str, typer.Option(help="Column of the time in FILE.", metavar="NAME")
-    ] = "time",
-    column: Annotated[
-        str, typer.Option(help="Column of the voltage in FILE.", metavar="NAME")
-    ] = "voltage",
+    values: Values = None,
+    factors: Factors = None,
+    rate: Rate = 512.0,
+    interpolation: FileInterpolation = None,
+    time_column: TimeColumn = "time",
+    column: VoltageColumn = "voltage",
 ) -> None:
     """Invert a drive's steady map: the voltage for a wanted speed.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swashplate.cli.arguments import AxisName, CampaignPath
 from swashplate.cli.inputs import parameters_of
 from swashplate.cli.terminal import note, say, show, table, working
 from swashplate.cli.validate import chosen_axis
@@ -36,13 +37,8 @@ _LETTERS = {"most": "#", "some": "+", "unseen": "o", "none": "."}
 
 
 def excitation(
-    path: Annotated[
-        Path, typer.Argument(metavar="CAMPAIGN.toml", help="The campaign file, beside its logs.")
-    ] = Path("campaign.toml"),
-    axis: Annotated[
-        str | None,
-        typer.Option(help="The axis, where the campaign has several.", show_default=False),
-    ] = None,
+    path: CampaignPath = Path("campaign.toml"),
+    axis: AxisName = None,
     setup: Annotated[
         str | None,
         typer.Option(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from swashplate.cli.arguments import AxisName, CampaignPath
 from swashplate.cli.fit_output import (
     estimates_table,
     folds_table,
@@ -44,16 +45,11 @@ Figures = Literal["svg", "pdf"]
 
 
 def fit(
-    path: Annotated[
-        Path, typer.Argument(metavar="CAMPAIGN.toml", help="The campaign file, beside its logs.")
-    ] = Path("campaign.toml"),
+    path: CampaignPath = Path("campaign.toml"),
     out: Annotated[
         Path, typer.Option(help="Folder for the fitted drive and its tables.", metavar="DIR")
     ] = Path("fitted"),
-    axis: Annotated[
-        str | None,
-        typer.Option(help="The axis, where the campaign has several.", show_default=False),
-    ] = None,
+    axis: AxisName = None,
     setup: Annotated[
         str | None,
         typer.Option(

@@ -9,10 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swashplate.cli.arguments import (
+    Clip,
+    DriveWord,
+    Factors,
+    FileInterpolation,
+    Rate,
+    StartFrom,
+    TimeColumn,
+    Values,
+    VoltageColumn,
+)
 from swashplate.cli.inputs import (
-    Interpolation,
     Options,
-    Start,
     changes_said,
     drive_of,
     simulated,
@@ -37,14 +46,7 @@ FREQUENCIES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
 
 
 def limits(
-    drive: Annotated[
-        str,
-        typer.Argument(
-            metavar="AXIS|SET.toml",
-            help="A packaged drive (see 'swashplate axes') or your own TOML file.",
-            show_default=False,
-        ),
-    ],
+    drive: DriveWord,
     command: Annotated[
         str | None,
         typer.Argument(
@@ -84,33 +86,14 @@ def limits(
             metavar="FILE",
         ),
     ] = None,
-    values: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="As in 'swashplate simulate'.", metavar="NAME=VALUE"),
-    ] = None,
-    factors: Annotated[
-        list[str] | None,
-        typer.Option("--scale", help="As in 'swashplate simulate'.", metavar="NAME=FACTOR"),
-    ] = None,
-    rate: Annotated[
-        float, typer.Option(help="Samples a second of the command, 10 to 100000.", metavar="HZ")
-    ] = 512.0,
-    interpolation: Annotated[
-        Interpolation | None,
-        typer.Option(help="As in 'swashplate simulate'.", show_default=False),
-    ] = None,
-    start: Annotated[
-        Start, typer.Option(help="Start from rest at 0 V, or settled at the first voltage.")
-    ] = "rest",
-    clip: Annotated[
-        bool, typer.Option("--clip", help="Clip a voltage beyond ±10 V instead of refusing it.")
-    ] = False,
-    time_column: Annotated[
-        str, typer.Option(help="Column of the time in FILE.", metavar="NAME")
-    ] = "time",
-    column: Annotated[
-        str, typer.Option(help="Column of the voltage in FILE.", metavar="NAME")
-    ] = "voltage",
+    values: Values = None,
+    factors: Factors = None,
+    rate: Rate = 512.0,
+    interpolation: FileInterpolation = None,
+    start: StartFrom = "rest",
+    clip: Clip = False,
+    time_column: TimeColumn = "time",
+    column: VoltageColumn = "voltage",
 ) -> None:
     """Say what a drive can do, or what limits it under a command.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from swashplate.cli.arguments import DriveWord, Factors, Values
 from swashplate.cli.inputs import changes_said, drive_of, title_of
 from swashplate.cli.terminal import note, show, table, working
 
@@ -29,14 +30,7 @@ Examples:
 
 
 def linearize(
-    drive: Annotated[
-        str,
-        typer.Argument(
-            metavar="AXIS|SET.toml",
-            help="A packaged drive (see 'swashplate axes') or your own TOML file.",
-            show_default=False,
-        ),
-    ],
+    drive: DriveWord,
     at: Annotated[
         float | None,
         typer.Option(help="Linearise at this constant voltage.", metavar="V", show_default=False),
@@ -95,14 +89,8 @@ def linearize(
         Path | None,
         typer.Option(help="Write the model, in SI, to a .toml or .json file.", metavar="FILE"),
     ] = None,
-    values: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="As in 'swashplate simulate'.", metavar="NAME=VALUE"),
-    ] = None,
-    factors: Annotated[
-        list[str] | None,
-        typer.Option("--scale", help="As in 'swashplate simulate'.", metavar="NAME=FACTOR"),
-    ] = None,
+    values: Values = None,
+    factors: Factors = None,
 ) -> None:
     """Linearise a drive at a voltage, a current or a speed.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swashplate.cli.arguments import DriveWord
 from swashplate.cli.inputs import parameters_of
 from swashplate.cli.terminal import say, show, table, working
 
@@ -49,14 +50,7 @@ def axes() -> None:
 
 
 def show_parameters(
-    drive: Annotated[
-        str,
-        typer.Argument(
-            metavar="AXIS|SET.toml",
-            help="A packaged drive (see 'swashplate axes') or your own TOML file.",
-            show_default=False,
-        ),
-    ],
+    drive: DriveWord,
     toml: Annotated[
         bool, typer.Option("--toml", help="Print a TOML file, complete and ready to edit.")
     ] = False,

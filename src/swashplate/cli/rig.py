@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from swashplate.cli.arguments import DriveWord
 from swashplate.cli.inputs import maneuver_of, parameters_of
 from swashplate.cli.terminal import note, show, table, working
 from swashplate.errors import InputError
@@ -25,14 +26,7 @@ Format = Literal["csv", "mat", "parquet"]
 
 
 def rig(
-    drive: Annotated[
-        str,
-        typer.Argument(
-            metavar="AXIS|SET.toml",
-            help="A packaged drive (see 'swashplate axes') or your own TOML file.",
-            show_default=False,
-        ),
-    ],
+    drive: DriveWord,
     out: Annotated[
         Path, typer.Option(help="A new or empty folder for logs and campaign.", metavar="DIR")
     ],

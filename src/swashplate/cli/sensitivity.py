@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swashplate.cli.inputs import Interpolation, Options, drive_of, title_of
+from swashplate.cli.arguments import DriveWord, FileInterpolation, Rate, TimeColumn, VoltageColumn
+from swashplate.cli.inputs import Options, drive_of, title_of
 from swashplate.cli.levers import ranges_from, trial_of
 from swashplate.cli.terminal import note, say, show, table, working
 from swashplate.errors import InputError
@@ -40,14 +41,7 @@ FAINTEST = 5e-4
 
 
 def sensitivity(
-    drive: Annotated[
-        str,
-        typer.Argument(
-            metavar="AXIS|SET.toml",
-            help="A packaged drive (see 'swashplate axes') or your own TOML file.",
-            show_default=False,
-        ),
-    ],
+    drive: DriveWord,
     levers: Annotated[
         list[str] | None,
         typer.Option(
@@ -78,19 +72,10 @@ def sensitivity(
             metavar="NAME|FILE",
         ),
     ] = "step:9",
-    rate: Annotated[
-        float, typer.Option(help="Samples a second, 10 to 100000.", metavar="HZ")
-    ] = 512.0,
-    interpolation: Annotated[
-        Interpolation | None,
-        typer.Option(help="Of a FILE, as in 'swashplate simulate'.", show_default=False),
-    ] = None,
-    time_column: Annotated[
-        str, typer.Option(help="Column of the time in FILE.", metavar="NAME")
-    ] = "time",
-    column: Annotated[
-        str, typer.Option(help="Column of the voltage in FILE.", metavar="NAME")
-    ] = "voltage",
+    rate: Rate = 512.0,
+    interpolation: FileInterpolation = None,
+    time_column: TimeColumn = "time",
+    column: VoltageColumn = "voltage",
     samples: Annotated[
         int | None,
         typer.Option(

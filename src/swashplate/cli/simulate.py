@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swashplate.cli.arguments import Clip, DriveWord, Figure, StartFrom, TimeColumn, VoltageColumn
 from swashplate.cli.inputs import (
     Interpolation,
     Options,
-    Start,
     changes_said,
     drive_of,
     simulated,
@@ -33,14 +33,7 @@ Examples:
 
 
 def simulate(
-    drive: Annotated[
-        str,
-        typer.Argument(
-            metavar="AXIS|SET.toml",
-            help="A packaged drive (see 'swashplate axes') or your own TOML file.",
-            show_default=False,
-        ),
-    ],
+    drive: DriveWord,
     command: Annotated[
         str,
         typer.Argument(
@@ -58,9 +51,7 @@ def simulate(
         Path | None,
         typer.Option(help="Write all signals, in SI, to a .csv or .parquet file.", metavar="FILE"),
     ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(help="Draw a figure: .png, .svg or .pdf.", metavar="FILE")
-    ] = None,
+    plot: Figure = None,
     values: Annotated[
         list[str] | None,
         typer.Option(
@@ -86,18 +77,10 @@ def simulate(
             show_default=False,
         ),
     ] = None,
-    start: Annotated[
-        Start, typer.Option(help="Start from rest at 0 V, or settled at the first voltage.")
-    ] = "rest",
-    clip: Annotated[
-        bool, typer.Option("--clip", help="Clip a voltage beyond ±10 V instead of refusing it.")
-    ] = False,
-    time_column: Annotated[
-        str, typer.Option(help="Column of the time in FILE.", metavar="NAME")
-    ] = "time",
-    column: Annotated[
-        str, typer.Option(help="Column of the voltage in FILE.", metavar="NAME")
-    ] = "voltage",
+    start: StartFrom = "rest",
+    clip: Clip = False,
+    time_column: TimeColumn = "time",
+    column: VoltageColumn = "voltage",
 ) -> None:
     """Simulate a drive over a manoeuvre or a measured voltage.
 

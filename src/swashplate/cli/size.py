@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from swashplate.cli.arguments import DriveWord
 from swashplate.cli.inputs import drive_of, maneuver_of, title_of
 from swashplate.cli.levers import ranges_from
 from swashplate.cli.terminal import note, say, show, table, working
@@ -28,14 +29,7 @@ LEVERS = ("orifice", "pump")
 
 
 def size(
-    drive: Annotated[
-        str,
-        typer.Argument(
-            metavar="AXIS|SET.toml",
-            help="A packaged drive (see 'swashplate axes') or your own TOML file.",
-            show_default=False,
-        ),
-    ],
+    drive: DriveWord,
     speed_deg_s: Annotated[
         float | None,
         typer.Option(help="Speed that is required.", metavar="DEG/S", show_default=False),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from swashplate.cli.arguments import AxisName, CampaignPath
 from swashplate.cli.inputs import parameters_of
 from swashplate.cli.terminal import note, say, show, side, working
 from swashplate.cli.validation_tables import (
@@ -44,13 +45,8 @@ def validate(
             show_default=False,
         ),
     ],
-    path: Annotated[
-        Path, typer.Argument(metavar="CAMPAIGN.toml", help="The campaign file, beside its logs.")
-    ] = Path("campaign.toml"),
-    axis: Annotated[
-        str | None,
-        typer.Option(help="The axis, where the campaign has several.", show_default=False),
-    ] = None,
+    path: CampaignPath = Path("campaign.toml"),
+    axis: AxisName = None,
     role: Annotated[
         Role, typer.Option(help="Runs that were held back, those to fit, or both.")
     ] = "validate",

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swashplate.cli.inputs import Interpolation, Options, drive_of, title_of
+from swashplate.cli.arguments import Figure, FileInterpolation, Rate, TimeColumn, VoltageColumn
+from swashplate.cli.inputs import Options, drive_of, title_of
 from swashplate.cli.levers import factors_of, list_levers, trial_of
 from swashplate.cli.terminal import note, say, show, table, working
 from swashplate.errors import InputError
@@ -59,19 +60,10 @@ def whatif(
             metavar="NAME|FILE",
         ),
     ] = "sine:9,0.1",
-    rate: Annotated[
-        float, typer.Option(help="Samples a second, 10 to 100000.", metavar="HZ")
-    ] = 512.0,
-    interpolation: Annotated[
-        Interpolation | None,
-        typer.Option(help="Of a FILE, as in 'swashplate simulate'.", show_default=False),
-    ] = None,
-    time_column: Annotated[
-        str, typer.Option(help="Column of the time in FILE.", metavar="NAME")
-    ] = "time",
-    column: Annotated[
-        str, typer.Option(help="Column of the voltage in FILE.", metavar="NAME")
-    ] = "voltage",
+    rate: Rate = 512.0,
+    interpolation: FileInterpolation = None,
+    time_column: TimeColumn = "time",
+    column: VoltageColumn = "voltage",
     uncertainty: Annotated[
         Path | None,
         typer.Option(
@@ -90,9 +82,7 @@ def whatif(
     ] = None,
     draws: Annotated[int, typer.Option(help="Drives drawn for the bands, 20 or more.")] = 200,
     seed: Annotated[int, typer.Option(help="Of the draws.", min=0)] = 0,
-    plot: Annotated[
-        Path | None, typer.Option(help="Draw a figure: .png, .svg or .pdf.", metavar="FILE")
-    ] = None,
+    plot: Figure = None,
     out: Annotated[
         Path | None,
         typer.Option(help="Write the changed drive as a parameter file.", metavar="SET.toml"),
