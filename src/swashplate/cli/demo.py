@@ -119,7 +119,7 @@ def _truth_beside_estimate(
         ">estimate",
         ">95 % from",
         ">to",
-        "holds",
+        "held",
     )
     model = assessment.stage.problem.model
     assert isinstance(model, DriveModel)
