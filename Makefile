@@ -35,7 +35,7 @@ demo: $(STAMP) ## identify a virtual hoist from its tests, with a report, into d
 
 test: lint ## lint, then all tests: compiled, and a part of them interpreted
 	@echo; echo "== Tests, compiled"
-	@$(BIN)/pytest -n 2
+	@$(BIN)/pytest -n 2 --dist loadgroup
 	@echo; echo "== Tests marked 'interpreted', without the JIT"
 	@NUMBA_DISABLE_JIT=1 $(BIN)/pytest -n 2 -m interpreted
 
@@ -70,7 +70,7 @@ calibration: $(STAMP) ## how often intervals hold the truth, over 400 virtual ca
 
 coverage: $(STAMP) ## which lines of src no test reaches; the kernels interpreted (ten minutes)
 	@$(BIN)/coverage erase
-	@$(BIN)/coverage run -m pytest -n 2
+	@$(BIN)/coverage run -m pytest -n 2 --dist loadgroup
 	@NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -n 2 -m 'interpreted or traced'
 	@$(BIN)/coverage combine -q
 	@$(BIN)/coverage report

@@ -44,11 +44,3 @@ def test_a_place_that_is_taken(run, tmp_path):
     assert result.exit_code == 2
     assert "out/reproduction.html cannot be written: Is a directory" in result.stderr
     assert [each.name for each in (tmp_path / "out").iterdir()] == ["reproduction.html"]
-
-
-@pytest.mark.slow
-def test_everything(done, tmp_path):
-    printed = done("reproduce")
-    assert "46 figures and 15 tables" in printed
-    text = (tmp_path / "reproduction/reproduction.html").read_text("utf-8")
-    assert text.count("<img ") == 46

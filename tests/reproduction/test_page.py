@@ -141,6 +141,7 @@ def test_subscripts() -> None:
 
 @pytest.mark.slow
 def test_all_of_it(everything: Reproduction, tmp_path: Path) -> None:
+    assert (len(everything.figures), len(everything.tables)) == (46, 15)
     write_page(everything, tmp_path / "page.html")
     page = Page((tmp_path / "page.html").read_text("utf-8"))
     assert len(page.sources) == 46
