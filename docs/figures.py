@@ -21,6 +21,7 @@ FIGURES = {
         "whatif hoist --scale orifice=1.5 --scale pump=1.5 --maneuver sine:9,0.1 "
         "--plot what-if.png",
     ),
+    "full-order.png": ("full-order hoist step:4 --plot full-order.png",),
     "encoder.png": (
         "rig hoist --out virtual",
         "campaign plot virtual/campaign.toml --run hoist_sine_4_V_0.1_Hz --channel counts "

@@ -1,6 +1,7 @@
 """Units at the edge: what comes in with a unit is turned into SI, or refused by name."""
 
 from functools import cache
+from math import pi
 from tokenize import TokenError
 from typing import Any
 
@@ -22,6 +23,8 @@ def _written_out(unit: str) -> str:
 def to_si(value: float, unit: str, si: str, what: str) -> float:
     """Convert a value to the SI unit that the model computes in.
 
+    An angular frequency in Hz counts its turns as 2π.
+
     Parameters
     ----------
     value : float
@@ -38,6 +41,9 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
     """
     if unit == si:
         return value
+    if si == "rad/s" and unit.endswith(("Hz", "hertz")):
+        # for pint a hertz is one a second, and so is a radian a second
+        return 2.0 * pi * to_si(value, unit, "Hz", what)
     from pint import DimensionalityError, UndefinedUnitError
     from pint.errors import DefinitionSyntaxError
 

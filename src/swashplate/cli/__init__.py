@@ -69,6 +69,7 @@ Examples:
   swashplate fit virtual/campaign.toml                the drive behind them
   swashplate limits fitted/drive.toml step:9          what limits it
   swashplate whatif hoist --scale orifice=1.5 --maneuver step:9
+  swashplate full-order hoist step:9                  is one state enough
   swashplate demo                                     everything at once
 
 Files are written in SI, whole or not at all. What is wrong is said in one

@@ -31,6 +31,42 @@ ASSUMED: Mapping[str, float] = {
 }
 """What `from_lumped` chooses where nothing else is given."""
 
+IN_PLACE_OF: Mapping[str, str] = {
+    "feedback_arm_inertia": "spool_frequency",
+    "spool_damping": "spool_damping_ratio",
+    "swash_inertia": "swash_frequency",
+    "piston_damping": "swash_damping_ratio",
+}
+"""Quantities that may be chosen in place of a frequency or a damping ratio."""
+
+
+def chosen_over(
+    assumed: Mapping[str, PhysicalValue], chosen: Mapping[str, Change]
+) -> dict[str, PhysicalValue]:
+    """What a set is completed from: assumed values, and the user's in their place.
+
+    Parameters
+    ----------
+    assumed : mapping
+        Values by the names that `from_lumped` takes.
+    chosen : mapping of str to float or (float, float)
+        The user's values in SI, by the same names. An inertia or damping also takes the place of
+        the frequency or damping ratio that it would otherwise follow from.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown name or a value of another form.
+    """
+    entries = dict(assumed)
+    for name, change in chosen.items():
+        quantity = CHOICES[name] if name in CHOICES else quantity_of(name)
+        entries[name] = PhysicalValue(quantity, value_of(quantity, change))
+        instead = IN_PLACE_OF.get(name)
+        if instead is not None and instead not in chosen:
+            entries.pop(instead, None)
+    return entries
+
 
 def from_lumped(
     parameters: ParameterSet,
@@ -66,10 +102,13 @@ def from_lumped(
         If lumps contradict each other or a chosen value; the sentence names them.
     """
     owner = parameters.name if name is None else name
-    given = dict(entries or {})
-    for each, change in chosen.items():
-        quantity = CHOICES[each] if each in CHOICES else quantity_of(each)
-        given[each] = PhysicalValue(quantity, value_of(quantity, change))
+    given = chosen_over(entries or {}, chosen)
+    for made_from, choice in IN_PLACE_OF.items():
+        if made_from in given and choice in given:
+            raise ParameterError(
+                f"{owner}: {made_from} and {choice} are both given, but either follows from the "
+                "other; leave one out."
+            )
     numbers = {**ASSUMED}
     for entry in given.values():
         for column, value in zip(entry.quantity.columns, entry.values, strict=True):
@@ -204,7 +243,8 @@ def _motor_leakage(owner: str, Z: Mapping[str, float], chosen: Mapping[str, floa
     if len(leakages) == 2 and abs(leakages[0] - leakages[1]) > AGREES * abs(leakages[0]):
         raise ParameterError(
             f"{owner}: Z11 makes motor_leakage {leakages[0]:.6g} 1/(N m s), but Z12 makes it "
-            f"{leakages[1]:.6g}; choose load_torque and load_inertia so that both agree."
+            f"{leakages[1]:.6g}; choose load_torque and load_inertia so that both agree, for "
+            f"example load_inertia = {Z['Z12'] / (Z['Z10'] * leakages[0]):.12g} kg m²."
         )
     return leakages[0] if leakages else 0.0
 

@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError
+from swashplate.full_order.completion import chosen_over, from_lumped
 from swashplate.full_order.equilibrium import fastest_rate, rest_row, steady_row
+from swashplate.full_order.files import load_choices, nearest_set
 from swashplate.full_order.lumps import static_pressure
 from swashplate.full_order.machine import build_machine
 from swashplate.full_order.march import N_ROW, march
@@ -29,6 +31,7 @@ from swashplate.simulation.run import Start, check_start
 if TYPE_CHECKING:
     from swashplate.physics.five_states import Machine
     from swashplate.simulation.constants import Pump
+    from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
 Method = Literal["march", "radau", "lsoda"]
@@ -72,6 +75,40 @@ class FullOrderDrive:
         """
         physical = PhysicalSet.preset(name)
         return cls(Drive.preset(name), physical)
+
+    @classmethod
+    def from_drive(cls, drive: Drive, like: str | None = None, **chosen: Change) -> FullOrderDrive:
+        """A full-order drive for any parameters, a fitted set's for example.
+
+        Parameters
+        ----------
+        drive : Drive
+            Card, solenoids and the lumps that the machine shall have, Z6 apart.
+        like : str, optional
+            ``"hoist"``, ``"slew"`` or ``"luff"``: the packaged set whose assumed values count
+            where nothing is chosen; by default that of the drive's name, or else ``"hoist"``.
+        **chosen : float or (float, float)
+            Values in SI, e.g. ``oil_volume=1e-4``, by the names that
+            `swashplate.full_order.completion.from_lumped` takes.
+
+        Returns
+        -------
+        FullOrderDrive
+            Its physical set is completed from lumps and choices; what is chosen here is marked as
+            the user's, all the rest as assumed.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name, or if lumps contradict each other or a choice.
+        InputError
+            If the drive has refinements, which the full-order model does not know.
+        """
+        drive.parameters.refuse_refinements("Full-order drives")
+        assumed = load_choices(nearest_set(drive.name) if like is None else like)
+        entries = chosen_over(assumed, chosen)
+        title = drive.parameters.title
+        return cls(drive, from_lumped(drive.parameters, title=title, entries=entries))
 
     def replace(self, **changes: Change) -> FullOrderDrive:
         """With other physical values in SI, e.g. ``replace(load_torque=2e3)``."""
@@ -156,8 +193,28 @@ class FullOrderDrive:
         run = self.drive.simulate(
             voltage, rate, time=time, interpolation=interpolation, start=start, clip=clip
         )
-        assert run.card is not None
-        current = run.card.current_positive - run.card.current_negative
+        return self.follow(run, method=method, start=start, substeps=substeps, tolerance=tolerance)
+
+    def follow(
+        self,
+        run: Simulation,
+        *,
+        method: Method = "march",
+        start: Start = "rest",
+        substeps: int | None = None,
+        tolerance: float = 1e-6,
+    ) -> FullOrderSimulation:
+        """Simulate the machine over the current of a run that there is.
+
+        Parameters
+        ----------
+        run : Simulation
+            By voltage or by current; its current at the march's own steps counts, a straight line
+            between them.
+        method, start, substeps, tolerance :
+            As in `simulate_current`.
+        """
+        current = run_current(run)
         record = Record(current, run.record.start, run.record.rate, run.record.substeps)
         return self._integrate(record, False, method, start, substeps, tolerance)
 
@@ -280,3 +337,10 @@ class FullOrderDrive:
             events,
             static_pressure(self.physical.numbers),
         )
+
+
+def run_current(run: Simulation) -> Array:
+    """Signed current of a run on the grid of its march. [A]"""
+    if run.card is None:
+        return run.record.values
+    return run.card.current_positive - run.card.current_negative

@@ -10,6 +10,7 @@ from swashplate.report.encoder_view import plot_encoder as plot_encoder
 from swashplate.report.envelope_view import plot_envelope as plot_envelope
 from swashplate.report.files import save_figure as save_figure
 from swashplate.report.fit_view import plot_fit as plot_fit
+from swashplate.report.full_order_view import plot_full_order as plot_full_order
 from swashplate.report.limit_timeline_view import plot_limit_timeline as plot_limit_timeline
 from swashplate.report.overview import plot_maneuvers_overview as plot_maneuvers_overview
 from swashplate.report.sensitivity_view import plot_sobol as plot_sobol

@@ -1,0 +1,209 @@
+"""Figure of the full-order model beside the reduced one: what masses and load add to a run."""
+
+from __future__ import annotations
+
+from math import degrees
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from swashplate.full_order.reduction import Comparison
+from swashplate.report.shading import MOST_RUNS, SHADES, merged
+from swashplate.report.signals import NARROW, WIDE, Mark, Trace
+from swashplate.report.style import (
+    BLUE,
+    GREY,
+    INK,
+    THIN,
+    VERMILION,
+    MarginLabel,
+    Margins,
+    dress,
+    label_below,
+    label_margin,
+    line_up_labels,
+    margins,
+    new_figure,
+    put_legend,
+    signed,
+    write_title,
+    zero_line,
+)
+from swashplate.report.traces import draw, fit_time
+from swashplate.simulation.limits import Limit
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.int8]
+
+WIDTH = 8.6
+SMALL_PANEL, LARGE_PANEL, GAP = 1.0, 1.7, 0.2
+LEGEND = 0.25
+AROUND = Margins(left=0.95, right=1.2, bottom=0.55, top=0.47)
+"""Sizes; a legend adds to the margin at the top. [inch]"""
+
+NEAR = 0.3
+"""A limit is marked if the signal goes at least this share of the way to it."""
+LEAST_PRESSURE = 0.1
+"""Range that a panel of pressures shows at least, so that rounding looks like nothing. [MPa]"""
+
+
+class Panel(NamedTuple):
+    """What one panel shows, in its unit."""
+
+    label: str
+    traces: tuple[Trace, ...]
+    height: float = SMALL_PANEL
+    marks: tuple[Mark, ...] = ()
+    limit: Limit | None = None
+    held: Flags | None = None
+    """Where the limit holds: not zero."""
+    least: float = 0.0
+    """Range that is shown at least."""
+
+
+def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
+    """Figure of both models over one command: speeds, their difference, and what lies between.
+
+    Parameters
+    ----------
+    found : Comparison
+        What `swashplate.full_order.reduction.compare` found. Limits that hold are shaded.
+    title : str, optional
+        By default the name of the physical set.
+    """
+    panels = _panels(found)
+    handles = [
+        Patch(facecolor=color, edgecolor="#00000030", linewidth=0.5, label=name)
+        for limit, held in ((panel.limit, panel.held) for panel in panels)
+        if limit is not None and held is not None and held.any()
+        for color, name in (SHADES[limit],)
+    ]
+    around = AROUND._replace(top=AROUND.top + LEGEND) if handles else AROUND
+    heights = [panel.height for panel in panels]
+    figure = new_figure(WIDTH, around.bottom + around.top + sum(heights) + GAP * (len(panels) - 1))
+    axes = figure.subplots(
+        len(panels),
+        sharex=True,
+        gridspec_kw={
+            **margins(figure, around),
+            "height_ratios": heights,
+            "hspace": GAP * len(panels) / sum(heights),
+        },
+    )
+    for ax, panel in zip(axes, panels, strict=True):
+        _fill(figure, ax, panel, found.time)
+    fit_time(axes[-1], found.time)
+    label_below(axes[-1], "time (s)")
+    line_up_labels(figure, axes, 0.58)
+    write_title(figure, found.full.name if title is None else title, around.left)
+    if handles:
+        put_legend(figure, handles, around.left, 0.42)
+    return figure
+
+
+def _panels(found: Comparison) -> list[Panel]:
+    full, differ = found.full, found.difference
+    machine = full.machine
+    command = (
+        Panel("current\n(A)", (Trace(full.current, INK),))
+        if found.voltage is None
+        else Panel("voltage\n(V)", (Trace(found.voltage, INK),))
+    )
+    error = (
+        Panel("difference\n(% of top)", (Trace(100.0 * found.error / differ.top_speed, INK),))
+        if differ.moves
+        else Panel("difference\n(deg/s)", (Trace(np.degrees(found.error), INK),))
+    )
+    stops = [degrees(angle) for angle in (machine.upper_angle, machine.lower_angle)]
+    openings = [1e3 * edge for edge in (machine.opening_plus, -machine.opening_minus)]
+    return [
+        command,
+        Panel(
+            "shaft speed\n(deg/s)",
+            (
+                # where the two are the same, the wide line shows on both sides of the narrow one
+                Trace(np.degrees(full.shaft_speed), BLUE, "five states", WIDE),
+                Trace(np.degrees(found.reduced_speed), VERMILION, "one state", NARROW),
+            ),
+            LARGE_PANEL,
+        ),
+        error,
+        Panel(
+            "spool\n(mm)",
+            (
+                Trace(1e3 * full.spool_position, BLUE, "position", WIDE),
+                Trace(1e3 * full.orifice_opening, VERMILION, "opening", NARROW),
+            ),
+            marks=tuple(Mark(edge, f"orifice {signed(edge, 2)} mm") for edge in openings),
+            limit=Limit.SPOOL,
+            held=full.spool_hold,
+        ),
+        Panel(
+            "swash angle\n(deg)",
+            (Trace(np.degrees(full.swash_angle), BLUE),),
+            marks=tuple(Mark(stop, f"stop {signed(stop, 1)}°") for stop in stops),
+            limit=Limit.SWASH_STOP,
+            held=full.plate_hold,
+        ),
+        Panel(
+            "stroker pres-\nsure (MPa)",
+            (Trace(1e-6 * full.stroker_pressure, BLUE),),
+            limit=Limit.RELIEF,
+            held=full.relief_hold,
+            least=LEAST_PRESSURE,
+        ),
+        Panel(
+            "motor pressure\ndrop (MPa)",
+            (Trace(1e-6 * full.motor_pressure_drop, BLUE),),
+            least=LEAST_PRESSURE,
+        ),
+    ]
+
+
+def _fill(figure: Figure, ax: Axes, panel: Panel, time: Array) -> None:
+    dress(ax, panel.label)
+    zero_line(ax)
+    low = min(0.0, *(float(trace.values.min()) for trace in panel.traces))
+    high = max(0.0, *(float(trace.values.max()) for trace in panel.traces))
+    marks = [
+        mark
+        for mark in panel.marks
+        if np.isfinite(mark.level) and max(high / mark.level, low / mark.level) >= NEAR
+    ]
+    low, high = min(low, *(m.level for m in marks), 0.0), max(high, *(m.level for m in marks), 0.0)
+    spare = max(0.09 * (high - low), 0.5 * (panel.least - (high - low)))
+    ax.set_ylim(low - (spare or 1.0), high + (spare or 1.0))
+    if panel.limit is not None and panel.held is not None:
+        _shade(ax, time, panel.held, SHADES[panel.limit].color)
+    labels = []
+    for mark in marks:
+        ax.axhline(mark.level, color=GREY, linewidth=THIN, dashes=(5.0, 3.0), zorder=1.5)
+        labels.append(MarginLabel(mark.level, mark.words, GREY))
+    for trace in panel.traces:
+        draw(ax, time, trace.values, trace.color, width=trace.width)
+        if trace.name:
+            labels.append(MarginLabel(float(trace.values[-1]), trace.name, trace.color))
+    label_margin(figure, ax, labels)
+
+
+def _shade(ax: Axes, time: Array, held: Flags, color: str) -> None:
+    """Shade the stretches in which a limit holds, each sample up to half way to its neighbours."""
+    turns = np.flatnonzero(np.diff(held != 0, prepend=False, append=False))
+    if not turns.size:
+        return
+    half = 0.5 * float(time[-1] - time[0]) / max(time.size - 1, 1)
+    spans = np.stack((time[turns[::2]] - half, time[turns[1::2] - 1] + half), axis=1)
+    spans = merged(spans, float(time[-1] - time[0]) / MOST_RUNS)
+    ax.broken_barh(
+        [(begin, end - begin) for begin, end in spans.tolist()],
+        (0.0, 1.0),
+        transform=ax.get_xaxis_transform(),
+        facecolor=color,
+        edgecolor=color,
+        linewidth=0.4,
+        zorder=0.2,
+    )

@@ -1,0 +1,210 @@
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swashplate import Drive
+
+PAGE = Path(__file__).parents[2] / "docs" / "full-order.md"
+
+
+def cells(text: str, row: str) -> list[str]:
+    """The words of a table's row, by the words that it begins with."""
+    (line,) = [line for line in text.splitlines() if line.startswith(row + "  ")]
+    return line.removeprefix(row).split()
+
+
+def test_a_run(done, number):
+    text = done("full-order", "hoist", "step:9")
+    assert text.startswith("hoist, step 9 V, five states against one: 5121 samples at 512 Hz\n")
+    assert "16 of 16 physical values are assumed, as of the packaged hoist" in text
+    assert cells(text, "oil_volume") == ["200", "cm³", "assumed"]
+    assert cells(text, "spool_frequency") == ["40", "Hz", "assumed"]
+    assert cells(text, "load_inertia") == ["150", "kg", "m²", "assumed"]
+    # Z10 Z13
+    assert number(text, "top speed") == round(float(np.degrees(12.396 * 0.27596)), 2)
+    # docs/full-order.md: 0.26 %, 0.12 % and 0.08 %
+    assert number(text, "largest difference", 1) == pytest.approx(0.26, abs=0.006)
+    assert number(text, "rms difference", 1) == pytest.approx(0.12, abs=0.006)
+    step_error = "step error of the march at 512 Hz"
+    assert number(text, step_error, 1) == pytest.approx(0.08, abs=0.006)
+    assert number(text, "largest difference") == pytest.approx(1.96 * 0.261, abs=2e-3)
+    assert cells(text, "within 1 %") == ["yes"]
+    assert cells(text, "within 0.1 %") == ["no"]
+    assert number(text, "worst energy balance, of the turnover") < 1e-6
+    assert number(text, "oil's volume balance, of the turnover") < 1e-6
+    assert "One state is enough here: within 1 % of the top speed, at most 0.26 %" in text
+    words = " ".join(text.split())
+    assert re.search(r"which make the speed 2\.\d ms later \(9\d % of the mean squared", words)
+
+
+def test_modes(done):
+    text = done("full-order", "hoist", "rest:1")
+    hertz, ratio = cells(text, "spool")[:2]
+    # section 6.2.4 of the source, and what is assumed
+    assert float(hertz) == pytest.approx(40.0, rel=0.02)
+    assert float(ratio) == pytest.approx(0.3, abs=0.02)
+    assert float(cells(text, "swash plate, held pressure")[0]) == pytest.approx(40.0, rel=0.02)
+    assert float(cells(text, "swash plate")[0]) == pytest.approx(920.0, rel=0.01)
+    # τ, 0.1214 s, less the lag of the modes
+    assert float(cells(text, "slow pole")[4]) == pytest.approx(0.1214, rel=0.03)
+
+
+def test_the_load_that_is_given(done, number):
+    load = ("--physical", "load_torque=2kN*m", "--physical", "load_inertia=0")
+    text = done("full-order", "hoist", "step:4", *load)
+    assert "14 of 16 physical values are assumed" in text
+    assert cells(text, "load_torque") == ["2000", "N", "m", "given"]
+    # 2π over 25.1 l a turn times 2 kN m
+    drop = f"{2.0 * np.pi / 25.1e-3 * 2e3 / 1e6:.3f}"
+    assert cells(text, "motor pressure drop, MPa") == [drop, "to", drop]
+
+
+def test_units_of_what_is_given(done):
+    given = ("spool_frequency=30 Hz", "oil_volume=0.1l", "piston_damping=90", "swash_arm=.08")
+    words = [word for each in given for word in ("--physical", each)]
+    text = done("full-order", "hoist", "rest:1", *words)
+    assert cells(text, "spool_frequency") == ["30", "Hz", "given"]
+    assert cells(text, "oil_volume") == ["100", "cm³", "given"]
+    assert cells(text, "piston_damping") == ["90", "N", "s/m", "given"]
+    assert cells(text, "swash_arm") == ["80", "mm", "given"]
+    assert "swash_damping_ratio" not in text
+    assert float(cells(text, "spool")[0]) == pytest.approx(30.0, rel=0.02)
+
+
+def test_too_fast_for_one_state(done):
+    # a sine of 3 Hz, whose end would overshoot, cut to its first 4 s
+    times = np.arange(0.0, 4.0, 1.0 / 512.0)
+    volts = 6.5 * np.sin(2.0 * np.pi * 3.0 * times)
+    pl.DataFrame({"time": times, "voltage": volts}).write_csv("sine.csv")
+    text = done("full-order", "hoist", "sine.csv", "--interpolation", "linear")
+    assert "One state is not enough here: up to 4." in text
+    assert cells(text, "within 1 %") == ["no"]
+
+
+def test_nothing_moves(done):
+    text = done("full-order", "hoist", "rest:2", "--set", "Z18=0")
+    assert "The shaft does not move under this command" in text
+    assert "within 1 %" not in text
+    text = done("full-order", "slew", "--set", "Z17=5")
+    assert text.count("does not move") == 12
+    assert "The shaft does not move under any of these" in " ".join(text.split())
+
+
+def test_the_table_is_the_documented_one(done):
+    text = done("full-order", "luff")
+    assert text.startswith("luff, five states against one: 11 manoeuvres\n")
+    documented = re.findall(r"^\| luff \| (.*?) \|$", PAGE.read_text("utf-8"), re.MULTILINE)
+    rows = [[cell.strip() for cell in row.split("|")] for row in documented]
+    rows = [row for row in rows if re.match("step|ramp|sine", row[0])]
+    assert len(rows) == 11
+    for maneuver, *numbers, within in rows:
+        found = cells(text, maneuver)
+        shown = [float(each) for each in found[1:4]]
+        assert shown == pytest.approx([float(each) for each in numbers], abs=0.011)
+        assert " ".join(found[4:]) == within
+    said = "One state is enough for 10 of 11, to 1 % of the top speed; not for sine 6.5 V 3 Hz."
+    assert said in " ".join(text.split())
+
+
+def test_files(done, tmp_path):
+    text = done("full-order", "hoist", "step:4", "--out", "run.parquet", "--plot", "run.png")
+    assert "All signals, in SI: run.parquet" in text
+    assert "Figure: run.png" in text
+    table = pl.read_parquet(tmp_path / "run.parquet")
+    difference = table["reduced_shaft_speed"] - table["shaft_speed"]
+    (largest,) = re.findall(r"^largest difference +([\d.]+)", text, re.MULTILINE)
+    assert np.degrees(difference.abs().max()) == pytest.approx(float(largest), abs=1e-4)
+    assert table["voltage"].max() == 4.0
+    assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
+    assert "Table: table.csv" in done("full-order", "slew", "--out", "table.csv")
+    assert pl.read_csv(tmp_path / "table.csv").height == 11
+
+
+def test_a_drive_of_one_s_own(done, tmp_path):
+    drive = Drive.preset("slew").scale(Z8=1.2, Z10=0.9).replace(spool_friction=1.0)
+    drive.renamed("mine").to_toml(tmp_path / "mine.toml")
+    text = done("full-order", "mine.toml", "step:4", "--like", "slew", "--set", "Z15=5e6")
+    lines = text.splitlines()
+    assert lines[0].startswith("mine, step 4 V, five states")
+    assert lines[1].startswith("Z15 (")
+    assert lines[3] == "Left out of both models, which do not know refinements: spool_friction."
+    assert cells(text, "spool_mass") == ["10", "g", "assumed"]
+
+
+def test_a_solver_agrees_with_the_march(done, number):
+    words = ("full-order", "hoist", "step:4,length=3,stop=2")
+    march, radau = done(*words), done(*words, "--method", "radau")
+    row = "largest difference"
+    assert number(radau, row) == pytest.approx(number(march, row), abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("crane",), "no packaged parameter set 'crane'"),
+        (("none.toml", "step:9"), "There is no file none.toml"),
+        (("neutral",), "neutral: piston_mass on swash_arm alone has"),
+        (("hoist", "stepp:9"), "'stepp' is no manoeuvre"),
+        (("hoist", "step:11"), "the card takes ±10 V"),
+        (("hoist", "--rate", "1"), "must be between 10 and 100000 Hz"),
+        (("hoist", "step:9", "--rate", "1"), "must be between 10 and 100000 Hz"),
+        (("hoist", "--like", "crane"), "no packaged physical set 'crane'; there are hoist"),
+        (("slew", "--like", "hoist"), "slew: spool_mass on spool_arm alone has"),
+        (("hoist", "--plot", "run.png"), "--plot draws one run; name a manoeuvre"),
+        (("hoist", "--method", "radau"), "--method radau checks one run; name a manoeuvre"),
+        (("hoist", "step:9", "--out", "run.doc"), "run.doc ends in '.doc'"),
+        (("hoist", "--out", "none/table.csv"), "cannot be written"),
+        (("hoist", "step:9", "--plot", "run.gif"), "a figure is written as .png"),
+        (("hoist", "--physical", "oil=1"), "A physical set has no quantity 'oil'"),
+        (("hoist", "--physical", "oil_volum=1"), "did you mean oil_volume?"),
+        (("hoist", "--physical", "oil_volume"), "--physical cannot read 'oil_volume'; write"),
+        (("hoist", "--physical", "oil_volume=nan"), "cannot read 'oil_volume=nan'"),
+        (("hoist", "--physical", "oil_volume=1e-4/2e-4"), "oil_volume takes one value, not 2"),
+        (("hoist", "--physical", "oil_volume=1kg"), "in 'kg', which does not measure the same"),
+        (("hoist", "--physical", "oil_volume=1 glug"), "the unknown unit 'glug'"),
+        (("hoist", "--physical", "oil_volume=-1"), "is -1 m^3, but must be above 0"),
+        (("hoist", "--physical", "bulk_modulus=inf"), "is inf Pa, but must be above 0"),
+        (
+            ("hoist", "--physical", "swash_arm=0.1", "--physical", "swash_arm=80mm"),
+            "--physical gives swash_arm twice",
+        ),
+        (("hoist", "--physical", "return_spring_rate=7e4"), "76102.8345 follows from Z1"),
+        (
+            (
+                *("hoist", "--physical", "spool_frequency=50Hz"),
+                *("--physical", "feedback_arm_inertia=1e-6"),
+            ),
+            "feedback_arm_inertia and spool_frequency are both given",
+        ),
+        (("hoist", "--set", "Z2=0.1"), "a physical set has Z2 = 0"),
+        (("hoist", "--set", "Z11=0.01"), "without load_torque no speed is lost to it"),
+    ],
+)
+def test_refusals(refused, words, said):
+    assert said in refused("full-order", *words)
+
+
+def test_the_examples_in_its_help(run, done, tmp_path):
+    text = run("full-order", "--help").stdout
+    (tmp_path / "fitted").mkdir()
+    Drive.preset("luff").renamed("mine").to_toml(tmp_path / "fitted" / "drive.toml")
+    (tmp_path / "log.csv").write_text("time,voltage\n0,0\n1,4\n2,0\n", "utf-8")
+    examples = re.findall(r"^ *swashplate (full-order .*?) *$", text.partition("Example")[2], re.M)
+    assert len(examples) >= 4
+    for example in examples:
+        done(*shlex.split(example))
+
+
+def test_the_page_shows_what_is_printed(done, monkeypatch, tmp_path):
+    page = PAGE.read_text("utf-8")
+    ((command, shown),) = re.findall(r"```console\n\$ swashplate (.*?)\n(.*?)```", page, re.DOTALL)
+    (tmp_path / "docs" / "images").mkdir(parents=True)
+    printed = [" ".join(line.split()) for line in done(*shlex.split(command)).splitlines()]
+    for line in shown.splitlines():
+        assert line == "..." or " ".join(re.sub("─+", "─", line).split()) in printed, line
+    made, kept = (each / "images" / "full-order.png" for each in (tmp_path / "docs", PAGE.parent))
+    assert made.read_bytes()[:24] == kept.read_bytes()[:24]  # a PNG of the same size
