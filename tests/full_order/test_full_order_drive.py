@@ -279,3 +279,14 @@ def test_one_sample(hoist: FullOrderDrive) -> None:
         run = hoist.simulate_current([0.4], method=method)
         assert run.time.size == 1
         assert run.swash_angle[0] == 0.0
+
+
+def test_a_stop_that_is_left_slowly_is_left() -> None:
+    """Luff's spool leaves its stroke at next to no speed; interpolation once found it there again
+    and again, until the limits were said to chatter."""
+    luff = FullOrderDrive.preset("luff")
+    command = maneuvers.sine(6.5, 0.3, settle=None, length=6.0).sample(512.0)
+    run, march = luff.simulate(command, method="radau"), luff.simulate(command)
+    assert run.events == march.events == 2
+    assert np.abs(run.shaft_speed - march.shaft_speed).max() < 2e-6
+    assert np.abs(run.spool_position).max() <= luff.machine.stroke * (1.0 + 1e-7)

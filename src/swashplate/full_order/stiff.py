@@ -33,7 +33,10 @@ LOOKS = 4
 SHORT = -1e-12
 """Margin below which a limit has been reached or let go; a restart on a limit has none, but for
 rounding. [1, rad]"""
-MOST_EVENTS = 100_000
+GRAZING = -1e-7
+"""The same after a limit has let go, until the state is clear of it: a step's interpolation is off
+by more than rounding, and would find the limit that is being left again and again. [1, rad]"""
+MOST_EVENTS = 10_000
 STATE_TOLERANCES = (1e-9, 1e-7, 1.0, 1e-9, 1e-7)
 """Absolute: position [m], velocity [m/s], pressure [Pa], angle [rad], swash rate [rad/s]."""
 ACCOUNT_TOLERANCES = {"work": 1e-7, "loss": 1e-7, "volume": 1e-12, "position": 1e-7}
@@ -95,7 +98,7 @@ def solve(
     plant = Plant(current, held, step, (0, 0, 0), machine, pump)
     plant = plant._replace(holds=settle_at(0.0, row, *plant, losses))
     rows[0], holds_at[0], losses_at[0] = row, plant.holds, losses
-    now, done, events = 0.0, 1, 0
+    now, done, events, least = 0.0, 1, 0, SHORT
     for stretch in stretches_of(force, held, step) if time.size > 1 else []:
         solver = _solver(method, plant, now, row, time[stretch.end], stretch, tolerance)
         while done <= stretch.end:
@@ -106,18 +109,21 @@ def solve(
             now, row, between = solver.t, solver.y, solver.dense_output()
             looks = _looks(before, now, step)
             seen = np.vstack([between(looks[:-1]).T, row])
-            short = first_short(looks, seen, SHORT, *plant)
+            short = first_short(looks, seen, least, *plant)
             if short >= 0:
                 low = looks[short - 1] if short else before
-                now = _first_beyond(low, looks[short], between, plant)
+                now = _first_beyond(low, looks[short], between, least, plant)
                 row = np.array(between(now))
             while done < time.size and time[done] <= now:
                 rows[done] = between(time[done]) if time[done] < now else row
                 holds_at[done], losses_at[done] = plant.holds, losses
                 done += 1
             if short < 0:
+                if margin_at(now, row, *plant) > 0.0:
+                    least = SHORT
                 continue
             plant = plant._replace(holds=settle_at(now, row, *plant, losses))
+            least = SHORT if margin_at(now, row, *plant) > 0.0 else GRAZING
             if time[done - 1] == now:
                 rows[done - 1], holds_at[done - 1], losses_at[done - 1] = row, plant.holds, losses
             events += 1
@@ -161,13 +167,13 @@ def _looks(before: float, now: float, step: float) -> Array:
     return looks
 
 
-def _first_beyond(low: float, high: float, between: Any, plant: Plant) -> float:
+def _first_beyond(low: float, high: float, between: Any, least: float, plant: Plant) -> float:
     """The time just beyond an event, by bisection down to neighbours. [s]"""
     while True:
         middle = 0.5 * (low + high)
         if not low < middle < high:
             return high
-        if margin_at(middle, np.array(between(middle)), *plant) < SHORT:
+        if margin_at(middle, np.array(between(middle)), *plant) < least:
             high = middle
         else:
             low = middle
