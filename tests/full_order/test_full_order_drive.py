@@ -289,4 +289,4 @@ def test_a_stop_that_is_left_slowly_is_left() -> None:
     run, march = luff.simulate(command, method="radau"), luff.simulate(command)
     assert run.events == march.events == 2
     assert np.abs(run.shaft_speed - march.shaft_speed).max() < 2e-6
-    assert np.abs(run.spool_position).max() <= luff.machine.stroke * (1.0 + 1e-7)
+    assert np.abs(run.spool_position).max() < luff.machine.stroke + 1e-9  # the solver's tolerance
