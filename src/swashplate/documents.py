@@ -63,16 +63,24 @@ def validated(content: Any, model: type[Model], origin: str) -> Model:
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise ParameterError(f"{origin}: {_sentence(error.errors()[0], model)}.") from None
+        found = error.errors()
+        raise ParameterError(f"{origin}: {_sentence(found[0], model, found)}.") from None
 
 
-def _sentence(error: ErrorDetails, model: type[BaseModel]) -> str:
+def _sentence(error: ErrorDetails, model: type[BaseModel], others: list[ErrorDetails]) -> str:
     where = [str(part) for part in error["loc"] if part not in _BRANCHES]
     path, kind = ".".join(where), error["type"]
     parent, key = ".".join(where[:-1]), where[-1] if where else ""
     table = f"[{parent}]" if parent else "the file"
     if kind == "missing":
-        return f"{table} needs an entry '{key}'"
+        unknown = [
+            str(each["loc"][-1])
+            for each in others
+            if each["type"] == "extra_forbidden" and each["loc"][:-1] == error["loc"][:-1]
+        ]
+        close = get_close_matches(key, unknown, 1)
+        written = f"; it has '{close[0]}', which may be meant" if close else ""
+        return f"{table} needs an entry '{key}'{written}"
     if kind == "extra_forbidden":
         known = _known_keys(model, where[:-1])
         close = get_close_matches(key, known, 1)

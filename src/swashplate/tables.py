@@ -2,15 +2,71 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from secrets import token_hex
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from swashplate.errors import FileError
 
 if TYPE_CHECKING:
     import polars
+
+
+class Form(NamedTuple):
+    """A sort of file, and the endings that its names may have."""
+
+    what: str
+    """In words, with an article: ``"a table"``."""
+    endings: tuple[str, ...]
+    also: tuple[str, ...] = ()
+    """Endings that are taken without being offered."""
+
+
+TABLE = Form("a table", (".csv", ".parquet"), (".pq",))
+FIGURE = Form("a figure", (".png", ".svg", ".pdf"))
+
+
+def ending(path: str | Path, form: Form) -> str:
+    """Ending of a path in small letters, with its dot.
+
+    Raises
+    ------
+    FileError
+        If the form has no such ending.
+    """
+    suffix = Path(path).suffix
+    if suffix.lower() not in (*form.endings, *form.also):
+        known = f"{', '.join(form.endings[:-1])} or {form.endings[-1]}"
+        raise FileError(f"{path} ends in '{suffix}'; {form.what} is written as {known}.")
+    return suffix.lower()
+
+
+def check_place(path: str | Path) -> None:
+    """See to it that a file can be where it shall be, as far as that shows beforehand.
+
+    Raises
+    ------
+    FileError
+        If its folder does not exist, or a folder has its name.
+    """
+    target = Path(path)
+    folder = target.parent
+    reason = None
+    try:
+        if not folder.exists():
+            reason = f"folder {folder} does not exist"
+        elif not folder.is_dir():
+            reason = f"{folder} is no folder"
+        elif target.is_dir():
+            reason = "it is a folder"
+        elif not os.access(folder, os.W_OK):
+            reason = f"folder {folder} may not be written to"
+    except OSError as error:  # such as a name that is too long
+        reason = error.strerror or str(error)
+    if reason is not None:
+        raise FileError(f"{target} cannot be written: {reason}.")
 
 
 def write_whole(path: str | Path, write: Callable[[Path], None]) -> None:
@@ -29,6 +85,7 @@ def write_whole(path: str | Path, write: Callable[[Path], None]) -> None:
         If it cannot be written; nothing is left behind and an older file stays.
     """
     target = Path(path)
+    check_place(target)
     beside = target.parent / f".{target.stem}-{token_hex(4)}{target.suffix}"
     try:
         try:
@@ -63,10 +120,7 @@ def write_table(table: polars.DataFrame, path: str | Path) -> None:
     FileError
         For another ending or a place that cannot be written.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix == ".csv":
+    if ending(path, TABLE) == ".csv":
         write_whole(path, lambda beside: table.write_csv(beside))
-    elif suffix in (".parquet", ".pq"):
-        write_whole(path, lambda beside: table.write_parquet(beside))
     else:
-        raise FileError(f"{path} ends in '{suffix}'; a table is written as .csv or .parquet.")
+        write_whole(path, lambda beside: table.write_parquet(beside))

@@ -89,3 +89,31 @@ def test_names_that_need_quotes(tmp_path: Path) -> None:
     path = tmp_path / 'a "b".csv'
     path.write_text('time,"volt ""x"" [V]",counts\n0,1,2\n1,2,3\n', "utf-8")
     assert tomllib.loads(draft([path], tmp_path))["runs"][0]["file"] == 'a "b".csv'
+
+
+def write_wrapping(folder: Path, name: str) -> list[Path]:
+    """A column of whole numbers that go up to 4095 and begin anew, and one that numbers rows."""
+    rows = [f"{k},{k / 100},{4 if k > 20 else 0},{60 * (k - 20) % 4096},on" for k in range(21, 200)]
+    rows = [f"{k},{k / 100},0,{0},on" for k in range(21)] + rows
+    (folder / "log.csv").write_text("\n".join([f"Nr,time,voltage,{name},state", *rows]), "utf-8")
+    return [folder / "log.csv"]
+
+
+@pytest.mark.parametrize("name", ["Drehgeber", "counts"])
+def test_a_counter_that_begins_anew_is_an_encoder_s(tmp_path: Path, name: str) -> None:
+    text = draft(write_wrapping(tmp_path, name), tmp_path, "hoist", 4096.0)
+    counts = tomllib.loads(text)["axes"]["hoist"]["channels"]["encoder_counts"]
+    assert counts["column"] == name
+    assert (counts["counts_per_turn"], counts["rolls_over_at"]) == (4096, 4096)
+    (line,) = [line for line in text.splitlines() if line.startswith("rolls_over_at")]
+    assert "# guessed" in line
+    assert "# Columns that are not used: Nr, state" in text
+
+
+def test_counts_per_turn_without_an_encoder(tmp_path: Path) -> None:
+    rows = [f"{k},{k / 100},{4 if k > 20 else 0},0.4,{k % 7}" for k in range(100)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["Nr,time,voltage,current,Geber", *rows]), "utf-8")
+    said = "# No column looks like an encoder's counts among Nr, Geber; counts_per_turn = 4096 is"
+    assert said in draft([path], tmp_path, "hoist", 4096.0)
+    assert "No column looks like" not in draft([path], tmp_path, "hoist")

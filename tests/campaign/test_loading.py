@@ -33,7 +33,7 @@ def test_selection_and_drive(campaign_folder: Path) -> None:
     tests = Campaign.from_toml(campaign_folder / "campaign.toml")
     assert [each.name for each in tests.select(role="validate")] == ["down"]
     assert tests.drive("winch").parameters == Drive.preset("hoist").parameters
-    with pytest.raises(InputError, match="no experiment 'sideways'; it has up, down"):
+    with pytest.raises(InputError, match="no run 'sideways'; it has up, down"):
         tests["sideways"]
     with pytest.raises(InputError, match="no axis 'boom'; it has winch"):
         tests.select(axis="boom")
@@ -153,6 +153,14 @@ def test_a_counter_that_rolls_over(edited: Edit) -> None:
     counts = Campaign.from_toml(path)["up"]["counts"].counts
     assert counts is not None
     assert counts[-1] == 30 * 59
+
+
+def test_counts_beyond_their_counter(edited: Edit) -> None:
+    """They go down to -2040."""
+    path = edited("gear_ratio = 2.0", "gear_ratio = 2.0\nrolls_over_at = 1024")
+    said = "up.csv: column 'counts': .* counter of 1024 readings; give the right rolls_over_at"
+    with pytest.raises(InputError, match=said):
+        Campaign.from_toml(path)
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def test_gaps(campaign_folder: Path) -> None:
     path = rewrite(campaign_folder / "campaign.toml", lambda t: np.delete(t, range(20, 30), axis=0))
     found = qualities(path)
     assert found["current"].gap_time == pytest.approx(0.11)
-    assert "1 gaps, the longest 0.11 s; 10 samples are missing" in found["input"].findings[0]
+    assert "1 gap, the longest 0.11 s; 10 samples are missing" in found["input"].findings[0]
     assert found["current"].findings == ()
 
 
@@ -56,7 +56,7 @@ def test_lost_counts(campaign_folder: Path) -> None:
 
     found = qualities(rewrite(campaign_folder / "campaign.toml", lose))
     assert found["counts"].lost_counts == 1
-    assert "jumps 1 times" in found["counts"].findings[0]
+    assert "jumps once" in found["counts"].findings[0]
 
 
 def test_a_turned_sign(edited: Edit) -> None:

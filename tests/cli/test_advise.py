@@ -77,7 +77,7 @@ def test_a_fresh_plan_needs_a_drive_alone(done: Words) -> None:
 def test_a_fitted_drive_brings_its_noise(done: Words, campaign: str, tmp_path: Path) -> None:
     Drive.preset("hoist").to_toml(tmp_path / "fitted.toml")
     words = ("--setup", "setup.toml", "--drive", "fitted.toml", *TRIALS[:2], *PRESSURE)
-    assert "(residuals of the fit)" in done("advise", campaign, *words)
+    assert "(residuals of the drive)" in done("advise", campaign, *words)
 
 
 def test_a_stated_noise_and_a_parameter_more(done: Words, campaign: str) -> None:

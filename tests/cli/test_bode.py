@@ -58,7 +58,7 @@ def test_a_changed_drive_and_another_frequency(done):
         (("--to", "100"), "at most 64 Hz"),
         (("--amplitude", "11"), "reach 11 V"),
         (("--amplitude", "0.05"), "nothing moves about 0 V"),
-        (("--linear-at", "0"), "lies in the card's dead zone"),
+        (("--linear-at", "0"), "so the gain is 0; linearise at +0.2065 V or beyond."),
         (("--frequency", "nan"), "The frequencies must be one or more finite numbers"),
         (("--points", "3", "--out", "bode.txt"), "a table is written as .csv or .parquet"),
         (("--points", "3", "--plot", "none/bode.png"), "cannot be written"),

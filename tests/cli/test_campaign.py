@@ -30,7 +30,7 @@ def test_from_logs_to_a_check(done: Done, logs: list[str], tmp_path: Path) -> No
     assert "step +4 V" in said
     # the logs are made up: a hoist turns at 98 deg/s, these counts at 252
     assert "'encoder_counts' moves" in " ".join(said.split())
-    assert "1 findings" in said
+    assert "1 finding, marked" in said
 
 
 def test_a_check_without_findings(done: Done, logs: list[str]) -> None:
@@ -52,7 +52,8 @@ def test_strict_fails_on_findings(
     path.write_text(
         path.read_text("utf-8").replace("counts_per_turn", "sign = -1\ncounts_per_turn"), "utf-8"
     )
-    assert "moves against the input" in " ".join(done("campaign", "check").split())
+    said = " ".join(done("campaign", "check").split())
+    assert "moves against the input: should its sign be -1? " in said
     result = run("campaign", "check", "--strict")
     assert result.exit_code == 1  # type: ignore[attr-defined]
 
@@ -78,6 +79,75 @@ def test_a_close_look(done: Done, refused: Callable[..., str], logs: list[str]) 
         )
     assert "go together" in refused("campaign", "plot", "--run", "lift")
     assert "no channel 'speed'" in refused(*look, "speed")
+
+
+def test_a_run_that_there_is_not(done: Done, refused: Callable[..., str], logs: list[str]) -> None:
+    done("campaign", "init", *logs, *COUNTS)
+    said = refused("campaign", "plot", "--run", "lfit")
+    assert "no run 'lfit' (did you mean lift?); it has lift, lower" in said
+    assert "lift has rectified_current, enc" in refused("campaign", "plot", "--run", "lift")
+
+
+def test_what_a_draft_leaves_out_stands_before_the_command_to_run(
+    done: Done, tmp_path: Path
+) -> None:
+    rows = [f"{k},{row}" for k, row in enumerate(ROWS)]
+    text = "\n".join(["Nr,time [s],voltage [V],current [A],Geber", *rows]) + "\n"
+    (tmp_path / "log.csv").write_text(text, "utf-8")
+    said = done("campaign", "init", "log.csv", *COUNTS, "--drive", "hoist").splitlines()
+    assert said[2:] == [
+        "  Columns that are not used: Nr, Geber",
+        "  No column looks like an encoder's counts among Nr, Geber; counts_per_turn = 1000 is "
+        "left out",
+        "Then run",
+        "  swashplate campaign check campaign.toml",
+    ]
+    assert "! axis 'hoist': no channel measures its motion" in done("campaign", "check")
+
+
+def test_names_and_heads_in_the_tables(done: Done, logs: list[str]) -> None:
+    done("campaign", "init", *logs, *COUNTS)
+    said = done("campaign", "check")
+    assert said.count("rectified_current ") == said.count("encoder_counts ") == len(logs)
+    assert said.count("signal  ") == len(logs)
+    assert max(map(len, said.splitlines())) <= 91  # the legend's; tables have 80 columns
+
+
+def _below(text: str, line: str) -> list[str]:
+    """The line below one."""
+    lines = text.splitlines()
+    return [lines[lines.index(line) + 1].strip()]
+
+
+def test_long_names_are_not_cut(done: Done, logs: list[str], tmp_path: Path) -> None:
+    done("campaign", "init", *logs, *COUNTS)
+    path, name = tmp_path / "campaign.toml", "encoder_counts_of_the_drum_behind_the_gear"
+    path.write_text(path.read_text("utf-8").replace("channels.encoder_counts", f"channels.{name}"))
+    said = done("campaign", "check")
+    assert "…" not in said
+    # folded, so that the columns behind it are there: the last one counts lost counts
+    rows = [line for line in said.splitlines() if line.startswith("encoder_counts_of")]
+    assert [line.split()[0] + rest for line in rows for rest in _below(said, line)] == [name] * 2
+    assert all(line.split()[-1] == "0" for line in rows)
+
+
+def test_a_voltage_beyond_the_card_is_a_finding(
+    done: Done, logs: list[str], tmp_path: Path
+) -> None:
+    done("campaign", "init", *logs, *COUNTS, "--drive", "hoist")
+    path = tmp_path / "campaign.toml"
+    old = 'column = "voltage [V]"'
+    path.write_text(path.read_text("utf-8").replace(old, f"{old}\nscale = 4.0"), "utf-8")
+    said = " ".join(done("campaign", "check").split())
+    assert "! lift.csv: column 'voltage [V]': the voltage is 16 V at 0.21 s, but the card" in said
+
+
+def test_a_drive_out_of_a_folder(done: Done, logs: list[str], tmp_path: Path) -> None:
+    (tmp_path / "fitted").mkdir()
+    done("whatif", "hoist", "--scale", "pump=1.1", "--out", "fitted/drive.toml")
+    done("campaign", "init", *logs, *COUNTS, "--drive", "fitted")
+    assert 'drive = "fitted/drive.toml"' in (tmp_path / "campaign.toml").read_text("utf-8")
+    done("campaign", "check")
 
 
 def test_refusals(refused: Callable[..., str], tmp_path: Path) -> None:

@@ -15,6 +15,8 @@ def test_the_map_that_is_printed(done):
     assert float(rows["-22.16"]) == pytest.approx(-1.0, abs=5e-4)
     assert float(rows["195.997"]) == pytest.approx(7.87, abs=0.005)
     assert float(rows["-184.996"]) == pytest.approx(-7.41, abs=0.005)
+    assert "11 of 203 points shown" in text  # five of 101 each way, and 0 V
+    assert "points shown" not in done("compensate", "hoist", "--points", "5")
 
 
 def test_the_improvement(done, number):

@@ -145,7 +145,7 @@ def test_a_solver_agrees_with_the_march(done, number):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("crane",), "no packaged parameter set 'crane'"),
+        (("crane",), "no packaged set, file or folder 'crane'"),
         (("none.toml", "step:9"), "There is no file none.toml"),
         (("neutral",), "neutral: piston_mass on swash_arm alone has"),
         (("hoist", "stepp:9"), "'stepp' is no manoeuvre"),

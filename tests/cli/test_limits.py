@@ -30,7 +30,10 @@ def test_what_to_change_first(done, number):
     assert "spool stop" not in rows  # it does nothing here
     assert "Change first: in-line orifice: larger bore (Z16)." in text
     assert "falls by 96.6 %" in " ".join(text.split())
-    assert "\nTo try: swashplate whatif luff --scale orifice=1.5 --maneuver sine:9,0.1\n" in text
+    assert (
+        "\nSee more of it: swashplate whatif luff --scale orifice=1.5 --maneuver sine:9,0.1\n"
+        in text
+    )
 
 
 def test_what_is_to_be_tried_is_the_same_command(done, tmp_path):
@@ -38,10 +41,10 @@ def test_what_is_to_be_tried_is_the_same_command(done, tmp_path):
     words = ("a log.csv", "--interpolation", "linear", "--rate", "256")
     tried = done("limits", "hoist", *words).rstrip().splitlines()[-1]
     assert tried.endswith("--maneuver 'a log.csv' --rate 256 --interpolation linear")
-    text = done(*shlex.split(tried.removeprefix("To try: swashplate ")))
+    text = done(*shlex.split(tried.removeprefix("See more of it: swashplate ")))
     assert "hoist, a log.csv" in text
     for changed in (("--set", "Z16=1e-4"), ("--start", "steady"), ("--clip",)):
-        assert "To try" not in done("limits", "hoist", "step:9,stop=3,length=5", *changed)
+        assert "See more" not in done("limits", "hoist", "step:9,stop=3,length=5", *changed)
 
 
 def test_nothing_to_change(done):
@@ -85,16 +88,25 @@ def test_a_log(done, tmp_path):
     assert "Change first: in-line orifice" in text
 
 
+def test_the_units_of_the_errors(done):
+    said = done("limits", "hoist", "step:9")
+    (head,) = [line for line in said.splitlines() if line.startswith("Limit ")]
+    assert " ".join(head.split()) == "Limit share of time deg/s share of error deg/s"
+    assert max(len(line) for line in said.splitlines() if "whatif" not in line) <= 80
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (("hoist", "--error", "0"), "The error is 0, but must be above 0 and below 1"),
         (("hoist", "--frequency", "300"), "from 0.001 to 64 Hz"),
         (("hoist", "--frequency", "nan"), "from 0.001 to 64 Hz"),
+        (("hoist", "sine:4,0.2", "--frequency", "-1"), "leave them out, or 'sine:4,0.2'"),
+        (("hoist", "step:9", "--error", "0.1"), "--error and --frequency belong to the sines"),
         (("hoist", "step:11"), "The voltage is 11 V"),
         (("hoist", "stepp:1"), "is no manoeuvre"),
         (("hoist", "none.csv"), "none.csv"),
-        (("crane",), "no packaged parameter set 'crane'"),
+        (("crane",), "no packaged set, file or folder 'crane'"),
         (("hoist", "--out", "e.txt"), "a table is written as .csv or .parquet"),
         (("hoist", "--plot", "e.bmp"), "a figure is written as .png"),
         (("hoist", "step:9", "--plot", "none/e.png"), "cannot be written"),

@@ -68,9 +68,14 @@ def test_files(done, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("hoist",), "Linearise at a voltage, a current or a speed"),
-        (("hoist", "--at", "4", "--current", "0.4"), "exactly one of them"),
-        (("hoist", "--at", "0.1"), "lies in the card's dead zone"),
+        (("hoist",), "give one of --at, --current and --speed-deg-s"),
+        (("hoist", "--at", "4", "--current", "0.4"), "give one of --at, --current and"),
+        (("hoist", "--current", "1", "--input", "voltage"), "needs --at or --speed-deg-s, not"),
+        (
+            ("hoist", "--at", "0.1"),
+            "lies in the card's dead zone, so the gain is 0; linearise at +0.",
+        ),
+        (("hoist", "--at", "0.15"), "pump alone with --current 0 --input solenoid_force."),
         (("hoist", "--at", "9"), "at its stop, so the gain is 0"),
         (("hoist", "--at", "11"), "the card takes ±10 V"),
         (("hoist", "--speed-deg-s", "300"), "no constant voltage settles at 300 deg/s"),
@@ -80,7 +85,7 @@ def test_files(done, tmp_path):
         (("hoist", "--at", "4", "--frequency", "-1"), "from 0 on"),
         (("hoist", "--at", "4", "--out", "none/model.toml"), "cannot be written"),
         (("hoist", "--at", "4", "--out", "model.mat"), "is written as .toml or .json"),
-        (("crane", "--at", "4"), "no packaged parameter set 'crane'"),
+        (("crane", "--at", "4"), "no packaged set, file or folder 'crane'"),
     ],
 )
 def test_refusals(refused, words, said):

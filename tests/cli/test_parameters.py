@@ -45,4 +45,4 @@ def test_toml_holds_the_card_too(done):
 
 
 def test_show_refuses_an_unknown_name(refused):
-    assert "there are hoist, slew, luff, neutral" in refused("show", "crane")
+    assert "packaged are hoist, slew, luff, neutral" in refused("show", "crane")

@@ -100,8 +100,11 @@ def test_clip(done, refused, tmp_path):
         ("time,voltage\n0,1\n1,1\n1,1\n", "'time' has 1.0 twice, in data rows 2 and 3"),
         ("time,voltage\n0,1\n1,-10.5\n", "-10.5 V at 1 s, but the card takes ±10 V"),
         ("time,voltage\n0,1\n4e9,1\n", "check the unit of the time"),
-        ("t,u\n0,1\n1,1\n", "no column 'time'; it has 't', 'u'"),
-        ("time,u\n0,1\n1,1\n", "no column 'voltage'; it has 'time', 'u'"),
+        (
+            "t,u\n0,1\n1,1\n",
+            "no column 'time'; it has 't', 'u': name the one to take, with --time-",
+        ),
+        ("time,u\n0,1\n1,1\n", "it has 'time', 'u': name the one to take, with --column."),
         ("time,voltage [bar]\n0,1\n1,1\n", "'bar', which does not measure the same as V"),
         ("time,voltage_furlongs\n0,1\n1,1\n", "'furlongs', which does not measure the same as V"),
         ("time [blinks],voltage\n0,1\n1,1\n", "unknown unit 'blinks'; give it in s"),

@@ -6,13 +6,16 @@ import pytest
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("crane", "step:9"), "no packaged parameter set 'crane'; there are hoist, slew, luff"),
+        (("crane", "step:9"), "no packaged set, file or folder 'crane'; packaged are hoist, slew"),
         (("none.toml", "step:9"), "There is no file none.toml"),
         (("sub/none", "step:9"), "There is no file sub/none"),
         (("hoist", "stepp:9"), "'stepp' is no manoeuvre: choose one of rest, step"),
-        (("hoist", "step +8 V"), "or one of the tests of hoist: ramp +1 V/s"),
+        (
+            ("hoist", "step +8 V"),
+            'multisine; or name one of the tests of hoist, such as "step +9 V".',
+        ),
         (("neutral", "step +9 V"), "is no manoeuvre: choose one of rest, step"),
-        (("hoist", "step"), "missing a required argument: 'amplitude'"),
+        (("hoist", "step"), "'amplitude'; step takes amplitude, start, stop, length; or name one"),
         (("hoist", "step:x"), "'x' is not a number"),
         (("hoist", "step:9,stop=-1"), "a step needs 0 <= start < stop <= length"),
         (("hoist", "step:9,top=3"), "step takes amplitude, start, stop, length"),
@@ -80,9 +83,9 @@ def test_a_change_is_given_once(refused, option):
     [
         ("run.doc", "run.doc ends in '.doc'"),
         ("run", "run ends in ''"),
-        ("missing/run.{}", "cannot be written: No such file or directory"),
-        ("file/run.{}", "cannot be written: Not a directory"),
-        ("folder.{}", "cannot be written: Is a directory"),
+        ("missing/run.{}", "cannot be written: folder missing does not exist"),
+        ("file/run.{}", "cannot be written: file is no folder"),
+        ("folder.{}", "cannot be written: it is a folder"),
     ],
 )
 def test_places_that_cannot_be_written(refused, tmp_path, command, option, name, said):

@@ -42,5 +42,5 @@ def test_a_place_that_is_taken(run, tmp_path):
     (tmp_path / "out/reproduction.html").mkdir(parents=True)
     result = run("reproduce", "--out", "out")
     assert result.exit_code == 2
-    assert "out/reproduction.html cannot be written: Is a directory" in result.stderr
+    assert "out/reproduction.html cannot be written: it is a folder" in result.stderr
     assert [each.name for each in (tmp_path / "out").iterdir()] == ["reproduction.html"]

@@ -39,7 +39,7 @@ def test_effects_change_the_logs(done: Words, tmp_path: Path) -> None:
 def test_refusals(refused: Words, done: Words) -> None:
     assert "'wobble=on'" in refused("rig", "hoist", "--out", "x", "--effect", "wobble=on")
     assert "not 'some'" in refused("rig", "hoist", "--out", "x", "--effect", "leakage=some")
-    assert "no packaged parameter set 'crane'" in refused("rig", "crane", "--out", "x")
+    assert "no packaged set, file or folder 'crane'" in refused("rig", "crane", "--out", "x")
     assert "share" in refused("rig", "hoist", "--out", "x", "--load", "2", *SHORT)
     done("rig", "slew", "--out", "y", *SHORT)
     assert "empty" in refused("rig", "slew", "--out", "y", *SHORT)

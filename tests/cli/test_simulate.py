@@ -28,6 +28,18 @@ def test_the_table_says_what_the_simulation_says(done, number):
     assert "never" in text
 
 
+def test_the_dead_zone_holds_nothing_back_at_rest(done, number):
+    still = done("simulate", "hoist", "rest:1")
+    assert next(line for line in still.splitlines() if "dead zone" in line).endswith("never")
+    moved, judged = done("simulate", "hoist", "step:9"), done("limits", "hoist", "step:9")
+    share = number(moved, "dead zone")
+    assert share == number(judged, "dead zone")
+    run = Drive.preset("hoist").simulate(maneuvers.step(9.0).sample())
+    held = run.active(Limit.DEAD_ZONE)
+    # half the record is after the step, at 0 V and within the dead zone
+    assert share < 1.0 < 100.0 * held.mean()
+
+
 def test_a_test_of_the_source_by_its_name(done, number):
     text = done("simulate", "hoist", "step -9 V")
     assert "hoist, step -9 V" in text

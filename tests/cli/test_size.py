@@ -1,6 +1,11 @@
+import re
+
+import numpy as np
 import pytest
 
 from swashplate import Drive
+from swashplate.analysis.levers import pulled
+from swashplate.analysis.performance import performance
 
 
 def test_speed_and_acceleration(done, number, tmp_path):
@@ -22,6 +27,18 @@ def test_a_tracking_error(done, number):
     assert 1.0 < number(text, "pump") < 1.5
     (line,) = [line for line in text.splitlines() if line.startswith("tracking error")]
     assert line.split()[2:4] == ["<=", "18.00"]
+
+
+@pytest.mark.parametrize("wanted", [150.0, 200.0, 220.0])
+@pytest.mark.parametrize("levers", [("orifice",), ("pump",), ("orifice", "pump")])
+def test_the_command_that_is_proposed_is_enough(done, wanted, levers):
+    words = [word for lever in levers for word in ("--lever", lever)]
+    text = done("size", "hoist", "--acceleration-deg-s2", f"{wanted:g}", *words)
+    given = dict(re.findall(r"--scale (\w+)=([\d.]+)", text))
+    assert set(given) == set(levers)
+    assert all(len(factor) <= 7 for factor in given.values())
+    changed = pulled(Drive.preset("hoist"), {name: float(each) for name, each in given.items()})
+    assert np.degrees(performance(changed).acceleration) >= wanted
 
 
 def test_nothing_to_change(done):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from swashplate.cli.terminal import long_work, waiting
+from swashplate.cli.terminal import counted, long_work, waiting
 
 
 @pytest.mark.parametrize(
@@ -15,6 +15,14 @@ def test_time_left_in_words(seconds: float | None, words: str) -> None:
 
 def test_an_upper_bound_is_called_one() -> None:
     assert waiting(30.0, "at most") == "at most 30 s left"
+
+
+def test_what_is_counted() -> None:
+    assert [counted(number, "finding", "findings") for number in (0, 1, 2)] == [
+        "0 findings",
+        "1 finding",
+        "2 findings",
+    ]
 
 
 def test_a_pipe_gets_no_bar(capsys: pytest.CaptureFixture[str]) -> None:

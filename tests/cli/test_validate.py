@@ -35,7 +35,12 @@ def test_a_drive_is_held_against_the_runs_that_were_held_back(
     assert "current: RMSE in mA" in said
     assert "speed from counts: RMSE in deg/s" in said
     assert "Largest per cent error of current" in said
-    assert "Left out (zero crossings)" in said
+    # no sine among the tests: what would leave out parts of one is not said
+    assert "Left out (overshoot)" in said
+    assert "Left out (zero crossings)" not in said
+    assert "Left out (fast sines)" not in said
+    assert "NRMSE is the RMSE over" in said
+    assert "'of its range' below means" in " ".join(said.split())
     assert "Predicts speed from counts to 0." in said
     assert "<svg" in (tmp_path / "found" / "report.html").read_text("utf-8")
     assert [each.suffix for each in (tmp_path / "found" / "figures").iterdir()] == [".svg"]
@@ -47,6 +52,19 @@ def test_a_drive_is_held_against_the_runs_that_were_held_back(
     assert rows["counts"]["unit"] == "rad"
     assert rows["current"]["initial_state"] == "rest"
     assert rows["speed from counts"]["correlation_with_input"] == ""
+
+
+def test_a_correlation_beyond_its_band_is_marked(
+    run: Callable[..., Result], campaign: Path
+) -> None:
+    """A drive of too low a gain misses the more the larger the command."""
+    Drive.preset("hoist").scale(J=0.4).to_toml("wrong.toml")
+    for drive, marks in (("hoist", {False}), ("wrong.toml", {True})):
+        said = run("validate", drive, "virtual/campaign.toml").stdout
+        table = said[said.index("Residuals: correlation") : said.index("'own' is how long")]
+        rows = [line for line in table.splitlines() if line.startswith("hoist_step")]
+        assert {"*" in row for row in rows if " current " in row} == marks
+        assert "* marks what lies beyond" in " ".join(said.split())
 
 
 def test_roles(done: Words, campaign: Path) -> None:

@@ -36,6 +36,8 @@ def test_bands_from_standard_errors(done, run, tmp_path):
     # one per cent of 196 deg/s, about twice that each way
     assert float(line.split()[3]) == pytest.approx(3.8, abs=1.2)
     assert float(line.split()[5]) == pytest.approx(1.5 * float(line.split()[3]), abs=0.02)
+    (limit,) = [line for line in text.splitlines() if line.startswith("speed limit, positive")]
+    assert limit.split()[3:7] == line.split()[2:6]  # 9 V reaches the stop
     assert "Band of 50 drives, changed: at most" in text
     assert "Correlations ignored" in text
     result = run("whatif", "luff", "--scale", "pump=1.5", "--uncertainty", "fitted")

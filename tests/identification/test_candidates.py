@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swashplate import Channel, Drive, Experiment, InputError, maneuvers
+from swashplate import Campaign, Channel, Drive, Experiment, InputError, maneuvers
+from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.identification.advice import Candidate, advise
+from swashplate.identification.assessment import assess
 from swashplate.identification.bench import bench
 from swashplate.identification.candidates import (
     best_for_each,
@@ -17,7 +19,7 @@ from swashplate.identification.candidates import (
     in_turn,
     judge_sensors,
 )
-from swashplate.identification.fit import smooth
+from swashplate.identification.fit import fit, smooth
 from swashplate.identification.sensors import (
     MEMORY,
     Sensor,
@@ -25,13 +27,20 @@ from swashplate.identification.sensors import (
     default_sensors,
     measurable,
 )
-from swashplate.identification.setup import Free, GivenPrior, Setup, Stage
+from swashplate.identification.setup import Free, GivenPrior, Setup, Stage, load_setup
 from swashplate.identification.variables import Variables
 
 HOIST = Drive(smooth(Drive.preset("hoist").parameters))
 SOURCE = Source(Path("log.csv"), "speed")
 FACTOR = Free(relative=(0.5, 2.0), log=True)
 SPEED = Sensor("shaft_speed", 0.01)
+
+
+@pytest.fixture(scope="module")
+def hoist_tests(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    """The source's tests of a hoist near the published one, with instruments."""
+    tests = rig.run("hoist", seed=4, perturb=0.02)
+    return Campaign.from_toml(rig.write(tests, tmp_path_factory.mktemp("rig") / "tests"))
 
 
 def setup(*names: str) -> Setup:
@@ -168,6 +177,28 @@ def test_residuals_of_a_fit_tell_the_noise() -> None:
     assert fitted.sensors[0].memory == pytest.approx(1.0 / 512.0)
     with pytest.raises(InputError, match="residuals of 'speed' are as good as zero"):
         bench(HOIST.parameters, setup("Z10"), [run("exact", 5.0)], fitted=True)
+
+
+def test_what_is_known_is_what_a_fit_of_the_same_tests_knows(hoist_tests: Campaign) -> None:
+    """Coloured residuals and free zeros of the encoder: neither makes the errors another story."""
+    setup = load_setup("hoist")
+    runs = hoist_tests.select(role="fit")
+    found = fit(runs, Drive.preset("hoist").parameters, setup)
+    known = bench(found.parameters, setup, runs, fitted=True)
+    now = np.sqrt(np.diag(np.linalg.inv(known.present.T @ known.present)))
+    errors = {}
+    for stage in assess(found.stages):
+        quoted = stage.uncertainty.quoted
+        errors |= dict(zip(quoted.variables.names, quoted.standard_errors, strict=True))
+    ratio = np.array([now[k] / errors[name] for k, name in enumerate(known.variables.names)])
+    assert 0.5 < np.median(ratio) < 2.0
+    assert (np.abs(np.log(ratio)) < np.log(4.0)).all(), ratio
+
+
+def test_a_drive_of_other_values_has_no_noise_to_tell() -> None:
+    other = Drive(smooth(Drive.preset("hoist").replace(Z10=18.0).parameters))
+    with pytest.raises(InputError, match="The drive misses 'speed' by .* % of its range"):
+        bench(other.parameters, setup("Z10"), [run("up", 5.0, 0.04)], fitted=True)
 
 
 def test_a_stated_noise_replaces_the_campaigns() -> None:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from swashplate import Experiment
-from swashplate.identification.assessment import linearised_fit
 from swashplate.identification.checked_ends import checked_ends
 from swashplate.identification.held import minimiser
 from swashplate.identification.intervals import estimates, reach
+from swashplate.identification.linearising import linearised_fit
 from swashplate.identification.problem import Problem
 from swashplate.identification.solving import solve
 from swashplate.identification.uncertainty import uncertainty

@@ -5,7 +5,7 @@ import pytest
 
 from swashplate.errors import InputError
 from swashplate.identification.covariance import Covariance
-from swashplate.identification.intervals import estimates
+from swashplate.identification.intervals import Estimate, estimates
 from swashplate.identification.variables import Variables
 
 
@@ -56,3 +56,10 @@ def test_undetermined_there_is_none_either() -> None:
 def test_a_level_is_a_probability(level: float) -> None:
     with pytest.raises(InputError, match="between 0 and 1"):
         estimates(covariance(), level=level)
+
+
+def test_half_widths_are_of_the_values_size() -> None:
+    known = Estimate("Z2", -4.0, "estimated", 0.1, -4.2, -3.8, 30.0)
+    assert known.relative_half_width == pytest.approx(0.05)
+    assert known._replace(upper=None).relative_half_width == np.inf
+    assert known._replace(value=0.0).relative_half_width == np.inf

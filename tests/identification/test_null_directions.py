@@ -27,13 +27,19 @@ def test_sentences() -> None:
         "Z14 +1 % changes nothing. Hold Z14."
     )
     assert Direction(pair, 5e-4, None, "Z3").sentence == (
-        "Z3 -0.7 %, Z9 +1 % together change the residuals 2,000 times less than the clearest "
-        "direction. Hold Z3, or test what tells them apart."
+        "Faint: Z3 -0.7 %, Z9 +1 % move together and change the residuals 2,000 times less than "
+        "the clearest direction; hold one of them only if you know it, or make a test that tells "
+        "them apart."
     )
     gauge = next(each for each in GAUGES if "Z6" in each.moves)
     assert Direction({"Z8": 1.0, "Z6": 0.9}, 1e-5, gauge, "Z6").sentence == (
-        "Z6 and Z8 can move together all but unseen (piston motion against flow gain): only "
-        "Z8/(1+Z6) is determined. Hold Z6."
+        "Faint: Z6 and Z8 move together all but unseen (piston motion against flow gain): only "
+        "Z8/(1+Z6) is determined; hold one of them only if you know it, or make a test that tells "
+        "them apart."
+    )
+    assert Direction({"Z8": 1.0, "Z6": 0.9}, 0.0, gauge, "Z6").sentence == (
+        "Z6 and Z8 can move together unseen (piston motion against flow gain): only Z8/(1+Z6) is "
+        "determined. Hold Z6."
     )
 
 

@@ -33,7 +33,13 @@ SETUP = Setup.model_validate(
             {
                 "name": "pump",
                 "part": "pump",
-                "free": {"Z10": {"relative": (0.8, 1.25), "log": True}},
+                "free": {
+                    "Z10": {
+                        "relative": (0.8, 1.25),
+                        "log": True,
+                        "prior": {"mean": 12.8, "deviation": 0.05},
+                    }
+                },
             },
         ],
     }

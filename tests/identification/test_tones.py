@@ -49,6 +49,22 @@ def test_a_ripple_is_found_and_taken_out() -> None:
     assert np.var(left) == pytest.approx(1.0, abs=0.15)
 
 
+def test_shares_are_of_all_runs_of_a_channel() -> None:
+    """Two of four runs sampled half as often: their tones are a part of all, not of themselves."""
+    rng = np.random.default_rng(8)
+    fit, _ = fitted(rng.normal(size=(RUNS, N)) + ripple(rng))
+    runs = [
+        run._replace(time=run.time[::2], residual=run.residual[::2], jacobian=run.jacobian[::2])
+        if k < 2
+        else run
+        for k, run in enumerate(fit.runs)
+    ]
+    tones = separated(LinearisedFit.of(runs, Variables.of("abc", np.ones(3)))).tones
+    # a third of the samples, two thirds: each with the same part of ripple
+    power = 32.0 * np.mean(LEVEL**2)
+    assert sum(each.share for each in tones) == pytest.approx(power / (power + 1.0), rel=0.05)
+
+
 def test_errors_are_those_of_the_noise_under_a_ripple() -> None:
     """Estimates scatter by the noise alone, as the ripple averages out; errors say so."""
     rng = np.random.default_rng(2)

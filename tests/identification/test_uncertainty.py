@@ -76,11 +76,24 @@ def test_white_noise_intervals_do_not(campaigns: list) -> None:
     assert ((spread / white > 6.0) & (spread / white < 11.0)).all()
 
 
+def test_correlations_that_cancel_cost_no_samples() -> None:
+    """A resonance swings: its correlations are of both signs, and their sum is next to nothing."""
+    rng = np.random.default_rng(11)
+    turn, decay = 2.0 * np.pi * 60.0 / 512.0, 0.99
+    poles = [1.0, -2.0 * decay * np.cos(turn), decay**2]
+    noise = lfilter([1.0], poles, rng.normal(size=(RUNS, N + 400)))[:, 400:]
+    fit, _ = fitted([shapes(rng) for _ in range(RUNS)], noise)
+    said = " ".join(uncertainty(fit).sentences())
+    assert "stay correlated over" in said
+    assert "positive and negative correlations cancel, and the samples tell as much as" in said
+
+
 def test_the_sentences_say_so(campaigns: list) -> None:
     first = campaigns[0][0]
     said = " ".join(first.sentences())
     assert "Residuals of speed stay correlated over 0." in said
     assert "White-noise errors would be" in said
+    assert "times too small; the report shows them for comparison only." in said
     assert first.inflation.min() > 30.0
     label, samples, worth = first.samples[0]
     assert (label, samples) == ("run 0, speed", N)

@@ -11,6 +11,7 @@ from swashplate.campaign.experiment import InputSignal
 from swashplate.identification.assessment import Assessment, RunQuality, compared
 from swashplate.identification.fit import StageFit
 from swashplate.identification.judgements import Statement, listed, percent
+from swashplate.identification.null_directions import Direction
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage
 from swashplate.identification.solving import solve
@@ -156,6 +157,25 @@ def test_a_fit_that_does_not_carry_over_is_not_usable(experiment, measured, stag
     slightly = verdict([Assessment(stage())], [held_out(experiment, measured, 0.08 * SWAP)])
     assert slightly.usable
     assert statement(slightly, "Validation").weight == "look"
+
+
+def test_a_faint_direction_asks_for_attention_where_the_intervals_show_it(stage) -> None:
+    assessment = Assessment(stage())
+    faint = Direction({"gain": 1.0, "lag": -0.5}, 5e-4, None, "gain")
+    found = replace(assessment.identifiability, faint=(faint,))
+    vars(assessment)["identifiability"] = found
+    # gain and lag are known to about a per cent: faint, but determined
+    calm = statement(verdict([assessment], []), "Identifiability")
+    assert calm.weight == "good"
+    assert any("hold one of them only if you know it" in each for each in calm.sentences)
+    known = assessment.uncertainty
+    quoted = replace(known.quoted, matrix=1e6 * known.quoted.matrix)
+    vars(assessment)["uncertainty"] = replace(known, quoted=quoted)
+    wide = statement(verdict([assessment], []), "Identifiability")
+    assert wide.weight == "look"
+    assert wide.sentences[-1] == (
+        "rise: intervals wider than ±10 % along faint directions: gain and lag."
+    )
 
 
 def test_most_unknowns_at_bounds_is_hopeless(experiment, measured, stage) -> None:

@@ -107,9 +107,12 @@ def test_switches_are_declared(hoist: Drive) -> None:
 @pytest.mark.parametrize(
     ("where", "said"),
     [
-        ({"at": 0.1}, "the card's dead zone, which ends beyond \\+0.12663 V"),
-        ({"at": -0.05}, "ends beyond -0.097857 V"),
-        ({"at": 0.14}, "the solenoids' dead zone of Z17 = ±0.27867 A"),
+        ({"at": 0.1}, "the card's dead zone, so the gain is 0; linearise at \\+0.2065 V or beyond"),
+        ({"at": -0.05}, "linearise at -0.0979 V or beyond"),
+        (
+            {"at": 0.14},
+            "gives 0.275.* A, which lies in the solenoids' dead zone of Z17 = ±0.27867 A",
+        ),
         ({"current": 0.2}, "the solenoids' dead zone"),
         ({"at": 9.0}, "at its stop, so the gain is 0"),
         ({"at": -8.0, "input": "solenoid_force"}, "at its stop"),

@@ -18,6 +18,7 @@ from swashplate.identification.assessment import assess, run_qualities
 from swashplate.identification.fit import Fit, fit
 from swashplate.identification.fold_results import CrossValidation, Fold, FoldEstimate, HeldRun
 from swashplate.identification.measures import Measures
+from swashplate.identification.named_tones import distinct
 from swashplate.identification.profile_side import Point
 from swashplate.identification.profiles import Profile, Threshold
 from swashplate.identification.setup import Setup
@@ -31,9 +32,10 @@ from swashplate.report.fit_page import (
     write_fit_report,
     write_validation_report,
 )
+from swashplate.report.fit_page.files import plot_overlay
 from swashplate.report.fit_page.numbers import percent, plain, spread, unit_text
 from swashplate.report.fit_page.page import StageProfile
-from swashplate.report.fit_page.runs import ignored_words
+from swashplate.report.fit_page.runs import Shown, ignored_words, shown_runs
 from swashplate.report.fit_page.truth import in_the_fits_scales
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
@@ -252,8 +254,23 @@ def test_a_position_is_judged_by_its_speed_too(read: Page) -> None:
     channels = {row[2] for row in read.tables["agreement"][1:]}
     assert channels == {"current", "counts", "speed from counts"}
     assert "speed from counts" in read.words
-    assert "zero crossings" in read.words
+    # of the source's rules those that left out something
     assert "start transient" in read.words
+    assert "zero crossings" not in read.words
+    assert "start transient" in read.words
+
+
+def test_tones_are_told_once_and_listed_in_a_table(read: Page, assessments) -> None:
+    tones = [distinct(each.uncertainty.tones) for each in assessments]
+    listed = [tone for each in tones if len(each) > 1 for tone in each]
+    heads = sum(len(each) > 1 for each in tones)
+    assert heads > 0
+    rows = [row for row in read.tables["tones"] if row[0] != "channel"]
+    assert [row[0] for row in rows] == [tone.channel for tone in listed]
+    found = [number(row[1]) for row in rows]
+    assert found == pytest.approx([tone.frequency for tone in listed], rel=5e-3)
+    # in the verdict and beside the intervals
+    assert len(re.findall(r"\d+ tones between", read.words)) == 2 * heads
 
 
 def test_every_sample_is_in_the_file(read: Page, fitted: Fit) -> None:
@@ -471,6 +488,19 @@ def test_figures_for_print(tmp_path, campaign, fitted, assessments, validation, 
     assert [each.suffix for each in paths] == [f".{kind}"] * 4
     assert paths[-1].name == f"waterfall.{kind}"
     assert all(each.stat().st_size > 2000 for each in paths)
+
+
+def test_long_names_stay_beside_their_panels(assessments, assert_legible) -> None:
+    def renamed(shown: Shown) -> Shown:
+        own = shown.quality
+        name = f"{own.channel}_of_the_upper_winch"
+        channels = {name: replace(own.experiment[own.channel], name=name)}
+        experiment = replace(own.experiment, channels=channels)
+        return replace(shown, quality=replace(own, experiment=experiment, channel=name))
+
+    run = shown_runs(assessments, ())[0]
+    assert any("speed from" in each.quality.channel for each in run.channels)
+    assert_legible(plot_overlay(replace(run, channels=tuple(map(renamed, run.channels)))))
 
 
 ZOOM = """<script>

@@ -5,13 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.patches import FancyBboxPatch
 
 from swashplate import Drive, maneuvers
 from swashplate.errors import InputError
+from swashplate.report.reproduction.drawing import own_canvas
 from swashplate.reproduction.bench import BELOW_STOP, ON_CURRENT, with_stand_in_card
 from swashplate.reproduction.build import ALL, reproduce
 from swashplate.reproduction.catalogue import FIGURES
 from swashplate.reproduction.content import Curve, Diagram, Figure, Reproduction
+from swashplate.reproduction.diagrams import DIAGRAMS
 from swashplate.reproduction.errata import ERRATA
 
 SPEC = Path(__file__).parents[3] / "shared" / "spec"
@@ -83,6 +86,31 @@ def test_steady_levels_are_those_of_the_static_table() -> None:
     ):
         curve = curves(made[number])["simulated"]
         assert np.interp(5.9, curve.time, curve.values) == pytest.approx(level, abs=digit)
+
+
+def test_an_axis_names_all_that_is_drawn_on_it(small: Reproduction) -> None:
+    """A scaled command stands on another quantity's axis, whose label says so."""
+    scaled = 0
+    for figure in small.figures:
+        for panel in () if isinstance(figure.content, Diagram) else figure.content:
+            for words in (c.name for c in panel.curves if c.name.startswith("voltage")):
+                assert panel.ordinate.endswith(f",\n{words}"), figure.number
+                scaled += 1
+    assert scaled > 3
+
+
+@pytest.mark.parametrize("number", sorted(DIAGRAMS))
+def test_arrows_of_a_diagram_have_shafts(number: str) -> None:
+    """Blocks of a row are apart by more than an arrow's head."""
+    canvas = own_canvas(DIAGRAMS[number])
+    canvas.draw_without_rendering()
+    boxes = [each.get_window_extent() for each in canvas.findobj(FancyBboxPatch)]
+    assert len(boxes) > 3
+    for box in boxes:
+        after = [
+            each.x0 - box.x1 for each in boxes if each.x0 > box.x0 and abs(each.y0 - box.y0) < 1.0
+        ]
+        assert min(after, default=1e3) > 0.16 * canvas.dpi
 
 
 def test_commands_are_scaled_as_they_say(small: Reproduction) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.analysis.levers import pulled
 from swashplate.analysis.removals import REMOVALS, Removal
 from swashplate.analysis.tracking import tracking_error
 from swashplate.drive import Drive
@@ -35,10 +36,6 @@ class LimitShare:
     """In words."""
     component: str
     """What would have to change in the machine."""
-    lever: str
-    """The same as a lever of `what_if`, or a parameter's symbol."""
-    eases: float
-    """A factor on the lever that eases the limit, to try."""
     changes: dict[str, Change]
     """The changes that took it away, SI."""
     time_share: float | None
@@ -50,6 +47,10 @@ class LimitShare:
     """By how much of itself the rms error falls without it; negative if it grows. [1]"""
     alone: float | None
     """Rms tracking error with this limit and none of the others. [rad/s]"""
+    eased_by: Mapping[str, float]
+    """Factors on levers (`levers`) that ease it, to try; none where that needs another command."""
+    eased_error: float | None
+    """Rms tracking error with these; None without any. [rad/s]"""
     failure: str = ""
     """Why a drive without it cannot be simulated."""
 
@@ -85,8 +86,8 @@ class LimitShares:
         """Table of the shares, SI, the costliest first."""
         import polars as pl
 
-        floats = ("time_share", "error", "error_share", "alone")
-        words = ("limit", "component", "lever", "failure")
+        floats = ("time_share", "error", "error_share", "alone", "eased_error")
+        words = ("limit", "component", "failure")
         return pl.DataFrame(
             {name: [getattr(each, name) for each in self.shares] for name in (*words, *floats)},
             schema=dict.fromkeys(words, pl.String) | dict.fromkeys(floats, pl.Float64),
@@ -171,17 +172,18 @@ def limit_shares(
         without, failure = error_of(built[removal])
         others = [present[each] for each in removed if each is not removal]
         alone, _ = error_of(_replaced(drive, _joined(others)))
+        eased_by = removal.eased_by(drive)
         shares.append(
             LimitShare(
                 removal.limit,
                 removal.component,
-                removal.lever,
-                removal.eases,
                 changes,
-                _time_share(run, removal.flag),
+                None if removal.flag is None else time_share(run, removal.flag),
                 without,
                 None if without is None else _fall(error, without),
                 alone,
+                eased_by,
+                error_of(_eased(drive, eased_by))[0],
                 failure,
             )
         )
@@ -189,13 +191,21 @@ def limit_shares(
     return LimitShares(drive.name, run, asked, error, error_of(unlimited)[0], tuple(shares))
 
 
-def _time_share(run: Simulation, flag: Limit | None) -> float | None:
-    if flag is None:
-        return None
-    acts = run.active(flag)
-    if flag == Limit.DEAD_ZONE:
-        assert run.voltage is not None
-        acts = acts & (run.voltage != 0.0)
+def time_share(run: Simulation, limit: Limit) -> float:
+    """Share of a record's samples at which a limit acts, 0 to 1.
+
+    Parameters
+    ----------
+    run : Simulation
+        By voltage or by current.
+    limit : Limit
+        Of the dead zone only samples with a command other than 0 count: at rest nothing is asked
+        that it could hold back.
+    """
+    acts = run.active(limit)
+    if limit == Limit.DEAD_ZONE:
+        command = run.current if run.voltage is None else run.voltage
+        acts = acts & (command != 0.0)
     return float(acts.mean())
 
 
@@ -206,6 +216,16 @@ def _fall(before: float, after: float) -> float:
 
 def _joined(changes: Iterable[Mapping[str, Change]]) -> dict[str, Change]:
     return {name: value for each in changes for name, value in each.items()}
+
+
+def _eased(drive: Drive, factors: Mapping[str, float]) -> Drive | str:
+    """The drive with its levers moved, or why there is none."""
+    if not factors:
+        return "No lever eases it under the same command."
+    try:
+        return pulled(drive, factors)
+    except SwashplateError as refusal:
+        return str(refusal)
 
 
 def _replaced(drive: Drive, changes: Mapping[str, Change]) -> Drive | str:

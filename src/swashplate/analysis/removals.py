@@ -25,11 +25,10 @@ class Removal:
     """In words."""
     component: str
     """What would have to change in the machine."""
-    lever: str
-    """The same as a lever of `whatif`, or a parameter's symbol."""
-    eases: float
-    """A factor on the lever that eases the limit."""
     changes: Callable[[Drive], Mapping[str, Change]]
+    eased_by: Callable[[Drive], Mapping[str, float]]
+    """Factors on levers that ease the limit under the same command; none where that needs another
+    command as well."""
     flag: Limit | None = None
     """How a simulation marks it, None for what acts always or is not marked."""
 
@@ -44,13 +43,21 @@ class Removal:
         return made
 
 
+def _covered(drive: Drive) -> float:
+    """Dead zone of the solenoids that the card's jump covers both ways. [A]"""
+    numbers = drive.parameters.numbers
+    return min(numbers["Z17"], numbers["J_plus"], numbers["J_minus"])
+
+
 def _dead_zone(drive: Drive) -> dict[str, Change]:
     # with the card's jump left as it is, a solenoid's dead zone beyond it would stay
-    numbers = drive.parameters.numbers
-    return {
-        "V_dz": 0.0,
-        "Z17": min(numbers["Z17"], numbers["J_plus"], numbers["J_minus"]),
-    }
+    return {"V_dz": 0.0, "Z17": _covered(drive)}
+
+
+def _less_dead_zone(drive: Drive) -> dict[str, float]:
+    left = drive.parameters.numbers["Z17"]
+    covered = _covered(drive)
+    return {"dead_zone": 0.0} if covered == left else {"dead_zone": 0.0, "Z17": covered / left}
 
 
 def _swash_stop(drive: Drive) -> dict[str, Change]:
@@ -65,71 +72,62 @@ REMOVALS = (
     Removal(
         "dead zone",
         "card: dead-zone compensation (V_dz, or an inverse map)",
-        "dead_zone",
-        0.0,
         _dead_zone,
+        _less_dead_zone,
         Limit.DEAD_ZONE,
     ),
     Removal(
         "current rate",
         "card: faster ramp (lim1, lim2)",
-        "rate_limits",
-        1.5,
         lambda _: {"lim1": inf, "lim2": inf},
+        lambda _: {"rate_limits": 1.5},
         Limit.CURRENT_RATE,
     ),
     Removal(
         "final decay",
         "card: no decay of the current (I_t2)",
-        "I_t2",
-        0.5,
         lambda _: {"I_t2": 0.0},
+        lambda _: {"I_t2": 0.5},
     ),
     Removal(
         "delay",
         "card: shorter delay (tau)",
-        "tau",
-        0.5,
         lambda _: {"tau": 0.0},
+        lambda _: {"tau": 0.5},
     ),
     Removal(
         "orifice",
         "in-line orifice: larger bore (Z16)",
-        "orifice",
-        1.5,
         lambda _: {"Z16": inf},
+        lambda _: {"orifice": 1.5},
         Limit.ORIFICE,
     ),
     Removal(
         "spool stop",
         "spool: longer stroke (Z14)",
-        "spool_stroke",
-        1.5,
         lambda _: {"Z14": inf},
+        lambda _: {"spool_stroke": 1.5},
         Limit.SPOOL,
     ),
     Removal(
         "swash stop",
         "pump: larger, or a smaller motor (Z10, Z13)",
-        "pump",
-        1.5,
         _swash_stop,
+        lambda _: {},
         Limit.SWASH_STOP,
     ),
     Removal(
         "relief valve",
         "relief valve: higher setting (Z15)",
-        "relief",
-        1.5,
         lambda _: {"Z15": inf},
+        lambda _: {"relief": 1.5},
         Limit.RELIEF,
     ),
     Removal(
         "plussing",
         "spool: centred at rest (Z18)",
-        "plussing",
-        0.0,
         lambda _: {"Z18": 0.0},
+        lambda _: {"plussing": 0.0},
     ),
 )
 """What can be taken away, in the order of the chain; the plussing, which no force limits, because

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,9 @@ from swashplate.errors import InputError
 
 if TYPE_CHECKING:
     from swashplate.drive import Drive
+
+_LISTED = 12
+"""Runs that a sentence names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +74,12 @@ class Campaign:
         for each in self.experiments:
             if each.name == name:
                 return each
-        known = ", ".join(each.name for each in self.experiments)
-        raise InputError(f"{self.path} has no experiment '{name}'; it has {known}.")
+        names = [each.name for each in self.experiments]
+        near = get_close_matches(name, names, 1)
+        meant = f" (did you mean {near[0]}?)" if near else ""
+        known = ", ".join(names[:_LISTED])
+        more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+        raise InputError(f"{self.path} has no run '{name}'{meant}; it has {known}{more}.")
 
     def select(
         self, *, axis: str | None = None, role: Role | None = None

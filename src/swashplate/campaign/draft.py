@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from swashplate.campaign.guesses import Guess, by_axis, guess, refined
 from swashplate.campaign.kinds import KINDS
 from swashplate.campaign.recognition import recognise
-from swashplate.errors import InputError
+from swashplate.errors import FileError, InputError
 from swashplate.logs import Log, open_log
 
 Array = NDArray[np.float64]
@@ -24,6 +24,11 @@ HEADER = """\
 # Every entry is explained by `swashplate campaign schema`; `swashplate campaign check` reads
 # all logs and says what is wrong with them.
 """
+
+
+UNUSED = "# Columns that are not used"
+NO_ENCODER = "# No column looks like an encoder's counts"
+"""How the lines begin that say what the draft leaves out."""
 
 
 class _Look(NamedTuple):
@@ -72,9 +77,9 @@ def draft(
     """
     if not logs:
         raise InputError("A draft needs at least one log.")
-    looks = [_look(open_log(path)) for path in logs]
+    looks = [_look(open_log(path), counts_per_turn) for path in logs]
     first = looks[0]
-    axes = by_axis(first.guesses)
+    axes = by_axis(_with_counters(looks))
     plain = Path(drive).stem if drive is not None else "drive"
     named = {prefix or plain: guesses for prefix, guesses in axes.items()}
     for guesses in named.values():
@@ -89,18 +94,49 @@ def draft(
         if each.column.name not in taken and each.role != "time"
     ]
     if left:
-        lines += [f"# Columns that are not used: {', '.join(left)}", ""]
+        lines += [f"{UNUSED}: {', '.join(left)}", ""]
+    kinds = {each.kind for guesses in named.values() for each in guesses}
+    if counts_per_turn is not None and "encoder_counts" not in kinds:
+        among = f" among {', '.join(left)}" if left else ""
+        lines += [f"{NO_ENCODER}{among}; counts_per_turn = {counts_per_turn:.12g} is left out", ""]
     for number, look in enumerate(looks):
         held_back = len(looks) >= 4 and number == len(looks) - 1
         lines += _run(look, named, Path(folder), held_back)
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _look(log: Log) -> _Look:
+def _look(log: Log, counts_per_turn: float | None) -> _Look:
     guesses = [guess(column) for column in log.columns]
+    unknown = [each.column.name for each in guesses if each.role == "unknown"]
     wanted = [each.column.name for each in guesses if each.role != "unknown"]
-    values = log.read(wanted)
-    return _Look(log, [refined(g, values.get(g.column.name, np.zeros(0))) for g in guesses], values)
+    values = {**_numbers(log, unknown), **log.read(wanted)}
+    none = np.zeros(0)
+    return _Look(
+        log,
+        [refined(each, values.get(each.column.name, none), counts_per_turn) for each in guesses],
+        values,
+    )
+
+
+def _numbers(log: Log, names: list[str]) -> dict[str, Array]:
+    """Those columns that hold numbers; of the others nothing is wanted."""
+    try:
+        return log.read(names) if names else {}
+    except FileError:
+        if len(names) == 1:
+            return {}
+        return {key: each for name in names for key, each in _numbers(log, [name]).items()}
+
+
+def _with_counters(looks: list[_Look]) -> list[Guess]:
+    """Guesses of the first log; whether a counter begins anew, any of the logs may show."""
+    rolled = {
+        each.column.name: each
+        for look in reversed(looks)
+        for each in look.guesses
+        if each.rolls_over_at is not None
+    }
+    return [rolled.get(each.column.name, each) for each in looks[0].guesses]
 
 
 def _demand(log: Log, guesses: list[Guess]) -> None:
@@ -175,6 +211,9 @@ def _signal(guessed: Guess, look: _Look, counts_per_turn: float | None) -> list[
             else "# counts_per_turn = 1000    # fill in: for one turn, quadrature included",
             "gear_ratio = 1.0    # turns of the encoder for one turn of the shaft",
         ]
+        if guessed.rolls_over_at is not None:
+            size = guessed.rolls_over_at
+            lines.append(f"rolls_over_at = {size}    # guessed: begins anew after {size} counts")
     elif column.unit is None:
         unit = "mm" if guessed.linear else next(iter(KINDS[kind].units), "1")
         lines.append(f'unit = "{unit}"    # guessed: the header gives none')

@@ -5,6 +5,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from swashplate.campaign.counters import CounterRangeError
 from swashplate.campaign.stamps import Array, Rows, increasing, signal
 from swashplate.errors import InputError
 from swashplate.maneuvers.checks import positive, row, whole
@@ -117,10 +118,9 @@ def _check_range(readings: Array, size: int) -> None:
     low, high = (-(size // 2), (size - 1) // 2) if signed else (0, size - 1)
     outside = np.flatnonzero((readings < low) | (readings > high))
     if outside.size:
-        raise InputError(
+        raise CounterRangeError(
             f"counts hold {readings[outside[0]]:.0f} in row {outside[0]} (the first is 0), outside "
-            f"the {low} to {high} of a {'signed ' if signed else ''}counter of {size} readings; "
-            "give the right bits or modulus."
+            f"the {low} to {high} of a {'signed ' if signed else ''}counter of {size} readings"
         )
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign.counters import rolls_over_at
 from swashplate.campaign.kinds import ChannelKind, InputKind
 from swashplate.logs import Column
 
@@ -54,6 +55,8 @@ class Guess(NamedTuple):
     """What stands before the word in its name, such as the "boom" of "Boom Cmd", or empty."""
     linear: bool = False
     """Whether its name is that of a rod's displacement and not of a shaft's angle."""
+    rolls_over_at: int | None = None
+    """Counts after which an encoder's counter begins anew, where its numbers show it."""
 
 
 def guess(column: Column) -> Guess:
@@ -82,8 +85,17 @@ def _ends(name: str, words: str) -> str | None:
     return (match[1] or "") if match else None
 
 
-def refined(guessed: Guess, values: Array) -> Guess:
-    """The same with what its numbers say: a current that turns negative has a sign."""
+def refined(guessed: Guess, values: Array, counts_per_turn: float | None = None) -> Guess:
+    """The same with what its numbers say.
+
+    A current that turns negative has a sign; whole numbers that begin anew at their end are an
+    encoder's, whatever their name.
+    """
+    nameless = guessed.role == "unknown" and guessed.column.unit is None
+    if nameless or guessed.kind == "encoder_counts":
+        size = rolls_over_at(values, counts_per_turn)
+        if size is not None:
+            return guessed._replace(role="channel", kind="encoder_counts", rolls_over_at=size)
     if (
         guessed.kind == "rectified_current"
         and values.size

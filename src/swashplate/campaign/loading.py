@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import schema
 from swashplate.campaign.columns import Columns, named, read_signal
+from swashplate.campaign.counters import CounterRangeError
 from swashplate.campaign.encoder import unwrap_counts
 from swashplate.campaign.experiment import Channel, Encoder, Experiment, InputSignal
 from swashplate.campaign.recognition import Recognised, recognise
@@ -150,6 +151,10 @@ def _experiment(
             if channel.rolls_over_at is not None:
                 try:
                     counts = unwrap_counts(values, modulus=channel.rolls_over_at).counts
+                except CounterRangeError as error:
+                    raise InputError(
+                        f"{read.source}: {error.said}; give the right rolls_over_at."
+                    ) from None
                 except InputError as error:
                     raise InputError(f"{read.source}: {error}") from None
             values = counts * encoder.angle_per_count

@@ -72,6 +72,10 @@ def examine(experiment: Experiment) -> tuple[Quality, ...]:
     )
 
 
+def _counted(number: int, one: str, several: str) -> str:
+    return f"{number} {one if number == 1 else several}"
+
+
 def _input_quality(experiment: Experiment, drive: InputSignal) -> Quality:
     limits = drive.limits
     if limits is None and drive.kind == "voltage":
@@ -112,7 +116,8 @@ def _channel_quality(experiment: Experiment, drive: InputSignal, channel: Channe
     same = np.array_equal(channel.time, drive.time)
     findings = [] if same else list(_stamp_findings(stamps))
     if channel.dropped:
-        findings.append(f"{channel.dropped} missing samples are left out")
+        dropped = channel.dropped
+        findings.append(f"{_counted(dropped, 'missing sample is', 'missing samples are')} left out")
     if clipped > 0.0:
         findings.append(f"{100.0 * clipped:.2g} % of the samples are at the end of its range")
     if np.ptp(channel.values) == 0.0 and np.ptp(drive.values) > 0.0:
@@ -120,7 +125,8 @@ def _channel_quality(experiment: Experiment, drive: InputSignal, channel: Channe
     elif stuck is not None and stuck > STUCK:
         findings.append(f"stands still for {stuck:.3g} s while the input is away from rest")
     if lost:
-        findings.append(f"jumps {lost} times as no motion does: lost or doubled counts")
+        times = "once" if lost == 1 else f"{lost} times"
+        findings.append(f"jumps {times} as no motion does: lost or doubled counts")
     findings += _rollover_findings(channel)
     if channel.kind == "rectified_current" and channel.values.min() < -0.02 * np.ptp(
         channel.values
@@ -132,7 +138,8 @@ def _channel_quality(experiment: Experiment, drive: InputSignal, channel: Channe
         findings.append("all samples are ignored")
     elif not (drive.time[0] <= channel.time[0] and channel.time[-1] <= drive.time[-1]):
         outside = (channel.time < drive.time[0]) | (channel.time > drive.time[-1])
-        findings.append(f"{int(outside.sum())} samples lie before or after the input's record")
+        lie = _counted(int(outside.sum()), "sample lies", "samples lie")
+        findings.append(f"{lie} before or after the input's record")
     return Quality(
         experiment.name,
         channel.name,
@@ -153,8 +160,8 @@ def _channel_quality(experiment: Experiment, drive: InputSignal, channel: Channe
 def _stamp_findings(stamps: StampStatistics) -> Iterator[str]:
     if stamps.longest > LONG_GAP * stamps.period or stamps.missing > LOST_SHARE * stamps.rows:
         yield (
-            f"{stamps.gaps.size} gaps, the longest {stamps.longest:.3g} s; {stamps.missing} "
-            "samples are missing at the median rate"
+            f"{_counted(stamps.gaps.size, 'gap', 'gaps')}, the longest {stamps.longest:.3g} s; "
+            f"{_counted(stamps.missing, 'sample is', 'samples are')} missing at the median rate"
         )
     if stamps.jitter > 0.2 * stamps.period:
         yield (
@@ -210,8 +217,8 @@ def _rollover_findings(channel: Channel) -> Iterator[str]:
     doubtful = unwrap_counts(np.mod(channel.counts, size), modulus=size).doubtful
     if doubtful.size:
         yield (
-            f"{doubtful.size} steps are so large that a roll-over more or less may be what "
-            f"happened, the first at {channel.time[doubtful[0]]:.4g} s"
+            f"{_counted(doubtful.size, 'step is', 'steps are')} so large that a roll-over more or "
+            f"less may be what happened, the first at {channel.time[doubtful[0]]:.4g} s"
         )
 
 

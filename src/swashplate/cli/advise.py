@@ -18,9 +18,11 @@ from swashplate.cli.advice_tables import (
 )
 from swashplate.cli.arguments import AxisName
 from swashplate.cli.inputs import maneuver_of, parameters_of
+from swashplate.cli.outputs import check_outputs
 from swashplate.cli.terminal import note, say, show, working
 from swashplate.cli.validate import chosen_axis
 from swashplate.errors import InputError
+from swashplate.tables import TABLE
 
 if TYPE_CHECKING:
     from swashplate.campaign.kinds import ChannelKind
@@ -118,6 +120,7 @@ def advise(
     )
     from swashplate.identification.sensors import ADDED, assumed_sensors, measurable
 
+    check_outputs((out, TABLE))
     with working("Judging tests"):
         bench = _bench(word, drive, axis, setup, free or [], noise or [])
         machine = Drive(bench.parameters)

@@ -11,7 +11,8 @@ DriveWord = Annotated[
     str,
     typer.Argument(
         metavar="AXIS|SET.toml",
-        help="A packaged drive (see 'swashplate axes') or your own TOML file.",
+        help="A packaged drive (see 'swashplate axes'), your own TOML file, or the folder of a "
+        "fit.",
         show_default=False,
     ),
 ]

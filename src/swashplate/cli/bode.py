@@ -9,13 +9,17 @@ import typer
 
 from swashplate.cli.arguments import DriveWord, Factors, Figure, Values
 from swashplate.cli.inputs import changes_said, drive_of, title_of
+from swashplate.cli.outputs import check_outputs
 from swashplate.cli.terminal import note, show, table, working
-from swashplate.errors import InputError
+from swashplate.errors import DomainError, InputError
+from swashplate.tables import FIGURE, TABLE
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from swashplate.drive import Drive
     from swashplate.linear.frequency_response import FrequencyResponse
+    from swashplate.linear.model import LinearDrive
 
 EXAMPLES = """\
 Examples:
@@ -75,6 +79,7 @@ def bode(
     """
     import numpy as np
 
+    check_outputs((out, TABLE), (plot, FIGURE))
     if not 2 <= points <= MOST_POINTS:
         raise InputError(f"--points is {points}, but must be 2 to {MOST_POINTS}.")
     if not (np.isfinite([lowest, highest]).all() and 0.0 < lowest < highest):
@@ -83,7 +88,7 @@ def bode(
         )
     with working("Sweeping"):
         chosen = drive_of(drive, values or (), factors or ())
-        linear = None if linear_at is None else chosen.linearize(linear_at)
+        linear = None if linear_at is None else _linear(chosen, linear_at)
         grid = np.union1d(np.geomspace(lowest, highest, points), [frequency])
         response = chosen.frequency_response(grid, amplitudes or AMPLITUDES, bias=bias)
         made = _at(response.at(frequency))
@@ -105,6 +110,15 @@ def bode(
         note(f"Gain, phase and distortion, in SI: {out}")
     if plot is not None:
         note(f"Figure: {plot}")
+
+
+def _linear(drive: Drive, voltage: float) -> LinearDrive:
+    from swashplate.linear.dead_zone import DeadZoneError
+
+    try:
+        return drive.linearize(voltage)
+    except DeadZoneError as error:
+        raise DomainError(f"--linear-at: {error.where}; {error.instead}.") from None
 
 
 def _at(response: FrequencyResponse) -> Table:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swashplate.cli.quality_table import LEGEND, heading, quality_table
-from swashplate.cli.terminal import note, say, show, working
+from swashplate.cli.inputs import drive_file
+from swashplate.cli.outputs import check_outputs
+from swashplate.cli.quality_table import LEGEND, heading, quality_table, widths_of
+from swashplate.cli.terminal import counted, note, say, show, working
 from swashplate.errors import InputError
+from swashplate.tables import FIGURE, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,22 +86,32 @@ def init(
     What each column is gets guessed from its name and unit, and marked as such:
     read the file, mend what is wrong, then run 'swashplate campaign check'.
     """
-    from swashplate.campaign.draft import draft
-    from swashplate.tables import write_text
+    from swashplate.campaign.draft import NO_ENCODER, UNUSED, draft
 
     target = out or logs[0].parent / "campaign.toml"
     if target.exists() and not force:
         raise InputError(f"{target} exists already; name another with --out, or say --force.")
+    check_outputs((target, None))
     with working("Reading"):
-        text = draft(logs, target.parent, drive, counts_per_turn)
+        text = draft(logs, target.parent, _from(target.parent, drive), counts_per_turn)
     write_text(text, target)
     note(f"Draft: {target}")
     guessed = text.count("# guessed")
-    note(f"{guessed} entries are guessed: look for '# guessed', then run")
+    note(f"{counted(guessed, 'entry is', 'entries are')} guessed: look for '# guessed'.")
     for line in text.splitlines():
-        if line.startswith("# Columns that are not used") or "# fill in" in line:
+        if line.startswith((UNUSED, NO_ENCODER)) or "# fill in" in line:
             note(f"  {line.lstrip('# ')}")
-    note(f"  swashplate campaign check {target}")
+    note("Then run")
+    note(f"  swashplate campaign check {shlex.quote(str(target))}")
+
+
+def _from(folder: Path, drive: str | None) -> str | None:
+    """A drive as a campaign file in a folder names it."""
+    file = None if drive is None else drive_file(drive)
+    if file is None:
+        return drive
+    place, root = file.resolve(), folder.resolve()
+    return (place.relative_to(root) if place.is_relative_to(root) else place).as_posix()
 
 
 @app.command("check", epilog=CHECK_EXAMPLES)
@@ -116,19 +130,25 @@ def check(
     """
     from swashplate.campaign.campaign import Campaign
     from swashplate.campaign.quality import examine
+    from swashplate.campaign.shortcomings import without_motion
     from swashplate.campaign.unused_windows import unused_windows
 
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
         qualities = {each.name: examine(each) for each in campaign}
-        of_file = (*unused_windows(campaign), *_beside_the_drives(campaign))
+        of_file = (
+            *unused_windows(campaign),
+            *without_motion(campaign),
+            *_beside_the_drives(campaign),
+        )
     note(heading(campaign))
-    for number, experiment in enumerate(campaign):
+    widths = widths_of(qualities.values())
+    for experiment in campaign:
         found = qualities[experiment.name]
-        show(quality_table(experiment, found, header=number == 0))
+        show(quality_table(experiment, found, widths))
         for each in found:
             for text in each.findings:
-                say(f"! {each.signal}: {text}.")
+                say(f"! {each.signal}: {text}{'' if text.endswith('?') else '.'}")
     note(LEGEND)
     for text in of_file:
         say(f"! {text}.")
@@ -136,13 +156,18 @@ def check(
     findings += len(of_file)
     if not campaign.select(role="fit"):
         note("No run has the role 'fit'.")
-    note("Nothing to look into." if not findings else f"{findings} findings, marked by '!'.")
+    note(
+        f"{counted(findings, 'finding', 'findings')}, marked by '!'."
+        if findings
+        else "Nothing to look into."
+    )
     if strict and findings:
         raise typer.Exit(1)
 
 
 def _beside_the_drives(campaign: Campaign) -> list[str]:
     """What stands out when each axis's drive is simulated under the runs' commands."""
+    from swashplate.campaign.shortcomings import beyond_the_card
     from swashplate.identification.fit import smooth
     from swashplate.identification.soundness import check_runs
 
@@ -152,6 +177,9 @@ def _beside_the_drives(campaign: Campaign) -> list[str]:
             continue
         nominal = smooth(campaign.drive(name).parameters)
         runs = [each for each in campaign.select(axis=name) if each.role != "ignore"]
+        beyond = [said for each in runs for said in beyond_the_card(each)]
+        found += [f"{said}; this run is not held against the drive" for said in beyond]
+        runs = [each for each in runs if not beyond_the_card(each)]
         # a drive that is made up says nothing of what a machine does
         made_up = all(each.status == "assumed" for each in nominal.values())
         if runs and not made_up and all(each.input.kind != "other" for each in runs):
@@ -195,10 +223,15 @@ def plot(
     from swashplate.campaign.campaign import Campaign
     from swashplate.report.figures import plot_campaign, save_figure
 
-    if (run is None) != (channel is None):
-        raise InputError("--run and --channel go together: give both, or none for the overview.")
+    check_outputs((out, FIGURE))
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
+    channels = () if run is None else campaign[run].channels
+    if (run is None) != (channel is None):
+        known = f"; {run} has {', '.join(channels)}" if channels else ""
+        raise InputError(
+            f"--run and --channel go together: give both, or none for the overview{known}."
+        )
     with working("Drawing"):
         if run is not None and channel is not None:
             targets = [out]
@@ -243,7 +276,7 @@ def _close_look(
 
 @app.command("schema", epilog=SCHEMA_EXAMPLES)
 def schema() -> None:
-    """Print the JSON Schema of a campaign file, for editors that check while one writes."""
+    """Print a campaign file's JSON Schema, for editors that check while one writes."""
     from swashplate.campaign.campaign import json_schema
 
     typer.echo(json_schema(), nl=False)

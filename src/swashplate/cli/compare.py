@@ -9,7 +9,9 @@ import typer
 
 from swashplate.cli.arguments import Rate
 from swashplate.cli.inputs import drive_of, maneuver_of
+from swashplate.cli.outputs import check_outputs
 from swashplate.cli.terminal import note, show, table, working
+from swashplate.tables import FIGURE, TABLE
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -58,6 +60,7 @@ def compare(
     from swashplate.cli.measures import rms_difference_deg_s
     from swashplate.simulation.record import least_substeps
 
+    check_outputs((out, TABLE), (plot, FIGURE))
     least_substeps(rate)  # a rate out of range is refused before anything is sampled
     with working("Simulating"):
         drives = _labelled(first, second)

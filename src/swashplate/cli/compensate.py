@@ -24,8 +24,10 @@ from swashplate.cli.inputs import (
     simulated,
     title_of,
 )
+from swashplate.cli.outputs import check_outputs
 from swashplate.cli.terminal import note, show, table, working
 from swashplate.errors import InputError
+from swashplate.tables import FIGURE, Form
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -39,6 +41,7 @@ Examples:
   swashplate compensate hoist --speed-deg-s 5 --speed-deg-s -120
   swashplate compensate luff sine:4,0.1 --plot inverse.png
 """
+INVERSE_MAP = Form("an inverse map", (".toml", ".csv", ".parquet"), (".pq",))
 PRINTED = 5
 """Points each way that are printed."""
 
@@ -89,11 +92,12 @@ def compensate(
 ) -> None:
     """Invert a drive's steady map: the voltage for a wanted speed.
 
-    The map crosses the dead zone at once, ends where the speed saturates, and is
-    straight between its points, so that any controller can follow it. With what a
-    stick does, compares three controllers in simulation: a straight line, the map,
-    and the map with the drive's lag made up for.
+    The map crosses the dead zone at once, ends where the speed saturates, and
+    is straight between its points, so that any controller can follow it. With
+    what a stick does, compares three controllers in simulation: a straight
+    line, the map, and the map with the drive's lag made up for.
     """
+    check_outputs((out, INVERSE_MAP), (plot, FIGURE))
     with working("Inverting"):
         from swashplate.analysis.compensation import inverse_map
 
@@ -151,6 +155,10 @@ def _map_table(found: InverseMap) -> Table:
         size = branch.speed.size
         for n in np.unique(np.linspace(0, size - 1, min(PRINTED, size)).round().astype(int)):
             made.add_row(f"{degrees(branch.speed[n]):z.3f}", f"{branch.voltage[n]:z.4f}")
+    total = found.minus.speed.size + found.plus.speed.size + 1
+    if made.row_count < total:
+        made.caption = f"{made.row_count} of {total} points shown"
+        made.caption_justify = "left"
     return made
 
 

@@ -31,7 +31,7 @@ def demo(
     ] = Path("demo"),
     seed: Annotated[int, typer.Option(help="Of truth and noise.", min=0)] = 1,
 ) -> None:
-    """Identify a virtual hoist from its tests, and hold the result against the truth.
+    """Identify a virtual hoist from its tests, and compare it with the truth.
 
     Draws a hoist that differs from the published one, logs the source's 13
     tests of it through a 12-bit command, an ammeter and an encoder, fits card,

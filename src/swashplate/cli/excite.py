@@ -10,9 +10,11 @@ import typer
 
 from swashplate.cli.arguments import AxisName, CampaignPath
 from swashplate.cli.inputs import parameters_of
+from swashplate.cli.outputs import check_outputs
 from swashplate.cli.terminal import note, say, show, table, working
 from swashplate.cli.validate import chosen_axis
 from swashplate.errors import InputError
+from swashplate.tables import TABLE
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -58,7 +60,10 @@ def excitation(
         ),
     ] = None,
     faint: Annotated[
-        bool, typer.Option("--faint", help="Propose to hold what is hardly told as well.")
+        bool,
+        typer.Option(
+            "--faint", help="Propose to hold what is hardly told as well: only for values you know."
+        ),
     ] = False,
     write: Annotated[
         Path | None,
@@ -89,6 +94,7 @@ def excitation(
     from swashplate.identification.staging import setup_of
     from swashplate.tables import write_text
 
+    check_outputs((write, None), (out, TABLE))
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
         chosen = chosen_axis(campaign, axis)

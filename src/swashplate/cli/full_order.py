@@ -29,8 +29,10 @@ from swashplate.cli.full_order_tables import (
     validity_verdict,
 )
 from swashplate.cli.inputs import Options, changes_said, drive_of, simulated, title_of
+from swashplate.cli.outputs import check_outputs
 from swashplate.cli.terminal import note, progress, say, show, working
 from swashplate.errors import InputError
+from swashplate.tables import FIGURE, TABLE
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -111,6 +113,7 @@ def full_order(
     ones. Prints these, the modes, and by how much the speed of the one-state
     model differs. What is assumed can be replaced by what you know.
     """
+    check_outputs((out, TABLE), (plot, FIGURE))
     if command is None and plot is not None:
         raise InputError("--plot draws one run; name a manoeuvre or a log, such as step:9.")
     if command is None and method != "march":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -20,15 +21,48 @@ Start = Literal["rest", "steady"]
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
+DRIVE = "drive.toml"
+"""The drive in a folder that a fit wrote."""
 _ENDING = re.compile(r"\.[A-Za-z]\w*$")
 
 
+def drive_file(word: str) -> Path | None:
+    """The parameter file that a word means, None for a packaged set.
+
+    A folder means the drive.toml that 'fit' wrote into it; a packaged name goes before a folder of
+    that name, which can be written ``./hoist``.
+
+    Raises
+    ------
+    InputError
+        If it is none of these, or a folder without a drive.
+    """
+    from swashplate.parameters.files import preset_names
+
+    place = Path(word)
+    if word in preset_names():
+        return None
+    if place.is_dir():
+        if not (place / DRIVE).is_file():
+            raise InputError(
+                f"There is no {DRIVE} in {word}: give a folder that 'swashplate fit' wrote, or a "
+                "parameter file."
+            )
+        return place / DRIVE
+    if place.suffix.lower() == ".toml" or len(place.parts) > 1 or place.is_file():
+        return place
+    raise InputError(
+        f"There is no packaged set, file or folder '{word}'; packaged are "
+        f"{', '.join(preset_names())}."
+    )
+
+
 def parameters_of(word: str) -> ParameterSet:
-    """The packaged set of a name, or the set in a TOML file."""
+    """The packaged set of a name, the set in a TOML file, or the one that a fit's folder holds."""
     from swashplate.parameters.files import load_preset, load_set
 
-    is_file = word.lower().endswith(".toml") or len(Path(word).parts) > 1
-    return load_set(word) if is_file else load_preset(word)
+    file = drive_file(word)
+    return load_preset(word) if file is None else load_set(file)
 
 
 def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:
@@ -41,7 +75,8 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
 
 def title_of(word: str, drive: Drive) -> str:
     """A drive's name for a heading; one from a file of another name goes by that, too."""
-    return drive.name if Path(word).stem == drive.name else f"{Path(word).name} ({drive.name})"
+    path = Path(word)
+    return drive.name if path.stem == drive.name else f"{path.name or word} ({drive.name})"
 
 
 def changes_said(word: str, drive: Drive) -> list[str]:
@@ -101,8 +136,11 @@ def maneuver_of(word: str, *drives: Drive) -> Maneuver:
     except InputError as error:
         if ":" in word or not tests:
             raise
-        known = ", ".join(tests)
-        raise InputError(f"{error}; or one of the tests of {axes[0]}: {known}.") from None
+        said = str(error).rstrip(".")
+        near = get_close_matches(word, tests, 1) or [*tests]
+        raise InputError(
+            f'{said}; or name one of the tests of {" or ".join(axes)}, such as "{near[0]}".'
+        ) from None
 
 
 class Options(NamedTuple):
@@ -145,6 +183,7 @@ def _is_file(word: str, drive: Drive) -> bool:
 def _simulated_file(drive: Drive, path: str, options: Options) -> Simulation:
     from swashplate.logs import read_series
 
+    _check_columns(path, options)
     series = read_series(path, options.column, "V", time_column=options.time_column)
     if options.interpolation is None:
         raise InputError(
@@ -162,3 +201,15 @@ def _simulated_file(drive: Drive, path: str, options: Options) -> Simulation:
         )
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+
+
+def _check_columns(path: str, options: Options) -> None:
+    """Say with which option another column is named, if one is not there."""
+    from swashplate.logs import open_log
+
+    log = open_log(path)
+    for option, name in (("--time-column", options.time_column), ("--column", options.column)):
+        try:
+            log.find(name)
+        except InputError as error:
+            raise InputError(f"{str(error).rstrip('.')}, with {option}.") from None

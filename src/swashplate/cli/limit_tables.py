@@ -72,9 +72,9 @@ def share_table(found: LimitShares) -> Table:
         None,
         "Limit",
         ">share of time",
-        ">error without it",
+        ">error without it\ndeg/s",
         ">share of error",
-        ">error if alone",
+        ">error if alone\ndeg/s",
     )
     for share in found.shares:
         if not (share.time_share or share.error_share or share.failure or share.alone):

@@ -28,8 +28,10 @@ from swashplate.cli.inputs import (
     title_of,
 )
 from swashplate.cli.limit_tables import envelope_table, share_table, sine_table
+from swashplate.cli.outputs import check_outputs
 from swashplate.cli.terminal import note, say, show, working
-from swashplate.errors import DomainError
+from swashplate.errors import DomainError, InputError
+from swashplate.tables import FIGURE, TABLE
 
 if TYPE_CHECKING:
     from swashplate.analysis.limits import LimitShare, LimitShares
@@ -42,6 +44,7 @@ Examples:
   swashplate limits luff sine:9,0.1 --plot timeline.png
   swashplate limits mine.toml log.csv --interpolation previous --out shares.csv
 """
+ERROR = 0.1
 FREQUENCIES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
 
 
@@ -57,11 +60,12 @@ def limits(
         ),
     ] = None,
     error: Annotated[
-        float,
+        float | None,
         typer.Option(
-            help="Error within which a sine counts as followed, rms by rms, above 0 and below 1."
+            help="Error within which a sine counts as followed, rms by rms, above 0 and below 1.",
+            show_default=f"{ERROR:g}",
         ),
-    ] = 0.1,
+    ] = None,
     frequencies: Annotated[
         list[float] | None,
         typer.Option(
@@ -103,11 +107,18 @@ def limits(
     component to change first. The error is the rms of the speed less that of a
     drive without limits. The shares need not add up to 100 %.
     """
+    check_outputs((out, TABLE), (plot, FIGURE))
     options = Options(rate, interpolation, start, clip, time_column, column)
+    if command is not None and (error is not None or frequencies):
+        raise InputError(
+            "--error and --frequency belong to the sines that a drive can follow, which are said "
+            f"without a command: leave them out, or '{command}'."
+        )
     chosen = drive_of(drive, values or (), factors or ())
     title = title_of(drive, chosen)
     if command is None:
-        _say_envelope(drive, chosen, title, error, tuple(frequencies or FREQUENCIES), out, plot)
+        within = ERROR if error is None else error
+        _say_envelope(drive, chosen, title, within, tuple(frequencies or FREQUENCIES), out, plot)
     else:
         _say_shares(drive, chosen, title, command, options, out, plot)
     if plot is not None:
@@ -189,16 +200,26 @@ def _say_shares(
         show(shares)
     _say_first(found)
     if found.first is not None and not changes_said(word, drive):
-        _say_try(word, command, options, found.first)
+        _say_try(word, command, options, found, found.first)
     if out is not None:
         note(f"Shares of each limit, in SI: {out}")
 
 
-def _say_try(word: str, command: str, options: Options, first: LimitShare) -> None:
-    """The command that shows what a change of the first limit buys, where there is one."""
-    if options.start != "rest" or options.clip:
+def _say_try(
+    word: str, command: str, options: Options, found: LimitShares, first: LimitShare
+) -> None:
+    """What a change of the first limit buys, and the command that shows more of it."""
+    if first.eased_error is None or options.start != "rest" or options.clip:
         return
-    words = ["swashplate", "whatif", word, "--scale", f"{first.lever}={first.eases:g}"]
+    named = " and ".join(f"{name} x {factor:.4g}" for name, factor in first.eased_by.items())
+    fall = 100.0 * (1.0 - first.eased_error / found.error)
+    say(
+        f"With {named} it {'falls' if fall >= 0.0 else 'grows'} by {abs(fall):.1f} % to "
+        f"{degrees(first.eased_error):.3f} deg/s rms."
+    )
+    words = ["swashplate", "whatif", word]
+    for name, factor in first.eased_by.items():
+        words += ["--scale", f"{name}={factor:.6g}"]
     words += ["--maneuver", command]
     for option, given, usual in (
         ("--rate", f"{options.rate:g}", "512"),
@@ -208,7 +229,7 @@ def _say_try(word: str, command: str, options: Options, first: LimitShare) -> No
     ):
         if given is not None and given != usual:
             words += [option, given]
-    note(f"To try: {shlex.join(words)}")
+    note(f"See more of it: {shlex.join(words)}")
 
 
 def _say_first(found: LimitShares) -> None:

@@ -9,7 +9,9 @@ import typer
 
 from swashplate.cli.arguments import DriveWord, Factors, Values
 from swashplate.cli.inputs import changes_said, drive_of, title_of
+from swashplate.cli.outputs import check_outputs
 from swashplate.cli.terminal import note, show, table, working
+from swashplate.errors import DomainError, InputError
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -100,15 +102,36 @@ def linearize(
     """
     import numpy as np
 
+    from swashplate.linear.dead_zone import DeadZoneError
+    from swashplate.linear.files import LINEAR_MODEL
+
+    check_outputs((out, LINEAR_MODEL))
+    if sum(each is not None for each in (at, current, speed_deg_s)) != 1:
+        raise InputError(
+            "A drive is linearised at a voltage, a current or a speed: give one of --at, --current "
+            "and --speed-deg-s."
+        )
+    if current is not None and input == "voltage":
+        raise InputError("--input voltage needs --at or --speed-deg-s, not --current.")
     with working("Linearising"):
         chosen = drive_of(drive, values or (), factors or ())
-        model = chosen.linearize(
-            at,
-            current=current,
-            speed=None if speed_deg_s is None else float(np.radians(speed_deg_s)),
-            input=input,
-            coulomb=coulomb,
-        )
+        if coulomb == "tangent" and chosen.parameters.coulomb_sign == "literal":
+            raise InputError(
+                "The literal sign of the card's Coulomb term has no slope; take --coulomb ignored."
+            )
+        try:
+            model = chosen.linearize(
+                at,
+                current=current,
+                speed=None if speed_deg_s is None else float(np.radians(speed_deg_s)),
+                input=input,
+                coulomb=coulomb,
+            )
+        except DeadZoneError as error:
+            raise DomainError(
+                f"{error.where}; {error.instead}, or the pump alone with "
+                "--current 0 --input solenoid_force."
+            ) from None
         if sample_time is not None:
             model = model.discrete(sample_time, interpolation)
         tables = [_point(model), _motion(model, frequency), _poles(model)]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.analysis.limits import time_share
 from swashplate.simulation.limits import Limit
 
 if TYPE_CHECKING:
@@ -41,11 +42,8 @@ def peak_speeds_deg_s(run: Simulation) -> Peaks:
 
 
 def limit_shares(run: Simulation) -> dict[str, float]:
-    """Share of the samples at which each limit acts, 0 to 1, by its name in words."""
-    return {
-        str(limit.name).lower().replace("_", " "): float(run.active(limit).mean())
-        for limit in Limit
-    }
+    """Share of the samples at which each limit acts, see `analysis.limits.time_share`, by name."""
+    return {str(limit.name).lower().replace("_", " "): time_share(run, limit) for limit in Limit}
 
 
 def largest_command(run: Simulation) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import degrees, isnan
 from typing import TYPE_CHECKING
 
@@ -15,18 +15,9 @@ if TYPE_CHECKING:
     from swashplate.campaign.experiment import Experiment
     from swashplate.campaign.quality import Quality
 
-WIDTHS = {
-    "signal": 13,
-    ">Hz": 6,
-    ">jitter": 6,
-    ">gap": 6,
-    "range": 20,
-    ">clip": 5,
-    ">stuck": 5,
-    ">lost": 4,
-}
-"""Columns of the check, the same in each run's table, so that all stand one above the other."""
-
+LINE, BETWEEN = 80, 2
+"""Characters of a line, and those between two columns."""
+COLUMNS = ("signal", ">Hz", ">jitter", ">gap", "range", ">clip", ">stuck", ">lost")
 
 LEGEND = (
     "jitter and longest gap in ms; clip: % of the samples at the ends of the instrument's range;\n"
@@ -34,30 +25,49 @@ LEGEND = (
 )
 
 
-def quality_table(experiment: Experiment, qualities: Sequence[Quality], *, header: bool) -> Table:
-    """The signals of one experiment; all tables have the same widths."""
+def widths_of(runs: Iterable[Sequence[Quality]]) -> list[int]:
+    """Widths of the columns that fit all runs, so that they stand one above the other.
+
+    The first is at most what the others leave of a line.
+    """
+    rows = [[head.removeprefix(">") for head in COLUMNS]]
+    rows += [_cells(each) for found in runs for each in found]
+    names, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
+    left = LINE - sum(others) - BETWEEN * len(others)
+    return [max(min(names, left), len(COLUMNS[0])), *others]
+
+
+def quality_table(
+    experiment: Experiment, qualities: Sequence[Quality], widths: Sequence[int]
+) -> Table:
+    """The signals of one experiment, in columns of the widths of `widths_of`."""
     stamps = qualities[0].stamps
     made = table(
         f"{experiment.name}: {experiment.maneuver}, to {experiment.role}, "
         f"{experiment.duration:.4g} s, {stamps.rows} samples",
-        *WIDTHS,
+        *COLUMNS,
         wrap="signal",
     )
-    made.show_header = header
-    for column, width in zip(made.columns, WIDTHS.values(), strict=True):
+    for column, width in zip(made.columns, widths, strict=True):
         column.width = width
+    made.columns[0].overflow = "fold"  # a name that is too long goes on in the next line
     for each in qualities:
-        made.add_row(
-            each.signal,
-            f"{each.stamps.rate:.4g}",
-            _milliseconds(each.stamps.jitter),
-            _milliseconds(each.stamps.longest) if each.stamps.gaps.size else "-",
-            _range(each),
-            "" if isnan(each.clipped) else f"{100.0 * each.clipped:.2g}",
-            "" if each.stuck is None else f"{each.stuck:.2f}",
-            "" if each.lost_counts is None else f"{each.lost_counts}",
-        )
+        made.add_row(*_cells(each))
     return made
+
+
+def _cells(quality: Quality) -> list[str]:
+    stamps = quality.stamps
+    return [
+        quality.signal,
+        f"{stamps.rate:.4g}",
+        _milliseconds(stamps.jitter),
+        _milliseconds(stamps.longest) if stamps.gaps.size else "-",
+        _range(quality),
+        "" if isnan(quality.clipped) else f"{100.0 * quality.clipped:.2g}",
+        "" if quality.stuck is None else f"{quality.stuck:.2f}",
+        "" if quality.lost_counts is None else f"{quality.lost_counts}",
+    ]
 
 
 def _milliseconds(seconds: float) -> str:

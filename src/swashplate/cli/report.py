@@ -9,7 +9,7 @@ import typer
 
 from swashplate.cli.inputs import parameters_of
 from swashplate.cli.terminal import note, say, working
-from swashplate.cli.validate import drive_file, made_folder
+from swashplate.cli.validate import made_folder
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def report(
     from swashplate.report.fit_page import save_fit_figures, write_fit_report
 
     with working(f"Reading {path}"):
-        true = None if truth is None else parameters_of(drive_file(truth))
+        true = None if truth is None else parameters_of(truth)
         campaign = Campaign.from_toml(path)
         if true is not None and not campaign.virtual:
             raise InputError(f"{path} is not virtual: nobody knows its truth, leave out --truth.")

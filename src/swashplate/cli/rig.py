@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from swashplate.cli.arguments import DriveWord
-from swashplate.cli.inputs import maneuver_of, parameters_of
+from swashplate.cli.inputs import drive_file, maneuver_of, parameters_of
 from swashplate.cli.terminal import note, show, table, working
 from swashplate.errors import InputError
 
@@ -78,9 +78,8 @@ def rig(
 
     with working("Simulating"):
         nominal = Drive(parameters_of(drive))
-        own = drive.lower().endswith(".toml")
         tests = bench.run(
-            nominal if own else drive,
+            drive if drive_file(drive) is None else nominal,
             None if not maneuver else [maneuver_of(each, nominal) for each in maneuver],
             seed=seed,
             severity=severity,

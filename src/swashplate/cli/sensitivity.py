@@ -10,8 +10,10 @@ import typer
 from swashplate.cli.arguments import DriveWord, FileInterpolation, Rate, TimeColumn, VoltageColumn
 from swashplate.cli.inputs import Options, drive_of, title_of
 from swashplate.cli.levers import ranges_from, trial_of
+from swashplate.cli.outputs import check_outputs
 from swashplate.cli.terminal import note, say, show, table, working
 from swashplate.errors import InputError
+from swashplate.tables import FIGURE, TABLE
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -107,6 +109,7 @@ def sensitivity(
     from swashplate.analysis.sensitivity import one_at_a_time
     from swashplate.analysis.sobol import sobol
 
+    check_outputs((out, TABLE), (plot, FIGURE))
     wanted = tuple(outcomes) if outcomes else OUTCOMES
     indices = None
     with working("Simulating"):

@@ -16,7 +16,9 @@ from swashplate.cli.inputs import (
     simulated,
     title_of,
 )
+from swashplate.cli.outputs import check_outputs
 from swashplate.cli.terminal import note, show, table, working
+from swashplate.tables import FIGURE, TABLE
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -85,9 +87,11 @@ def simulate(
     """Simulate a drive over a manoeuvre or a measured voltage.
 
     Prints what the drive did: its largest speeds and currents, how far it went
-    and how long each of its limits held it back. --out writes every signal of
-    the chain, --plot draws them. 'swashplate --help' lists the manoeuvres.
+    and how long each of its limits held it back, the dead zone only while the
+    command is not 0 V. --out writes every signal of the chain, --plot draws
+    them. 'swashplate --help' lists the manoeuvres.
     """
+    check_outputs((out, TABLE), (plot, FIGURE))
     options = Options(rate, interpolation, start, clip, time_column, column)
     with working("Simulating"):
         chosen = drive_of(drive, values or (), factors or ())

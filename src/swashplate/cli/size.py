@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from math import ceil, copysign
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -10,13 +12,16 @@ import typer
 from swashplate.cli.arguments import DriveWord
 from swashplate.cli.inputs import drive_of, maneuver_of, title_of
 from swashplate.cli.levers import ranges_from
+from swashplate.cli.outputs import check_outputs
 from swashplate.cli.terminal import note, say, show, table, working
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from swashplate.analysis.performance import Wanted
     from swashplate.analysis.sizing import Requirements, Sizing
+    from swashplate.drive import Drive
 
 EXAMPLES = """\
 Examples:
@@ -89,6 +94,7 @@ def size(
     from swashplate.analysis.sizing import size as sized
     from swashplate.analysis.trial import proportional_speed
 
+    check_outputs((out, None))
     if (tracking_deg_s is None) != (maneuver is None):
         raise InputError("--tracking-deg-s and --maneuver belong together: give both or neither.")
     required = Requirements(
@@ -110,14 +116,37 @@ def size(
     if found.change == 0.0:
         say("The drive meets it as it is; nothing needs to be changed.")
     else:
-        words = " ".join(
-            f"--scale {name}={factor:.4g}"
-            for name, factor in found.factors.items()
-            if factor != 1.0
-        )
-        note(f"See it over a command: swashplate whatif {drive} {words}")
+        words = ["swashplate", "whatif", drive]
+        for name, factor in _rounded(found, chosen, required, follow).items():
+            words += ["--scale", f"{name}={factor:.9g}"]
+        note(f"See it over a command: {shlex.join(words)}")
     if out is not None:
         note(f"Changed drive: {out}")
+
+
+def _rounded(
+    found: Sizing, drive: Drive, required: Requirements, follow: Wanted | None
+) -> dict[str, float]:
+    """Factors that someone can type: short, and still enough.
+
+    Each is rounded away from 1, to as few decimals, four or more, as meet what is required.
+    """
+    from swashplate.analysis.levers import pulled
+    from swashplate.analysis.performance import performance
+
+    moved = {name: factor for name, factor in found.factors.items() if factor != 1.0}
+    for decimals in range(4, 9):
+        factors = {name: _away_from_one(factor, decimals) for name, factor in moved.items()}
+        after = performance(pulled(drive, factors), follow, direction=required.direction)
+        if min(required.slacks(after).values()) >= 0.0:
+            return factors
+    return moved
+
+
+def _away_from_one(factor: float, decimals: int) -> float:
+    # round() drops what only the factor's last bits are off a number of so many decimals
+    steps = ceil(round(abs(factor - 1.0) * 10.0**decimals, 6))
+    return 1.0 + copysign(steps, factor - 1.0) / 10.0**decimals
 
 
 def _radians(degrees: float | None) -> float | None:

@@ -120,6 +120,11 @@ def long_work(text: str) -> Iterator[Shown]:
         yield show
 
 
+def counted(number: int, one: str, several: str) -> str:
+    """A number and what it counts: ``"1 finding"``, ``"2 findings"``."""
+    return f"{number} {one if number == 1 else several}"
+
+
 def waiting(seconds: float | None, sort: str = "about") -> str:
     """A time left in words a person takes in at once: ``"about 12 s left"``."""
     if seconds is None:

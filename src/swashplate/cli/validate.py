@@ -12,6 +12,8 @@ from swashplate.cli.arguments import AxisName, CampaignPath
 from swashplate.cli.inputs import parameters_of
 from swashplate.cli.terminal import note, say, show, side, working
 from swashplate.cli.validation_tables import (
+    MEASURES,
+    RESIDUALS,
     errors_table,
     left_out,
     measures_table,
@@ -77,7 +79,7 @@ def validate(
     if figures is not None and out is None:
         raise InputError("--figures needs a folder to write them to: give --out DIR.")
     with working(f"Reading {path}"):
-        parameters = parameters_of(drive_file(drive))
+        parameters = parameters_of(drive)
         campaign = Campaign.from_toml(path)
         chosen = chosen_axis(campaign, axis)
         wanted = ("fit", "validate") if role == "all" else (role,)
@@ -100,10 +102,13 @@ def validate(
             lines = _written(parameters, campaign, predicted, judged, out, figures, drive)
     virtual = " (virtual)" if campaign.virtual else ""
     note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
-    show(*quality_tables(qualities), *(errors_table(each) for each in errors))
+    show(*quality_tables(qualities))
+    say(MEASURES)
+    show(*(errors_table(each) for each in errors))
     for words in left_out(errors):
         say(f"- {words}")
     show(residual_table(predicted))
+    say(RESIDUALS)
     for words in judged.sentences:
         say(f"- {words}")
     for line in lines:
@@ -112,11 +117,6 @@ def validate(
         side.print(judged.headline)
         raise typer.Exit(1)
     say(judged.headline)
-
-
-def drive_file(word: str) -> str:
-    """A drive as it is named, or the drive.toml in a folder that a fit wrote."""
-    return str(Path(word) / "drive.toml") if Path(word).is_dir() else word
 
 
 def chosen_axis(campaign: Campaign, axis: str | None) -> str:

@@ -16,6 +16,19 @@ if TYPE_CHECKING:
     from swashplate.identification.validation import ChannelErrors
 
 
+MEASURES = (
+    "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - NRMSE); "
+    "'of its range' below means RMSE over the largest less the smallest value measured."
+)
+"""What the errors of the runs are."""
+RESIDUALS = (
+    "'own' is how long residuals stay correlated, 'input' their largest correlation with the "
+    "command, at that lag (positive: after it). Residuals that owe nothing to the command stay "
+    "within the band at 95 % of the lags; * marks what lies beyond, as the largest may by chance."
+)
+"""What the columns of the residuals' table are."""
+
+
 def quality_tables(qualities: Sequence[RunQuality]) -> list[Table]:
     """A table for each channel: errors of each run and of all, with start and what is ignored."""
     from swashplate.identification.validation import ignored_windows, pooled
@@ -90,11 +103,14 @@ def errors_table(found: ChannelErrors) -> Table:
 
 
 def left_out(errors: Sequence[ChannelErrors]) -> list[str]:
-    """What the error tables leave out, each rule once, and what else belongs to them."""
+    """What the error tables leave out, each rule that acted once, and what else belongs to them."""
     said = []
     if errors:
         said.append("Per cent of what is measured at that instant.")
+    acted = {rule for each in errors for rule in each.table.acted}
     for rule in dict.fromkeys(rule for each in errors for rule in each.table.rules):
+        if rule not in acted:
+            continue
         runs = dict.fromkeys(
             run for each in errors for run, by in each.table.left_out if by == rule.name
         )
@@ -109,13 +125,14 @@ def left_out(errors: Sequence[ChannelErrors]) -> list[str]:
 
 
 def residual_table(qualities: Sequence[RunQuality]) -> Table:
-    """How long residuals stay correlated, and how far they follow the input."""
+    """How long residuals stay correlated, and how far they follow the input; see `RESIDUALS`."""
     made = table(
-        "Residuals: how long they stay correlated, and how much with the input",
+        "Residuals: correlation with themselves and with the input",
         "run",
         "channel",
         ">own",
         ">input",
+        "",
         ">95 % band",
         ">lag",
         wrap="run",
@@ -130,6 +147,7 @@ def residual_table(qualities: Sequence[RunQuality]) -> Table:
             each.channel,
             f"{test.duration:.2g} s",
             f"{value:+.2f}",
+            "*" if abs(value) > test.cross_band else "",
             f"{test.cross_band:.2f}",
             f"{lag:+.2f} s",
         )

@@ -4,21 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from swashplate.cli.arguments import Figure, FileInterpolation, Rate, TimeColumn, VoltageColumn
+from swashplate.cli.arguments import (
+    DriveWord,
+    Figure,
+    FileInterpolation,
+    Rate,
+    TimeColumn,
+    VoltageColumn,
+)
 from swashplate.cli.inputs import Options, drive_of, title_of
 from swashplate.cli.levers import factors_of, list_levers, trial_of
+from swashplate.cli.outputs import check_outputs
 from swashplate.cli.terminal import note, say, show, table, working
 from swashplate.errors import InputError
+from swashplate.tables import FIGURE
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from rich.table import Table
 
     from swashplate.analysis.bands import Bands
     from swashplate.analysis.draws import Draws
+    from swashplate.analysis.outcomes import Outcome
     from swashplate.analysis.whatif import WhatIf
 
 EXAMPLES = """\
@@ -34,15 +45,7 @@ CHOSEN = ("final_speed", "rise_time", "largest_acceleration", "tracking_error", 
 
 
 def whatif(
-    drive: Annotated[
-        str,
-        typer.Argument(
-            metavar="AXIS|SET.toml",
-            help="A packaged drive (see 'swashplate axes'), your own TOML file, or the folder of a "
-            "fit.",
-            show_default=False,
-        ),
-    ],
+    drive: DriveWord,
     factors: Annotated[
         list[str],
         typer.Option(
@@ -96,20 +99,19 @@ def whatif(
 ) -> None:
     """See what a change of the machine does.
 
-    Simulates the drive as it is and with its levers moved, over one command. The
-    speed that is wanted is in proportion to the voltage, at the ratio of the drive
-    as it is. With --uncertainty outcomes get intervals and the figure bands:
-    drives are drawn from the errors of a fit's estimates.
+    Simulates the drive as it is and with its levers moved, over one command.
+    The speed that is wanted is in proportion to the voltage, at the ratio of
+    the drive as it is. With --uncertainty outcomes get intervals and the figure
+    bands: drives are drawn from the errors of a fit's estimates.
     """
     from swashplate.analysis.whatif import what_if
-    from swashplate.cli.validate import drive_file
 
+    check_outputs((out, None), (plot, FIGURE))
     moved = factors_of(factors)
     if uncertainty is not None and draws < 20:
         raise InputError(f"--draws is {draws}, but bands need 20 or more.")
-    word = drive_file(drive)
     with working("Simulating"):
-        chosen = drive_of(word)
+        chosen = drive_of(drive)
         options = Options(rate, interpolation, "rest", False, time_column, column)
         name, trial = trial_of(chosen, maneuver, options)
         result = what_if(chosen, moved, trial, outcomes=CHOSEN)
@@ -126,7 +128,7 @@ def whatif(
     with working("Writing"):
         made = _before_and_after(result, drawn)
         bands = _bands(result, drawn)
-        title = f"{title_of(word, chosen)}, {name}"
+        title = f"{title_of(drive, chosen)}, {name}"
         if out is not None:
             result.after.drive.to_toml(out)
         if plot is not None:
@@ -166,10 +168,12 @@ def _before_and_after(result: WhatIf, drawn: Mapping[str, Draws]) -> Table:
     made = table(None, "", *columns, ">change", "unit")
     speed = next(each for each in result.outcomes if each.unit == "rad/s")
     limits = zip(result.before.speed_limits, result.after.speed_limits, strict=True)
-    for way, (before, after) in zip(("positive", "negative"), limits, strict=True):
+    ends = [_limit_half_widths(speed, each) for each in drawn.values()]
+    for way, (before, after) in enumerate(limits):
         texts = [outcome_text(speed, before), outcome_text(speed, after)]
-        cells = [texts[0], "", texts[1], ""] if drawn else texts
-        made.add_row(f"speed limit, {way}", *cells, _change(before, after), "deg/s")
+        cells = [texts[0], ends[0][way], texts[1], ends[1][way]] if drawn else texts
+        word = ("positive", "negative")[way]
+        made.add_row(f"speed limit, {word}", *cells, _change(before, after), "deg/s")
     for k, outcome in enumerate(result.outcomes):
         before, after = float(result.before.values[k]), float(result.after.values[k])
         texts = [outcome_text(outcome, before), outcome_text(outcome, after)]
@@ -189,17 +193,32 @@ def _change(before: float, after: float) -> str:
 
 def _half_widths(result: WhatIf, draws: Draws) -> list[str]:
     """Half of the interval that holds most of the drives, for each outcome."""
-    import numpy as np
-
     from swashplate.analysis.outcome_batch import batch_outcomes
     from swashplate.report.outcome_units import outcome_text
 
     found = batch_outcomes(draws.drives[0], draws.columns, result.trial, result.outcomes)
-    texts = []
-    for k, outcome in enumerate(found.outcomes):
-        low, high = np.quantile(found.values[:, k], [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
-        texts.append(outcome_text(outcome, 0.5 * float(high - low)))
-    return texts
+    return [
+        outcome_text(outcome, _half_width(found.values[:, k]))
+        for k, outcome in enumerate(found.outcomes)
+    ]
+
+
+def _limit_half_widths(speed: Outcome, draws: Draws) -> list[str]:
+    """The same of the speed limits, each way."""
+    import numpy as np
+
+    from swashplate.parameters.rules import FULL_VOLTAGE
+    from swashplate.report.outcome_units import outcome_text
+
+    speeds = [each.steady_speed([FULL_VOLTAGE, -FULL_VOLTAGE]) for each in draws.drives]
+    return [outcome_text(speed, _half_width(each)) for each in np.transpose(speeds)]
+
+
+def _half_width(values: NDArray[Any]) -> float:
+    import numpy as np
+
+    low, high = np.quantile(values, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
+    return 0.5 * float(high - low)
 
 
 def _bands(result: WhatIf, drawn: Mapping[str, Draws]) -> dict[str, Bands]:

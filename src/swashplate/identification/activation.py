@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
+from swashplate.errors import InputError
 from swashplate.identification.drives import current_record, voltage_record
 from swashplate.identification.forces import Forces
 from swashplate.identification.unknowns import Unknown
@@ -68,11 +69,14 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
     """
     start: Start = "steady" if experiment.start == "steady" else "rest"
     refined = bool(parameters.refinements)
-    if experiment.input.kind == "current":
-        march = simulate_refined_pump if refined else simulate_pump
-        return march(parameters, current_record(experiment), start, experiment.start_pressure)
-    drive = simulate_refined_drive if refined else simulate_drive
-    return drive(parameters, voltage_record(experiment), start, experiment.start_pressure)
+    try:
+        if experiment.input.kind == "current":
+            march = simulate_refined_pump if refined else simulate_pump
+            return march(parameters, current_record(experiment), start, experiment.start_pressure)
+        drive = simulate_refined_drive if refined else simulate_drive
+        return drive(parameters, voltage_record(experiment), start, experiment.start_pressure)
+    except InputError as error:
+        raise InputError(f"{experiment.input.source}: {error}") from None
 
 
 def acting(simulation: Simulation, parameters: ParameterSet) -> dict[str, float]:

@@ -15,68 +15,17 @@ from swashplate.identification.fit import StageFit
 from swashplate.identification.handed_on import Handed, slopes_by_earlier
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import reach
-from swashplate.identification.linearised import TOLERANCE, LinearisedFit, LinearisedRun
+from swashplate.identification.linearised import LinearisedFit
+from swashplate.identification.linearising import linearised_fit
 from swashplate.identification.measures import Measures, measures
-from swashplate.identification.model import Differentiable
+from swashplate.identification.prior_weights import prior_sentences
 from swashplate.identification.problem import Problem
 from swashplate.identification.residual_tests import ResidualTest, residual_test
 from swashplate.identification.uncertainty import Uncertainty, uncertainty
-from swashplate.identification.variables import Variables
 
 Array = NDArray[np.float64]
-BY_DIFFERENCES = 1e-6
-"""Singular values of difference derivatives below this part of the largest count as zero."""
 LIMITS = ("Z13", "Z14", "Z15", "Z16")
 """Parameters that limit something: stops, strokes, relief, orifices."""
-
-
-def variables_of(problem: Problem, vector: Array) -> Variables:
-    """The unknowns at a point, as the statistics see them."""
-    unknowns = problem.unknowns
-    bounds = unknowns.at_bounds(vector)
-    side = {"lower": -1, "upper": 1}
-    return Variables.of(
-        unknowns.names,
-        list(unknowns.values(vector).values()),
-        scales=[each.scale for each in unknowns],
-        logarithmic=[each.log for each in unknowns],
-        at_bound=[side.get(bounds.get(name, ""), 0) for name in unknowns.names],
-    )
-
-
-def linearised_fit(problem: Problem, vector: Array) -> LinearisedFit:
-    """Residuals and derivatives of every run at a point, ignored samples left out.
-
-    Parameters
-    ----------
-    problem : Problem
-        What was fitted.
-    vector : (K,) array
-        The solver's vector at the optimum.
-    """
-    runs = []
-    for number, experiment in enumerate(problem.experiments):
-        weights = problem.weights[number]
-        for name, part in problem.linearised(vector, number).items():
-            used = weights[name] > 0.0
-            runs.append(
-                LinearisedRun(
-                    experiment.name,
-                    name,
-                    experiment[name].time[used],
-                    part.values[used],
-                    part.by[used],
-                    weights[name][used],
-                )
-            )
-    _, prior = problem.unknowns.prior_rows(vector)
-    exact = isinstance(problem.model, Differentiable)
-    return LinearisedFit.of(
-        runs,
-        variables_of(problem, vector),
-        prior=prior,
-        tolerance=TOLERANCE if exact else BY_DIFFERENCES,
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +88,8 @@ class Assessment:
             if slopes is not None:
                 handed.append(Handed(each.uncertainty.quoted, slopes))
         found = uncertainty(self.linearised, handed=handed)
+        said = prior_sentences(self.stage.problem.unknowns, self._vector, found.quoted)
+        found = replace(found, priors=said)
         if not found.noisy:
             return found
         half = reach(found.own, found.level)

@@ -14,9 +14,8 @@ from swashplate.campaign.kinds import KINDS
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.advice import Candidate
-from swashplate.identification.assessment import linearised_fit
-from swashplate.identification.autocorrelation import noise_colours
 from swashplate.identification.linearised import triangular_factor
+from swashplate.identification.measured_noise import interval, measured_sensors
 from swashplate.identification.problem import Problem
 from swashplate.identification.sensors import RATE, Sensor, default_sensors, measurable
 from swashplate.identification.setup import Free, Setup, Stage
@@ -27,9 +26,6 @@ from swashplate.parameters.catalogue import CATALOGUE
 from swashplate.parameters.parameter_set import ParameterSet, find
 
 Array = NDArray[np.float64]
-
-NOISELESS = 1e-9
-"""Residuals, over their channel's noise, that are rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,15 +106,15 @@ def bench(
         _, prior = problem.unknowns.prior_rows(problem.start)
         return Bench(parameters, stage, variables, prior[:, machine], chosen)
     problem = stage_problem(stage, parameters, experiments)
-    variables, _ = _machine(problem)
-    known = _measured(problem, fitted)
+    variables, machine = _machine(problem)
+    known = measured_sensors(problem, machine, fitted=fitted)
     own = {each.kind: each for each in sensors}
     named = {}
     for name, sensor in known.items():
         named[name] = own.pop(sensor.kind, sensor)
     # an independent sample every so often: the others are worth nothing
     scales = {
-        name: sensor.noise * float(np.sqrt(max(sensor.memory / _interval(problem, name), 1.0)))
+        name: sensor.noise * float(np.sqrt(max(sensor.memory / interval(problem, name), 1.0)))
         for name, sensor in named.items()
     }
     present = _machine_rows(replace(problem, scales=scales), problem.start)
@@ -193,47 +189,3 @@ def _machine_rows(problem: Problem, vector: Array) -> Array:
     own = [k for k in range(derivatives.shape[1]) if k not in machine]
     factor = triangular_factor(np.column_stack([derivatives[:, own], derivatives[:, machine]]))
     return np.asarray(factor[len(own) :, len(own) :])
-
-
-def _measured(problem: Problem, fitted: bool) -> dict[str, Sensor]:
-    """The campaign's own sensors, by channel."""
-    kinds = {
-        name: each[name].kind
-        for each in problem.experiments
-        for name in problem.channels
-        if name in each.channels
-    }
-    if not fitted:
-        return {
-            name: Sensor(kind, problem.scales[name], origin="as in the campaign")
-            for name, kind in kinds.items()
-        }
-    fit = linearised_fit(problem, problem.start)
-    made = {}
-    for name, kind in kinds.items():
-        ours = [run for run in fit.runs if run.channel == name]
-        residual = np.concatenate([run.residual for run in ours])
-        deviation = float(np.sqrt(np.mean(residual**2)))
-        if not deviation > NOISELESS:
-            raise InputError(
-                f"The residuals of '{name}' are as good as zero: without noise any test is perfect."
-            )
-        colours = [each for each in noise_colours(fit) if each.channel == name]
-        memory = max(each.inflation * each.step for each in colours)
-        made[name] = Sensor(kind, problem.scales[name] * deviation, memory, "residuals of the fit")
-    return made
-
-
-def _interval(problem: Problem, channel: str) -> float:
-    """Median interval between samples of a channel. [s]"""
-    return float(
-        np.median(
-            np.concatenate(
-                [
-                    np.diff(each[channel].time)
-                    for each in problem.experiments
-                    if channel in each.channels and each[channel].time.size > 1
-                ]
-            )
-        )
-    )

@@ -121,7 +121,7 @@ def hac_covariance(
     grids = [grid_of(run.time) for run in fit.runs]
     widths = _bandwidths(fit, grids, bandwidths)
     directions = fit.whitening
-    middle = directions.T @ fit.prior.T @ fit.prior @ directions
+    middle = directions.T @ fit.prior_middle @ directions
     for run, grid, width, residual in zip(
         fit.runs, grids, widths, corrected_residuals(fit, grids, widths), strict=True
     ):

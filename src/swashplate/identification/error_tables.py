@@ -46,12 +46,14 @@ class ErrorTable:
     """Of the kinds of test that there are: ramp, step, sine."""
     rules: tuple[Rule, ...]
     """That were applied."""
+    acted: tuple[Rule, ...]
+    """Those of them that left out a sample."""
     reference: Reference
     left_out: tuple[tuple[str, str], ...]
     """Runs that were left out as a whole, and the rule."""
 
     def sentences(self) -> tuple[str, ...]:
-        """The table in words, and every rule that was applied."""
+        """The table in words, and every rule that left out anything."""
         said = []
         for row in self.rows:
             if row.percent is None:
@@ -63,7 +65,7 @@ class ErrorTable:
                 )
         of = "what is measured then" if self.reference == "measured" else "the run's largest value"
         said.append(f"Per cent of {of}.")
-        said += [f"Left out ({rule.name}): {rule.why}" for rule in self.rules]
+        said += [f"Left out ({rule.name}): {rule.why}" for rule in self.acted]
         return tuple(said)
 
 
@@ -103,6 +105,7 @@ def error_table(
     if not average >= 0.0:
         raise InputError(f"The width {average:g} s of a moving mean must not be negative.")
     rows, left_out = [], list[tuple[str, str]]()
+    acted = set[str]()
     for kind in get_args(Kind):
         alike = [run for run in runs if run.kind == kind]
         if not alike:
@@ -111,9 +114,10 @@ def error_table(
         samples, judged = 0, 0
         for run in alike:
             _check(run)
-            kept, by = _kept(run, rules)
-            if by is not None:
-                left_out.append((run.name, by))
+            kept, whole, by = _kept(run, rules)
+            acted.update(by)
+            if whole is not None:
+                left_out.append((run.name, whole))
             percent, defined = _percent(run, reference, average)
             places = np.flatnonzero(kept & defined)
             samples += places.size
@@ -123,7 +127,8 @@ def error_table(
                 best = float(percent[worst]), run.name, float(run.time[worst])
         percent_of, where, when = best if best is not None else (None, None, None)
         rows.append(LargestError(kind, percent_of, where, when, samples, judged))
-    return ErrorTable(tuple(rows), tuple(rules), reference, tuple(left_out))
+    of_use = tuple(rule for rule in rules if rule.name in acted)
+    return ErrorTable(tuple(rows), tuple(rules), of_use, reference, tuple(left_out))
 
 
 class SineError(NamedTuple):
@@ -156,7 +161,7 @@ def sine_error(run: ComparedRun, *, rules: Sequence[Rule] = SOURCE_RULES) -> Sin
         raise InputError(f"{run.name} is no sine of known frequency; it has no amplitude error.")
     if run.quantity == "rectified_current":
         raise InputError(f"{run.name}: a rectified current is no sine any more.")
-    kept, _ = _kept(run, rules)
+    kept, _, _ = _kept(run, rules)
     time = run.time[kept]
     if time.size < 8 or _length(time) < (1.0 - 1e-6) / run.frequency:
         raise InputError(f"Of {run.name} less than one period is left to judge.")
@@ -192,15 +197,21 @@ def _percent(
     return np.divide(percent, full, out=np.zeros_like(full), where=full > 0.0), full > 0.0
 
 
-def _kept(run: ComparedRun, rules: Sequence[Rule]) -> tuple[NDArray[np.bool_], str | None]:
-    """(n,) samples that no rule leaves out, and the rule that leaves out all if one does."""
+def _kept(
+    run: ComparedRun, rules: Sequence[Rule]
+) -> tuple[NDArray[np.bool_], str | None, list[str]]:
+    """(n,) samples that no rule leaves out, the rule that leaves out all, and those that act."""
     kept = np.ones(run.time.shape, dtype=np.bool_)
+    acted = []
     for rule in rules:
         out = rule.excluded(run)
         if out.all():
-            return ~out, rule.name
+            # of what is not there at all no other rule can take anything
+            return ~out, rule.name, [rule.name]
+        if out.any():
+            acted.append(rule.name)
         kept &= ~out
-    return kept, None
+    return kept, None, acted
 
 
 def _check(run: ComparedRun) -> None:

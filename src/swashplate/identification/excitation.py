@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
 from swashplate.identification.activation import Activation, activation, simulated_run
-from swashplate.identification.assessment import linearised_fit
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.linearised import LinearisedFit
+from swashplate.identification.linearising import linearised_fit
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage
 from swashplate.identification.staging import stage_problem

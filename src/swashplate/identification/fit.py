@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from hashlib import blake2b
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from swashplate.__about__ import __version__
 from swashplate.campaign.experiment import Experiment
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.executors import Executor, Serial
+from swashplate.identification.prior_weights import weighed
 from swashplate.identification.problem import Problem
 from swashplate.identification.refined_model import is_refined
 from swashplate.identification.setup import Setup, Stage
@@ -136,15 +138,19 @@ def fit(
         if search is not None and search.starts > 0:
             results = _searched(stage, problem, search, method, tolerance, max_evaluations)
             begin = np.array(min(results, key=lambda each: each.cost).vector)
-        solution = solve(
-            problem,
-            begin,
+        solved = partial(
+            solve,
             method=method,
             loss=loss,
             tolerance=tolerance,
             max_evaluations=max_evaluations,
             watch=None if watch is None else _named(watch, stage.name),
         )
+        solution = solved(problem, begin)
+        if any(each.prior is not None for each in problem.unknowns) and not solution.interrupted:
+            # what the residuals are worth is known only now
+            problem = weighed(problem, solution.vector)
+            solution = solved(problem, solution.vector)
         model = problem.model
         assert isinstance(model, DriveModel)
         parameters = model.parameters_at(problem.unknowns.targets(solution.vector, ""))

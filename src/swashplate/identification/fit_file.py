@@ -49,6 +49,8 @@ class StoredStage(Entry):
     unknowns: tuple[str, ...]
     solution: StoredSolution
     starts: tuple[StartResult, ...]
+    worths: tuple[float, ...] = ()
+    """Of the priors, in the order of the unknowns."""
 
 
 class StoredPoint(Entry):

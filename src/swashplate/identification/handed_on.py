@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.identification.covariance import Covariance
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.fit import StageFit
 from swashplate.identification.linearised import LinearisedFit
+
+if TYPE_CHECKING:
+    from swashplate.identification.fit import StageFit
 
 Array = NDArray[np.float64]
 

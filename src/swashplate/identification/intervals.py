@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
@@ -37,6 +38,13 @@ class Estimate(NamedTuple):
     is no end."""
     upper: float | None
     degrees_of_freedom: float | None
+
+    @property
+    def relative_half_width(self) -> float:
+        """Half of the interval over the value's size; infinite where an end is missing."""
+        if self.lower is None or self.upper is None or self.value == 0.0:
+            return inf
+        return 0.5 * (self.upper - self.lower) / abs(self.value)
 
 
 def reach(covariance: Covariance, level: float = 0.95) -> Array:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
+from math import inf
 from typing import Literal, NamedTuple
 
 import numpy as np
 
+from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment, RunQuality
 from swashplate.identification.measures import Measures
 from swashplate.identification.starts import StartResult
@@ -28,6 +30,9 @@ FAR = 3.0
 """Factor from which the fit does not carry over: twice what manoeuvres differ by anyway."""
 MOST = 0.5
 """Share of unknowns without a value of their own from which a fit has found nothing."""
+WIDE = 0.1
+"""Half width of an interval, over the estimate, from which a faint direction shows in it: any value
+within 10 % would then do as well."""
 MOVES = 0.05
 """A run that moves by less than this part of the channel's movement is not judged by itself."""
 FOLLOWS = 0.5
@@ -153,8 +158,15 @@ def unknowns(assessments: Sequence[Assessment]) -> Statement:
         }
         without = shared & {*found.at_bounds, *found.to_hold}
         lost, total = lost + len(without), total + len(shared)
-        look = look or bool(without) or bool(found.faint)
+        faint = shared & {name for direction in found.faint for name in direction.changes}
+        wide = _wide(each, faint) if faint else []
+        look = look or bool(without or wide)
         said += [f"{each.stage.stage.name}: {words}" for words in found.sentences()]
+        if wide:
+            said.append(
+                f"{each.stage.stage.name}: intervals wider than ±{percent(WIDE)} along faint "
+                f"directions: {listed(wide)}."
+            )
     if lost > MOST * total:
         words = f"{lost} of {total} unknowns stand at a bound or are not determined"
         reasons.append(words)
@@ -225,6 +237,15 @@ def percent(part: float) -> str:
 def listed(words: Sequence[str]) -> str:
     """``a, b and c``; empty for none."""
     return " and ".join([*([", ".join(words[:-1])] if words[:-1] else []), *words[-1:]])
+
+
+def _wide(assessment: Assessment, names: Set[str]) -> list[str]:
+    """Those of some unknowns whose intervals are wide or have no end; all if there are none."""
+    try:
+        found = {each.name: each.relative_half_width for each in assessment.uncertainty.estimates}
+    except InputError:
+        found = {}
+    return [name for name in sorted(names) if found.get(name, inf) > WIDE]
 
 
 def _worse(quality: RunQuality, pool: Measures) -> bool:

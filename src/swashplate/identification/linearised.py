@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -51,8 +51,11 @@ class LinearisedFit:
     runs: tuple[LinearisedRun, ...]
     variables: Variables
     prior: Array
-    """(p, K) rows of the Gaussian priors: derivatives of (number less mean)/deviation."""
+    """(p, K) rows of the Gaussian priors: derivatives of (number less mean)/deviation, times the
+    root of `prior_noise`."""
     tolerance: float = TOLERANCE
+    prior_noise: Array = field(default_factory=lambda: np.ones(0))
+    """(p,) variance of each prior's residual, which counts as that many of the data's."""
 
     @classmethod
     def of(
@@ -61,6 +64,7 @@ class LinearisedFit:
         variables: Variables,
         *,
         prior: Array | None = None,
+        prior_noise: Array | None = None,
         tolerance: float = TOLERANCE,
     ) -> LinearisedFit:
         """Check the runs, drop samples of weight 0 and runs without samples.
@@ -81,7 +85,14 @@ class LinearisedFit:
         rows = np.zeros((0, count)) if prior is None else np.asarray(prior, dtype=np.float64)
         if rows.ndim != 2 or rows.shape[1] != count or not np.isfinite(rows).all():
             raise InputError(f"The rows of the priors need {count} finite columns each.")
-        return cls(tuple(kept), variables, rows, tolerance)
+        noise = np.ones(len(rows)) if prior_noise is None else np.asarray(prior_noise)
+        return cls(tuple(kept), variables, rows, tolerance, noise)
+
+    @property
+    def prior_middle(self) -> Array:
+        """(K, K) covariance of the scores of the priors."""
+        middle: Array = (self.prior.T * self.prior_noise) @ self.prior
+        return middle
 
     @property
     def samples(self) -> int:

@@ -33,28 +33,33 @@ class Direction(NamedTuple):
     gauge: Gauge | None
     """The known gauge that it is, if it is one."""
     hold: str
-    """The unknown to hold, by which the least is lost."""
+    """The unknown to hold, by which the least is lost; in a faint direction only if its value is
+    known, as a wrong one shows in the others."""
 
     @property
     def sentence(self) -> str:
         """What an engineer would say."""
+        faint = self.sharpness > 0.0
+        advice = (
+            "; hold one of them only if you know it, or make a test that tells them apart."
+            if faint
+            else f". Hold {self.hold}."
+        )
         if self.gauge is not None:
             together = _listed(sorted(self.changes, key=_in_order))
-            faint = "" if self.sharpness == 0.0 else "all but "
-            return (
-                f"{together} can move together {faint}unseen ({self.gauge.name}): "
-                f"{self.gauge.determined}. Hold {self.hold}."
-            )
+            how = "move together all but unseen" if faint else "can move together unseen"
+            words = f"{together} {how} ({self.gauge.name}): {self.gauge.determined}"
+            return f"{'Faint: ' if faint else ''}{words}{advice}"
         named = list(self.changes.items())[:NAMED]
         moves = ", ".join(f"{name} {change:+.2g} %" for name, change in named)
         if len(self.changes) > NAMED:
             moves += f" and {len(self.changes) - NAMED} others"
-        if self.sharpness == 0.0:
+        if not faint:
             together = "together change nothing" if len(self.changes) > 1 else "changes nothing"
-            return f"{moves} {together}. Hold {self.hold}."
+            return f"{moves} {together}{advice}"
         return (
-            f"{moves} together change the residuals {1.0 / self.sharpness:,.0f} times less than "
-            f"the clearest direction. Hold {self.hold}, or test what tells them apart."
+            f"Faint: {moves} move together and change the residuals {1.0 / self.sharpness:,.0f} "
+            f"times less than the clearest direction{advice}"
         )
 
 

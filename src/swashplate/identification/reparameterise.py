@@ -12,6 +12,7 @@ import numpy as np
 from swashplate.errors import InputError
 from swashplate.identification.excitation import Outlook
 from swashplate.identification.forces import Forces
+from swashplate.identification.null_directions import NAMED
 from swashplate.identification.setup import Free, GivenForces, Setup, Stage
 from swashplate.parameters.catalogue import CATALOGUE
 
@@ -76,7 +77,8 @@ def propose(outlook: Outlook, *, faint: bool = False) -> Proposal:
     outlook : Outlook
         Of one stage.
     faint : bool
-        Hold as well what the runs hardly tell; what is held is then taken for exact.
+        Hold as well what the runs hardly tell: for values that are known, as they are then taken
+        for exact.
     """
     verdict = outlook.identifiability
     reasons = dict.fromkeys(verdict.unexcited, IDLE)
@@ -85,7 +87,9 @@ def propose(outlook: Outlook, *, faint: bool = False) -> Proposal:
         if direction.gauge is not None:
             reason = direction.gauge.determined
         elif direction.sharpness > 0.0:
-            reason = f"the runs hardly tell it from {', '.join(others)}"
+            more = len(others) - NAMED
+            told = f"{', '.join(others[:NAMED])}{f' and {more} others' if more > 0 else ''}"
+            reason = f"the runs hardly tell it from {told}, but a wrong value shows in them"
         else:
             reason = f"the runs cannot tell it from {', '.join(others)}"
         reasons[direction.hold] = reason

@@ -26,6 +26,7 @@ from swashplate.identification.fit_file import (
     profile_of,
 )
 from swashplate.identification.fold_results import CrossValidation
+from swashplate.identification.prior_weights import with_worths
 from swashplate.identification.solving import Solution
 from swashplate.identification.staging import stage_problem
 from swashplate.parameters.files import dump_set, read_set
@@ -90,6 +91,11 @@ def save_fit(
                 }
             ),
             starts=each.starts,
+            worths=tuple(
+                unknown.prior.worth
+                for unknown in each.problem.unknowns
+                if unknown.prior is not None
+            ),
         )
         for each in fit.stages
     )
@@ -142,6 +148,8 @@ def load_fit(path: str | Path, campaign: Campaign, *, threads: int | None = None
                 f"{path}: stage {entry.name} has other unknowns than swashplate {__version__} "
                 f"makes of its set-up; it was written by {file.swashplate}, fit again."
             )
+        if entry.worths:
+            problem = with_worths(problem, entry.worths)
         given = entry.solution.model_dump()
         solution = Solution(**{**given, "vector": np.array(entry.solution.vector)})
         model = problem.model

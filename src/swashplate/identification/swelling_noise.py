@@ -43,7 +43,7 @@ def swelling_noise_covariance(fit: LinearisedFit) -> Covariance:
     """
     fit.spare_samples  # noqa: B018  refuses what tells nothing of the noise
     rank = fit.rank
-    middle = fit.whitening.T @ fit.prior.T @ fit.prior @ fit.whitening
+    middle = fit.whitening.T @ fit.prior_middle @ fit.whitening
     total = np.einsum("ki,ij,kj->k", fit.whitening, middle, fit.whitening)
     squares = np.zeros(fit.variables.count)
     for run in fit.runs:

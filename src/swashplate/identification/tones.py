@@ -41,7 +41,7 @@ class Tone(NamedTuple):
     """Ends of its band. [Hz]"""
     high: float
     share: float
-    """Of the residuals' variance. [1]"""
+    """Of the variance of the channel's residuals in all runs. [1]"""
     frequencies: Array
     """(n,) in the band. [Hz]"""
     excess: Array
@@ -87,12 +87,15 @@ def separated(fit: LinearisedFit) -> Separated:
     """
     middle = np.zeros((fit.rank, fit.rank))
     runs, found = list(fit.runs), []
+    powers: dict[str, float] = {}
+    for run in fit.runs:
+        each = unweighted(run)
+        powers[run.channel] = powers.get(run.channel, 0.0) + float(each @ each)
     for channel, step, members in _groups(fit):
         if min(fit.runs[m].time.size for m in members) < SEGMENT:
             continue
         bands: list[Tone] = []
         left = {m: unweighted(fit.runs[m]) for m in members}
-        whole = sum(float(each @ each) for each in left.values())
         grids = {m: grid_of(fit.runs[m].time) for m in members}
         seen = {m: _powers(fit.runs[m], grids[m], fit.whitening) for m in members}
         for _ in range(ROUNDS):
@@ -101,7 +104,7 @@ def separated(fit: LinearisedFit) -> Separated:
             if not more:
                 break
             remain = sum(float(each @ each) for each in left.values())
-            bands += [tone._replace(share=tone.share * remain / whole) for tone in more]
+            bands += [tone._replace(share=tone.share * remain / powers[channel]) for tone in more]
             for m in members:
                 left[m] = left[m] - _within(left[m], grids[m], more)
         if not bands:

@@ -19,6 +19,7 @@ from swashplate.identification.covariance import (
 from swashplate.identification.handed_on import Handed, with_handed
 from swashplate.identification.intervals import Estimate, estimates, reach
 from swashplate.identification.linearised import LinearisedFit
+from swashplate.identification.named_tones import tone_sentences
 from swashplate.identification.swelling_noise import swelling_noise_covariance
 from swashplate.identification.tones import Tone, separated
 
@@ -58,6 +59,8 @@ class Uncertainty:
     """Lines in the residuals' spectra, taken out before the noise was judged."""
     ends: tuple[CheckedEnd, ...] = ()
     """Sides on which the cost does not rise as the covariance says."""
+    priors: tuple[str, ...] = ()
+    """What each prior adds, in words."""
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -84,18 +87,14 @@ class Uncertainty:
         """What the errors rest on."""
         if not self.noisy:
             return ("The residuals are exactly zero: errors of zero say nothing of other tests.",)
-        said = [
-            f"A tone at {tone.frequency:.3g} Hz makes {100.0 * tone.share:.2g} % of the residuals' "
-            f"variance of {tone.channel}; no unknown depends on it, and the noise is judged "
-            "without it."
-            for tone in self.tones
-        ]
+        said = list(tone_sentences(self.tones))
         for colour in self.colours:
             if colour.length:
                 worth = (
                     f"{colour.inflation:.3g} samples are worth one"
                     if colour.inflation > 1.05
-                    else "they swing to and fro, so that each sample still counts as one"
+                    else "positive and negative correlations cancel, and the samples tell as much "
+                    "as independent ones"
                 )
                 said.append(
                     f"Residuals of {colour.channel} stay correlated over {colour.duration:.3g} s: "
@@ -111,14 +110,15 @@ class Uncertainty:
         ratio = self._ratio()
         if ratio is not None:
             said.append(
-                f"White-noise errors would be {ratio:.2g} times too small; they are shown for "
-                "comparison only."
+                f"White-noise errors would be {ratio:.2g} times too small; the report shows them "
+                "for comparison only."
             )
         if self.uneven:
             said.append(
                 f"The noise is not alike in all parts of the runs: {', '.join(self.uneven)} "
                 f"{'has' if len(self.uneven) == 1 else 'have'} wider intervals for it."
             )
+        said += self.priors
         for end in self.ends:
             side, name = "upper" if end.upper else "lower", self.own.variables.names[end.number]
             if end.better is not None:

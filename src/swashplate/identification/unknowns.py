@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import exp, isfinite, log
+from math import exp, isfinite, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,9 @@ class Prior:
     """In the unknown's unit."""
     deviation: float
     """Standard deviation, positive; of a logarithmic unknown that of its logarithm."""
+    worth: float = 1.0
+    """Squared residuals of the data's cost that stand for one independent one of variance 1: so
+    often the prior counts, see `prior_weights`."""
 
 
 @dataclass(frozen=True)
@@ -207,6 +210,17 @@ class Unknowns(Sequence[Unknown]):
                     matrix[rows[target], column] = each.slope(float(number))
         return matrix
 
+    def with_worths(self, worths: Sequence[float] | None) -> Unknowns:
+        """The same with these worths of the priors, in order; without any priors for None."""
+        given = iter(worths or ())
+        items = []
+        for each in self.items:
+            prior = each.prior
+            if prior is not None:
+                prior = None if worths is None else replace(prior, worth=next(given))
+            items.append(replace(each, prior=prior))
+        return Unknowns(tuple(items))
+
     def prior_rows(self, vector: Array) -> tuple[Array, Array]:
         """Residuals (p,) of the priors and their derivatives (p, K) by the vector."""
         having = [k for k, each in enumerate(self.items) if each.prior is not None]
@@ -220,6 +234,8 @@ class Unknowns(Sequence[Unknown]):
             else:
                 residuals[row] = (number * each.scale - each.prior.mean) / each.prior.deviation
                 rows[row, k] = each.scale / each.prior.deviation
+            residuals[row] *= sqrt(each.prior.worth)
+            rows[row] *= sqrt(each.prior.worth)
         return residuals, rows
 
     def at_bounds(self, vector: Array, tolerance: float = 1e-6) -> dict[str, str]:

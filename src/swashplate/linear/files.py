@@ -6,11 +6,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swashplate.errors import FileError
 from swashplate.linear.units import UNITS
+from swashplate.tables import Form, ending, write_text
 
 if TYPE_CHECKING:
     from swashplate.linear.model import LinearDrive
+
+LINEAR_MODEL = Form("a linear model", (".toml", ".json"))
 
 
 def content(model: LinearDrive) -> dict[str, Any]:
@@ -42,16 +44,11 @@ def content(model: LinearDrive) -> dict[str, Any]:
 
 def write_model(model: LinearDrive, path: str | Path) -> None:
     """Write a model as .toml or .json; see `LinearDrive.write`."""
-    from swashplate.tables import write_text
-
-    suffix = Path(path).suffix.lower()
-    if suffix == ".json":
+    if ending(path, LINEAR_MODEL) == ".json":
         from json import dumps as dump_json
 
         write_text(dump_json(content(model), indent=1) + "\n", path)
-    elif suffix == ".toml":
+    else:
         from tomlkit import dumps as dump_toml
 
         write_text(dump_toml(content(model)), path)
-    else:
-        raise FileError(f"{path} ends in '{suffix}'; a linear model is written as .toml or .json.")

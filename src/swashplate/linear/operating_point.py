@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import DomainError, InputError
+from swashplate.linear.dead_zone import check_card, check_solenoid
 from swashplate.linear.slopes import solenoid_slope
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -95,7 +96,7 @@ def operating_point(
         if abs(voltage) > FULL_VOLTAGE:
             raise InputError(f"The voltage is {voltage:g} V, but the card takes ±10 V.")
         if input == "voltage":
-            sides += _check_card(parameters.name, voltage, plus if voltage >= 0.0 else minus)
+            sides += check_card(parameters.name, voltage, plus, minus, pump)
         positive, negative, pressure = steady_start(voltage, plus, minus, pump)
         current = positive - negative
     else:
@@ -109,7 +110,7 @@ def operating_point(
     force, _ = solenoid_slope(current, pump)
     check_domain(parameters.name, pump.Z5**2 * force**2 / pump.Z4, "current")
     if input != "solenoid_force":
-        sides += _check_solenoid(parameters.name, current, pump)
+        sides += check_solenoid(parameters.name, current, voltage, plus, minus, pump)
     _check_limits(parameters.name, pressure, pump)
     inside = [np.empty(1) for _ in range(5)]
     at = (np.array([current]), np.array([pressure]))
@@ -133,31 +134,6 @@ def operating_point(
 def card_command(voltage: float, channel: Channel) -> float:
     """Command in the channel's direction, kept beyond its dead zone by a hair. [V]"""
     return max(abs(voltage), nextafter(channel.V_dz, np.inf))
-
-
-def _check_card(name: str, voltage: float, channel: Channel) -> list[str]:
-    side = "+" if voltage >= 0.0 else "-"
-    if abs(voltage) > channel.V_dz:
-        return []
-    if channel.V_dz == 0.0 and channel.J == 0.0:
-        return ["card at 0 V: the side of positive voltage"]
-    raise DomainError(
-        f"{name}: {voltage:g} V lies in the card's dead zone, which ends beyond "
-        f"{side}{channel.V_dz:g} V, so the gain is 0; linearise at a larger voltage, or the pump "
-        "alone with input='solenoid_force'."
-    )
-
-
-def _check_solenoid(name: str, current: float, pump: Pump) -> list[str]:
-    if abs(current) > pump.Z17:
-        return []
-    if pump.Z17 == 0.0:
-        return ["solenoids at 0 A: the side of positive current"]
-    raise DomainError(
-        f"{name}: {current:.6g} A lies in the solenoids' dead zone of Z17 = ±{pump.Z17:g} A, so "
-        "the gain is 0; linearise at a larger current, or the pump alone with "
-        "input='solenoid_force'."
-    )
 
 
 def _check_limits(name: str, pressure: float, pump: Pump) -> None:

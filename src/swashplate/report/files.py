@@ -5,8 +5,7 @@ from pathlib import Path
 import matplotlib
 from matplotlib.figure import Figure
 
-from swashplate.errors import FileError
-from swashplate.tables import write_whole
+from swashplate.tables import FIGURE, ending, write_whole
 
 _METADATA: dict[str, dict[str, None]] = {
     "png": {},
@@ -27,10 +26,7 @@ def save_figure(figure: Figure, path: str | Path) -> None:
     FileError
         For another ending, or a folder that cannot be written.
     """
-    suffix = Path(path).suffix
-    kind = suffix.lower().removeprefix(".")
-    if kind not in _METADATA:
-        raise FileError(f"{path} ends in '{suffix}'; a figure is written as .png, .svg or .pdf.")
+    kind = ending(path, FIGURE).removeprefix(".")
 
     def write(beside: Path) -> None:
         # without a salt of its own, an SVG's clip paths get random names

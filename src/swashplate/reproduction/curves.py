@@ -31,6 +31,10 @@ class Scaled(NamedTuple):
     factor: float
     words: str
 
+    def beside(self, ordinate: str) -> str:
+        """Label of an axis that carries both."""
+        return f"{ordinate},\n{self.words}"
+
 
 DIVIDED = Scaled(0.1, "voltage / 10 (V)")
 MULTIPLIED = Scaled(10.0, "voltage × 10 (V)")
@@ -73,7 +77,7 @@ def current_figure(shown: Shown) -> Figure:
         + " The model has no dither.",
         (
             Panel(
-                "current (A)",
+                DIVIDED.beside("current (A)"),
                 (command(run, DIVIDED), Curve("simulated", run.time, total, "simulated")),
             ),
         ),
@@ -99,7 +103,7 @@ def speed_figure(shown: Shown) -> Figure:
         f" ({shown.logs} in the source). " + ABSENT.format("speed") + creep,
         (
             Panel(
-                f"{shaft} speed (deg/s)",
+                scaled.beside(f"{shaft} speed (deg/s)"),
                 (
                     command(run, scaled),
                     Curve("simulated", run.time, filtered_speed_deg_s(run), "simulated"),
@@ -123,7 +127,10 @@ def inside_figure(shown: Shown) -> Figure:
     openings = 1e3 * np.array([pump.Z16_plus, -pump.Z16_minus])
     seen = "7.12" if shown.axis == "hoist" else "7.19"
     panels = (
-        Panel("current (A)", (command(run, DIVIDED), curve("signed current", run.current))),
+        Panel(
+            DIVIDED.beside("current (A)"),
+            (command(run, DIVIDED), curve("signed current", run.current)),
+        ),
         Panel("solenoid force (N)", (curve("net force", run.solenoid_force),)),
         Panel(
             "spool (mm)",
@@ -140,7 +147,7 @@ def inside_figure(shown: Shown) -> Figure:
             tuple(Level(height, "stop") for height in stops.tolist()),
         ),
         Panel(
-            f"{SHAFTS[shown.axis]} speed\n(deg/s)",
+            scaling_of(shown.axis).beside("speed (deg/s)"),
             (
                 command(run, scaling_of(shown.axis)),
                 curve("not low-passed", np.degrees(run.shaft_speed)),
@@ -193,7 +200,7 @@ def larger_figure(shown: Shown) -> Figure:
         f"limits become {speed.max():+.0f} and {speed.min():+.0f} deg/s.".replace("-", "−"),
         (
             Panel(
-                "winch speed (deg/s)",
+                MULTIPLIED.beside("winch speed (deg/s)"),
                 (
                     command(before, MULTIPLIED),
                     Curve("published set", before.time, filtered_speed_deg_s(before), "other"),

@@ -47,11 +47,12 @@ def _optimisation(machine: str, model: str, signal: str, unknowns: str) -> Diagr
 
 _MEASURED_SPEED = Diagram(
     (
+        # apart so that all arrows are of one length
         Node("counts", 0.0, 0.0, "encoder\ncounts", plain=True),
-        Node("filled", 1.0, 0.0, "straight lines\nin between"),
-        Node("low pass", 2.0, 0.0, "a / (s + a)\na = 2π·10 rad/s"),
-        Node("derivative", 3.0, 0.0, "b s / (s + b)\nb = 2π·30 rad/s"),
-        Node("speed", 4.0, 0.0, "measured\nspeed", plain=True),
+        Node("filled", 1.35, 0.0, "straight lines\nin between"),
+        Node("low pass", 3.04, 0.0, "a / (s + a)\na = 2π·10 rad/s"),
+        Node("derivative", 4.76, 0.0, "b s / (s + b)\nb = 2π·30 rad/s"),
+        Node("speed", 6.2, 0.0, "measured\nspeed", plain=True),
     ),
     (
         Arrow("counts", "filled"),

@@ -63,7 +63,7 @@ def measured_current_figure(shown: Shown, bench: Bench) -> Figure:
         f"card ({shown.logs}); neither that nor its measured speed is at hand. Approximate.",
         (
             Panel(
-                "winch speed (deg/s)",
+                MULTIPLIED.beside("winch speed (deg/s)"),
                 (
                     Curve(MULTIPLIED.words, run.time, np.asarray(volts), "command"),
                     Curve("by virtual current", run.time, filtered_speed_deg_s(run), "simulated"),

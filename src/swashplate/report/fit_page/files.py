@@ -17,6 +17,7 @@ from swashplate.identification.fit import Fit
 from swashplate.identification.starts import StartResult
 from swashplate.identification.validation import ignored_windows
 from swashplate.identification.verdict import starts_of
+from swashplate.report.axis_labels import in_lines
 from swashplate.report.broken_lines import draw_broken
 from swashplate.report.display_units import display_unit
 from swashplate.report.files import save_figure
@@ -47,7 +48,9 @@ from swashplate.report.style import (
 WIDTH = 8.6
 HEIGHTS = {"input": 0.75, "overlay": 1.5, "residual": 0.85}
 GAP = 0.28
-AROUND = Margins(left=0.95, right=0.25, bottom=0.5, top=0.75)
+LETTER = 0.065
+"""Width of a letter of a label. [inch]"""
+AROUND = Margins(left=1.1, right=0.25, bottom=0.5, top=0.75)
 """Sizes. [inch]"""
 
 
@@ -156,8 +159,11 @@ def plot_overlay(run: ShownRun, *, virtual: bool = False) -> Figure:
     for place, shown in enumerate(run.channels):
         upper, lower = axes[1 + 2 * place], axes[2 + 2 * place]
         time, factor = shown.channel.time, shown.unit.factor
-        dress(upper, shown.unit.label(shown.quality.channel))
-        dress(lower, shown.small.label("residual"))
+        for ax, label, height in (
+            (upper, shown.unit.label(shown.quality.channel), HEIGHTS["overlay"]),
+            (lower, shown.small.label("residual"), HEIGHTS["residual"]),
+        ):
+            dress(ax, in_lines(label, int(height / LETTER)))
         zero_line(lower)
         draw_broken(upper, time, factor * shown.channel.values, GREY)
         draw_broken(upper, time, factor * shown.quality.simulated, VERMILION)

@@ -34,7 +34,7 @@ from swashplate.report.fit_page.statistics_plots import (
     waterfall_item,
 )
 from swashplate.report.fit_page.truth import in_the_fits_scales
-from swashplate.report.fit_page.verdict import statements, uncertainty_sentences
+from swashplate.report.fit_page.verdict import statements, tones_of, uncertainty_sentences
 from swashplate.tables import write_text
 
 
@@ -129,7 +129,12 @@ def write_fit_report(
         "held": held_rows(fit, truth),
         "excitation": [excitation_table(each) for each in assessed],
         "stages": [
-            (each.stage.stage.name, each.identifiability, uncertainty_sentences(each))
+            (
+                each.stage.stage.name,
+                each.identifiability,
+                uncertainty_sentences(each),
+                tones_of(each),
+            )
             for each in assessed
         ],
         "starts": several,

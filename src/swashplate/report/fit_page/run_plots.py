@@ -25,6 +25,7 @@ from bokeh.models import (
 )
 from bokeh.plotting import figure
 
+from swashplate.report.axis_labels import in_lines
 from swashplate.report.display_units import display_unit
 from swashplate.report.fit_page.bokeh_style import dress
 from swashplate.report.fit_page.runs import ShownRun
@@ -33,6 +34,10 @@ from swashplate.report.style import BLUE, FAINT, GREY, INK, VERMILION
 HEIGHTS = {"input": 92, "overlay": 156, "residual": 98}
 AXIS = 40
 """What the lowest panel is higher for its time axis. [px]"""
+MARGIN = 10
+"""What of a panel's height is not its axis. [px]"""
+LETTER = 6.2
+"""Width of a letter of a label. [px]"""
 
 
 class Stack(NamedTuple):
@@ -110,12 +115,12 @@ def _panel(label: str, kind: str, time: Range1d, across: Span) -> Any:
         x_range=time,
         tools=tools,
         active_drag=zoom,
-        min_border_left=78,
+        min_border_left=94,
         sizing_mode="stretch_width",
         # many points: let the browser draw them at once
         output_backend="canvas",
     )
-    dress(panel, label)
+    dress(panel, in_lines(label, int((HEIGHTS[kind] - MARGIN) / LETTER)))
     return panel
 
 

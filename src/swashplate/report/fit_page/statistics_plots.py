@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 from bokeh.embed import json_item
-from bokeh.models import ColorBar, ColumnDataSource, LinearColorMapper, Span
+from bokeh.models import BasicTicker, ColorBar, ColumnDataSource, LinearColorMapper, Range1d, Span
 from bokeh.plotting import figure
 
 from swashplate.identification.covariance import Covariance
 from swashplate.identification.identifiability import Identifiability
+from swashplate.identification.judgements import SAME
 from swashplate.identification.profiles import Profile
 from swashplate.identification.starts import StartResult
 from swashplate.identification.unknowns import Unknown
@@ -24,6 +25,8 @@ CELL = 17
 """Size of a cell of the correlations. [px]"""
 MOST = 60
 """Unknowns up to which correlations are drawn."""
+LEAST_SCALE = 10.0 * SAME
+"""Range of the starts' costs, of the best, below which differences are not drawn larger."""
 
 
 def sensitivity_item(found: Identifiability, shown: Sequence[bool]) -> Any:
@@ -158,6 +161,9 @@ def waterfall_item(starts: Sequence[StartResult]) -> Any:
     )
     panel.scatter("place", "cost", size=7, line_color=BLUE, fill_color="color", source=source)
     dress(panel, "cost, best = 1" if best > 0.0 else "cost", "starts, best first")
+    if best > 0.0 and costs[-1] < 1.0 + LEAST_SCALE:
+        panel.y_range = Range1d(1.0 - LEAST_SCALE, 1.0 + LEAST_SCALE)
+    panel.xaxis.ticker = BasicTicker(desired_num_ticks=8, min_interval=1.0)
     return json_item(panel)
 
 

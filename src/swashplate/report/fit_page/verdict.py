@@ -8,6 +8,8 @@ from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment, RunQuality
 from swashplate.identification.judgements import Statement
 from swashplate.identification.measures import Measures
+from swashplate.identification.named_tones import distinct
+from swashplate.identification.tones import Tone
 from swashplate.identification.validation import pooled
 from swashplate.identification.verdict import Verdict
 from swashplate.report.display_units import display_unit
@@ -89,3 +91,11 @@ def uncertainty_sentences(assessment: Assessment) -> tuple[str, ...]:
         return assessment.uncertainty.sentences()
     except InputError as error:
         return (f"There are no intervals: {error}",)
+
+
+def tones_of(assessment: Assessment) -> tuple[Tone, ...]:
+    """Tones in a stage's residuals; none where there are no intervals."""
+    try:
+        return distinct(assessment.uncertainty.tones)
+    except InputError:
+        return ()

@@ -34,7 +34,7 @@ from swashplate.reproduction.content import Diagram, Figure, Panel, Role
 WIDTH, WIDE = 5.6, 8.6
 SINGLE, STACKED = 1.85, 1.15
 """Widths of a figure of one panel and of several, heights of such panels. [inch]"""
-AROUND = Margins(left=0.78, right=0.12, bottom=0.44, top=0.28)
+AROUND = Margins(left=0.84, right=0.12, bottom=0.44, top=0.28)
 BESIDE = 0.55
 """Room for words beside a panel that has levels. [inch]"""
 ROW, BOX_HEIGHT, LETTER = 0.78, 0.42, 0.064

@@ -1,0 +1,85 @@
+"""A prior counts as much as the residuals beside it are really worth."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from swashplate import Experiment
+from swashplate.campaign.experiment import Channel, InputSignal, Source
+from swashplate.identification.intervals import estimates
+from swashplate.identification.linearising import linearised_fit
+from swashplate.identification.prior_weights import prior_sentences, weighed
+from swashplate.identification.problem import Problem
+from swashplate.identification.solving import solve
+from swashplate.identification.uncertainty import uncertainty
+from swashplate.identification.unknowns import Prior, Unknown, Unknowns
+
+COUNT, MEMORY = 40_000, 0.95
+SOURCE = Source(Path("log.csv"), "y")
+
+
+class Level:
+    """y = level."""
+
+    def simulate(
+        self, values: Mapping[str, float], experiment: Experiment
+    ) -> Mapping[str, np.ndarray]:
+        return {"y": np.full(experiment["y"].time.size, values["level"])}
+
+
+def problem(prior: Prior, *, memory: float, scale: float = 1.0) -> Problem:
+    """A level of 2 under noise of variance 1 with this correlation from sample to sample."""
+    drawn = np.random.default_rng(5).normal(size=COUNT)
+    noise = lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], drawn)
+    unknowns = Unknowns((Unknown("level", 1.0, 0.1, 9.0, prior=prior),))
+    time = 0.01 * np.arange(COUNT)
+    drive = InputSignal("other", "1", time, np.ones(COUNT), "previous", SOURCE)
+    channel = Channel("y", "other", "1", time, 2.0 + noise, np.ones(COUNT), SOURCE)
+    run = Experiment("run", "bench", "run", "fit", "rest", None, drive, {"y": channel})
+    return Problem(Level(), (run,), unknowns, ("y",), {"y": scale})
+
+
+def posterior(found: Problem, prior: Prior, memory: float) -> tuple[float, float]:
+    """Mean and deviation by hand: a mean has (1 + a)/(1 - a)/n of the noise's variance."""
+    mean = float(found.experiments[0]["y"].values.mean())
+    data = COUNT * (1.0 - memory) / (1.0 + memory)
+    known = 1.0 / prior.deviation**2
+    return (data * mean + known * prior.mean) / (data + known), (data + known) ** -0.5
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.1], ids=["noise as stated", "noise ten times as stated"])
+@pytest.mark.parametrize("memory", [0.0, MEMORY], ids=["white", "coloured"])
+def test_estimate_and_interval_are_those_of_bayes(memory: float, scale: float) -> None:
+    data = COUNT * (1.0 - memory) / (1.0 + memory)
+    prior = Prior(2.0 + 3.0 * data**-0.5, data**-0.5)  # as sharp as the data, and beside them
+    given = problem(prior, memory=memory, scale=scale)
+    first = solve(given).vector
+    found = weighed(given, first)
+    best = solve(found, first).vector
+    mean, deviation = posterior(given, prior, memory)
+    assert float(best[0]) == pytest.approx(mean, abs=0.1 * deviation)
+    told = uncertainty(linearised_fit(found, best))
+    (estimate,) = estimates(told.quoted)
+    half = 0.5 * (estimate.upper - estimate.lower)
+    assert half == pytest.approx(1.96 * deviation, rel=0.1)
+    if (memory, scale) != (0.0, 1.0):
+        # unweighed the data would have swept the prior aside
+        assert abs(first[0] - mean) > abs(best[0] - mean) + 0.3 * deviation
+    (said,) = prior_sentences(found.unknowns, best, told.quoted)
+    assert "makes up 5" in said or "makes up 4" in said  # half of what is known
+    assert "below its mean" in said
+
+
+def test_what_the_data_leave_open_is_the_prior() -> None:
+    given = problem(Prior(2.0, 1.0), memory=MEMORY)
+    spare = Unknown("spare", 5.0, 0.1, 9.0, prior=Prior(3.0, 0.2))  # the model does not use it
+    given = replace(given, unknowns=Unknowns((*given.unknowns, spare)))
+    found = weighed(given, solve(given).vector)
+    best = solve(found).vector
+    _, estimate = estimates(uncertainty(linearised_fit(found, best)).quoted)
+    assert estimate.value == pytest.approx(3.0, abs=1e-6)
+    assert estimate.upper - estimate.lower == pytest.approx(2.0 * 1.959964 * 0.2, rel=1e-3)
