@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swashplate import Drive, FullOrderDrive, InputError, ParameterError, PhysicalSet, maneuvers
-from swashplate.full_order import reduction
+from swashplate.full_order import comparison, reduction
 from swashplate.full_order.completion import from_lumped
 
 AXES = ("hoist", "slew", "luff")
@@ -189,10 +189,10 @@ def test_following_a_run_is_simulating_it() -> None:
 
 
 @pytest.fixture(scope="module")
-def compared() -> reduction.Comparison:
+def compared() -> comparison.Comparison:
     hoist = FullOrderDrive.preset("hoist")
     step = maneuvers.step(4.0, start=0.5, stop=2.0, length=3.0).sample(512.0)
-    return reduction.compare(hoist, hoist.drive.simulate(step))
+    return comparison.compare(hoist, hoist.drive.simulate(step))
 
 
 def test_the_lag_is_that_of_the_spool() -> None:
@@ -205,7 +205,7 @@ def test_the_lag_is_that_of_the_spool() -> None:
     omega, time = 2.0 * pi * 3.0, np.arange(3073) / 512.0
     small = 0.45 + 0.01 * np.sin(omega * time)
     run = hoist.drive.simulate_current(small, start="steady")
-    lag = reduction.compare(hoist, run, start="steady").lag
+    lag = comparison.compare(hoist, run, start="steady").lag
     assert lag is not None
     squared = (omega * 0.1214) ** 2  # τ of the reduced model, model.md section 9
     expected = 2.0 * 0.3 / (2.0 * pi * 40.0) * squared / (1.0 + squared)
@@ -214,7 +214,7 @@ def test_the_lag_is_that_of_the_spool() -> None:
     assert 0.5 < lag.share < squared / (1.0 + squared)
 
 
-def test_the_difference_is_that_of_the_speeds(compared: reduction.Comparison) -> None:
+def test_the_difference_is_that_of_the_speeds(compared: comparison.Comparison) -> None:
     error = compared.reduced_speed - compared.full.shaft_speed
     difference = compared.difference
     assert difference.largest == np.abs(error).max()
@@ -222,7 +222,7 @@ def test_the_difference_is_that_of_the_speeds(compared: reduction.Comparison) ->
     assert difference.within == 0.01  # docs/full-order.md: 0.56 %
 
 
-def test_a_speed_that_comes_earlier_by_3_ms_is_told(compared: reduction.Comparison) -> None:
+def test_a_speed_that_comes_earlier_by_3_ms_is_told(compared: comparison.Comparison) -> None:
     hoist = FullOrderDrive.preset("hoist")
     time = np.arange(2049) / 512.0
     amplitude, omega = 0.2, 2.0 * pi * 0.5
@@ -238,7 +238,7 @@ def test_a_speed_that_comes_earlier_by_3_ms_is_told(compared: reduction.Comparis
 def test_without_motion_there_is_nothing_to_tell() -> None:
     slew = Drive.preset("slew").replace(Z17=5.0)  # a dead zone that no current leaves
     full = FullOrderDrive.from_drive(slew)
-    found = reduction.compare(full, slew.simulate(maneuvers.step(2.0).sample()))
+    found = comparison.compare(full, slew.simulate(maneuvers.step(2.0).sample()))
     assert not found.difference.moves
     assert found.lag is None
     begun: list[str] = []
@@ -249,19 +249,19 @@ def test_without_motion_there_is_nothing_to_tell() -> None:
     assert table["top_speed"].max() < 1e-6
 
 
-def test_a_table_of_both(compared: reduction.Comparison, tmp_path: Path) -> None:
+def test_a_table_of_both(compared: comparison.Comparison, tmp_path: Path) -> None:
     compared.write(tmp_path / "run.parquet")
     table = pl.read_parquet(tmp_path / "run.parquet")
     assert table.columns[:3] == ["time", "voltage", "current"]
     error = (table["reduced_shaft_speed"] - table["shaft_speed"]).abs().max()
     assert error == compared.difference.largest
     hoist = FullOrderDrive.preset("hoist")
-    by_current = reduction.compare(hoist, hoist.drive.simulate_current(np.full(32, 0.5)))
+    by_current = comparison.compare(hoist, hoist.drive.simulate_current(np.full(32, 0.5)))
     assert "voltage" not in by_current.to_polars().columns
 
 
 def test_steps_of_the_reduced_march() -> None:
-    assert reduction.fine_steps(512.0, 5000) == 64
-    assert reduction.fine_steps(1024.0, 5000) == 32
-    assert reduction.fine_steps(512.0, 1_000_000) == 20
-    assert reduction.fine_steps(100_000.0, 5000) == 4
+    assert comparison.fine_steps(512.0, 5000) == 64
+    assert comparison.fine_steps(1024.0, 5000) == 32
+    assert comparison.fine_steps(512.0, 1_000_000) == 20
+    assert comparison.fine_steps(100_000.0, 5000) == 4

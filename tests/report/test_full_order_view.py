@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, FullOrderDrive, maneuvers
-from swashplate.full_order.reduction import Comparison, compare
+from swashplate.full_order.comparison import Comparison, compare
 from swashplate.report.full_order_view import plot_full_order
 
 

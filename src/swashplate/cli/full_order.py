@@ -179,7 +179,7 @@ def _say_run(
     out: Path | None,
     plot: Path | None,
 ) -> None:
-    from swashplate.full_order.reduction import compare
+    from swashplate.full_order.comparison import compare
 
     with working("Simulating"):
         name, run = simulated(full.drive, command, options)

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     import polars
     from rich.table import Table
 
+    from swashplate.full_order.comparison import Comparison
     from swashplate.full_order.drive import FullOrderDrive
-    from swashplate.full_order.reduction import Comparison
     from swashplate.parameters.parameter_set import Change
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf"
@@ -113,7 +113,7 @@ def modes_table(full: FullOrderDrive) -> Table:
 def run_table(found: Comparison) -> Table:
     """Both models under one command."""
     from swashplate.cli.measures import degrees
-    from swashplate.full_order.reduction import BANDS
+    from swashplate.full_order.comparison import BANDS
 
     differ = found.difference
     made = table("Reduced model less full-order one", "Shaft speed", ">deg/s", ">% of top speed")

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from swashplate.full_order.reduction import Comparison
+from swashplate.full_order.comparison import Comparison
 from swashplate.report.shading import MOST_RUNS, SHADES, merged
 from swashplate.report.signals import NARROW, WIDE, Mark, Trace
 from swashplate.report.style import (
@@ -71,7 +71,7 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
     Parameters
     ----------
     found : Comparison
-        What `swashplate.full_order.reduction.compare` found. Limits that hold are shaded.
+        What `swashplate.full_order.comparison.compare` found. Limits that hold are shaded.
     title : str, optional
         By default the name of the physical set.
     """
