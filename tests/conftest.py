@@ -59,3 +59,12 @@ def source_parameters() -> dict:
     if not path.exists():
         pytest.skip("the source's tables are not beside this checkout")
     return tomllib.loads(path.read_text("utf-8"))
+
+
+@pytest.fixture(scope="session")
+def source_text() -> str:
+    """The source itself: others' work, which stays outside the project."""
+    path = SHARED / "spec" / "thesis.txt"
+    if not path.exists():
+        pytest.skip("the source's text is not beside this checkout, and may not be copied into it")
+    return path.read_text("utf-8")

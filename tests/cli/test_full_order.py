@@ -162,7 +162,10 @@ def test_a_solver_agrees_with_the_march(done, number):
         (("hoist", "--physical", "oil=1"), "A physical set has no quantity 'oil'"),
         (("hoist", "--physical", "oil_volum=1"), "did you mean oil_volume?"),
         (("hoist", "--physical", "oil_volume"), "--physical cannot read 'oil_volume'; write"),
-        (("hoist", "--physical", "oil_volume=nan"), "cannot read 'oil_volume=nan'"),
+        (
+            ("hoist", "--physical", "oil_volume=nan"),
+            "oil_volume (oil under pressure at the stroking piston) is nan m^3, but must be above 0",
+        ),
         (("hoist", "--physical", "oil_volume=1e-4/2e-4"), "oil_volume takes one value, not 2"),
         (("hoist", "--physical", "oil_volume=1kg"), "in 'kg', which does not measure the same"),
         (("hoist", "--physical", "oil_volume=1 glug"), "the unknown unit 'glug'"),

@@ -1,7 +1,6 @@
 """Each figure of the source is there, with curves that hit the source's numbers."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,14 +16,10 @@ from swashplate.reproduction.content import Curve, Diagram, Figure, Reproduction
 from swashplate.reproduction.diagrams import DIAGRAMS
 from swashplate.reproduction.errata import ERRATA
 
-SPEC = Path(__file__).parents[3] / "shared" / "spec"
 
-
-def captions() -> dict[str, str]:
-    if not SPEC.exists():
-        pytest.skip("the source's text is not beside this checkout")
-    text = (SPEC / "thesis.txt").read_text("utf-8")
-    return dict(re.findall(r"^FIGURE (\d+\.\d+) (.+)$", text, re.MULTILINE))
+@pytest.fixture
+def captions(source_text: str) -> dict[str, str]:
+    return dict(re.findall(r"^FIGURE (\d+\.\d+) (.+)$", source_text, re.MULTILINE))
 
 
 def curves(figure: Figure) -> dict[str, Curve]:
@@ -36,16 +31,15 @@ def by_number(reproduction: Reproduction) -> dict[str, Figure]:
     return {each.number: each for each in reproduction.figures}
 
 
-def test_every_figure_of_the_chapters_is_in_the_catalogue() -> None:
-    wanted = [number for number in captions() if number[0] in "47"] + ["9.1"]
+def test_every_figure_of_the_chapters_is_in_the_catalogue(captions: dict[str, str]) -> None:
+    wanted = [number for number in captions if number[0] in "47"] + ["9.1"]
     assert [each.number for each in FIGURES] == wanted
     assert len(wanted) == 46
 
 
-def test_each_shows_the_log_and_the_manoeuvre_of_its_caption() -> None:
-    titles = captions()
+def test_each_shows_the_log_and_the_manoeuvre_of_its_caption(captions: dict[str, str]) -> None:
     for shown in FIGURES:
-        caption = titles[shown.number]
+        caption = captions[shown.number]
         assert re.findall(r"\w+\.dat", shown.logs) == re.findall(r"\w+\.dat", caption)
         numbers = re.search(r", ?(\d[\d.]*) ?V/sec Ramp|([\d.]+)V,? ", caption)
         if numbers and len(shown.tests) == 1:
@@ -56,9 +50,8 @@ def test_each_shows_the_log_and_the_manoeuvre_of_its_caption() -> None:
             assert shown.tests[0].endswith(f" {hertz[1]} Hz")
 
 
-def test_the_text_names_no_unknown_figure() -> None:
-    text = (SPEC / "thesis.txt").read_text("utf-8") if captions() else ""
-    named = set(re.findall(r"Figure ([47]\.\d+)", text))
+def test_the_text_names_no_unknown_figure(source_text: str) -> None:
+    named = set(re.findall(r"Figure ([47]\.\d+)", source_text))
     assert named <= {each.number for each in FIGURES}
 
 

@@ -1,7 +1,6 @@
 """The tables are those of the source: digit for digit but for what the errata name."""
 
 import re
-from pathlib import Path
 
 import pytest
 
@@ -10,7 +9,6 @@ from swashplate.reproduction.catalogue import ERROR_TABLES, TABLES
 from swashplate.reproduction.content import Cell, Reproduction, Table
 from swashplate.reproduction.virtual_errors import thesis_errors
 
-SPEC = Path(__file__).parents[3] / "shared" / "spec"
 PARAMETER_TABLES = [number for number in TABLES if number not in (*ERROR_TABLES, "7.1")]
 NUMBER = re.compile(r"-?\d+\.?\d*(?:[eE][-+]?\d+)?")
 LABELS = {
@@ -53,11 +51,9 @@ def symbol_of(label: str) -> str:
     return LABELS.get(name) or re.sub(r"[_{}]", "", name)
 
 
-def source_rows(number: str) -> list[list[str]]:
+def source_rows(text: str, number: str) -> list[list[str]]:
     """Rows of a table in the source's text, parameters as they are printed."""
-    if not SPEC.exists():
-        pytest.skip("the source's text is not beside this checkout")
-    lines = (SPEC / "thesis.txt").read_text("utf-8").splitlines()
+    lines = text.splitlines()
     start = next(n for n, line in enumerate(lines) if line.startswith(f"Table {number} "))
     rows = []
     for line in lines[start + 2 :]:
@@ -70,11 +66,11 @@ def source_rows(number: str) -> list[list[str]]:
 
 
 @pytest.mark.parametrize("number", PARAMETER_TABLES)
-def test_numbers_are_those_of_the_text(number: str) -> None:
+def test_numbers_are_those_of_the_text(source_text: str, number: str) -> None:
     """Signs too, but where a cell bears an erratum."""
     ours = [cell for _, cells in values(table(number)) for cell in cells]
     theirs = []
-    for row in source_rows(number):
+    for row in source_rows(source_text, number):
         if number[0] == "4":
             theirs += row[1:3]
         else:
@@ -147,12 +143,9 @@ def test_gear_ratios_with_hoist_and_luff_exchanged() -> None:
 
 
 @pytest.mark.parametrize("number", ERROR_TABLES)
-def test_the_source_s_errors_are_those_of_its_text(number: str) -> None:
+def test_the_source_s_errors_are_those_of_its_text(source_text: str, number: str) -> None:
     kept = thesis_errors()[number]
-    if not SPEC.exists():
-        pytest.skip("the source's text is not beside this checkout")
-    text = (SPEC / "thesis.txt").read_text("utf-8")
-    after = text[text.index(f"Table {number} ") :]
+    after = source_text[source_text.index(f"Table {number} ") :]
     rows = re.findall(r"^(Ramp|Step|Sine)\t([\d.]+)%\t(.+)\tFigure ([\d.]+)$", after, re.MULTILINE)
     found = {kind.lower(): (percent, where, figure) for kind, percent, where, figure in rows[:3]}
     for kind in ("ramp", "step", "sine"):

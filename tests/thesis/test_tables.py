@@ -5,14 +5,11 @@ read itself, signs and misprints included, so that each erratum of the tables sh
 """
 
 import re
-from pathlib import Path
 
 import pytest
 
 from swashplate import Drive
 from swashplate.parameters.catalogue import CATALOGUE
-
-SOURCE = Path(__file__).parents[3] / "shared" / "spec" / "thesis.txt"
 
 Cells = dict[str, list[str]]
 
@@ -23,11 +20,9 @@ NAMES = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def text() -> str:
-    if not SOURCE.exists():
-        pytest.skip("the source's text is not beside this checkout")
-    return SOURCE.read_text("utf-8")
+@pytest.fixture
+def text(source_text: str) -> str:
+    return source_text
 
 
 def table(text: str, number: str) -> Cells:

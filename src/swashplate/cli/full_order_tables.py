@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from math import pi
 from typing import TYPE_CHECKING
 
+from swashplate.cli.inputs import numbers_and_unit
 from swashplate.cli.terminal import table
 from swashplate.errors import InputError
 
@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from swashplate.full_order.comparison import Comparison
     from swashplate.full_order.drive import FullOrderDrive
     from swashplate.parameters.parameter_set import Change
-
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf"
-_VALUE = re.compile(rf"({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*)?")
 
 UNITS = {
     "kg": ("g", 1e3),
@@ -54,15 +51,15 @@ def _physical_value(word: str) -> tuple[str, Change]:
     from swashplate.full_order.quantities import CHOICES
 
     name, _, given = (part.strip() for part in word.partition("="))
-    match = _VALUE.fullmatch(given)
-    if match is None:
+    read = numbers_and_unit(given)
+    if read is None:
         raise InputError(
             f"--physical cannot read '{word}'; write it as oil_volume=1e-4 or oil_volume=100cm^3."
         )
     quantity = CHOICES[name] if name in CHOICES else quantity_of(name)
-    numbers = [float(number) for number in match.group(1, 2) if number]
-    if match[3]:
-        numbers = [si_value(quantity, number, match[3].strip()) for number in numbers]
+    numbers, unit = read
+    if unit:
+        numbers = [si_value(quantity, number, unit) for number in numbers]
     return name, numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
 
 

@@ -106,8 +106,8 @@ def _change(option: str, word: str) -> tuple[str, Change]:
 
     scaled = option == "--scale"
     name, equals, given = (part.strip() for part in word.partition("="))
-    match = _VALUE.fullmatch(given) if equals else None
-    if match is None or (scaled and match[3]):
+    read = numbers_and_unit(given) if equals else None
+    if read is None or (scaled and read[1]):
         examples = (
             "Z16=1.5 or Z16=1.5/1.2 (plus/minus)"
             if scaled
@@ -115,11 +115,19 @@ def _change(option: str, word: str) -> tuple[str, Change]:
         )
         raise InputError(f"{option} cannot read '{word}'; write it as {examples}.")
     definition = find(name)
-    numbers = [float(number) for number in match.group(1, 2) if number]
-    if match[3]:
+    numbers, unit = read
+    if unit:
         what = f"{name} ({definition.name})"
-        numbers = [to_si(number, match[3].strip(), definition.unit, what) for number in numbers]
+        numbers = [to_si(number, unit, definition.unit, what) for number in numbers]
     return name, numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
+
+
+def numbers_and_unit(given: str) -> tuple[list[float], str] | None:
+    """One number or two, and their unit, from ``1.2e-4``, ``0.12mm`` or ``1.2/1.5``."""
+    match = _VALUE.fullmatch(given)
+    if match is None:
+        return None
+    return [float(number) for number in match.group(1, 2) if number], (match[3] or "").strip()
 
 
 def maneuver_of(word: str, *drives: Drive) -> Maneuver:

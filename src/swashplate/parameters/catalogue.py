@@ -7,7 +7,7 @@ no published set has, stand apart in `swashplate.parameters.refinements`.
 
 from dataclasses import dataclass
 from math import inf, pi
-from typing import Literal
+from typing import Literal, TypedDict, Unpack
 
 Block = Literal["control_card", "pump_motor", "refinements"]
 
@@ -46,13 +46,25 @@ class Definition:
         return (self.symbol,)
 
 
-def _card(symbol: str, name: str, unit: str, **more: float | bool) -> Definition:
-    directional = bool(more.pop("directional", True))
-    return Definition(symbol, name, unit, "control_card", directional, **more)  # type: ignore[arg-type]
+class Rules(TypedDict, total=False):
+    """What a definition may say besides symbol, name and unit."""
+
+    lower: float
+    upper: float
+    above: bool
+    can_be_off: bool
 
 
-def _pump(symbol: str, name: str, unit: str, **more: float | bool) -> Definition:
-    return Definition(symbol, name, unit, "pump_motor", **more)  # type: ignore[arg-type]
+def _card(
+    symbol: str, name: str, unit: str, *, directional: bool = True, **rules: Unpack[Rules]
+) -> Definition:
+    return Definition(symbol, name, unit, "control_card", directional, **rules)
+
+
+def _pump(
+    symbol: str, name: str, unit: str, *, directional: bool = False, **rules: Unpack[Rules]
+) -> Definition:
+    return Definition(symbol, name, unit, "pump_motor", directional, **rules)
 
 
 _DEFINITIONS = (

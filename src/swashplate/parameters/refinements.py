@@ -5,8 +5,9 @@ Each belongs to a component of `swashplate.physics`; docs/refinements.md says wh
 
 from dataclasses import dataclass
 from math import inf
+from typing import Unpack
 
-from swashplate.parameters.catalogue import Definition
+from swashplate.parameters.catalogue import Definition, Rules
 
 
 @dataclass(frozen=True)
@@ -19,8 +20,16 @@ class Refinement(Definition):
     """Whether the model is another one as soon as it is not zero."""
 
 
-def _of(symbol: str, name: str, unit: str, **more: float | bool) -> Refinement:
-    return Refinement(symbol, name, unit, "refinements", **more)  # type: ignore[arg-type]
+def _of(
+    symbol: str,
+    name: str,
+    unit: str,
+    *,
+    default: float = 0.0,
+    switch: bool = False,
+    **rules: Unpack[Rules],
+) -> Refinement:
+    return Refinement(symbol, name, unit, "refinements", default=default, switch=switch, **rules)
 
 
 _ALL = (

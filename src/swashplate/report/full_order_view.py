@@ -6,34 +6,26 @@ from math import degrees
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from swashplate.full_order.comparison import Comparison
-from swashplate.report.shading import MOST_RUNS, SHADES, merged
-from swashplate.report.signals import NARROW, WIDE, Mark, Trace
+from swashplate.report.panels import NARROW, WIDE, Mark, Trace, fill_panel
+from swashplate.report.shading import shade_handle, shade_stretches, stretches
 from swashplate.report.style import (
     BLUE,
-    GREY,
     INK,
-    THIN,
     VERMILION,
-    MarginLabel,
     Margins,
-    dress,
     label_below,
-    label_margin,
     line_up_labels,
     margins,
     new_figure,
     put_legend,
     signed,
     write_title,
-    zero_line,
 )
-from swashplate.report.traces import draw, fit_time
+from swashplate.report.traces import fit_time
 from swashplate.simulation.limits import Limit
 
 Array = NDArray[np.float64]
@@ -45,8 +37,6 @@ LEGEND = 0.25
 AROUND = Margins(left=0.95, right=1.2, bottom=0.55, top=0.47)
 """Sizes; a legend adds to the margin at the top. [inch]"""
 
-NEAR = 0.3
-"""A limit is marked if the signal goes at least this share of the way to it."""
 LEAST_PRESSURE = 0.1
 """Range that a panel of pressures shows at least, so that rounding looks like nothing. [MPa]"""
 
@@ -77,10 +67,9 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
     """
     panels = _panels(found)
     handles = [
-        Patch(facecolor=color, edgecolor="#00000030", linewidth=0.5, label=name)
-        for limit, held in ((panel.limit, panel.held) for panel in panels)
-        if limit is not None and held is not None and held.any()
-        for color, name in (SHADES[limit],)
+        shade_handle(panel.limit)
+        for panel in panels
+        if panel.limit is not None and panel.held is not None and panel.held.any()
     ]
     around = AROUND._replace(top=AROUND.top + LEGEND) if handles else AROUND
     heights = [panel.height for panel in panels]
@@ -95,7 +84,12 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
         },
     )
     for ax, panel in zip(axes, panels, strict=True):
-        _fill(figure, ax, panel, found.time)
+        if panel.limit is not None and panel.held is not None:
+            held = stretches(panel.held != 0, found.time, found.full.record.rate)
+            shade_stretches(ax, held, panel.limit)
+        fill_panel(
+            figure, ax, panel.label, found.time, panel.traces, panel.marks, least=panel.least
+        )
     fit_time(axes[-1], found.time)
     label_below(axes[-1], "time (s)")
     line_up_labels(figure, axes, 0.58)
@@ -162,48 +156,3 @@ def _panels(found: Comparison) -> list[Panel]:
             least=LEAST_PRESSURE,
         ),
     ]
-
-
-def _fill(figure: Figure, ax: Axes, panel: Panel, time: Array) -> None:
-    dress(ax, panel.label)
-    zero_line(ax)
-    low = min(0.0, *(float(trace.values.min()) for trace in panel.traces))
-    high = max(0.0, *(float(trace.values.max()) for trace in panel.traces))
-    marks = [
-        mark
-        for mark in panel.marks
-        if np.isfinite(mark.level) and max(high / mark.level, low / mark.level) >= NEAR
-    ]
-    low, high = min(low, *(m.level for m in marks), 0.0), max(high, *(m.level for m in marks), 0.0)
-    spare = max(0.09 * (high - low), 0.5 * (panel.least - (high - low)))
-    ax.set_ylim(low - (spare or 1.0), high + (spare or 1.0))
-    if panel.limit is not None and panel.held is not None:
-        _shade(ax, time, panel.held, SHADES[panel.limit].color)
-    labels = []
-    for mark in marks:
-        ax.axhline(mark.level, color=GREY, linewidth=THIN, dashes=(5.0, 3.0), zorder=1.5)
-        labels.append(MarginLabel(mark.level, mark.words, GREY))
-    for trace in panel.traces:
-        draw(ax, time, trace.values, trace.color, width=trace.width)
-        if trace.name:
-            labels.append(MarginLabel(float(trace.values[-1]), trace.name, trace.color))
-    label_margin(figure, ax, labels)
-
-
-def _shade(ax: Axes, time: Array, held: Flags, color: str) -> None:
-    """Shade the stretches in which a limit holds, each sample up to half way to its neighbours."""
-    turns = np.flatnonzero(np.diff(held != 0, prepend=False, append=False))
-    if not turns.size:
-        return
-    half = 0.5 * float(time[-1] - time[0]) / max(time.size - 1, 1)
-    spans = np.stack((time[turns[::2]] - half, time[turns[1::2] - 1] + half), axis=1)
-    spans = merged(spans, float(time[-1] - time[0]) / MOST_RUNS)
-    ax.broken_barh(
-        [(begin, end - begin) for begin, end in spans.tolist()],
-        (0.0, 1.0),
-        transform=ax.get_xaxis_transform(),
-        facecolor=color,
-        edgecolor=color,
-        linewidth=0.4,
-        zorder=0.2,
-    )

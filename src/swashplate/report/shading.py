@@ -42,37 +42,44 @@ SHADES = {
 def shade_limits(ax: Axes, simulation: Simulation, limits: Iterable[Limit]) -> None:
     """Shade a panel wherever one of the limits acts."""
     for limit in limits:
-        spans = active_spans(simulation, limit)
-        if not spans.size:
-            continue
-        color, name = SHADES[limit]
-        left, right = spans[:, 0], spans[:, 1]
-        corners = np.empty((spans.shape[0], 4, 2))
-        corners[:, :, 0] = np.stack((left, right, right, left), axis=1)
-        corners[:, :, 1] = (0.0, 0.0, 1.0, 1.0)
-        ax.add_collection(
-            PolyCollection(
-                list(corners),
-                transform=ax.get_xaxis_transform(),
-                facecolor=color,
-                edgecolor=color,  # a thin edge, so that a single sample can be seen too
-                linewidth=0.4,
-                zorder=0.2 + 0.01 * int(limit).bit_length(),
-                label=name,
-            ),
-            autolim=False,
-        )
+        shade_stretches(ax, active_spans(simulation, limit), limit)
+
+
+def shade_stretches(ax: Axes, spans: Array, limit: Limit) -> None:
+    """Shade stretches of time, shape (m, 2), in the colour of a limit."""
+    if not spans.size:
+        return
+    color, name = SHADES[limit]
+    left, right = spans[:, 0], spans[:, 1]
+    corners = np.empty((spans.shape[0], 4, 2))
+    corners[:, :, 0] = np.stack((left, right, right, left), axis=1)
+    corners[:, :, 1] = (0.0, 0.0, 1.0, 1.0)
+    ax.add_collection(
+        PolyCollection(
+            list(corners),
+            transform=ax.get_xaxis_transform(),
+            facecolor=color,
+            edgecolor=color,  # a thin edge, so that a single sample can be seen too
+            linewidth=0.4,
+            zorder=0.2 + 0.01 * int(limit).bit_length(),
+            label=name,
+        ),
+        autolim=False,
+    )
 
 
 def active_spans(simulation: Simulation, limit: Limit) -> Array:
-    """Beginning and end of each stretch of time in which a limit acts, shape (m, 2). [s]
+    """Beginning and end of each stretch of time in which a limit acts, shape (m, 2). [s]"""
+    return stretches(simulation.active(limit), simulation.time, simulation.record.rate)
+
+
+def stretches(active: NDArray[np.bool_], time: Array, rate: float) -> Array:
+    """Beginning and end of each stretch of active samples, shape (m, 2). [s]
 
     A sample stands for the time up to half way to its neighbours.
     """
-    active = simulation.active(limit)
     turns = np.flatnonzero(np.diff(active, prepend=False, append=False))
-    half = 0.5 / simulation.record.rate
-    time = simulation.time
+    half = 0.5 / rate
     spans = np.stack((time[turns[::2]] - half, time[turns[1::2] - 1] + half), axis=1)
     return merged(spans, float(time[-1] - time[0]) / MOST_RUNS)
 
@@ -89,8 +96,10 @@ def merged(spans: Array, gap: float, most: int = MOST_RUNS) -> Array:
 
 def shade_handles(simulation: Simulation) -> list[Patch]:
     """Handles for a legend of the limits that act anywhere in a simulation."""
-    return [
-        Patch(facecolor=shade.color, edgecolor="#00000030", linewidth=0.5, label=shade.name)
-        for limit, shade in SHADES.items()
-        if simulation.active(limit).any()
-    ]
+    return [shade_handle(limit) for limit in SHADES if simulation.active(limit).any()]
+
+
+def shade_handle(limit: Limit) -> Patch:
+    """Handle for a legend of one limit."""
+    color, name = SHADES[limit]
+    return Patch(facecolor=color, edgecolor="#00000030", linewidth=0.5, label=name)

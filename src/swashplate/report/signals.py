@@ -6,32 +6,25 @@ from math import degrees
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from swashplate.report.panels import NARROW, WIDE, Mark, Trace, fill_panel
 from swashplate.report.shading import shade_handles, shade_limits
 from swashplate.report.style import (
     BLUE,
-    GREY,
     INK,
-    LINE,
-    THIN,
     VERMILION,
-    MarginLabel,
     Margins,
-    dress,
     label_below,
-    label_margin,
     line_up_labels,
     margins,
     new_figure,
     put_legend,
     signed,
     write_title,
-    zero_line,
 )
-from swashplate.report.traces import draw, fit_time
+from swashplate.report.traces import fit_time
 from swashplate.simulation.limits import Limit
 from swashplate.simulation.result import Simulation
 
@@ -41,28 +34,6 @@ WIDTH = 8.6
 PANEL, GAP = 1.3, 0.22
 AROUND = Margins(left=0.95, right=1.2, bottom=0.55, top=0.72)
 """Sizes. [inch]"""
-
-WIDE, NARROW = 1.9, 0.9
-"""Widths of two lines that lie on one another for long. [pt]"""
-
-_NEAR = 0.3
-"""A line that marks a limit is shown if the signal goes at least this share of the way to it."""
-
-
-class Trace(NamedTuple):
-    """A signal of a panel, in the panel's unit; its name if there is more than one."""
-
-    values: Array
-    color: str
-    name: str = ""
-    width: float = LINE
-
-
-class Mark(NamedTuple):
-    """A level that the signal should be compared with, in the panel's unit."""
-
-    level: float
-    words: str
 
 
 class Panel(NamedTuple):
@@ -94,7 +65,8 @@ def plot_simulation(simulation: Simulation, *, title: str | None = None) -> Figu
         gridspec_kw={**margins(figure, AROUND), "hspace": GAP / PANEL},
     )[:, 0]
     for ax, panel in zip(axes, panels, strict=True):
-        _fill(figure, ax, panel, simulation)
+        shade_limits(ax, simulation, panel.limits)
+        fill_panel(figure, ax, panel.label, simulation.time, panel.traces, panel.marks)
     fit_time(axes[-1], simulation.time)
     label_below(axes[-1], "time (s)")
     line_up_labels(figure, axes, 0.58)
@@ -162,29 +134,3 @@ def _pressure_unit(pressure: Array) -> tuple[str, float]:
     if largest >= 2e6:
         return "MPa", 1e-6
     return ("Pa", 1.0) if 0.0 < largest < 1e3 else ("kPa", 1e-3)
-
-
-def _fill(figure: Figure, ax: Axes, panel: Panel, simulation: Simulation) -> None:
-    dress(ax, panel.label)
-    zero_line(ax)
-    low = min(float(trace.values.min()) for trace in panel.traces)
-    high = max(float(trace.values.max()) for trace in panel.traces)
-    marks = [mark for mark in panel.marks if _within_reach(mark.level, low, high)]
-    low, high = min(low, *(m.level for m in marks), 0.0), max(high, *(m.level for m in marks), 0.0)
-    margin = 0.09 * (high - low) or 1.0
-    ax.set_ylim(low - margin, high + margin)
-    shade_limits(ax, simulation, panel.limits)
-    labels = []
-    for mark in marks:
-        ax.axhline(mark.level, color=GREY, linewidth=THIN, dashes=(5.0, 3.0), zorder=1.5)
-        labels.append(MarginLabel(mark.level, mark.words, GREY))
-    for trace in panel.traces:
-        draw(ax, simulation.time, trace.values, trace.color, width=trace.width)
-        if trace.name:
-            labels.append(MarginLabel(float(trace.values[-1]), trace.name, trace.color))
-    label_margin(figure, ax, labels)
-
-
-def _within_reach(level: float, low: float, high: float) -> bool:
-    reached = high if level > 0.0 else -low
-    return level != 0.0 and reached >= _NEAR * abs(level)

@@ -158,6 +158,7 @@ class Sheets:
         self._canvas.text(
             0.5, 0.45 / HEIGHT, str(self._count), fontsize=SMALL, color=GREY, ha="center"
         )
+        # matplotlib ships no types for PdfPages
         self._pdf.savefig(self._canvas)  # type: ignore[no-untyped-call]
         self._canvas, self._used = None, TOP
 
