@@ -13,7 +13,7 @@ export PIP_BUILD_CONSTRAINT := constraints.txt
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test lint docs figures bench cluster fuzz tools browser calibration coverage dist \
+.PHONY: help .venv demo test golden lint docs figures bench cluster fuzz tools browser calibration coverage dist \
   format clean
 
 help: ## list the targets
@@ -35,9 +35,12 @@ demo: $(STAMP) ## identify a virtual hoist from its tests, with a report, into d
 
 test: lint ## lint, then all tests: compiled, and a part of them interpreted
 	@echo; echo "== Tests, compiled"
-	@$(BIN)/pytest -n 2 --dist loadgroup
+	@$(BIN)/pytest -n 2 --dist loadgroup --durations=40
 	@echo; echo "== Tests marked 'interpreted', without the JIT"
 	@NUMBA_DISABLE_JIT=1 $(BIN)/pytest -n 2 -m interpreted
+
+golden: $(STAMP) ## compare with the numbers stored before the engine was rebuilt, all 600 cases
+	@GOLDEN=all $(BIN)/pytest tests/golden -q
 
 lint: $(STAMP) ## style, format, types and the direction of imports
 	@echo "== Style";   $(BIN)/ruff check .

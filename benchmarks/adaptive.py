@@ -5,11 +5,19 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from swashplate.physics.spool import orifice_opening
-from swashplate.physics.stroker import pressure_rate
-from swashplate.simulation.chain import plate_motion, pump_force, pump_spool
-from swashplate.simulation.constants import Pump
-from swashplate.simulation.march import observe_speed
+from swashplate.models.pump import (
+    Pump,
+    PumpConstants,
+    arm_sine,
+    orifice_opening,
+    plate_motion,
+    pressure_rate,
+    shaft_speed,
+    solenoid_force,
+    spool_balance,
+    swash_angle,
+    swash_tangent,
+)
 
 Array = NDArray[np.float64]
 
@@ -18,22 +26,32 @@ RTOL, ATOL = 1e-6, 1.0
 
 
 @njit(error_model="numpy")
-def slope(t: float, state: Array, current: Array, h: float, pump: Pump) -> float:
+def slope(t: float, state: Array, current: Array, h: float, pump: Pump, k: PumpConstants) -> float:
     """Rate of the pressure at any time; the current is a straight line between samples. [Pa/s]"""
     at = min(max(t / h, 0.0), current.size - 1.0)
     n = min(int(at), current.size - 2)
     i = current[n] + (at - n) * (current[n + 1] - current[n])
-    p = min(max(state[0], pump.lower), pump.upper)
-    free = pump_spool(pump_force(i, pump), p, pump)
-    opening = orifice_opening(free, pump.Z14, pump.Z16_plus, pump.Z16_minus)
-    Z6 = plate_motion(p, pump)
-    rate = pressure_rate(p, opening, Z6, pump.Z7, pump.Z8, pump.Z9, pump.symmetric)
-    if (p >= pump.upper and rate > 0.0) or (p <= pump.lower and rate < 0.0):
+    p = min(max(state[0], k.lower), k.upper)
+    free = spool_balance(solenoid_force(i, pump), arm_sine(p, pump), pump)
+    opening = orifice_opening(free, pump)
+    Z6 = plate_motion(p, pump, k)
+    rate = pressure_rate(p, opening, Z6, pump.Z7, pump.Z8, pump.Z9, None)
+    if (p >= k.upper and rate > 0.0) or (p <= k.lower and rate < 0.0):
         return 0.0
     return rate
 
 
-def integrate(current: Array, h: float, pump: Pump, longest: float) -> Array:
+@njit(error_model="numpy")
+def speed_of(pressure: Array, pump: Pump) -> Array:
+    """Shaft speed of every pressure. [rad/s]"""
+    speed = np.empty_like(pressure)
+    for n in range(pressure.size):
+        angle = swash_angle(swash_tangent(pressure[n], pump), pump, None)
+        speed[n] = shaft_speed(angle, 0.0, pump.Z10, pump.Z11)
+    return speed
+
+
+def integrate(current: Array, h: float, pump: Pump, k: PumpConstants, longest: float) -> Array:
     """Shaft speed over a signed current. [rad/s]
 
     Parameters
@@ -49,14 +67,11 @@ def integrate(current: Array, h: float, pump: Pump, longest: float) -> Array:
         [pump.Z2 / pump.Z1],
         method="RK45",
         t_eval=time,
-        args=(current, h, pump),
+        args=(current, h, pump, k),
         rtol=RTOL,
         atol=ATOL,
         max_step=longest,
     )
     if not solution.success:
         raise RuntimeError(solution.message)
-    pressure = np.clip(solution.y[0], pump.lower, pump.upper)
-    speed = np.empty_like(pressure)
-    observe_speed(current, pressure, pump, speed)
-    return speed
+    return speed_of(np.clip(solution.y[0], k.lower, k.upper), pump)

@@ -11,20 +11,19 @@ from table import Row, duration, times
 from timing import Timing, in_turns, one_core
 
 from swashplate import Drive
+from swashplate.equations.observation import Observation, ObservedRecord
+from swashplate.equations.record import record_of
 from swashplate.maneuvers import source_tests
-from swashplate.parameters.parameter_set import columns_of
-from swashplate.simulation.build import ALL_PARAMETERS
-from swashplate.simulation.constants import PUMP_PARAMETERS
-from swashplate.simulation.observation import Observation, ObservedRecord
-from swashplate.simulation.record import record_of
+from swashplate.parameters.definitions import columns_of
 from swashplate.simulation.residuals import jacobian, residuals, triangle
+from swashplate.simulation.sensitivities import ALL_COLUMNS, PUMP_COLUMNS
 
 Array = NDArray[np.float64]
 
 ROUNDS = 40
-PUMP = tuple(name for name in PUMP_PARAMETERS if name != "Z12")
+PUMP = tuple(name for name in PUMP_COLUMNS if name != "Z12")
 """The source's 27 parameters of pump and motor."""
-CARD = tuple(name for name in ALL_PARAMETERS if name not in PUMP_PARAMETERS and name != "tau")
+CARD = tuple(name for name in ALL_COLUMNS if name not in PUMP_COLUMNS and name != "tau")
 FREE = tuple(columns_of(["Z1", "Z3", "Z8", "Z10", "Z13", "Z16", "Z17", "Z19", "Z20", "Z21", "Z22"]))
 """What is left of them without gauges and without what no test reaches."""
 
@@ -86,7 +85,7 @@ def fit_rows() -> Iterator[Row]:
         yield _row("... residuals, pump", run(partial(tests.residuals, tests.pump)), 1)
         found = run(tests.jacobian)
         text = f"... residuals and Jacobian, {len(PUMP)} parameters, against {len(PUMP) + 1} C runs"
-        yield _row(text, found, len(PUMP) + 1, least=15.0)
+        yield _row(text, found, len(PUMP) + 1, least=30.0)
         for text, observed, columns, limit in (
             ("pump", tests.pump, FREE, 0.024),
             ("pump", tests.pump, PUMP, None),

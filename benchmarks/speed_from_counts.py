@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swashplate.campaign.encoder import interpolate_counts, shaft_angle, unwrap_counts
+from swashplate.campaign.encoder import interpolate_counts, radians_per_count, unwrap_counts
 from swashplate.campaign.filters import matched_speed, path_delay, speed_from_counts
 from swashplate.campaign.kalman import smooth_counts
 from swashplate.campaign.savitzky_golay import savitzky_golay_speed
@@ -61,7 +61,7 @@ MOTIONS = {
 
 def differences(counts: Array) -> Array:
     """Change of the angle over the sample before each instant [rad/s]."""
-    return np.diff(shaft_angle(counts, counts_per_turn=TURN), prepend=0.0) / PERIOD
+    return np.diff(radians_per_count(TURN) * counts, prepend=0.0) / PERIOD
 
 
 def source(counts: Array) -> Array:
@@ -71,7 +71,7 @@ def source(counts: Array) -> Array:
 
 def savitzky_golay(counts: Array) -> Array:
     """Parabolas through 0.1 s of interpolated counts [rad/s]."""
-    angle = shaft_angle(interpolate_counts(TIME, counts), counts_per_turn=TURN)
+    angle = radians_per_count(TURN) * interpolate_counts(TIME, counts)
     return savitzky_golay_speed(TIME, angle, window=0.1, order=2)
 
 

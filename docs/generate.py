@@ -1,11 +1,13 @@
 """Pages of the reference that would only repeat what the package says of itself.
 
 The API from `api.toml` and docstrings, the command line from its own help, campaign files and
-set-ups from their schemas.
+set-ups from their schemas. The tables of the nomenclature, a page that is kept, are made of the
+parameters' definitions: ``python docs/generate.py`` writes them anew.
 """
 
 import importlib
 import inspect
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -17,6 +19,7 @@ from pydantic import BaseModel
 from swashplate.campaign.schema import CampaignFile
 from swashplate.cli import EPILOG, HELP, app
 from swashplate.identification.setup import Setup
+from swashplate.parameters.definitions import CATALOGUE, REFINEMENTS, Block, Definition
 from swashplate.parameters.schema import SetFile
 
 HERE = Path(__file__).parent
@@ -186,3 +189,59 @@ def type_words(entry: Mapping[str, Any], tables: set[str], schema: Mapping[str, 
     return {"string": "text", "integer": "whole number", "boolean": "true or false"}.get(
         entry.get("type", ""), entry.get("type", "any")
     )
+
+
+# --- nomenclature ---------------------------------------------------------------------------------
+
+NOMENCLATURE = HERE / "nomenclature.md"
+HEADS: Mapping[Block, tuple[str, ...]] = {
+    "control_card": ("equation",),
+    "pump_motor": ("lump", "equation"),
+    "refinements": ("not given", "switch", "of"),
+}
+"""Columns of a block's table after those of all tables."""
+
+
+def nomenclature(text: str) -> str:
+    """The page with its tables as the definitions have them, each behind the heading of its block.
+
+    Parameters
+    ----------
+    text : str
+        The page; a table begins with a row ``| symbol | name | unit | each way | range | ...``.
+    """
+    tables = iter(HEADS)
+
+    def made(_: re.Match[str]) -> str:
+        return parameter_table(next(tables))
+
+    return re.sub(r"^\| symbol \| name \| unit \|.*\n(\|.*\n)+", made, text, flags=re.MULTILINE)
+
+
+def parameter_table(block: Block) -> str:
+    """All parameters of a block, a row each."""
+    heads = ("symbol", "name", "unit", "each way", "range", *HEADS[block])
+    members = [d for d in (*CATALOGUE.values(), *REFINEMENTS.values()) if d.block == block]
+    lines = [row(heads), "|" + "---|" * len(heads), *(row(cells(each)) for each in members)]
+    return "\n".join(lines) + "\n"
+
+
+def cells(each: Definition) -> tuple[str, ...]:
+    """A parameter's row."""
+    first = (each.symbol, each.name, each.unit, "yes" if each.directional else "no", each.range)
+    match each.block:
+        case "control_card":
+            return (*first, each.source)
+        case "pump_motor":
+            return (*first, each.stands_for or "—", each.source)
+        case "refinements":
+            return (*first, f"{each.default:g}", "yes" if each.switch else "no", each.stands_for)
+
+
+def row(cells: tuple[str, ...]) -> str:
+    """Cells between bars."""
+    return f"| {' | '.join(cells)} |"
+
+
+if __name__ == "__main__":
+    NOMENCLATURE.write_text(nomenclature(NOMENCLATURE.read_text("utf-8")), "utf-8")

@@ -15,6 +15,7 @@ docs/own-models.md tells the story and keeps the table that this prints.
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -24,11 +25,10 @@ from matplotlib.figure import Figure
 from numba import njit
 
 from swashplate import Campaign, Drive
-from swashplate.campaign.experiment import Experiment, InputSignal
-from swashplate.identification.anchoring import anchored, anchored_model
+from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.measures import measures
-from swashplate.identification.model import Model
+from swashplate.identification.model import Differentiable, Linearised, Model, linearised, simulated
 from swashplate.identification.problem import Problem
 from swashplate.identification.solving import solve
 from swashplate.identification.starts import sobol_starts
@@ -132,6 +132,61 @@ def mean_command(command: InputSignal, edges: np.ndarray) -> np.ndarray:
     return np.diff(integral) / np.diff(edges)
 
 
+# %% Re-anchored to the measurement
+# A position is the integral of a speed, so a small error of the speed grows without end, and the
+# RMSE of a long run says more about its length than about the model. Counted from the measured
+# position at the beginning of each window, runs of any length are comparable.
+def since_anchor(channel: Channel, rows: np.ndarray) -> np.ndarray:
+    """Rows of a time series less the row at the first sample of each window that counts."""
+    windows = (channel.time - channel.time[0]) // ANCHOR
+    counting = np.flatnonzero(channel.used)
+    first = np.searchsorted(windows, windows)
+    if not counting.size:
+        return rows - rows[first]
+    held = np.minimum(np.searchsorted(windows[counting], windows), counting.size - 1)
+    candidate = counting[held]
+    return rows - rows[np.where(windows[candidate] == windows, candidate, first)]
+
+
+def anchored(experiment: Experiment) -> Experiment:
+    """An experiment whose position says how far it moved since the last anchor."""
+    channel = experiment["position"]
+    moved = replace(channel, values=since_anchor(channel, channel.values))
+    return replace(experiment, channels={**experiment.channels, "position": moved})
+
+
+def anchored_model(model: Model) -> Model:
+    """A model that runs freely, of which only what it moves since the anchor is compared."""
+    return (DifferentiableAnchored if isinstance(model, Differentiable) else Anchored)(model)
+
+
+@dataclass(frozen=True)
+class Anchored:
+    """See `anchored_model`."""
+
+    model: Model
+
+    def simulate(
+        self, values: Mapping[str, float], experiment: Experiment
+    ) -> Mapping[str, np.ndarray]:
+        """Motion since the last anchor [m]."""
+        position = simulated(self.model, values, experiment)["position"]
+        return {"position": since_anchor(experiment["position"], position)}
+
+
+@dataclass(frozen=True)
+class DifferentiableAnchored(Anchored):
+    """The same with derivatives."""
+
+    def linearise(
+        self, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
+    ) -> Mapping[str, Linearised]:
+        """Motion since the last anchor with its derivatives."""
+        channel = experiment["position"]
+        output = linearised(self.model, values, experiment, names)["position"]
+        return {"position": Linearised(*(since_anchor(channel, rows) for rows in output))}
+
+
 # %% Fitted to some trials, scored on another
 class Score(NamedTuple):
     """What two models make of a trial that neither was fitted to."""
@@ -151,8 +206,8 @@ def fitted(
 ) -> dict[str, float]:
     """Values of the unknowns, the best of several starts."""
     problem = Problem(
-        anchored_model(model, ["position"], ANCHOR),
-        tuple(anchored(each, ["position"], ANCHOR) for each in experiments),
+        anchored_model(model),
+        tuple(anchored(each) for each in experiments),
         unknowns,
         ("position",),
         {"position": NOISE},
@@ -164,8 +219,8 @@ def fitted(
 
 def error(model: Model, values: Mapping[str, float], experiment: Experiment) -> float:
     """RMSE of the re-anchored position [m]."""
-    measured = anchored(experiment, ["position"], ANCHOR)["position"]
-    simulated = anchored_model(model, ["position"], ANCHOR).simulate(values, experiment)
+    measured = anchored(experiment)["position"]
+    simulated = anchored_model(model).simulate(values, experiment)
     return measures(measured.values, simulated["position"], measured.weight).rmse
 
 
@@ -186,7 +241,7 @@ def scores(tests: Campaign) -> Iterator[Score]:
                 error(model, fitted(model, others, unknowns, starts), left_out)
                 for model, unknowns, starts in models_for(axis, tests)
             ]
-            moved = anchored(left_out, ["position"], ANCHOR)["position"].values
+            moved = anchored(left_out)["position"].values
             yield Score(axis, left_out.run, float(np.sqrt(np.mean(moved**2))), *rmse)
 
 
@@ -199,8 +254,8 @@ def draw(tests: Campaign, trial: str, path: Path) -> None:
         _, (valve, unknowns, starts) = models_for(axis, tests)
         values = fitted(valve, others, unknowns, starts)
         measured = left_out["position"]
-        moved = anchored(left_out, ["position"], ANCHOR)["position"].values
-        predicted = anchored_model(valve, ["position"], ANCHOR).simulate(values, left_out)
+        moved = anchored(left_out)["position"].values
+        predicted = anchored_model(valve).simulate(values, left_out)
         anchor = measured.values - moved
         plot.plot(measured.time, 1e3 * measured.values, color="0.3", label="measured")
         plot.plot(measured.time, 1e3 * (anchor + predicted["position"]), "C1", label="predicted")

@@ -3,7 +3,7 @@
 import pytest
 
 from swashplate import InputError
-from swashplate.parameters.catalogue import CATALOGUE
+from swashplate.parameters.definitions import CATALOGUE
 from swashplate.units import to_si
 
 

@@ -5,44 +5,42 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.equations.record import SOURCE_RATE, Interpolation, Record, record_of
+from swashplate.equations.run import Start
 from swashplate.errors import InputError
-from swashplate.linear.continuous import linearize
-from swashplate.linear.frequency_response import FrequencyResponse
-from swashplate.linear.model import Coulomb, LinearDrive
-from swashplate.linear.operating_point import Input
-from swashplate.linear.sweep import SweptInput, SweptOutput, frequency_response
 from swashplate.parameters.files import dump_set, load_preset, load_set
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.batch import Batch, SquaredError, simulate_many
-from swashplate.simulation.build import build_channel
-from swashplate.simulation.gradients import (
+from swashplate.simulation.result import Simulation
+from swashplate.simulation.run import (
+    check_voltage,
+    measured_records,
+    simulate_drive,
+    simulate_pump,
+)
+from swashplate.simulation.sensitivities import (
     Sensitivities,
     drive_sensitivities,
     pump_sensitivities,
 )
-from swashplate.simulation.record import (
-    SOURCE_RATE,
-    Interpolation,
-    Record,
-    check_voltage,
-    record_of,
-)
-from swashplate.simulation.refined import (
-    build_steady,
-    simulate_refined_drive,
-    simulate_refined_pump,
-)
-from swashplate.simulation.refined_stepper import RefinedStepper
-from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import Start, simulate_drive, simulate_pump
 from swashplate.simulation.steady import steady_states
 from swashplate.simulation.stepper import Stepper
+
+if TYPE_CHECKING:
+    from swashplate.linear import (
+        Coulomb,
+        FrequencyResponse,
+        Input,
+        LinearDrive,
+        SweptInput,
+        SweptOutput,
+    )
 
 Array = NDArray[np.float64]
 
@@ -150,6 +148,9 @@ class Drive:
         start: Start = "rest",
         clip: bool = False,
         substeps: int | None = None,
+        load_torque: ArrayLike | None = None,
+        pump_speed: ArrayLike | None = None,
+        supply_pressure: ArrayLike | None = None,
     ) -> Simulation:
         """Simulate the whole drive over a command.
 
@@ -169,12 +170,16 @@ class Drive:
             Clip a command beyond ±10 V instead of refusing it.
         substeps : int, optional
             Steps of the march a sample; by default so many that h ≤ 1/512 s.
+        load_torque, pump_speed, supply_pressure : (n,) array_like or float, optional
+            What was measured beside the command: torque of the load at the shaft, positive against
+            positive speed [N m]; speed of the prime mover over that which Z10 belongs to [1];
+            supply pressure less static pressure, in place of Z9 [Pa]. By default the parameters
+            count.
 
         Returns
         -------
         Simulation
-            All signals of the chain; a `RefinedSimulation`, which has the motor's torque and
-            pressure drop as well, where a refinement is on.
+            All signals of the chain, the motor's torque and pressure drop included.
 
         Raises
         ------
@@ -184,8 +189,13 @@ class Drive:
             If the solenoid overpowers the feedback spring.
         """
         record = _voltage_record(voltage, rate, time, interpolation, clip, substeps)
-        simulate = simulate_refined_drive if self.parameters.refinements else simulate_drive
-        return simulate(self.parameters, record, start)
+        measured = {
+            "load_torque": load_torque,
+            "pump_speed": pump_speed,
+            "supply_pressure": supply_pressure,
+        }
+        inputs = measured_records(record, measured)
+        return simulate_drive(self.parameters, record, start, measured=inputs)
 
     def simulate_current(
         self,
@@ -196,6 +206,9 @@ class Drive:
         interpolation: Interpolation | None = None,
         start: Start = "rest",
         substeps: int | None = None,
+        load_torque: ArrayLike | None = None,
+        pump_speed: ArrayLike | None = None,
+        supply_pressure: ArrayLike | None = None,
     ) -> Simulation:
         """Simulate pump and motor alone over a signed current [A]; arguments as `simulate`."""
         record = record_of(
@@ -206,8 +219,13 @@ class Drive:
             interpolation=interpolation,
             substeps=substeps,
         )
-        simulate = simulate_refined_pump if self.parameters.refinements else simulate_pump
-        return simulate(self.parameters, record, start)
+        measured = {
+            "load_torque": load_torque,
+            "pump_speed": pump_speed,
+            "supply_pressure": supply_pressure,
+        }
+        inputs = measured_records(record, measured)
+        return simulate_pump(self.parameters, record, start, measured=inputs)
 
     def sensitivities(
         self,
@@ -231,7 +249,6 @@ class Drive:
         voltage, rate, time, interpolation, start, clip, substeps :
             As in `simulate`.
         """
-        self.parameters.refuse_refinements("Sensitivities")
         record = _voltage_record(voltage, rate, time, interpolation, clip, substeps)
         return drive_sensitivities(self.parameters, record, start, parameters)
 
@@ -247,7 +264,6 @@ class Drive:
         substeps: int | None = None,
     ) -> Sensitivities:
         """The same for pump and motor alone over a signed current. [A]"""
-        self.parameters.refuse_refinements("Sensitivities")
         record = record_of(
             current,
             rate,
@@ -288,7 +304,6 @@ class Drive:
         threads : int, optional
             By default one a core. The numbers do not depend on it.
         """
-        self.parameters.refuse_refinements("Many sets at once")
         if (voltage is None) == (current is None):
             raise InputError("A batch needs either a voltage or a current.")
         if current is None:
@@ -322,8 +337,7 @@ class Drive:
         interpolation, start :
             As in `simulate`.
         """
-        made = RefinedStepper if self.parameters.refinements else Stepper
-        return made(self.parameters, h, interpolation, start)
+        return Stepper(self.parameters, h, interpolation, start)
 
     def linearize(
         self,
@@ -331,23 +345,32 @@ class Drive:
         *,
         current: float | None = None,
         speed: float | None = None,
-        input: Input | None = None,
+        input: Input | Sequence[Input] | None = None,
         outputs: Sequence[str] = ("shaft_speed",),
         coulomb: Coulomb = "ignored",
     ) -> LinearDrive:
         """Linear model of small motions about a steady state, from the exact partial derivatives.
+
+        Refinements count as their equations say of motions that are small enough. Friction is that
+        of presliding, whose memory is a state, ``"spool_deflection"``; damping and the line add
+        their states. The cam ring's ripple counts with the mean of a turn: not at all. Within the
+        solenoids' hysteresis a current moves nothing: only the force, or what is measured beside
+        the command, has a model there.
 
         Parameters
         ----------
         at, current, speed : float
             Where, one of the three: a constant voltage [V], a constant signed current [A], or the
             speed [rad/s] that a voltage settles at.
-        input : {"voltage", "current", "solenoid_force"}, optional
-            What moves the model; by default the voltage, or the current where one is given. With
-            another than the voltage it is the pump and motor alone.
+        input : str or sequence of str, optional
+            What moves the model: ``"voltage"``, ``"current"``, ``"solenoid_force"``; by default the
+            voltage, or the current where one is given. With another than the voltage it is the pump
+            and motor alone. Behind a command, or by themselves, ``"load_torque"``,
+            ``"pump_speed"`` and ``"supply_pressure"``, which move about the drive's parameters.
         outputs : sequence of str
             ``"shaft_speed"``, ``"swash_angle"``, ``"stroker_pressure"``, ``"orifice_opening"``,
-            ``"spool_position"``, ``"solenoid_force"``, ``"current"``.
+            ``"spool_position"``, ``"solenoid_force"``, ``"current"``, ``"motor_torque"``,
+            ``"motor_pressure_drop"``.
         coulomb : {"ignored", "tangent"}
             The card's Coulomb term: left out, which suits motions whose current moves much faster
             than 0.01 A/s, or with the slope of its smooth sign, exact for those that are slower.
@@ -363,10 +386,12 @@ class Drive:
         InputError
             For a point or option that there is not.
         DomainError
-            Where the gain is 0: in a dead zone or at a stop.
+            Where the gain is 0: in a dead zone, within the hysteresis, at a stop, or with a
+            friction that has no presliding.
         """
-        self.parameters.refuse_refinements("Linear models")
-        return linearize(
+        from swashplate.linear import linearize_drive
+
+        return linearize_drive(
             self.parameters,
             voltage=at,
             current=current,
@@ -389,6 +414,9 @@ class Drive:
     ) -> FrequencyResponse:
         """Gain and phase under sines of any size: the describing function, by simulation.
 
+        Refinements count, but for the cam ring's ripple: it does not repeat itself with the sine,
+        and the mean of a turn is without it.
+
         Parameters
         ----------
         frequencies : (f,) array_like
@@ -400,7 +428,7 @@ class Drive:
         input : {"voltage", "current"}
             Whole drive, or pump and motor alone.
         output : str
-            A signal as in `linearize`.
+            A signal as in `linearize`, the motor's torque and pressure drop apart.
         rate : float
             Steps a second, at least 512. At each frequency the step is shortened a little, so that
             a cycle has a whole number of them and its harmonics are exact. [Hz]
@@ -415,8 +443,9 @@ class Drive:
         DomainError
             If nothing moves at all, or the answer does not come to repeat itself.
         """
-        self.parameters.refuse_refinements("Frequency responses")
-        return frequency_response(
+        from swashplate.linear import sweep
+
+        return sweep(
             self.parameters,
             frequencies,
             amplitudes,
@@ -451,12 +480,7 @@ class Drive:
         volts = np.atleast_1d(np.array(voltage, dtype=np.float64))
         if not (np.abs(volts) <= FULL_VOLTAGE).all():
             raise InputError("A steady state needs finite commands within ±10 V.")
-        current, speed = np.empty(volts.size), np.empty(volts.size)
-        plus, minus = (
-            build_channel(self.parameters, side, 1.0 / SOURCE_RATE) for side in ("plus", "minus")
-        )
-        pump = build_steady(self.parameters)
-        steady_states(volts.reshape(-1), plus, minus, pump, current, speed)
+        current, speed = steady_states(self.parameters, volts.reshape(-1))
         if np.ndim(voltage) == 0:
             return float(current[0]), float(speed[0])
         return current.reshape(volts.shape), speed.reshape(volts.shape)

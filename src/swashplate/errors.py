@@ -19,3 +19,7 @@ class DomainError(SwashplateError):
 
 class FileError(SwashplateError):
     """A file that cannot be read or written."""
+
+
+class EquationError(SwashplateError):
+    """An equation that uses what equations may not, or that cannot be differentiated."""

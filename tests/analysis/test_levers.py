@@ -3,7 +3,7 @@ import pytest
 
 from swashplate import Drive, InputError, ParameterError
 from swashplate.analysis.levers import LEVERS, column_factors, find_lever, pulled, pulled_columns
-from swashplate.parameters.parameter_set import columns_of
+from swashplate.parameters.definitions import columns_of
 
 HOIST_Z16 = (1.1634e-04, 1.5126e-04)
 

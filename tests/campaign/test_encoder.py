@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from swashplate.campaign.encoder import (
     find_lost_counts,
     interpolate_counts,
-    shaft_angle,
+    radians_per_count,
     unwrap_counts,
 )
 from swashplate.errors import InputError
@@ -106,15 +106,13 @@ def test_steady_motion_is_found_to_the_motion_within_one_sample(
 
 def test_angle_of_the_hoist_winch() -> None:
     # 400 counts a turn geared 120/19 to 1: one turn of the winch is 400·120/19 = 2526.3 counts
-    counts = np.array([0.0, 400.0 * 120.0 / 19.0, 400.0])
-    angle = shaft_angle(counts, counts_per_turn=400.0, gear_ratio=120.0 / 19.0)
-    np.testing.assert_allclose(angle, [0.0, 2 * np.pi, 2 * np.pi * 19 / 120], rtol=1e-15)
-    down = shaft_angle(counts, counts_per_turn=400.0, gear_ratio=120.0 / 19.0, sign=-1)
-    np.testing.assert_array_equal(down, -angle)
+    angle = radians_per_count(400.0, 120.0 / 19.0)
+    assert angle * 400.0 * 120.0 / 19.0 == pytest.approx(2.0 * np.pi, rel=1e-15)
+    assert radians_per_count(400.0, 120.0 / 19.0, sign=-1) == -angle
     with pytest.raises(InputError, match="sign must be 1 or -1, not 0"):
-        shaft_angle(counts, counts_per_turn=400.0, sign=0)
+        radians_per_count(400.0, sign=0)
     with pytest.raises(InputError, match="counts_per_turn must be positive"):
-        shaft_angle(counts, counts_per_turn=0.0)
+        radians_per_count(0.0)
 
 
 def test_lost_counts_are_found_where_they_are() -> None:

@@ -1,10 +1,21 @@
 """Stamps and samples are checked, and every refusal names the row."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from swashplate.campaign.stamps import even_period, increasing, samples, signal, stamps_of
+from swashplate.campaign.stamps import (
+    even_period,
+    increasing,
+    samples,
+    signal,
+    stamp_statistics,
+    stamps_of,
+)
 from swashplate.errors import InputError
+
+SHARED = Path(__file__).parents[3] / "shared"
 
 
 def test_rounded_stamps_are_put_back_onto_their_grid() -> None:
@@ -55,3 +66,38 @@ def test_wrong_samples_are_refused_by_row_and_column() -> None:
         samples("speed", ["a", "b"], 2)
     with pytest.raises(InputError, match="one signal, not 3"):
         signal("speed", np.zeros((4, 3)), 4)
+
+
+def test_statistics_by_hand() -> None:
+    # intervals 0.1 0.12 0.08 0.1 0.5 0.1: median 0.1, the fifth a gap of four samples
+    found = stamp_statistics([0.0, 0.1, 0.22, 0.3, 0.4, 0.9, 1.0])
+    assert found.rows == 7
+    assert found.rate == pytest.approx(10.0)
+    assert found.jitter == pytest.approx(np.sqrt(2 * 0.02**2 / 5))
+    assert (found.shortest, found.longest) == pytest.approx((0.08, 0.5))
+    np.testing.assert_array_equal(found.gaps, [5])
+    assert found.missing == 4
+    assert not found.even
+
+
+def test_rounded_stamps_of_an_even_logger_are_even() -> None:
+    found = stamp_statistics(np.round(np.arange(1000) / 512.0, 4))
+    assert found.even
+    assert found.gaps.size == 0
+    assert found.missing == 0
+    with pytest.raises(InputError, match="gap must be above 1"):
+        stamp_statistics([0.0, 1.0], gap=1.0)
+
+
+def test_a_real_log_with_a_pause() -> None:
+    folder = SHARED / "data" / "excavator"
+    if not folder.exists():
+        pytest.skip("the excavator's measured data are not beside this checkout")
+    import polars as pl
+
+    path = sorted(folder.glob("steps_*.csv"))[0]
+    time = pl.read_csv(path)["Time"].to_numpy().astype(float)
+    found = stamp_statistics(time)
+    assert found.rate == pytest.approx(52.0, abs=2.0)
+    assert found.longest == pytest.approx(1.0, abs=0.2)
+    assert found.missing > 40

@@ -1,7 +1,7 @@
 import pytest
 
 from swashplate import Drive
-from swashplate.parameters.catalogue import CATALOGUE
+from swashplate.parameters.definitions import CATALOGUE
 from swashplate.parameters.files import preset_names
 
 

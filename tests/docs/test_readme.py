@@ -33,6 +33,8 @@ def test_calls_of_the_table_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         "amperes": np.full(20, 0.4),
         "stamps": np.arange(20) / 19.0,
         "values": np.array([1e-4, 2e-4]),
+        "torques": np.full(20, 500.0),
+        "ratios": np.full(20, 0.98),
     }
     ran = 0
     for call in calls:

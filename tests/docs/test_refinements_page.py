@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from swashplate import Drive, maneuvers
-from swashplate.parameters.refinements import REFINEMENTS
-from swashplate.physics.stiction import stiction_width
+from swashplate.models.refinements import friction_width
+from swashplate.parameters.definitions import REFINEMENTS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "refinements.md").read_text("utf-8")
 STICTION = {"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6}
@@ -29,7 +29,7 @@ def test_the_numbers_of_stiction() -> None:
     plain, stuck = hoist.simulate(sine).shaft_speed, sticky.simulate(sine).shaft_speed
     assert round(100.0 * np.abs(stuck - plain).max() / plain.max(), 1) == 2.2
     n = hoist.parameters.numbers
-    assert round(1e3 * stiction_width(0.115, n["Z4"], n["Z5"]), 3) == 0.031
+    assert round(1e3 * friction_width(0.115, n["Z4"], n["Z5"]), 3) == 0.031
 
 
 def test_the_numbers_of_hysteresis() -> None:

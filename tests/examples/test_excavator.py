@@ -9,7 +9,11 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Source
+from swashplate.identification.model import Differentiable, Linearised
+from swashplate.identification.problem import Problem
+from swashplate.identification.solving import solve
+from swashplate.identification.unknowns import Unknown, Unknowns
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "excavator"
@@ -62,6 +66,60 @@ def test_the_mean_of_a_held_command(excavator: ModuleType) -> None:
     edges = np.array([-1.0, 0.0, 0.5, 1.5, 3.0, 4.0])
     # before the log nothing is commanded; from 0.5 to 1.5 s half a second of 2 and half of -1
     assert excavator.mean_command(command, edges) == pytest.approx([0.0, 2.0, 0.5, -1.0, 4.0])
+
+
+def position(time: list[float], values: list[float], weight: list[float]) -> Channel:
+    arrays = (np.array(each, dtype=float) for each in (time, values, weight))
+    return Channel("position", "position", "m", *arrays, Source(Path("none.csv"), "x"))
+
+
+def test_each_window_is_anchored_by_its_first_sample_that_counts(excavator: ModuleType) -> None:
+    time = [0.5, 1.0, 5.4, 5.5, 7.6, 19.0, 19.1]
+    channel = position(time, time, [1, 1, 1, 1, 1, 0, 1])
+    moved = excavator.since_anchor(channel, channel.values)
+    assert moved == pytest.approx([0.0, 0.5, 4.9, 0.0, 2.1, -0.1, 0.0])
+    # nothing counts in the second window, or nowhere
+    channel = position(time, time, [0, 1, 0, 0, 0, 0, 0])
+    moved = excavator.since_anchor(channel, channel.values)
+    assert moved == pytest.approx([-0.5, 0.0, 4.4, 0.0, 2.1, 0.0, 0.1])
+    ignored = excavator.since_anchor(position(time, time, [0] * 7), np.array(time))
+    assert ignored == pytest.approx([0.0, 0.5, 4.9, 0.0, 2.1, 0.0, 0.1])
+
+
+class Ramp:
+    """A position that grows by a speed, from a zero of its own."""
+
+    def simulate(self, values, experiment):
+        return {"position": 3.0 + values["speed"] * experiment["position"].time}
+
+
+class KnownRamp(Ramp):
+    """The same, with derivatives."""
+
+    def linearise(self, values, experiment, names):
+        by = np.column_stack([experiment["position"].time for _ in names])
+        return {"position": Linearised(self.simulate(values, experiment)["position"], by)}
+
+
+@pytest.mark.parametrize("model", [Ramp(), KnownRamp()])
+def test_a_position_that_slips_between_windows_does_not_spoil_the_speed(
+    excavator: ModuleType, model: Ramp
+) -> None:
+    time = np.arange(0.0, 20.0, 0.25)
+    channel = position(time, 0.7 * time + 2.0 * np.floor(time / 5.0), np.ones(time.size))
+    command = InputSignal("other", "1", time, time, "linear", channel.source)
+    parts = ("run", "axis", "run", "fit", "rest", None, command, {"position": channel})
+    made = excavator.anchored_model(model)
+    assert isinstance(made, Differentiable) == isinstance(model, Differentiable)
+    problem = Problem(
+        made,
+        (excavator.anchored(Experiment(*parts)),),
+        Unknowns((Unknown("speed", 1.0, 0.1, 5.0),)),
+        ("position",),
+        {"position": 1.0},
+    )
+    found = problem.unknowns.values(solve(problem).vector)
+    assert found["speed"] == pytest.approx(0.7, abs=1e-9)
 
 
 @logs

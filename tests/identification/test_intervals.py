@@ -45,7 +45,7 @@ def test_at_a_bound_there_is_no_interval() -> None:
 def test_undetermined_there_is_none_either() -> None:
     base = covariance()
     found = estimates(
-        Covariance("HAC", base.variables, base.matrix, np.array([False, True]), np.ones(2))
+        Covariance("coloured", base.variables, base.matrix, np.array([False, True]), np.ones(2))
     )
     assert found[0].status == "undetermined"
     assert found[0].standard_error is None

@@ -10,6 +10,7 @@ from swashplate import Channel, DomainError, Experiment, FileError, InputError, 
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.identification.executors import Processes, Serial
+from swashplate.identification.model import Linearised
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import Free, Stage
 from swashplate.identification.solving import Progress, solve
@@ -109,13 +110,58 @@ class Fragile:
 
 def test_a_step_out_of_the_domain_is_taken_back(experiment: Make) -> None:
     run = experiment("run", 1.0, np.full(81, 15.9))
-    alone = UNKNOWNS.free_of(["lag"])
+    alone = Unknowns((UNKNOWNS.items[0],))
     made = Problem(Fragile(), (run,), alone, ("y",), {"y": 0.1})
     # the first step leads to e^7.45: far out of the domain
     solution = solve(made)
     assert alone.values(solution.vector)["gain"] == pytest.approx(np.sqrt(15.9), rel=1e-9)
     with pytest.raises(DomainError, match="below 4"):
         solve(made, alone.vector({"gain": 5.0}))
+
+
+WRONG = {
+    "nothing": (lambda y: None, "a mapping of channel names to an array of floats.* not None"),
+    "no mapping": (lambda y: y, "a mapping of channel names .*'y'.* not an array of float64"),
+    "complex": (lambda y: {"y": y + 1j}, "real numbers for y, not an array of complex128"),
+    "text": (lambda y: {"y": "fast"}, "real numbers for y, not a str"),
+    "texts": (lambda y: {"y": y.astype(str)}, "real numbers for y, not an array of str"),
+    "none": (lambda y: {"y": None}, "real numbers for y, not None"),
+    "a list": (lambda y: {"y": y.tolist()}, "real numbers for y, not a list"),
+    "objects": (lambda y: {"y": y.astype(object)}, "real numbers for y, not an array of object"),
+    "too few": (lambda y: {"y": y[1:]}, r"shape \(80,\) for y, but must return \(81,\)"),
+}
+
+
+@pytest.mark.parametrize(("change", "sentence"), WRONG.values(), ids=WRONG)
+def test_what_a_model_must_return_is_said(rise, experiment: Make, change, sentence: str) -> None:
+    class Wrong:
+        def simulate(self, values, experiment):
+            return change(rise.simulate(values, experiment)["y"])
+
+    made = Problem(Wrong(), (experiment("run", 1.0, np.ones(81)),), UNKNOWNS, ("y",), {"y": 0.1})
+    with pytest.raises(InputError, match=f"run: simulate .*{sentence}"):
+        solve(made)
+
+
+WRONG_LINEARISED = {
+    "nothing": (lambda y, by: None, "a mapping of channel names to a Linearised.* not None"),
+    "values alone": (lambda y, by: {"y": y}, "a Linearised for y, not an array"),
+    "complex": (lambda y, by: {"y": Linearised(y, by + 0j)}, "real numbers for y"),
+    "a list": (lambda y, by: {"y": Linearised(y.tolist(), by)}, "real numbers for y, not a list"),
+    "turned": (lambda y, by: {"y": Linearised(y, by.T)}, r"\(81, 2\): a row .* a column for each"),
+}
+
+
+@pytest.mark.parametrize(("change", "sentence"), WRONG_LINEARISED.values(), ids=WRONG_LINEARISED)
+def test_what_linearise_must_return_is_said(rise, experiment: Make, change, sentence: str) -> None:
+    class Wrong(type(rise)):
+        def linearise(self, values, experiment, names):
+            y = self.simulate(values, experiment)["y"]
+            return change(y, np.ones((y.size, len(names))))
+
+    made = Problem(Wrong(), (experiment("run", 1.0, np.ones(81)),), UNKNOWNS, ("y",), {"y": 0.1})
+    with pytest.raises(InputError, match=f"run: linearise .*{sentence}"):
+        solve(made)
 
 
 def test_interrupted_with_the_best_so_far(problem: Problem) -> None:

@@ -49,8 +49,7 @@ def test_a_prediction_is_the_simulation_of_the_command(campaign: Campaign) -> No
     simulated = drive.simulate(
         run.input.values, time=run.input.time, interpolation=run.input.interpolation
     )
-    assert simulated.card is not None
-    both = simulated.card.current_positive + simulated.card.current_negative
+    both = simulated.fine("current_positive") + simulated.fine("current_negative")
     expected = np.interp(run["current"].time, simulated.time, both)
     assert found["current"].simulated == pytest.approx(expected, abs=2e-3)
     assert found["current"].measures.fit_percent > 95.0

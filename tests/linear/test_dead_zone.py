@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive
-from swashplate.linear.dead_zone import DeadZoneError
+from swashplate.linear import DeadZoneError
 
 
 def proposed(drive: Drive, voltage: float) -> float:

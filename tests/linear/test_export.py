@@ -10,7 +10,7 @@ import pytest
 import scipy.signal
 
 from swashplate import Drive, FileError, InputError
-from swashplate.linear.transfer import pade_polynomials
+from swashplate.linear import pade_polynomials
 
 control = pytest.importorskip("control", reason="python-control is not installed")
 

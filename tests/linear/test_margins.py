@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, Drive, InputError
-from swashplate.linear.margins import loop_margins
-from swashplate.linear.model import LinearDrive
+from swashplate.linear import LinearDrive, loop_margins
 
 
 def radius(model: LinearDrive, gain: float, late: int = 0) -> float:

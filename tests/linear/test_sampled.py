@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError
-from swashplate.linear.model import LinearDrive
+from swashplate.linear import LinearDrive
 
 
 def marched(model: LinearDrive, u: np.ndarray) -> np.ndarray:

@@ -17,10 +17,10 @@ RETURNING = {
     "ramp": (maneuvers.ramp(1.0), 10.5),
     "sine": (maneuvers.sine(9.0, 0.3, length=20.0), 17.5),
     "stairs": (maneuvers.stairs([3.0, -5.0]), 5.0),
-    "chirp": (maneuvers.chirp(4.0, 0.05, 0.5), 57.5),
+    "chirp": (maneuvers.chirp(4.0, 0.05, 0.1), 57.5),
     "multisine": (maneuvers.multisine(5.0, (0.05, 0.5, 9)), 57.5),
     "recorded": (
-        maneuvers.recorded([0, 1, 3], [0, 4, 5], interpolation="linear")
+        maneuvers.recorded([0, 1, 3], [0, 6, 5], interpolation="linear")
         + maneuvers.spline_return(2.0),
         3.0,
     ),
@@ -36,8 +36,34 @@ def test_return_continues_voltage_and_slope_and_ends_at_rest(m, end):
     assert m.slope(m.length) == 0.0
 
 
+def test_return_of_a_fast_command_stays_within_its_amplitude():
+    m = maneuvers.chirp(4.0, 0.05, 2.0)  # the help's example
+    before, end = m(57.5 - 1e-9), 57.5
+    assert m(end) == pytest.approx(before, abs=1e-6)
+    # steeper than the return may start, which then just reaches the amplitude, at one instant
+    assert abs(rise(m, end, -1)) > abs(m.slope(end)) > 0.0
+    assert m.slope(end) * rise(m, end, -1) > 0.0
+    back = m(np.linspace(end, m.length, 100_001))
+    assert np.abs(back).max() == pytest.approx(4.0, rel=1e-8)
+    assert (np.abs(back) == np.abs(back).max()).sum() < 10
+    assert (m(m.length), m.slope(m.length)) == (0.0, 0.0)
+
+
+def test_return_from_what_states_no_amplitude_does_not_exceed_its_end():
+    class Line:
+        def __call__(self, time):
+            return 2.0 * time
+
+        def slope(self, time):
+            return np.full_like(time, 2.0)
+
+    own = maneuvers.Maneuver("own", 3.0, (maneuvers.Piece(0.0, Line()),))
+    assert (own + maneuvers.spline_return(2.0))(np.linspace(0.0, 5.0, 1001)).max() == 6.0
+
+
 def test_return_is_the_cubic_of_its_end_conditions():
-    m = maneuvers.ramp(2.0, start=0.0, settle=None, length=3.0) + maneuvers.spline_return(2.0)
+    ramp = maneuvers.ramp(2.0, start=0.0, settle=None, length=3.0)
+    m = ramp + maneuvers.spline_return(2.0)
     # V = a + b t + c t² + d t³ with V(0) = 6, V'(0) = 2, V(2) = V'(2) = 0.
     c, d = np.linalg.solve([[4.0, 8.0], [4.0, 12.0]], [-10.0, -2.0])
     t = np.linspace(0.0, 2.0, 21)

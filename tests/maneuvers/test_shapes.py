@@ -31,9 +31,11 @@ def test_ramp_stays_at_its_limit():
     assert m.slope([2.0, 2.5, 7.5]).tolist() == [-4.0, 0.0, 0.0]
 
 
-def test_ramp_that_just_reaches_its_limit_enters_the_return_with_its_slope():
+def test_ramp_that_just_reaches_its_limit_does_not_leave_it_in_the_return():
     m = maneuvers.ramp(2.0, limit=8.0, start=0.0, settle=1.0, length=5.0)
     assert m(4.0) == 8.0
+    assert m.slope(4.0) == 0.0
+    m = maneuvers.ramp(2.0, limit=8.5, start=0.0, settle=1.0, length=5.0)
     assert m.slope(4.0) == 2.0
 
 

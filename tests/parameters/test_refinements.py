@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from swashplate import Drive, ParameterError
-from swashplate.parameters.catalogue import CATALOGUE
-from swashplate.parameters.refinements import REFINEMENTS
+from swashplate.parameters.definitions import CATALOGUE, REFINEMENTS
 
 FILE = """
 [refinements]

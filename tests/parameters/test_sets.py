@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swashplate import Drive, FileError, Pair, ParameterError
-from swashplate.parameters.catalogue import CATALOGUE
+from swashplate.parameters.definitions import CATALOGUE
 from swashplate.parameters.files import preset_names
 
 

@@ -7,17 +7,14 @@ import pytest
 from scipy.optimize import least_squares
 
 from swashplate import Drive
+from swashplate.equations.observation import Observation, ObservedRecord
+from swashplate.equations.record import record_of
+from swashplate.equations.triangle import combine
 from swashplate.maneuvers import source_tests
-from swashplate.simulation.build import ALL_PARAMETERS
-from swashplate.simulation.constants import PUMP_PARAMETERS
-from swashplate.simulation.observation import Observation, ObservedRecord
-from swashplate.simulation.record import record_of
 from swashplate.simulation.residuals import triangle
-from swashplate.simulation.triangle import combine
+from swashplate.simulation.sensitivities import ALL_COLUMNS, PUMP_COLUMNS
 
-CARD = tuple(
-    name for name in ALL_PARAMETERS if name not in PUMP_PARAMETERS and not name.startswith("C_")
-)
+CARD = tuple(name for name in ALL_COLUMNS if name not in PUMP_COLUMNS and not name.startswith("C_"))
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -11,7 +11,7 @@ from swashplate.campaign.campaign import Campaign
 from swashplate.identification.assessment import Assessment, assess
 from swashplate.identification.fit import Fit, fit
 from swashplate.identification.setup import Setup, load_setup
-from swashplate.parameters.parameter_set import columns_of
+from swashplate.parameters.definitions import columns_of
 
 AXES = ("hoist", "slew", "luff")
 

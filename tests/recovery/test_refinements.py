@@ -1,4 +1,4 @@
-"""Refinements are found again from clean virtual tests, by a fit with difference derivatives."""
+"""Refinements are found again from clean virtual tests, by a fit with exact derivatives."""
 
 from pathlib import Path
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError
-from swashplate.linear.frequency_response import FrequencyResponse
+from swashplate.linear import FrequencyResponse
 from swashplate.report.bode_view import plot_bode
 from swashplate.report.style import BLUE, VERMILION
 

@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, SquaredError, maneuvers
+from swashplate.equations.observation import Observation, ObservedRecord
+from swashplate.equations.record import record_of
+from swashplate.simulation.residuals import jacobian, residuals
 
 VARIANTS = {
     "published": {},
@@ -121,6 +124,77 @@ def test_side_by_side_gives_the_same_bits(drive: Drive, form: str) -> None:
     assert np.array_equal(
         pumps[0], drive.replace(Z16_plus=1.44e-4).simulate_current(current).shaft_speed
     )
+
+
+STICTION = {"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6}
+LOAD = {"load_torque": 3e4, "load_inertia": 5e3, "motor_leakage": 1e-6, "motor_constant": 250.0}
+RIPPLE = {"cam_ripple": 0.01, "cam_ripple_per_torque": 5e-7, "cam_phase": 0.3}
+REFINED = {
+    "stiction": STICTION,
+    "hysteresis, leaky": {"solenoid_hysteresis": 0.005, "Z7": 0.4},
+    "cam ring": {**RIPPLE, "load_torque": 2e4},
+    "damping, loaded": {"swash_damping": 0.02, "Z12": 0.2, "Z11": 0.05},
+    "leakage": LOAD,
+    "line": {**LOAD, "line_stiffness": 1e6},
+    "everything": {
+        **STICTION,
+        **LOAD,
+        **RIPPLE,
+        "solenoid_hysteresis": 0.005,
+        "swash_damping": 0.02,
+        "line_stiffness": 1e6,
+        "Z7": 0.4,
+        "Z13": 0.6,
+    },
+}
+
+
+@pytest.mark.parametrize(
+    ("refinement", "form"),
+    [*((name, "published") for name in REFINED), ("everything", "physical root")],
+)
+def test_refinements_give_the_same_bits_every_way(hoist: Drive, refinement: str, form: str) -> None:
+    """March, stepper and lanes, over every option of the pump."""
+    drive = variant(hoist.replace(**REFINED[refinement]), form)
+    voltage = command()[:900]
+    run = drive.simulate(voltage)
+    samples = stepped(drive, voltage, 512.0)
+    for name in SIGNALS:
+        assert np.array_equal(samples[name], getattr(run, name)), name
+    factors = np.linspace(0.9, 1.1, 17)
+    changes = {"Z16_plus": 1.2e-4 * factors, "Z10": 12.0 * factors}
+    last = drive.replace(**{name: float(values[16]) for name, values in changes.items()})
+    whole = last.simulate(voltage)
+    for output in ("shaft_speed", "shaft_position", "current"):
+        batch = drive.simulate_many(changes, voltage=voltage, output=output)
+        assert not batch.failures
+        assert np.array_equal(batch.output[16], getattr(whole, output)), output
+
+
+def test_a_refinement_comes_on_in_some_sets_of_a_batch(hoist: Drive) -> None:
+    voltage = command()[:900]
+    changes = {"swash_damping": [0.0, 0.02, 0.0, 0.04], "cam_ripple": [0.0, 0.0, 0.01, 0.02]}
+    batch = hoist.simulate_many(changes, voltage=voltage)
+    for i in range(4):
+        one = hoist.replace(**{name: values[i] for name, values in changes.items()})
+        assert np.array_equal(batch.output[i], one.simulate(voltage).shaft_speed), i
+
+
+@pytest.mark.parametrize("refinement", ["stiction", "line", "everything"])
+def test_residuals_of_refined_drives_carry_the_same_bits(hoist: Drive, refinement: str) -> None:
+    drive = hoist.replace(**REFINED[refinement])
+    voltage = command()[:900]
+    run, time = drive.simulate(voltage), np.arange(900) / 512.0
+    observed = ObservedRecord(
+        record_of(voltage, 512.0, what="voltage"),
+        [Observation(name, time, np.zeros(900)) for name in ("shaft_speed", "shaft_position")],
+    )
+    for found in (
+        residuals(drive.parameters, observed),
+        jacobian(drive.parameters, observed, ["Z8", "Z10", "tau"]).residuals,
+    ):
+        assert np.array_equal(found[:900], run.shaft_speed)
+        assert np.array_equal(found[900:], run.shaft_position)
 
 
 def test_cost_is_the_weighted_sum_of_squares(hoist: Drive) -> None:

@@ -36,6 +36,33 @@ def test_an_unstable_filter_fails_only_its_set(hoist: Drive) -> None:
 
 
 @pytest.mark.parametrize(
+    ("zeta", "omega"), [(0.3, 409.6), (0.3, 307.0), (0.9, 950.0), (2.0, 275.0)]
+)
+def test_a_batch_refuses_the_filters_that_simulate_refuses(hoist: Drive, zeta, omega) -> None:
+    changes = {"zeta": [zeta, 1.0], "omega": [omega, 56.0]}
+    batch = hoist.simulate_many(changes, voltage=np.ones(50))
+    try:
+        hoist.replace(zeta=zeta, omega=omega).simulate(np.ones(50))
+    except InputError:
+        assert list(batch.failures) == [0]
+        assert "unstable" in batch.failures[0]
+        assert np.isnan(batch.output[0]).all()
+    else:
+        assert not batch.failures
+
+
+def test_overflow_fails_only_its_set(hoist: Drive) -> None:
+    for record in ({"voltage": np.full(600, 5.0)}, {"current": np.full(600, 0.5)}):
+        for cost in (None, SquaredError(np.zeros(600))):
+            batch = hoist.simulate_many({"Z7": [0.0, 1e150, 1e-3]}, cost=cost, **record)
+            assert list(batch.failures) == [1]
+            assert "beyond all bounds" in batch.failures[1]
+            results = batch.output if cost is None else batch.cost
+            assert np.isfinite(results[[0, 2]]).all()
+            assert not np.isfinite(results[1]).any()
+
+
+@pytest.mark.parametrize(
     ("changes", "options", "sentence"),
     [
         ({"Z16": [1e-4], "Z10": [1.0, 2.0]}, {"voltage": [0.0]}, "same number of sets"),
@@ -44,7 +71,7 @@ def test_an_unstable_filter_fails_only_its_set(hoist: Drive) -> None:
         ({"Z16": [1e-4], "Z16_plus": [1e-4]}, {"voltage": [0.0]}, "Z16_plus is given twice"),
         ({"Z10": [3.0]}, {}, "either a voltage or a current"),
         ({"Z10": [3.0]}, {"voltage": [0.0], "current": [0.0]}, "either a voltage or a current"),
-        ({"Z10": [3.0]}, {"voltage": [0.0], "output": "swash_angle"}, "no output 'swash_angle'"),
+        ({"Z10": [3.0]}, {"voltage": [0.0], "output": "torque"}, "no output 'torque'"),
         (
             {"Z10": [3.0]},
             {"voltage": [0.0, 1.0], "cost": SquaredError([0.0])},

@@ -1,4 +1,4 @@
-"""The cache of compiled kernels: used when nothing changed, never when a component did."""
+"""Machine code of a drive's march: used when nothing changed, never when an equation did."""
 
 import os
 import shutil
@@ -9,14 +9,15 @@ from pathlib import Path
 import pytest
 
 import swashplate
-from swashplate.simulation import compilation
 
 SCRIPT = """
 import numpy as np
 from swashplate import Drive
-from swashplate.simulation.march import march_pump, observe_speed
-print(Drive.preset("hoist").simulate_current(np.full(60, 0.5)).shaft_speed[-1])
-print(sum(march_pump.stats.cache_hits.values()), sum(march_pump.stats.cache_misses.values()))
+from swashplate.equations.run import march_kernel
+run = Drive.preset("hoist").simulate_current(np.full(60, 0.5))
+print(run.shaft_speed[-1])
+march = march_kernel(run.instance.model, (run.driven_by,), run.instance.options, run.kept)
+print(sum(march.stats.cache_hits.values()), sum(march.stats.cache_misses.values()))
 """
 
 
@@ -43,29 +44,18 @@ def run(package: Path) -> tuple[float, int, int]:
     return float(speed), int(hits), int(misses)
 
 
-def test_without_a_place_for_the_cache_kernels_still_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compilation._KernelCacheImpl, "_locator_classes", [])
-    with pytest.warns(RuntimeWarning, match="set NUMBA_CACHE_DIR to a folder"):
-
-        @compilation.kernel
-        def double(x: float) -> float:
-            return 2.0 * x
-
-    assert double(1.5) == 3.0
-
-
-def test_a_changed_component_is_never_answered_from_the_cache(package: Path) -> None:
+def test_a_changed_equation_is_never_answered_from_the_cache(package: Path) -> None:
     speed, hits, misses = run(package)
     assert (hits, misses) == (0, 1)
     assert run(package) == (speed, 1, 0)
 
-    # the march's own file stays as it is; a component that it inlines changes, at the same length
-    # and with the same time stamp, which is all that Numba itself would look at
-    component = package / "physics" / "stroker.py"
+    # an equation that the march inlines changes, at the same length and with the same time stamp,
+    # which is all that Numba itself would look at
+    component = package / "models" / "pump.py"
     stat = component.stat()
     text = component.read_text("utf-8")
-    assert "gain = 0.25 * Z8 * step" in text
-    component.write_text(text.replace("gain = 0.25 * Z8 * step", "gain = 0.24 * Z8 * step"))
+    assert "gain = 0.25 * Z8 * h" in text
+    component.write_text(text.replace("gain = 0.25 * Z8 * h", "gain = 0.24 * Z8 * h"))
     os.utime(component, ns=(stat.st_atime_ns, stat.st_mtime_ns))
 
     slower, hits, misses = run(package)

@@ -1,6 +1,7 @@
 """Steps and rates: first order in h, and the same answer from any sampling of one manoeuvre."""
 
 import itertools
+import re
 
 import numpy as np
 import pytest
@@ -64,6 +65,26 @@ def test_unstable_filter_is_refused_with_advice() -> None:
     settled = slew.simulate(voltage, substeps=2).current[5 * 512]
     # the Coulomb term may hold the filter within C/ω² of its level
     assert settled == pytest.approx(slew.steady_current(2.0), abs=4.8368 / 196.754**2 + 1e-6)
+
+
+@pytest.mark.parametrize("zeta", [0.05, 0.3, 0.9, 1.0, 1.2, 5.0, 40.0])
+def test_an_unstable_filter_is_refused_with_the_least_substeps_that_do(zeta: float) -> None:
+    drive, voltage = Drive.preset("neutral").replace(zeta=zeta, omega=1500.0), np.full(64, 5.0)
+    with pytest.raises(InputError, match="unstable") as refused:
+        drive.simulate(voltage)
+    least = int(re.findall(r"substeps=(\d+)", str(refused.value))[0])
+    assert np.isfinite(drive.simulate(voltage, substeps=least).current).all()
+    if least > 2:
+        with pytest.raises(InputError, match="unstable"):
+            drive.simulate(voltage, substeps=least - 1)
+
+
+@pytest.mark.parametrize(
+    ("zeta", "words"), [(1e300, "much damping .* lower"), (1e-5, "little damping .* raise")]
+)
+def test_a_filter_that_no_step_would_do_for_is_refused(zeta: float, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        Drive.preset("neutral").replace(zeta=zeta).simulate(np.ones(10))
 
 
 def test_a_filter_with_little_damping_needs_short_steps() -> None:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from swashplate import InputError
-from swashplate.simulation.observation import Observation, ObservedRecord, Own
-from swashplate.simulation.record import Record, record_of
+from swashplate.equations.observation import Observation, ObservedRecord, Own
+from swashplate.equations.record import Record, record_of
 
 pytestmark = pytest.mark.traced
 
@@ -20,7 +20,6 @@ def speed(**changes) -> Observation:
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"signal": "torque"}, "'torque' cannot be observed; signals are current, current_sum"),
         ({"time": [], "values": []}, "The observation of shaft_speed is empty"),
         ({"time": [0.0, 1.0]}, "has 2 stamps for 3 values"),
         ({"time": [0.0, 2.0, 1.0]}, "never fall, but is 1 s at sample 2"),
@@ -126,7 +125,7 @@ def test_own_unknowns_must_fit(own: Own, sentence: str) -> None:
 def test_refused_records() -> None:
     with pytest.raises(InputError, match="nothing observed"):
         ObservedRecord(record(), [])
-    with pytest.raises(InputError, match="'voltage' or a 'current', not 'torque'"):
-        ObservedRecord(record(), [speed()], driven_by="torque")
+    with pytest.raises(InputError, match="load_torque has 3 points, but the grid has 61"):
+        ObservedRecord(record(), [speed()], others={"load_torque": np.zeros(3)})
     with pytest.raises(InputError, match="start is 'later'"):
         ObservedRecord(record(), [speed()], start="later")

@@ -1,6 +1,6 @@
-"""The march with refinements: off it is the plain one, on it does what each is for."""
+"""The march with refinements: each does what it is for, and has exact derivatives."""
 
-from collections.abc import Callable
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from swashplate import Drive, InputError, Limit, ParameterError, Simulation, maneuvers
-from swashplate.simulation.record import record_of
-from swashplate.simulation.refined import simulate_refined_drive, simulate_refined_pump
-from swashplate.simulation.refined_result import RefinedSimulation
+from swashplate import Drive, Limit, Simulation, maneuvers
 from swashplate.simulation.result import SIGNALS
 
 pytestmark = pytest.mark.traced
@@ -33,9 +30,9 @@ ALL = {
 }
 
 
-def refined(drive: Drive, **changes: float) -> RefinedSimulation:
+def refined(drive: Drive, **changes: float) -> Simulation:
     run = drive.replace(**changes).simulate(maneuvers.step(4.0).sample(RATE))
-    assert isinstance(run, RefinedSimulation)
+    assert run.refined
     return run
 
 
@@ -44,40 +41,12 @@ def overshoot(run: Simulation, settled: float) -> Array:
     return 100.0 * (run.shaft_speed[512 : 6 * 512] / settled - 1.0)
 
 
-COMMANDS = {
-    "step": (maneuvers.step(4.0).sample(RATE), RATE),
-    "sine": (maneuvers.sine(9.0, 0.1).sample(RATE), RATE),
-    "another rate": (maneuvers.step(-9.0).sample(200.0), 200.0),
-}
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize("start", ["rest", "steady"])
-def test_off_it_is_the_plain_march_bit_for_bit(axis: Drive, command: str, start: str) -> None:
-    values, rate = COMMANDS[command]
-    plain = axis.simulate(values, rate, start=start)
-    record = record_of(values, rate, what="voltage")
-    off = simulate_refined_drive(axis.parameters, record, start)
-    for name in (*SIGNALS, "limits"):
-        np.testing.assert_array_equal(getattr(off, name), getattr(plain, name), err_msg=name)
-
-
-def test_off_it_is_the_plain_pump_in_all_its_variants(hoist: Drive) -> None:
-    current = 0.6 * np.sin(np.linspace(0.0, 12.0, 3000))
-    record = record_of(current, RATE, what="current")
-    for changes in ({}, {"Z7": 0.05}, {"Z12": 0.02, "Z11": 0.1}, {"Z2": 0.05}):
-        drive = hoist.replace(**changes)
-        plain = drive.simulate_current(current, RATE)
-        off = simulate_refined_pump(drive.parameters, record, "rest")
-        for name in ("stroker_pressure", "shaft_speed", "shaft_position", "spool_position"):
-            np.testing.assert_array_equal(getattr(off, name), getattr(plain, name), err_msg=name)
-        assert off.voltage is None
-
-
 def test_a_drive_without_refinements_is_marched_plainly(hoist: Drive) -> None:
     command = maneuvers.step(4.0).sample(RATE)
     given = hoist.replace(spool_friction=0.0, load_torque=3e4, dither_time=inf)
-    assert type(given.simulate(command)) is Simulation
+    run = given.simulate(command)
+    assert not run.refined
+    assert np.array_equal(run.shaft_speed, hoist.simulate(command).shaft_speed)
     assert given.parameters.refinements == ()
     assert hoist.plain is hoist
     assert hoist.replace(**ALL).plain.parameters == hoist.parameters
@@ -221,26 +190,83 @@ def test_everything_together_stays_finite(axis: Drive, tmp_path: Path) -> None:
     assert header.endswith("motor_torque,motor_pressure_drop")
 
 
-REFUSING: dict[str, Callable[[Drive], object]] = {
-    "sensitivities": lambda d: d.sensitivities(np.zeros(10), RATE),
-    "sensitivities_current": lambda d: d.sensitivities_current(np.zeros(10), RATE),
-    "simulate_many": lambda d: d.simulate_many({"Z10": [1.0]}, voltage=np.zeros(10)),
-    "linearize": lambda d: d.linearize(4.0),
-    "frequency_response": lambda d: d.frequency_response([0.1], [1.0]),
+def test_next_to_nothing_of_each_is_next_to_nothing(hoist: Drive) -> None:
+    """What a refinement does goes to nothing with its size: the way through it is the same."""
+    command = maneuvers.step(4.0).sample(RATE)
+    plain = hoist.simulate(command).shaft_speed
+    for small in (
+        {**STICTION, "spool_friction": 1e-7},
+        {"solenoid_hysteresis": 1e-8},
+        {"cam_ripple": 1e-9},
+        {"cam_ripple_per_torque": 1e-14, "load_torque": 1e4},
+        {"motor_leakage": 1e-15, "load_torque": 1e4},
+    ):
+        run = hoist.replace(**small).simulate(command)
+        assert run.refined
+        assert 0.0 <= np.abs(run.shaft_speed - plain).max() < 1e-5 * np.abs(plain).max()
+
+
+PARAMETERS = (
+    *(name for name in ALL if name != "load_torque"),
+    "load_torque",
+    "cam_cycles",
+    "Z1",
+    "Z8",
+    "Z10",
+    "Z16_plus",
+    "G1_plus",
+    "tau",
+)
+"""Every parameter of a refinement, and some of card and pump beside."""
+
+
+def slopes(drive: Drive, name: str, signals: tuple[str, ...], command: Array) -> list[Array]:
+    """Extrapolated differences of signals by one parameter, with several steps."""
+    value = drive.parameters.numbers[name]
+
+    def at(h: float) -> Array:
+        run = drive.replace(**{name: value + h}).simulate(command, RATE)
+        return np.stack([getattr(run, signal) for signal in signals])
+
+    found = []
+    for share in (2e-6, 2e-5, 2e-4):
+        h = share * abs(value)
+        coarse = (at(h) - at(-h)) / (2.0 * h)
+        fine = (at(0.5 * h) - at(-0.5 * h)) / h
+        found.append((4.0 * fine - coarse) / 3.0)
+    return found
+
+
+CASES = {
+    "everything": {**ALL, "cam_cycles": 5.4},
+    "everything but the line": {k: v for k, v in ALL.items() if k != "line_stiffness"},
+    "stiction": {**STICTION},
+    "hysteresis": {"solenoid_hysteresis": 0.005},
+    "cam ring": {"cam_ripple": 0.01, "cam_ripple_per_torque": 5e-7, "load_torque": 3e4},
+    "damping, physical root": {"swash_damping": 0.02, "Z7": 0.3},
 }
 
 
-@pytest.mark.parametrize("what", REFUSING)
-def test_what_does_not_know_refinements_refuses_them(hoist: Drive, what: str) -> None:
-    with pytest.raises(
-        InputError, match=r"do not know refinements, but .*spool_friction.* on; "
-    ) as e:
-        REFUSING[what](hoist.replace(**STICTION))
-    assert "\n" not in str(e.value)
-
-
-def test_a_refinement_has_no_exact_derivative(hoist: Drive) -> None:
-    with pytest.raises(ParameterError, match="spool_friction is a refinement"):
-        hoist.sensitivities(np.zeros(10), RATE, parameters=["spool_friction"])
-    with pytest.raises(ParameterError, match="spool_friction is a refinement"):
-        hoist.simulate_many({"spool_friction": [0.1]}, voltage=np.zeros(10))
+@pytest.mark.parametrize("case", CASES)
+def test_derivatives_are_those_of_differences(hoist: Drive, case: str) -> None:
+    drive = hoist.replace(**CASES[case])
+    if "root" in case:
+        drive = Drive(replace(drive.parameters, pressure_root="symmetric"))
+    command = maneuvers.sine(4.0, 0.8, start=0.05, length=2.0, settle=0.4).sample(RATE) + 0.5
+    signals = ("shaft_speed", "shaft_position")
+    on = [name for name in PARAMETERS if drive.parameters.numbers.get(name, 0.0) not in (0.0, inf)]
+    by = drive.sensitivities(command, RATE, parameters=on)
+    run = drive.simulate(command, RATE)
+    moved = set()
+    for j, name in enumerate(on):
+        found = slopes(drive, name, signals, command)
+        for k, signal in enumerate(signals):
+            exact = getattr(by, signal)[:, j]
+            size = np.abs(exact).max()
+            noise = 1e-11 * np.abs(getattr(run, signal)).max() / abs(drive.parameters.numbers[name])
+            error = np.min([np.abs(each[k] - exact) for each in found], axis=0)
+            assert (error > 1e-5 * size + noise).mean() < 0.01, (name, signal, error.max(), size)
+            if size > 0.0:
+                moved.add(name)
+    known = {name for name in CASES[case] if name != "Z7"}
+    assert known - moved <= {"motor_constant"}

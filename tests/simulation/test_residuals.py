@@ -12,14 +12,12 @@ import pytest
 from scipy.signal import lfilter
 
 from swashplate import DomainError, Drive, InputError, Limit, ParameterError, maneuvers
-from swashplate.simulation.build import ALL_PARAMETERS
-from swashplate.simulation.constants import PUMP_PARAMETERS
-from swashplate.simulation.observation import Observation, ObservedRecord, Own
-from swashplate.simulation.observe import OBSERVABLE
-from swashplate.simulation.record import record_of
-from swashplate.simulation.residuals import jacobian, residuals, triangle
+from swashplate.equations.observation import Observation, ObservedRecord
+from swashplate.equations.record import record_of
+from swashplate.equations.triangle import combine
+from swashplate.simulation.residuals import OBSERVABLE, Own, jacobian, residuals, triangle
 from swashplate.simulation.run import simulate_drive
-from swashplate.simulation.triangle import combine
+from swashplate.simulation.sensitivities import ALL_COLUMNS, PUMP_COLUMNS
 
 RATE = 512.0
 SWING = maneuvers.sine(3.0, 0.8, start=0.05, length=3.0, settle=0.4).sample(RATE)
@@ -89,13 +87,13 @@ def test_a_current_drives_the_pump_alone(hoist: Drive) -> None:
         driven_by="current",
     )
     alone = hoist.simulate_current(current)
-    found = jacobian(hoist.parameters, observed, ALL_PARAMETERS)
+    found = jacobian(hoist.parameters, observed, ALL_COLUMNS)
     for number, signal in enumerate(OBSERVABLE):
         assert np.array_equal(found.residuals[observed.rows_of(number)], simulated(alone, signal))
     by = hoist.sensitivities_current(current)
     speed = found.columns[observed.rows_of(OBSERVABLE.index("shaft_speed"))]
-    close(speed[:, : len(PUMP_PARAMETERS)], by.shaft_speed)
-    assert (speed[:, len(PUMP_PARAMETERS) :] == 0.0).all()
+    close(speed[:, : len(PUMP_COLUMNS)], by.shaft_speed)
+    assert (speed[:, len(PUMP_COLUMNS) :] == 0.0).all()
     for signal in CARD:
         assert (found.columns[observed.rows_of(OBSERVABLE.index(signal))] == 0.0).all()
 
@@ -113,7 +111,7 @@ def test_derivatives_are_those_of_the_readable_form(scene) -> None:
     command, changes, start = scene
     drive = drive_of(changes)
     observed = observed_at_samples(command, start)
-    found = jacobian(drive.parameters, observed, ALL_PARAMETERS)
+    found = jacobian(drive.parameters, observed, ALL_COLUMNS)
     by = drive.sensitivities(command, start=start)
     assert found.names == by.names
     for signal in ("current", "current_positive", "current_negative", "shaft_speed"):
@@ -169,7 +167,7 @@ OWN = Own(
 def test_derivatives_are_those_of_differences(name: str) -> None:
     command, changes, start = SCENES[name]
     drive, observed = drive_of(changes), everything_observed(command, start)
-    columns = (*ALL_PARAMETERS, "start_pressure")
+    columns = (*ALL_COLUMNS, "start_pressure")
     found = jacobian(drive.parameters, observed, columns, OWN)
     assert found.names[len(columns) :] == observed.own_columns
     assert np.array_equal(found.residuals, residuals(drive.parameters, observed, OWN))
@@ -276,7 +274,7 @@ def test_other_rates_are_compared_on_the_marchs_grid(hoist: Drive) -> None:
 FREE = ("Z8", "G1", "Z16", "tau", "Z6", "start_pressure", "Z10", "Z12", "lim1_minus")
 
 
-@pytest.mark.parametrize("columns", [FREE, ALL_PARAMETERS, ()], ids=["some", "all", "own alone"])
+@pytest.mark.parametrize("columns", [FREE, ALL_COLUMNS, ()], ids=["some", "all", "own alone"])
 @pytest.mark.parametrize("name", ["hoist, hard", "one way"])
 def test_triangle_is_the_qr_of_the_jacobian(name: str, columns: tuple) -> None:
     command, changes, start = SCENES[name]
@@ -389,10 +387,10 @@ def test_a_triangle_needs_no_memory_for_the_jacobian(hoist: Drive) -> None:
     observed = observed_at_samples(command, signals=["shaft_speed"])
     residuals(hoist.parameters, observed)  # whatever is made once
     tracemalloc.start()
-    triangle(hoist.parameters, observed, PUMP_PARAMETERS)
+    triangle(hoist.parameters, observed, PUMP_COLUMNS)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert peak < 3e6 < 8 * command.size * len(PUMP_PARAMETERS)
+    assert peak < 3e6 < 8 * command.size * len(PUMP_COLUMNS)
 
 
 def test_threads_do_not_disturb_each_other(hoist: Drive) -> None:

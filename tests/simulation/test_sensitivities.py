@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError, Limit, Simulation, maneuvers
-from swashplate.simulation.build import ALL_PARAMETERS
-from swashplate.simulation.constants import PUMP_PARAMETERS
+from swashplate.simulation.sensitivities import ALL_COLUMNS, PUMP_COLUMNS
 
 RATE = 512.0
 
@@ -152,7 +151,7 @@ def test_a_list_of_names_is_needed(hoist: Drive, names) -> None:
 def test_columns_are_those_asked_for(hoist: Drive) -> None:
     voltage = 2.0 * SWING
     everything = hoist.sensitivities(voltage)
-    assert everything.names == ALL_PARAMETERS
+    assert everything.names == ALL_COLUMNS
     some = hoist.sensitivities(voltage, parameters=["tau", "Z16", "G1_minus"])
     assert some.names == ("tau", "Z16_plus", "Z16_minus", "G1_minus")
     for j, name in enumerate(some.names):
@@ -164,9 +163,9 @@ def test_columns_are_those_asked_for(hoist: Drive) -> None:
 
 @pytest.mark.traced
 def test_pump_alone_has_the_same_columns(hoist: Drive) -> None:
-    whole = hoist.sensitivities(2.0 * SWING, parameters=list(PUMP_PARAMETERS))
+    whole = hoist.sensitivities(2.0 * SWING, parameters=list(PUMP_COLUMNS))
     pump = hoist.sensitivities_current(whole.simulation.current)
-    assert pump.names == tuple(PUMP_PARAMETERS)
+    assert pump.names == tuple(PUMP_COLUMNS)
     assert np.array_equal(pump.shaft_speed, whole.shaft_speed)
     with pytest.raises(InputError, match="does not depend on tau"):
         hoist.sensitivities_current([0.1, 0.2], parameters=["tau"])

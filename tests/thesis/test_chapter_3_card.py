@@ -7,9 +7,9 @@ import pytest
 import sympy as sp
 
 from swashplate import Drive, maneuvers
-from swashplate.physics.card_dynamics import filtered_current
-from swashplate.physics.control_card import steady_current
-from swashplate.simulation.build import build_delay
+from swashplate.equations.model import place
+from swashplate.models.card import Channel, filtered_current, steady_current
+from swashplate.models.drive import card
 
 H = 1.0 / 512.0
 NOW, BEFORE, NEXT, STEADY = sp.symbols("I_n I_before I_next I_ss", real=True)
@@ -21,6 +21,11 @@ HOIST = {
     "I_t2": 0.13724, "a": 19.131, "tau": 0.014,
 }  # fmt: skip
 """Positive channel of tables 4.1 and 4.2."""
+
+
+def channel_with(**values: float) -> Channel:
+    """A channel of zeros but for some values."""
+    return Channel(*[0.0] * len(Channel._fields))._replace(**values)
 
 
 def settled(volts: float) -> float:
@@ -55,7 +60,8 @@ def test_eq_3_1_channels_see_one_direction_each(hoist: Drive) -> None:
 def test_eq_3_2_is_the_straight_part_of_3_3(points: Callable) -> None:
     """The manufacturer's line; slew and luff have no more than that (G2 = G3 = 0)."""
     for volts, dead, jump, gain in points((1, 10), (0, 0.5), (0, 0.4), (0.01, 0.1)):
-        found = steady_current(volts, 1.0, dead, jump, gain, 0.0, 0.0)
+        channel = channel_with(V_dz=dead, J=jump, G1=gain)
+        found = steady_current(volts, 1.0, channel)
         assert found == pytest.approx(jump + gain * (volts - dead), rel=1e-12)
     for name in ("slew", "luff"):
         drive = Drive.preset(name)
@@ -78,7 +84,7 @@ def test_section_3_3_dead_zone_is_a_hundredth_of_full_scale_not_a_tenth() -> Non
 
 def test_eq_3_4_delay_is_no_whole_number_of_samples(hoist: Drive) -> None:
     """14 ms are 7.168 samples; a delay longer by three samples moves the current by three."""
-    delay = build_delay(0.014, H)
+    delay = place(card.tap("at"), 0.014, H)
     assert delay.whole + delay.fraction == pytest.approx(0.014 * 512.0, rel=1e-12)
     voltage = maneuvers.sine(6.0, 0.3, length=8.0).sample(512.0)
     early, late = (hoist.replace(tau=0.014 + k * H).simulate(voltage).current for k in (0, 3))
@@ -97,7 +103,8 @@ def test_eq_3_5_and_3_6_explicit_differences(gap: Callable) -> None:
 def test_eq_3_6_is_what_the_package_marches(points: Callable) -> None:
     printed = sp.lambdify((NOW, BEFORE, STEADY, zeta, omega, C, h, sign), printed_3_6())
     for at in points((0, 0.7), (0, 0.7), (0.01, 0.7), (0.5, 1.5), (40, 140), (0, 6)):
-        found = filtered_current(*at, H, True)
+        channel = channel_with(zeta=at[3], omega=at[4], C=at[5])
+        found = filtered_current(*at[:3], channel, H, True)
         assert found == pytest.approx(printed(*at, H, np.sign(at[0] - at[1])), abs=1e-15)
 
 

@@ -2,21 +2,33 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 import pytest
 import sympy as sp
 
-from swashplate import Drive, maneuvers
-from swashplate.physics.spool import orifice_opening
-from swashplate.physics.stroker import flow_head
-from swashplate.physics.stroker_flow import oil_pressure_rate, valve_flow
-from swashplate.physics.swash_mechanism import piston_speed
+from swashplate import Drive, PhysicalSet, maneuvers
+from swashplate.equations.equation import interpreted
+from swashplate.equations.fields import made
+from swashplate.models import full_order, pump
+from swashplate.models.full_order import Machine
+from swashplate.models.pump import Pump
 
 A_A, A_S, rho, C_d, k = sp.symbols("A_A A_S rho C_d k", positive=True)
 supply, tank, port_a, port_b = sp.symbols("supply tank port_a port_b", real=True)
 speed_wide, speed_narrow = sp.symbols("speed_wide speed_narrow", positive=True)
 P, Delta, x = sp.symbols("P Delta_P x", real=True)
+
+oil_pressure_rate = interpreted(full_order.oil_pressure_rate)
+orifice_opening = interpreted(pump.orifice_opening)
+piston_speed = interpreted(full_order.piston_speed)
+flow_head = interpreted(pump.flow_head)
+valve_flow = interpreted(full_order.valve_flow)
+valve_opening = interpreted(full_order.valve_opening)
+
+MACHINE = Machine(**PhysicalSet.preset("hoist").numbers)
+UNLIMITED = MACHINE._replace(spool_stroke=inf, orifice_opening_plus=inf, orifice_opening_minus=inf)
 
 PRESSURES = {supply: (8.0, 9.0), port_a: (5.0, 7.0), port_b: (3.0, 4.0), tank: (0.1, 1.0)}
 AREAS = {A_A: (0.1, 0.5), A_S: (0.8, 1.4)}
@@ -124,8 +136,16 @@ def test_eq_6_32_to_6_35_stroker_pressure(points: Callable) -> None:
         (0, 1e-11), (1e-4, 4e-4), (5e8, 2e9),
     ):  # fmt: skip
         pressure, flow, alpha, alpha_rate, lever, *oil = at
-        speed = piston_speed(float(np.tan(alpha)), alpha_rate, lever)
-        found = oil_pressure_rate(pressure, flow, speed, *oil)
+        piston_area, leakage, volume, bulk = oil
+        p = MACHINE._replace(
+            swash_arm=lever,
+            piston_area=piston_area,
+            piston_leakage=leakage,
+            oil_volume=volume,
+            bulk_modulus=bulk,
+        )
+        speed = piston_speed(float(np.tan(alpha)), alpha_rate, p)
+        found = oil_pressure_rate(pressure, flow, speed, p)
         assert found == pytest.approx(expected(*at), rel=1e-9)
 
 
@@ -140,7 +160,8 @@ def test_eq_6_35_valve_flow(points: Callable) -> None:
         (-5e6, 5e6), (-2e-4, 2e-4), (1e-4, 2e-4), (6e6, 1e7)
     ):
         expected = gain * np.sqrt((ahead - pressure) / 2.0) * opening
-        assert valve_flow(pressure, opening, gain, ahead, None) == pytest.approx(expected)
+        p = UNLIMITED._replace(valve_flow_gain=gain, supply_pressure=ahead)
+        assert valve_flow(opening, pressure, p, None) == pytest.approx(expected)
 
 
 def test_erratum_14_swept_flow_needs_the_stroking_pistons_area() -> None:
@@ -153,9 +174,12 @@ def test_erratum_14_swept_flow_needs_the_stroking_pistons_area() -> None:
     assert sp.simplify(swept[0] - lump) != 0
 
 
-def test_eq_6_36_opening_is_limited_both_ways() -> None:
+def test_eq_6_36_opening_is_limited_both_ways(hoist: Drive) -> None:
+    lumped = made(Pump, hoist.parameters.numbers)._replace(Z14=1e-4, Z16_plus=1.0, Z16_minus=1.0)
+    physical = UNLIMITED._replace(spool_stroke=1e-4)
     for x_, expected in ((-3e-4, -1e-4), (-5e-5, -5e-5), (0.0, 0.0), (5e-5, 5e-5), (3e-4, 1e-4)):
-        assert orifice_opening(x_, 1e-4, 1.0, 1.0) == expected
+        assert orifice_opening(x_, lumped) == expected
+        assert valve_opening(x_, physical) == expected
 
 
 def test_erratum_15_eq_6_36_prints_an_empty_branch() -> None:

@@ -7,8 +7,9 @@ import pytest
 import sympy as sp
 
 from swashplate import Drive
-from swashplate.physics.spool import spool_partials
-from swashplate.physics.stroker import pressure_rate_partials
+from swashplate.equations import derive
+from swashplate.equations.fields import made
+from swashplate.models.pump import Pump, pressure_rate, spool_balance
 
 d1, d3, d4, k_f, A_s, k_r, C_o, B, V = sp.symbols("d1 d3 d4 k_f A_s k_r C_o B V", positive=True)
 F, plate, rise, x, Delta, P0 = sp.symbols("F alpha_sw delta_P x_eff Delta_P P0", real=True)
@@ -101,21 +102,25 @@ def test_erratum_04_time_constant_needs_1_plus_z6() -> None:
     assert time_constant(0.0, luff) == pytest.approx(0.0142, abs=5e-5)
 
 
-def test_slopes_away_from_rest(points: Callable) -> None:
+def test_slopes_away_from_rest(points: Callable, hoist: Drive) -> None:
     """The partial derivatives that a linear model is made of, by SymPy at any point."""
     s = sp.symbols("s", real=True)
     free = Z[5] * sp.tan(sp.asin(Z[5] * F / sp.sqrt(Z[4])) - sp.asin(s))
     arguments = (F, s, Z[4], Z[5])
     derived = sp.lambdify(arguments, [sp.diff(free, each) for each in arguments])
+    spool = derive(spool_balance, by=("force", "arm_sine", "p.Z4", "p.Z5"))
+    assert spool.entries == tuple((0, n) for n in range(4))
+    pump = made(Pump, hoist.parameters.numbers)
     for moment, sine, square, arm in points((-0.6, 0.6), (-0.5, 0.5), (0.01, 0.3), (7e-3, 0.014)):
         force = moment * sqrt(square) / arm
-        found = spool_partials(force, sine, square, arm, 0.0)[1:5]
+        found = spool.python(force, sine, pump._replace(Z4=square, Z5=arm, Z18=0.0))[1:]
         assert found == pytest.approx(derived(force, sine, square, arm), rel=1e-9)
     rates = (rise, x, Z[6], Z[8], Z[9])
     derived = sp.lambdify(rates, [sp.diff(RATE, each) for each in rates])
+    oil = derive(
+        pressure_rate, by=("pressure", "opening", "Z6", "Z8", "Z9"), options={"symmetric": None}
+    )
+    assert oil.entries == tuple((0, n) for n in range(5))
     for at in points((-6e5, 6e5), (-2e-4, 2e-4), (0.05, 15), (5e5, 2e6), (8e6, 3e7)):
-        _, by_pressure, by_opening, by_6, _, by_8, by_9 = pressure_rate_partials(
-            *at[:3], 0.0, *at[3:], None
-        )
-        found = (by_pressure, by_opening, by_6, by_8, by_9)
+        found = oil.python(*at[:3], 0.0, *at[3:], None)[1:]
         assert found == pytest.approx(derived(*at), rel=1e-12)

@@ -8,13 +8,23 @@ import pytest
 import sympy as sp
 
 from swashplate import Drive
+from swashplate.equations.equation import interpreted
 from swashplate.full_order.physical_set import PhysicalSet
-from swashplate.physics.motor import load_leakage, shaft_speed
-from swashplate.physics.motor_pressure import load_torque, motor_pressure_drop, pump_flow
+from swashplate.models import full_order, pump, refinements
+from swashplate.models.full_order import Machine
 
 K, K_L, C_i, C_g, C_q, tau = sp.symbols("K_mf K_mL C_i C_g C_q tau", positive=True)
 Q, high, low = sp.symbols("Q P_hi P_lo", positive=True)
 angle, rate, rise = sp.symbols("alpha alpha_d delta_P_d", real=True)
+
+load_leakage = interpreted(refinements.load_leakage)
+motor_drop = interpreted(full_order.motor_drop)
+motor_pressure_drop = interpreted(refinements.motor_pressure_drop)
+motor_torque = interpreted(full_order.motor_torque)
+pump_flow = interpreted(full_order.pump_flow)
+shaft_speed = interpreted(pump.shaft_speed)
+
+MACHINE = Machine(**PhysicalSet.preset("hoist").numbers)
 
 
 def drop_of(stroke: sp.Expr) -> sp.Expr:
@@ -49,8 +59,15 @@ def test_eq_6_42_to_6_46_as_the_package_has_them(points: Callable) -> None:
     """The same chain for a flow that goes with the angle, which the published Z10 belongs to."""
     derived = sp.lambdify((rate, C_i, C_g, K, C_q), drop_of(angle))
     for at in points((-0.5, 0.5), (10, 500), (-5e3, 5e3), (100, 400), (0.02, 0.1)):
-        found = motor_pressure_drop(load_torque(*at), at[3])
-        assert found == pytest.approx(derived(*at), rel=1e-12)
+        swash_rate, inertia, static, constant, gain = at
+        p = MACHINE._replace(
+            load_inertia=inertia, load_torque=static, motor_constant=constant, pump_flow_gain=gain
+        )
+        for found in (
+            motor_drop(swash_rate, p),
+            motor_pressure_drop(motor_torque(swash_rate, p), constant),
+        ):
+            assert found == pytest.approx(derived(*at), rel=1e-12)
 
 
 def test_erratum_18_flow_of_a_swash_plate_pump_goes_with_the_tangent() -> None:
@@ -66,7 +83,7 @@ def test_erratum_18_flow_of_a_swash_plate_pump_goes_with_the_tangent() -> None:
 def test_erratum_18_the_three_forms_at_15_degrees() -> None:
     at = radians(15.0)
     assert (sin(at), at, tan(at)) == pytest.approx((0.2588, 0.2618, 0.2679), abs=5e-5)
-    assert pump_flow(at, 2.0) == 2.0 * at
+    assert pump_flow(at, MACHINE._replace(pump_flow_gain=2.0)) == 2.0 * at
 
 
 def test_eq_6_69_output(points: Callable) -> None:

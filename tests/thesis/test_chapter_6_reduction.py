@@ -9,16 +9,25 @@ import pytest
 import sympy as sp
 
 from swashplate import Drive, maneuvers
+from swashplate.equations.equation import interpreted
+from swashplate.equations.fields import made
 from swashplate.full_order.drive import FullOrderDrive
 from swashplate.full_order.lumps import static_pressure
 from swashplate.full_order.physical_set import PhysicalSet
 from swashplate.full_order.quantities import QUANTITIES
-from swashplate.parameters.catalogue import CATALOGUE
-from swashplate.physics.solenoid import solenoid_force
-from swashplate.physics.spool import orifice_opening
-from swashplate.physics.stroker import pressure_rate
-from swashplate.physics.swash import swash_angle, swash_rate, swash_tangent
-from swashplate.physics.swash_mechanism import holding_pressure
+from swashplate.models import full_order, pump
+from swashplate.models.full_order import Machine
+from swashplate.models.pump import Pump
+from swashplate.parameters.definitions import CATALOGUE
+
+holding_pressure = interpreted(full_order.holding_pressure)
+machine_constants = interpreted(full_order.machine_constants)
+orifice_opening = interpreted(pump.orifice_opening)
+pressure_rate = interpreted(pump.pressure_rate)
+solenoid_force = interpreted(pump.solenoid_force)
+swash_angle = interpreted(pump.swash_angle)
+swash_rate = interpreted(pump.swash_rate)
+swash_tangent = interpreted(pump.swash_tangent)
 
 A_s, A_p, B, V, k_r, d4, d5 = sp.symbols("A_s A_p B V k_r d4 d5", positive=True)
 C_o, K_L, K, C_g, Delta, P0 = sp.symbols("C_o K_L K_mf C_g Delta_P P0", positive=True)
@@ -26,6 +35,8 @@ rise, rise_rate, tangent, x = sp.symbols("delta_P delta_P_d tan_alpha x_eff", re
 
 Z1_OF = A_s / (k_r * d4)
 STATIC = K * C_g * A_p * d5 / (A_s * d4)
+
+PUMP = made(Pump, Drive.preset("hoist").parameters.numbers)
 
 
 def equilibrium(static: sp.Expr) -> sp.Expr:
@@ -55,10 +66,10 @@ def test_eq_6_52_to_6_54_static_pressure() -> None:
     assert found == pytest.approx(
         n["motor_constant"] * 4000.0 * 5e-4 * 2e-3 / (n["piston_area"] * 0.08), rel=1e-12
     )
-    held = holding_pressure(
-        0.0, n["motor_constant"] * 4000.0, 0.08, n["return_spring_rate"], n["piston_area"], 1e-6
-    )
+    machine = Machine(**n)
+    held = holding_pressure(0.0, n["motor_constant"] * 4000.0, machine)
     assert held == pytest.approx(found, rel=1e-12)
+    assert machine_constants(machine).rest_pressure == pytest.approx(found, rel=1e-12)
 
 
 def test_eq_6_55_follows_from_6_53() -> None:
@@ -68,7 +79,8 @@ def test_eq_6_55_follows_from_6_53() -> None:
 
 def test_eq_6_55_angle(points: Callable) -> None:
     for pressure, Z1, Z2 in points((-6e5, 6e5), (3e-7, 6e-7), (-0.05, 0.05)):
-        found = swash_angle(swash_tangent(pressure, Z1, Z2), 1.0, 1.0, True)
+        p = PUMP._replace(Z1=Z1, Z2=Z2, Z13_plus=1.0, Z13_minus=1.0)
+        found = swash_angle(swash_tangent(pressure, p), p, True)
         assert found == pytest.approx(np.arctan(Z1 * pressure - Z2), rel=1e-14)
 
 
@@ -84,16 +96,20 @@ def test_erratum_20_eq_6_56_offset_is_zero_and_a_ratio() -> None:
 def test_erratum_01_eq_6_61_on_the_signed_current() -> None:
     """Printed, the force of every current below Z17 is none, that of the other solenoid too."""
     plus, minus = (12.0, 0.3, 0.2, 0.0), (10.0, 3.7, 1.7, -54.0)
-    coefficients = [each for pair in zip(plus, minus, strict=True) for each in pair]
+    p = PUMP._replace(
+        Z17=0.27,
+        **{f"Z{n}_plus": each for n, each in enumerate(plus, 19)},
+        **{f"Z{n}_minus": each for n, each in enumerate(minus, 19)},
+    )
     for current in (0.28, 0.5, 0.7):
         e = current - 0.27
         expected = 12.0 * e + 0.3 * e**2 + 0.2 * e**3
-        assert solenoid_force(current, 0.27, *coefficients) == pytest.approx(expected, rel=1e-12)
+        assert solenoid_force(current, p) == pytest.approx(expected, rel=1e-12)
         e = -e
         expected = 10.0 * e + 3.7 * e**2 + 1.7 * e**3 - 54.0 * e**4
-        assert solenoid_force(-current, 0.27, *coefficients) == pytest.approx(expected, rel=1e-12)
-    assert solenoid_force(0.2, 0.27, *coefficients) == 0.0
-    assert solenoid_force(-0.2, 0.27, *coefficients) == 0.0
+        assert solenoid_force(-current, p) == pytest.approx(expected, rel=1e-12)
+    assert solenoid_force(0.2, p) == 0.0
+    assert solenoid_force(-0.2, p) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -167,9 +183,10 @@ def test_erratum_15_eq_6_68_prints_an_empty_branch(hoist: Drive) -> None:
 
 def test_erratum_15_eq_6_71_needs_a_negative_branch() -> None:
     """x_eff = x for every x ≤ Z16, as printed, would leave the other direction without orifice."""
-    assert orifice_opening(-3e-4, 1.0, 1e-4, 1.5e-4) == -1.5e-4
-    assert orifice_opening(3e-4, 1.0, 1e-4, 1.5e-4) == 1e-4
-    assert orifice_opening(-1.2e-4, 1.0, 1e-4, 1.5e-4) == -1.2e-4
+    p = PUMP._replace(Z14=1.0, Z16_plus=1e-4, Z16_minus=1.5e-4)
+    assert orifice_opening(-3e-4, p) == -1.5e-4
+    assert orifice_opening(3e-4, p) == 1e-4
+    assert orifice_opening(-1.2e-4, p) == -1.2e-4
 
 
 def test_lumps_have_the_units_of_the_tables() -> None:

@@ -7,9 +7,12 @@ import pytest
 import sympy as sp
 
 from swashplate import Drive
+from swashplate.equations.equation import interpreted
+from swashplate.equations.fields import made
 from swashplate.full_order.physical_set import PhysicalSet
-from swashplate.physics.spool import arm_sine, spool_position
-from swashplate.physics.spool_mechanism import feedback_moment, spool_acceleration, spool_energy
+from swashplate.models import full_order, pump
+from swashplate.models.full_order import Machine
+from swashplate.models.pump import Pump
 
 d1, d3, J_fa, m_sp, k_f = sp.symbols("d1 d3 J_fa m_sp k_f", positive=True)
 x, xd, xdd, F = sp.symbols("x xd xdd F", real=True)
@@ -17,10 +20,35 @@ a, ad, add = sp.symbols("alpha alpha_d alpha_dd", real=True)
 b, bd, bdd = sp.symbols("beta beta_d beta_dd", real=True)
 Z4, Z5 = sp.symbols("Z4 Z5", positive=True)
 
+arm_sine = interpreted(pump.arm_sine)
+feedback_moment = interpreted(full_order.feedback_moment)
+feedback_sine = interpreted(full_order.feedback_sine)
+spool_acceleration = interpreted(full_order.spool_acceleration)
+spool_balance = interpreted(pump.spool_balance)
+spool_energy = interpreted(full_order.spool_energy)
+
+PUMP = made(Pump, Drive.preset("hoist").parameters.numbers)
+MACHINE = Machine(**PhysicalSet.preset("hoist").numbers)
+
 AROUND = dict.fromkeys((a, b, x, xd, ad, bd, bdd, add, F), (-0.7, 0.7))
 
 PRINTED_6_14 = k_f * d3**2 * (1 - sp.cos(a + b))
 KINETIC = J_fa * ad**2 / 2 + J_fa * bd**2 / 2 + m_sp * (d1 * bd * (1 + sp.tan(b) ** 2)) ** 2 / 2
+
+
+def spool_of(
+    arm: float, mass: float, arm_inertia: float, spring_moment: float, plussing: float
+) -> Machine:
+    """A machine with an undamped spool; its feedback spring stands at an arm of 1 m."""
+    return MACHINE._replace(
+        spool_arm=arm,
+        spool_mass=mass,
+        feedback_arm_inertia=arm_inertia,
+        spool_damping=0.0,
+        feedback_spring_rate=spring_moment,
+        feedback_spring_arm=1.0,
+        plussing=plussing,
+    )
 
 
 def in_time(expression: sp.Expr) -> sp.Expr:
@@ -72,7 +100,8 @@ def test_eq_6_13_kinetic_energy(points: Callable) -> None:
     expected = sp.lambdify((x, xd, d1, m_sp, J_fa), in_spool_position(KINETIC.subs(ad, 0)))
     for at in points((-3e-3, 3e-3), (-0.5, 0.5), (5e-3, 1e-2), (0.01, 0.1), (1e-7, 1e-5)):
         position, speed, arm, mass, inertia = at
-        found = spool_energy(position, speed, 0.1, arm, mass, inertia, 0.2, 0.0)[0]
+        p = spool_of(arm, mass, inertia, 0.2, 0.0)
+        found = spool_energy(position, speed, 0.1, p)[0]
         assert found == pytest.approx(expected(*at), rel=1e-12)
 
 
@@ -108,10 +137,8 @@ def test_eq_6_19_is_what_the_package_integrates(points: Callable) -> None:
         (0.1, 0.5),
     ):  # fmt: skip
         position, speed, force, arm, *machine = at
-        lever, mass, inertia, moment = machine
-        found = spool_acceleration(
-            position + x0, speed, force, float(sp.sin(arm)), lever, mass, inertia, 0.0, moment, x0
-        )
+        p = spool_of(*machine, x0)
+        found = spool_acceleration(position + x0, speed, force, float(sp.sin(arm)), p)
         assert found == pytest.approx(expected(*at), rel=1e-9)
 
 
@@ -119,7 +146,11 @@ def test_eq_6_20_and_6_59_arm_follows_the_plate(points: Callable) -> None:
     """The ball of the control arm moves with the stroking piston, d3 sin α = d4 tan α_sw."""
     for pressure, Z1, d4, d3_ in points((-6e5, 6e5), (3e-7, 6e-7), (0.05, 0.1), (0.12, 0.2)):
         piston = d4 * Z1 * pressure
-        assert arm_sine(pressure, Z1, 0.0, d4 / d3_) == pytest.approx(piston / d3_, rel=1e-12)
+        p = PUMP._replace(Z1=Z1, Z2=0.0, Z3=d4 / d3_)
+        assert arm_sine(pressure, p) == pytest.approx(piston / d3_, rel=1e-12)
+        machine = MACHINE._replace(swash_arm=d4, control_arm=d3_)
+        found = feedback_sine(Z1 * pressure, machine)
+        assert found == pytest.approx(piston / d3_, rel=1e-12)
 
 
 def test_eq_6_57_rests_where_6_19_balances(gap: Callable) -> None:
@@ -157,7 +188,7 @@ def test_eq_6_57_is_what_the_package_computes(points: Callable) -> None:
     printed = sp.lambdify((F, a, Z4, Z5), printed_6_57(sp.sin(a), sp.cos(a), F))
     for moment, sine, square, arm in points((-0.6, 0.6), (-0.5, 0.5), (0.01, 0.3), (7e-3, 0.014)):
         force = moment * sqrt(square) / arm
-        found = spool_position(force, sine, square, arm, 3e-5)
+        found = spool_balance(force, sine, PUMP._replace(Z4=square, Z5=arm, Z18=3e-5))
         assert found - 3e-5 == pytest.approx(printed(force, asin(sine), square, arm), abs=1e-14)
 
 
@@ -186,7 +217,7 @@ def test_eq_6_58_and_6_60_lumps_of_the_spool() -> None:
 def test_eq_6_57_has_the_moment_of_6_17(points: Callable) -> None:
     """√Z4 sin(α + β) is the spring's moment about the pivot."""
     for position, sine, arm, moment in points((-3e-3, 3e-3), (-0.6, 0.6), (6e-3, 0.01), (0.1, 0.4)):
-        found = feedback_moment(position, sine, arm, moment, 0.0)
+        found = feedback_moment(position, sine, spool_of(arm, 0.04, 1e-6, moment, 0.0))
         expected = moment * float(sp.sin(asin(sine) + sp.atan(position / arm)))
         assert found == pytest.approx(expected, rel=1e-11, abs=1e-15)
 

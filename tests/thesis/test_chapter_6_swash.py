@@ -6,7 +6,15 @@ from math import radians, tan
 import pytest
 import sympy as sp
 
-from swashplate.physics.swash_mechanism import swash_acceleration, swash_energy
+from swashplate import PhysicalSet
+from swashplate.equations.equation import interpreted
+from swashplate.models import full_order
+from swashplate.models.full_order import Machine
+
+swash_acceleration = interpreted(full_order.swash_acceleration)
+swash_energy = interpreted(full_order.swash_energy)
+
+MACHINE = Machine(**PhysicalSet.preset("hoist").numbers)
 
 J, m, b, k, d4, d5, A_s, A_p = sp.symbols("J_sw m_st b_st k_r d4 d5 A_s A_p", positive=True)
 K, C_i, C_g, C_q = sp.symbols("K_mf C_i C_g C_q", positive=True)
@@ -137,8 +145,18 @@ def test_eq_6_51_is_what_the_package_integrates(points: Callable) -> None:
         (-2e5, 2e5), (-0.3, 0.3), (-50, 50), (-1e6, 1e6), (0.05, 0.1), (1e-3, 1e-2), (0.1, 0.5),
         (0, 300), (5e4, 1e5), (1e-3, 4e-3), (1e-7, 1e-5),
     ):  # fmt: skip
-        pressure, angle, *rest = at
-        found = swash_acceleration(pressure, tan(angle), *rest)
+        pressure, angle, rate, across, arm, plate, piston, damping, spring, area, moment = at
+        p = MACHINE._replace(
+            swash_arm=arm,
+            swash_inertia=plate,
+            piston_mass=piston,
+            piston_damping=damping,
+            return_spring_rate=spring,
+            piston_area=area,
+            pumping_area=moment,
+            pumping_arm=1.0,
+        )
+        found = swash_acceleration(pressure, tan(angle), rate, across, p)
         assert found == pytest.approx(expected(*at), rel=1e-9)
 
 
@@ -147,5 +165,9 @@ def test_energies_of_the_plate(points: Callable) -> None:
     energies = (J * qd**2 / 2 + m * speed**2 / 2, k * (d4 * sp.tan(q)) ** 2 / 2)
     expected = sp.lambdify((q, qd, d4, J, m, k), energies)
     for at in points((-0.3, 0.3), (-0.5, 0.5), (0.05, 0.1), (1e-3, 1e-2), (0.1, 0.5), (5e4, 1e5)):
-        found = swash_energy(tan(at[0]), *at[1:])
+        angle, rate, arm, plate, piston, spring = at
+        p = MACHINE._replace(
+            swash_arm=arm, swash_inertia=plate, piston_mass=piston, return_spring_rate=spring
+        )
+        found = swash_energy(tan(angle), rate, p)
         assert found == pytest.approx(expected(*at), rel=1e-12)

@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 from swashplate import Drive, maneuvers
-from swashplate.campaign.encoder import interpolate_counts, shaft_angle
+from swashplate.campaign.encoder import interpolate_counts, radians_per_count
 from swashplate.campaign.filters import (
     DIFFERENTIATOR,
     LOW_PASS,
@@ -41,23 +41,21 @@ def test_eq_7_1_cost_is_a_sum_of_squares_over_the_tests(hoist: Drive) -> None:
 def test_eq_7_2_to_7_4_counts_of_a_turn(
     axis: str, counts_per_turn: float, gear_ratio: float, turn: float
 ) -> None:
-    angle = shaft_angle([0.0, turn], counts_per_turn=counts_per_turn, gear_ratio=gear_ratio)
-    assert angle[1] == pytest.approx(2.0 * np.pi, rel=2e-5), axis
+    angle = turn * radians_per_count(counts_per_turn, gear_ratio)
+    assert angle == pytest.approx(2.0 * np.pi, rel=2e-5), axis
 
 
 def test_erratum_24_the_factor_2_pi_is_missing() -> None:
     """7.2 to 7.4 give turns per second; the model's speed, and the tables', are rad/s."""
     time = np.arange(2048) * H
     turns = 0.25 * time  # a quarter turn per second
-    speed = speed_from_angle(time, shaft_angle(turns * HOIST_TURN, counts_per_turn=HOIST_TURN))
+    speed = speed_from_angle(time, radians_per_count(HOIST_TURN) * turns * HOIST_TURN)
     assert speed[-1] == pytest.approx(2.0 * np.pi * 0.25, rel=1e-9)
 
 
 def test_erratum_24_quadrature_is_data() -> None:
     """81,000 'with quadrature' and still times 4 in 7.2: either reading can be said."""
-    once, again = (
-        shaft_angle([1.0], counts_per_turn=each, gear_ratio=7.0)[0] for each in (81e3, 324e3)
-    )
+    once, again = (radians_per_count(each, 7.0) for each in (81e3, 324e3))
     assert once / again == pytest.approx(4.0)
 
 

@@ -9,7 +9,7 @@ import re
 import pytest
 
 from swashplate import Drive
-from swashplate.parameters.catalogue import CATALOGUE
+from swashplate.parameters.definitions import CATALOGUE
 
 Cells = dict[str, list[str]]
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from swashplate.analysis.levers import pulled
 from swashplate.drive import Drive
 from swashplate.errors import InputError, ParameterError
-from swashplate.parameters.parameter_set import ParameterSet, columns_of
+from swashplate.parameters.definitions import columns_of
+from swashplate.parameters.parameter_set import ParameterSet
 
 Array = NDArray[np.float64]
 

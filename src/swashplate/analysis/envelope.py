@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.analysis.acceleration import (
     AcceleratedBy,
@@ -19,13 +18,12 @@ from swashplate.analysis.acceleration import (
 )
 from swashplate.analysis.steady_edges import dead_zone, saturation
 from swashplate.drive import Drive
+from swashplate.equations.record import SOURCE_RATE
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.record import SOURCE_RATE
 
 if TYPE_CHECKING:
     import polars
 
-Array = NDArray[np.float64]
 
 GAIN_POINTS = 401
 """Commands between dead zone and saturation at which the gain is taken."""

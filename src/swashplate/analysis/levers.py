@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.parameters.catalogue import CATALOGUE, COLUMNS
-from swashplate.parameters.parameter_set import columns_of
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
 
 Array = NDArray[np.float64]
 

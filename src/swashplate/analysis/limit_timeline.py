@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.simulation.limits import Limit
-from swashplate.simulation.result import Simulation
+from swashplate.simulation.result import Limit, Simulation
 
 if TYPE_CHECKING:
     import polars

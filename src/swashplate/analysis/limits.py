@@ -15,12 +15,12 @@ from swashplate.analysis.levers import pulled
 from swashplate.analysis.removals import REMOVALS, Removal
 from swashplate.analysis.tracking import tracking_error
 from swashplate.drive import Drive
+from swashplate.equations.record import SOURCE_RATE, Interpolation
+from swashplate.equations.run import Start
 from swashplate.errors import DomainError, SwashplateError
 from swashplate.parameters.parameter_set import Change
-from swashplate.simulation.limits import Limit
-from swashplate.simulation.record import SOURCE_RATE, Interpolation
-from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import Start, simulate_drive
+from swashplate.simulation.result import Limit, Simulation
+from swashplate.simulation.run import simulate_drive
 
 if TYPE_CHECKING:
     import polars

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from swashplate.analysis.outcomes import Outcome, outcome_matrix
 from swashplate.analysis.trial import Trial
 from swashplate.drive import Drive
+from swashplate.equations.lanes import LANES
 
 Array = NDArray[np.float64]
 
 SAMPLES_AT_ONCE = 2**20
 """Samples of speed that a block of drives holds: 8 MB, whatever the number of drives."""
-LANES = 8
-"""A block is a multiple of what the batch marches side by side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +83,7 @@ def batch_outcomes(
         kept[ran] = outcome_matrix(run.output[ran], trial, outcomes)
         return kept, {first + k: why for k, why in run.failures.items()}
 
+    # whole blocks of what the batch marches side by side
     size = max(SAMPLES_AT_ONCE // trial.voltage.size // LANES * LANES, LANES)
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         done = list(pool.map(partial(block, size=size), range(0, count, size)))

@@ -8,7 +8,7 @@ from math import atan, inf
 
 from swashplate.drive import Drive
 from swashplate.parameters.parameter_set import Change
-from swashplate.simulation.limits import Limit
+from swashplate.simulation.result import Limit
 
 FEEDBACK_ARM = 0.98
 """Sine of the feedback arm's angle at which a plate without a stop is still held: at 1 the closed

@@ -13,7 +13,7 @@ from swashplate.drive import Drive
 from swashplate.errors import FileError, InputError
 from swashplate.identification.assessment import assess
 from swashplate.identification.storing import load_fit
-from swashplate.parameters.catalogue import CATALOGUE, COLUMNS
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 
 STORED, ESTIMATES, FITTED = "fit.json", "estimates.csv", "drive.toml"
 """Files of a fit."""

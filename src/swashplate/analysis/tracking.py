@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.analysis.compensation import inverse_map
 from swashplate.analysis.inverse import InverseMap
 from swashplate.drive import Drive
+from swashplate.equations.record import SOURCE_RATE
 from swashplate.errors import InputError
-from swashplate.simulation.record import SOURCE_RATE
 
 if TYPE_CHECKING:
     import polars

@@ -1,6 +1,6 @@
 """Encoder counts: roll-overs taken out, staircases filled, jumps found, angles made of them."""
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -166,45 +166,27 @@ def interpolated(time: Array, counts: Array) -> Array:
     return filled
 
 
-def shaft_angle(
-    counts: ArrayLike,
-    *,
-    counts_per_turn: float,
-    gear_ratio: float = 1.0,
-    sign: Literal[1, -1] = 1,
-) -> Array:
-    """Angle of a shaft from the counts of an encoder geared to it.
+def radians_per_count(counts_per_turn: float, gear_ratio: float = 1.0, sign: int = 1) -> float:
+    """Angle of the shaft for one count, negative where the count runs the other way. [rad]
 
     Parameters
     ----------
-    counts : array_like, shape (n,)
-        Position without roll-overs. [count]
     counts_per_turn : float
-        Counts in one turn of the encoder, all four edges of a line counted if the counter does.
+        Counts in one turn of the encoder.
     gear_ratio : float
         Turns of the encoder in one turn of the shaft.
     sign : {1, -1}
         -1 if the counter goes down where the shaft's speed is positive.
 
-    Returns
-    -------
-    array, shape (n,)
-        Angle, 0 at count 0, positive with the shaft's speed. [rad]
-
     Raises
     ------
     InputError
-        If a number is not finite, a ratio not positive or the sign another.
+        If a ratio is not positive or the sign another.
 
     Notes
     -----
     Kruse (2001), eqs. 7.2-7.4 before their derivative, with the 2π that they leave out.
     """
-    return radians_per_count(counts_per_turn, gear_ratio, sign) * row("counts", counts)
-
-
-def radians_per_count(counts_per_turn: float, gear_ratio: float, sign: int) -> float:
-    """Angle of the shaft for one count, negative where the count runs the other way [rad]."""
     if sign not in (1, -1):
         raise InputError(f"sign must be 1 or -1, not {sign!r}.")
     turn = positive("counts_per_turn", counts_per_turn) * positive("gear_ratio", gear_ratio)

@@ -44,7 +44,7 @@ def speed_from_counts(
     counts : array_like, shape (n,)
         Position without roll-overs (`encoder.unwrap_counts`). [count]
     counts_per_turn, gear_ratio, sign :
-        Scale of the encoder, as in `encoder.shaft_angle`.
+        Scale of the encoder, as in `encoder.radians_per_count`.
     form, low_pass, differentiator, start_speed :
         The filters, as in `speed_from_angle`.
 
@@ -56,7 +56,7 @@ def speed_from_counts(
     Raises
     ------
     InputError
-        As `encoder.interpolate_counts`, `encoder.shaft_angle` and `speed_from_angle`.
+        As `encoder.interpolate_counts`, `encoder.radians_per_count` and `speed_from_angle`.
     """
     stamps = stamps_of(time)
     position = interpolated(stamps.time, signal("counts", counts, stamps.time.size))

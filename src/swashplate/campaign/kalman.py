@@ -57,7 +57,7 @@ def smooth_counts(
     counts : array_like, shape (n,)
         Position without roll-overs, not interpolated: the rounding is part of the model. [count]
     counts_per_turn, gear_ratio, sign :
-        Scale of the encoder, as in `encoder.shaft_angle`.
+        Scale of the encoder, as in `encoder.radians_per_count`.
     noise : float
         Standard deviation of whatever disturbs the position beside the rounding. [count]
     process_noise : float, optional
@@ -71,7 +71,7 @@ def smooth_counts(
     Raises
     ------
     InputError
-        As `smooth_positions` and `encoder.shaft_angle`.
+        As `smooth_positions` and `encoder.radians_per_count`.
     """
     scale = radians_per_count(counts_per_turn, gear_ratio, sign)
     read = rounded_positions(counts)

@@ -11,8 +11,8 @@ from math import log, sqrt
 import numpy as np
 
 from swashplate.campaign.stamps import Array
-from swashplate.physics.component import component
-from swashplate.simulation.compilation import kernel
+from swashplate.equations.cache import kernel
+from swashplate.equations.equation import inlined
 
 ORDER = 4
 """Number of states."""
@@ -29,7 +29,7 @@ NOISE_ROOT: Array = np.asarray(np.linalg.cholesky(NOISE_COVARIANCE), dtype=np.fl
 """Its lower triangular root."""
 
 
-@component
+@inlined
 def set_noise_root(interval: float, noise: float, unit_root: Array, root: Array) -> None:
     """Write the root, upper triangular, of the covariance that the noise adds over an interval."""
     scale = sqrt(noise * interval)
@@ -39,7 +39,7 @@ def set_noise_root(interval: float, noise: float, unit_root: Array, root: Array)
         scale *= interval
 
 
-@component
+@inlined
 def move(interval: float, rows: Array) -> None:
     """Move states, or the rows of a root, over an interval: each row times Fᵀ, in place."""
     d = interval
@@ -50,7 +50,7 @@ def move(interval: float, rows: Array) -> None:
         rows[i, 2] += d * jerk
 
 
-@component
+@inlined
 def triangularise(matrix: Array, columns: int) -> None:
     """Rotate the rows, in place, until the first four columns are an upper triangle."""
     rows = matrix.shape[0]
@@ -77,7 +77,7 @@ def triangularise(matrix: Array, columns: int) -> None:
             matrix[i, p] = 0.0
 
 
-@component
+@inlined
 def measure(state: Array, root: Array, position: float, variance: float, seen: Array) -> float:
     """Correct state and root, in place, by a measured position (Potter).
 

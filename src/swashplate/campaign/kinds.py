@@ -49,7 +49,6 @@ KINDS: dict[str, Kind] = {
 }
 """Every kind of input and channel, by its name in a campaign file."""
 
-INPUT_KINDS: tuple[InputKind, ...] = get_args(InputKind)
 CHANNEL_KINDS: tuple[ChannelKind, ...] = get_args(ChannelKind)
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.campaign import schema
 from swashplate.campaign.columns import Columns, named, read_signal
@@ -20,8 +19,6 @@ from swashplate.campaign.weighting import applying, weights
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.errors import InputError
 from swashplate.logs import Log, open_log
-
-Array = NDArray[np.float64]
 
 
 def read_campaign_file(path: str | Path) -> schema.CampaignFile:

@@ -5,9 +5,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from swashplate.campaign.stamps import Array, Stamps
+from swashplate.equations.cache import kernel
 from swashplate.errors import InputError
 from swashplate.maneuvers.checks import positive
-from swashplate.simulation.compilation import kernel
 
 Form = Literal["source", "exact"]
 """How the filters are made discrete.

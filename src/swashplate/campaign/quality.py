@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.encoder import find_lost_counts, unwrap_counts
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
-from swashplate.campaign.resampling import StampStatistics, stamp_statistics
+from swashplate.campaign.stamps import StampStatistics, stamp_statistics
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

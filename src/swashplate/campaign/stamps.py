@@ -1,4 +1,4 @@
-"""Time stamps of a measured record, and the samples that go with them, checked."""
+"""Time stamps of a measured record, checked; what they are like; the samples that go with them."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import row
+from swashplate.maneuvers.checks import positive, row
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -27,6 +27,28 @@ class Stamps(NamedTuple):
     """Stamps; where they are even, those of the even grid. [s]"""
     period: float | None
     """Sample period, None for uneven stamps. [s]"""
+
+
+class StampStatistics(NamedTuple):
+    """What the stamps of a record are like."""
+
+    rows: int
+    rate: float
+    """One over the median interval. [Hz]"""
+    period: float
+    """Median interval. [s]"""
+    jitter: float
+    """Standard deviation of the intervals about their median, gaps left out. [s]"""
+    shortest: float
+    """Shortest interval. [s]"""
+    longest: float
+    """Longest interval, gap or not. [s]"""
+    gaps: Rows
+    """Rows that come after a gap."""
+    missing: int
+    """Samples that the gaps would have held at the median rate."""
+    even: bool
+    """Whether all stamps lie on an even grid but for their rounding."""
 
 
 def increasing(time: ArrayLike) -> Array:
@@ -74,6 +96,41 @@ def stamps_of(time: ArrayLike) -> Stamps:
     if np.max(np.abs(stamps - grid)) > TOLERANCE * period:
         return Stamps(stamps, None)
     return Stamps(grid, period)
+
+
+def stamp_statistics(time: ArrayLike, *, gap: float = 1.5) -> StampStatistics:
+    """Rate, jitter and gaps of stamps.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Stamps, two or more. [s]
+    gap : float
+        An interval of more than this many medians is a gap.
+
+    Raises
+    ------
+    InputError
+        If the stamps do not increase, a number is not finite, or `gap` is not above 1.
+    """
+    stamps = increasing(time)
+    if positive("gap", gap) <= 1.0:
+        raise InputError(f"gap must be above 1, in median intervals, not {gap:g}.")
+    intervals = np.diff(stamps)
+    median = float(np.median(intervals))
+    wide = intervals > gap * median
+    usual = intervals[~wide]
+    return StampStatistics(
+        rows=stamps.size,
+        rate=1.0 / median,
+        period=median,
+        jitter=float(np.sqrt(np.mean((usual - median) ** 2))),
+        shortest=float(intervals.min()),
+        longest=float(intervals.max()),
+        gaps=np.flatnonzero(wide) + 1,
+        missing=int(np.sum(np.round(intervals[wide] / median) - 1.0)),
+        even=stamps_of(stamps).period is not None,
+    )
 
 
 def even_period(time: ArrayLike, what: str) -> float:

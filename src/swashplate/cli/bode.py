@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from swashplate.drive import Drive
-    from swashplate.linear.frequency_response import FrequencyResponse
-    from swashplate.linear.model import LinearDrive
+    from swashplate.linear import FrequencyResponse, LinearDrive
 
 EXAMPLES = """\
 Examples:
@@ -113,7 +112,7 @@ def bode(
 
 
 def _linear(drive: Drive, voltage: float) -> LinearDrive:
-    from swashplate.linear.dead_zone import DeadZoneError
+    from swashplate.linear import DeadZoneError
 
     try:
         return drive.linearize(voltage)

@@ -123,13 +123,11 @@ def _simulated() -> tuple[float, float]:
 
 def _kernels() -> str:
     """Where the machine code is kept, and how much of it."""
-    from swashplate.simulation.compilation import UNCACHED
-    from swashplate.simulation.march import march_drive
+    from swashplate.equations.cache import UNCACHED, cache_folder
 
-    found = getattr(getattr(march_drive, "_cache", None), "cache_path", None)
-    if found is None:
+    kept = cache_folder()
+    if kept is None:
         return UNCACHED
-    kept = Path(os.environ.get("NUMBA_CACHE_DIR") or Path(found).parent.parent)
     files = list(kept.rglob("*.nbc"))
     size = sum(each.stat().st_size for each in files)
     return f"Compiled kernels: {len(files)} files, {size / 1e6:.1f} MB, below {kept}"

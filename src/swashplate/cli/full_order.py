@@ -149,8 +149,8 @@ def _say_table(
     rate: float,
     out: Path | None,
 ) -> None:
+    from swashplate.equations.record import least_substeps
     from swashplate.full_order.reduction import TABLE_MANEUVERS, validity
-    from swashplate.simulation.record import least_substeps
 
     least_substeps(rate)  # a rate out of range is refused before anything is sampled
     with progress(len(TABLE_MANEUVERS)) as begin:

@@ -101,7 +101,7 @@ def _changes(option: str, words: Sequence[str]) -> dict[str, Change]:
 
 
 def _change(option: str, word: str) -> tuple[str, Change]:
-    from swashplate.parameters.parameter_set import find
+    from swashplate.parameters.definitions import find
     from swashplate.units import to_si
 
     scaled = option == "--scale"
@@ -164,7 +164,7 @@ class Options(NamedTuple):
 
 def simulated(drive: Drive, command: str, options: Options) -> tuple[str, Simulation]:
     """Name of a command, a manoeuvre or a file, and the drive's simulation over it."""
-    from swashplate.simulation.record import least_substeps
+    from swashplate.equations.record import least_substeps
 
     least_substeps(options.rate)  # a rate out of range is refused before anything is sampled
     if _is_file(command, drive):

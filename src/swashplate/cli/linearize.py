@@ -16,7 +16,7 @@ from swashplate.errors import DomainError, InputError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swashplate.linear.model import LinearDrive
+    from swashplate.linear import LinearDrive
 
 Input = Literal["voltage", "current", "solenoid_force"]
 Coulomb = Literal["ignored", "tangent"]
@@ -102,8 +102,7 @@ def linearize(
     """
     import numpy as np
 
-    from swashplate.linear.dead_zone import DeadZoneError
-    from swashplate.linear.files import LINEAR_MODEL
+    from swashplate.linear import LINEAR_MODEL, DeadZoneError
 
     check_outputs((out, LINEAR_MODEL))
     if sum(each is not None for each in (at, current, speed_deg_s)) != 1:
@@ -175,7 +174,7 @@ def _motion(model: LinearDrive, frequency: float) -> Table:
     import numpy as np
 
     from swashplate.cli.measures import degrees
-    from swashplate.linear.units import UNITS
+    from swashplate.linear import UNITS
 
     unit = UNITS[model.input]
     answer = complex(model.response(frequency)[0])
@@ -215,7 +214,7 @@ def _loop(model: LinearDrive, loop_gain: float) -> Table:
     import numpy as np
 
     from swashplate.cli.measures import degrees
-    from swashplate.linear.units import UNITS
+    from swashplate.linear import UNITS
 
     margins = model.margins(degrees(loop_gain))
     made = table(None, f"Proportional loop, {loop_gain:g} {UNITS[model.input]}/(deg/s)", ">", "")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.analysis.limits import time_share
-from swashplate.simulation.limits import Limit
+from swashplate.simulation.result import Limit
 
 if TYPE_CHECKING:
     from swashplate.simulation.result import Simulation

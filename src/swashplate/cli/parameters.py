@@ -14,7 +14,7 @@ from swashplate.cli.terminal import say, show, table, working
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swashplate.parameters.catalogue import Block
+    from swashplate.parameters.definitions import Block
     from swashplate.parameters.parameter_set import ParameterSet
 
 AXES_EXAMPLES = """\

@@ -58,15 +58,15 @@ class Balances(NamedTuple):
 
 def balances_of(run: FullOrderSimulation) -> Balances:
     """The four balances of a simulation, zero at its start."""
-    m, rows = run.machine, np.ascontiguousarray(run.rows[:: run.record.substeps])
+    m, rows = run.machine.p, np.ascontiguousarray(run.rows[:: run.record.substeps])
     lost = run.losses[:: run.record.substeps]
     stored = np.empty((rows.shape[0], 3))
     stored_energies(rows, m, stored)
     stored = stored - stored[0]
     angle, pressure = rows[:, 3], rows[:, 2]
-    turned = m.motor_constant * m.flow_gain * _ideal_angle(run)
+    turned = m.motor_constant * m.pump_flow_gain * _ideal_angle(run)
     swept = m.piston_area * m.swash_arm * (np.tan(angle) - np.tan(angle[0]))
-    squeezed = m.volume / m.bulk_modulus * (pressure - pressure[0])
+    squeezed = m.oil_volume / m.bulk_modulus * (pressure - pressure[0])
     account = run.account
     return Balances(
         _balance(
@@ -92,8 +92,8 @@ def balances_of(run: FullOrderSimulation) -> Balances:
 
 def _ideal_angle(run: FullOrderSimulation) -> Array:
     """Integral of the swash angle, from the shaft's position and what leaked. [rad s]"""
-    m = run.machine
-    gain = m.motor_constant * m.flow_gain
+    m = run.machine.p
+    gain = m.motor_constant * m.pump_flow_gain
     angle = run.swash_angle - run.swash_angle[0]
     time = run.time - run.time[0]
     leaked = m.motor_leakage * (m.load_inertia * gain * angle + m.load_torque * time)

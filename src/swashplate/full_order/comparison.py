@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.equations.record import SOURCE_RATE, least_substeps
+from swashplate.equations.run import Start
 from swashplate.full_order.drive import FullOrderDrive, Method
 from swashplate.full_order.result import FullOrderSimulation
-from swashplate.simulation.record import SOURCE_RATE, least_substeps
 from swashplate.simulation.result import read_only
-from swashplate.simulation.run import Start
 
 if TYPE_CHECKING:
     import polars

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.drive import Drive
+from swashplate.equations.record import SOURCE_RATE, Interpolation, Record, record_of
+from swashplate.equations.run import Start, check_start
 from swashplate.errors import DomainError, InputError
 from swashplate.full_order.completion import chosen_over, from_lumped
 from swashplate.full_order.equilibrium import fastest_rate, rest_row, steady_row
@@ -24,13 +26,11 @@ from swashplate.full_order.physical_set import PhysicalSet
 from swashplate.full_order.result import FullOrderSimulation
 from swashplate.full_order.stiff import StiffMethod, solve
 from swashplate.parameters.parameter_set import Change
-from swashplate.simulation.build import build_pump
-from swashplate.simulation.record import SOURCE_RATE, Interpolation, Record, record_of
-from swashplate.simulation.run import Start, check_start
+from swashplate.simulation.instance import pump_of
 
 if TYPE_CHECKING:
-    from swashplate.physics.five_states import Machine
-    from swashplate.simulation.constants import Pump
+    from swashplate.full_order.machine import Plate
+    from swashplate.models.pump import Pump
     from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
@@ -125,13 +125,13 @@ class FullOrderDrive:
         return self.drive.replace(**self.physical.to_lumped(Z6))
 
     @cached_property
-    def machine(self) -> Machine:
+    def machine(self) -> Plate:
         """The physical set, ready for compiled code."""
         return build_machine(self.physical, self.drive.parameters.pressure_root)
 
     @cached_property
     def _pump(self) -> Pump:
-        return build_pump(self.drive.parameters)
+        return pump_of(self.drive.parameters)
 
     def substeps(self, step: float, wanted: int | None = None) -> int:
         """Runge-Kutta steps that a step of the record takes.
@@ -341,6 +341,4 @@ class FullOrderDrive:
 
 def run_current(run: Simulation) -> Array:
     """Signed current of a run on the grid of its march. [A]"""
-    if run.card is None:
-        return run.record.values
-    return run.card.current_positive - run.card.current_negative
+    return run.fine("current")

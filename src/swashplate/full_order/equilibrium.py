@@ -5,27 +5,21 @@ from math import asin, atan, sin, sqrt, tan
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.equations.equation import interpreted
+from swashplate.full_order.machine import Plate
 from swashplate.full_order.march import N_ROW
-from swashplate.physics.component import uncompiled
-from swashplate.physics.five_states import Machine, machine_flow, machine_motor_pressure
-from swashplate.physics.swash_mechanism import holding_pressure
+from swashplate.models import full_order as model
 
 Array = NDArray[np.float64]
 
 
-def plate_pressure(angle: float, machine: Machine) -> float:
+def plate_pressure(angle: float, machine: Plate) -> float:
     """Stroker pressure that holds plate and static load at an angle. [Pa]"""
-    return uncompiled(holding_pressure)(
-        tan(angle),
-        machine_motor_pressure(0.0, machine),
-        machine.swash_arm,
-        machine.spring_rate,
-        machine.piston_area,
-        machine.pumping_moment,
-    )
+    drop = machine.p.motor_constant * machine.p.load_torque
+    return float(interpreted(model.holding_pressure)(tan(angle), drop, machine.p))
 
 
-def balanced_spool(force: float, angle: float, machine: Machine) -> float:
+def balanced_spool(force: float, angle: float, machine: Plate) -> float:
     """Spool position at which solenoids and feedback spring balance, within the stroke. [m]
 
     d1 F (1 + tan²β) = k_f d3² sin(α + β), the printed eq. 6.19 at rest. Where the solenoids
@@ -33,14 +27,16 @@ def balanced_spool(force: float, angle: float, machine: Machine) -> float:
     """
     from scipy.optimize import brentq
 
-    arm = asin(machine.arm_ratio * tan(angle))
+    p = machine.p
+    arm = asin(p.swash_arm / p.control_arm * tan(angle))
+    moment_of_spring = interpreted(model.spring_moment)(p)
 
     def surplus(position: float) -> float:
-        lever = (position - machine.plussing) / machine.spool_arm
-        moment = machine.spool_arm * force * (1.0 + lever * lever)
-        return moment - machine.spring_moment * sin(arm + atan(lever))
+        lever = (position - p.plussing) / p.spool_arm
+        moment = p.spool_arm * force * (1.0 + lever * lever)
+        return float(moment - moment_of_spring * sin(arm + atan(lever)))
 
-    stroke = machine.stroke
+    stroke = p.spool_stroke
     if surplus(stroke) >= 0.0:
         return stroke
     if surplus(-stroke) <= 0.0:
@@ -48,28 +44,29 @@ def balanced_spool(force: float, angle: float, machine: Machine) -> float:
     return float(brentq(surplus, -stroke, stroke, xtol=1e-16, rtol=1e-15))
 
 
-def steady_row(force: float, machine: Machine) -> Array:
+def steady_row(force: float, machine: Plate) -> Array:
     """Row at which the drive settles under a constant force. (N_ROW,)"""
     from scipy.optimize import brentq
+
+    p, flow = machine.p, interpreted(model.valve_flow)
 
     def surplus(angle: float) -> float:
         pressure = plate_pressure(angle, machine)
         position = balanced_spool(force, angle, machine)
-        return machine_flow(position, pressure, machine) - machine.leakage * pressure
+        return float(flow(position, pressure, p, machine.symmetric) - p.piston_leakage * pressure)
 
-    low, high = machine.lower_angle, machine.upper_angle
+    low, high = -p.swash_stop_minus, p.swash_stop_plus
     if surplus(high) >= 0.0:
         angle = high
     elif surplus(low) <= 0.0:
         angle = low
     else:
         angle = float(brentq(surplus, low, high, xtol=1e-15, rtol=1e-15))
-    pressure = plate_pressure(angle, machine)
-    pressure = min(max(pressure, machine.lower_pressure), machine.upper_pressure)
+    pressure = min(max(plate_pressure(angle, machine), machine.k.lower), machine.k.upper)
     return _row(balanced_spool(force, angle, machine), pressure, angle)
 
 
-def rest_row(force: float, machine: Machine) -> Array:
+def rest_row(force: float, machine: Plate) -> Array:
     """Row with the plate upright, its load held, and the spool in balance. (N_ROW,)"""
     return _row(balanced_spool(force, 0.0, machine), plate_pressure(0.0, machine), 0.0)
 
@@ -80,20 +77,20 @@ def _row(position: float, pressure: float, angle: float) -> Array:
     return row
 
 
-def fastest_rate(machine: Machine) -> float:
+def fastest_rate(machine: Plate) -> float:
     """Fastest of the modes: spool, and plate on its spring and trapped oil. [rad/s]"""
-    spool = machine.spool_mass * machine.spool_arm**2 + machine.arm_inertia
-    plate = machine.plate_inertia + machine.piston_mass * machine.swash_arm**2
-    oil = machine.piston_area**2 * machine.bulk_modulus / machine.volume
-    spring = (machine.spring_rate + oil) * machine.swash_arm**2
+    p = machine.p
+    spool = p.spool_mass * p.spool_arm**2 + p.feedback_arm_inertia
+    plate = p.swash_inertia + p.piston_mass * p.swash_arm**2
+    oil = p.piston_area**2 * p.bulk_modulus / p.oil_volume
+    spring = (p.return_spring_rate + oil) * p.swash_arm**2
+    loaded = (
+        p.motor_constant**2 * p.load_inertia * p.pump_flow_gain * p.pumping_area * p.pumping_arm
+    )
     # an overdamped mode decays at up to 2 ζ ω
     decays = (
-        machine.spool_damping * machine.spool_arm**2 / spool,
-        (machine.piston_damping * machine.swash_arm**2 + _load_damping(machine)) / plate,
+        p.spool_damping * p.spool_arm**2 / spool,
+        (p.piston_damping * p.swash_arm**2 + loaded) / plate,
     )
-    return max(sqrt(machine.spring_moment / spool), sqrt(spring / plate), *decays)
-
-
-def _load_damping(machine: Machine) -> float:
-    rise = machine_motor_pressure(1.0, machine) - machine_motor_pressure(0.0, machine)
-    return rise * machine.pumping_moment
+    moment = p.feedback_spring_rate * p.feedback_spring_arm**2
+    return max(sqrt(moment / spool), sqrt(spring / plate), *decays)

@@ -8,20 +8,26 @@ start (`ACCOUNTS`). A limit that holds is -1 or 1, one that does not is 0: the s
 the relief valve open, the swash plate at a stop. Stops are inelastic.
 """
 
+from collections.abc import Callable
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.physics.component import component
-from swashplate.physics.five_states import (
-    Machine,
-    free_rate_partials,
+from swashplate.equations.cache import kernel
+from swashplate.equations.definition import Flag
+from swashplate.equations.derivatives import derive
+from swashplate.equations.equation import inlined
+from swashplate.equations.run import module
+from swashplate.full_order.machine import Plate
+from swashplate.models.full_order import (
+    Motion,
     free_rates,
-    machine_flow,
+    machine_energies,
+    machine_powers,
+    machine_speed,
 )
-from swashplate.physics.machine_accounts import machine_energies, machine_powers, machine_speed
-from swashplate.simulation.chain import pump_force
-from swashplate.simulation.compilation import kernel
-from swashplate.simulation.constants import Pump
+from swashplate.models.pump import Pump, solenoid_force
 
 Array = NDArray[np.float64]
 Holds = tuple[int, int, int]
@@ -50,23 +56,22 @@ MOST_EVENTS = 200
 """Events within one step, beyond which the limits are said to chatter."""
 
 
-@component
-def fill_rates(row: Array, force: float, holds: Holds, machine: Machine, rates: Array) -> None:
+@inlined
+def fill_rates(row: Array, force: float, holds: Holds, machine: Plate, rates: Array) -> None:
     """Rates of a whole row; a state that a limit holds has none."""
-    x, v, p, angle, r = row[0], row[1], row[2], row[3], row[4]
-    v_rate, p_rate, r_rate = free_rates(x, v, p, angle, r, force, machine)
-    rates[0] = v
+    state = Motion(row[0], row[1], row[2], row[3], row[4])
+    v_rate, p_rate, r_rate = free_rates(state, force, machine.p, machine.symmetric)
+    rates[0] = row[1]
     rates[1] = 0.0 if holds[0] != 0 else v_rate
     rates[2] = 0.0 if holds[1] != 0 else p_rate
-    rates[3] = r
+    rates[3] = row[4]
     rates[4] = 0.0 if holds[2] != 0 else r_rate
-    powers = machine_powers(x, v, p, angle, r, force, machine)
-    for k in range(7):
+    powers = machine_powers(state, force, machine.p, machine.symmetric)
+    for k in range(9):
         rates[5 + k] = powers[k]
-    rates[12] = machine_flow(x, p, machine)
-    rates[13] = machine.leakage * p
-    rates[14] = p_rate * machine.volume / machine.bulk_modulus if holds[1] != 0 else 0.0
-    rates[15] = machine_speed(angle, r, machine)
+    softness = machine.p.oil_volume / machine.p.bulk_modulus
+    rates[14] = p_rate * softness if holds[1] != 0 else 0.0
+    rates[15] = machine_speed(row[3], row[4], machine.p)
 
 
 @kernel
@@ -76,7 +81,7 @@ def runge_kutta(
     slope: float,
     step: float,
     holds: Holds,
-    machine: Machine,
+    machine: Plate,
     pump: Pump,
     work: Array,
     into: Array,
@@ -86,7 +91,7 @@ def runge_kutta(
     The current [A] rises along a straight line of the given slope [A/s]; `work` is (2, N_ROW).
     """
     stage, rates = work[0], work[1]
-    force = pump_force(current, pump)
+    force = solenoid_force(current, pump)
     for k in range(N_ROW):
         into[k] = row[k]
         stage[k] = row[k]
@@ -101,42 +106,43 @@ def runge_kutta(
             for k in range(N_STATES):
                 stage[k] = row[k] + reach * rates[k]
             if n != 1:
-                force = pump_force(current + slope * reach, pump)
+                force = solenoid_force(current + slope * reach, pump)
     return force
 
 
 @kernel
-def margin(row: Array, force: float, holds: Holds, machine: Machine) -> float:
+def margin(row: Array, force: float, holds: Holds, machine: Plate) -> float:
     """How far a row is from its next event: negative beyond. [1]
 
     A free state must stay within its limits; a held one must still be pushed against its limit.
     """
-    x, v, p, angle, r = row[0], row[1], row[2], row[3], row[4]
+    state = Motion(row[0], row[1], row[2], row[3], row[4])
+    m, k = machine.p, machine.k
     spool, relief, plate = holds
     least = np.inf
     if spool == 0:
-        least = min(least, (machine.stroke - abs(x)) / machine.stroke)
+        least = min(least, (m.spool_stroke - abs(row[0])) / m.spool_stroke)
     if relief == 0:
-        least = min(least, (machine.upper_pressure - p) / machine.supply_pressure)
-        least = min(least, (p - machine.lower_pressure) / machine.supply_pressure)
+        least = min(least, (k.upper - row[2]) / m.supply_pressure)
+        least = min(least, (row[2] - k.lower) / m.supply_pressure)
     if plate == 0:
-        least = min(least, machine.upper_angle - angle)
-        least = min(least, angle - machine.lower_angle)
+        least = min(least, m.swash_stop_plus - row[3])
+        least = min(least, row[3] + m.swash_stop_minus)
     if spool == 0 and relief == 0 and plate == 0:
         return least
-    v_rate, p_rate, r_rate = free_rates(x, v, p, angle, r, force, machine)
+    v_rate, p_rate, r_rate = free_rates(state, force, m, machine.symmetric)
     if spool != 0:
         least = min(least, spool * v_rate)
     if relief != 0:
-        least = min(least, relief * p_rate / machine.bulk_modulus)
+        least = min(least, relief * p_rate / m.bulk_modulus)
     if plate != 0:
-        least = min(least, plate * r_rate + machine.grip)
+        least = min(least, plate * r_rate + k.grip)
     return least
 
 
 @kernel
 def settle(
-    row: Array, force: float, holds: Holds, machine: Machine, losses: Array
+    row: Array, force: float, holds: Holds, machine: Plate, losses: Array
 ) -> tuple[int, int, int]:
     """Which limits hold from here on; what arrives at one is set on it and stops there.
 
@@ -147,32 +153,34 @@ def settle(
     losses : (2,) array
         Energy that the stops of spool and swash plate have taken, added to. [J]
     """
-    before = machine_energies(row[0], row[1], row[3], row[4], machine)
+    m, k = machine.p, machine.k
+    before = machine_energies(Motion(row[0], row[1], row[2], row[3], row[4]), m)
     spool = 0
-    if abs(row[0]) >= machine.stroke and row[0] * row[1] >= 0.0:
+    if abs(row[0]) >= m.spool_stroke and row[0] * row[1] >= 0.0:
         spool = 1 if row[0] > 0.0 else -1
-        row[0], row[1] = spool * machine.stroke, 0.0
+        row[0], row[1] = spool * m.spool_stroke, 0.0
     plate = 0
-    if row[3] >= machine.upper_angle and row[4] >= 0.0:
+    if row[3] >= m.swash_stop_plus and row[4] >= 0.0:
         plate = 1
-        row[3], row[4] = machine.upper_angle, 0.0
-    elif row[3] <= machine.lower_angle and row[4] <= 0.0:
+        row[3], row[4] = m.swash_stop_plus, 0.0
+    elif row[3] <= -m.swash_stop_minus and row[4] <= 0.0:
         plate = -1
-        row[3], row[4] = machine.lower_angle, 0.0
-    after = machine_energies(row[0], row[1], row[3], row[4], machine)
+        row[3], row[4] = -m.swash_stop_minus, 0.0
+    after = machine_energies(Motion(row[0], row[1], row[2], row[3], row[4]), m)
     losses[0] += before[0] - after[0]
     losses[1] += before[1] - after[1]
     relief = 0
-    if row[2] >= machine.upper_pressure:
+    if row[2] >= k.upper:
         relief = 1
-        row[2] = machine.upper_pressure
-    elif row[2] <= machine.lower_pressure:
+        row[2] = k.upper
+    elif row[2] <= k.lower:
         relief = -1
-        row[2] = machine.lower_pressure
-    v_rate, p_rate, r_rate = free_rates(row[0], row[1], row[2], row[3], row[4], force, machine)
+        row[2] = k.lower
+    state = Motion(row[0], row[1], row[2], row[3], row[4])
+    v_rate, p_rate, r_rate = free_rates(state, force, m, machine.symmetric)
     spool = spool if spool * v_rate >= 0.0 else 0
     relief = relief if relief * p_rate >= 0.0 else 0
-    if plate != 0 and plate * r_rate < -machine.grip:
+    if plate != 0 and plate * r_rate < -k.grip:
         plate = 0
     return spool, relief, plate
 
@@ -183,7 +191,7 @@ def march(
     held: bool,
     step: float,
     substeps: int,
-    machine: Machine,
+    machine: Plate,
     pump: Pump,
     rows: Array,
     holds_at: Flags,
@@ -214,7 +222,7 @@ def march(
     work = np.empty((2, N_ROW))
     row, following = rows[0].copy(), np.empty(N_ROW)
     losses = np.zeros(2)
-    holds = settle(row, pump_force(current[0], pump), (0, 0, 0), machine, losses)
+    holds = settle(row, solenoid_force(current[0], pump), (0, 0, 0), machine, losses)
     events = 0
     h = step / substeps
     for n in range(current.size):
@@ -260,7 +268,7 @@ def march(
     return events
 
 
-@component
+@inlined
 def current_at(time: float, current: Array, held: bool, step: float) -> float:
     """Current at any time of the record. [A]"""
     at = min(max(time / step, 0.0), current.size - 1.0)
@@ -277,17 +285,32 @@ def rates_at(
     held: bool,
     step: float,
     holds: Holds,
-    machine: Machine,
+    machine: Plate,
     pump: Pump,
 ) -> Array:
     """Rates of a row at any time of the record: the right-hand side for a library's solver."""
     rates = np.empty(N_ROW)
-    force = pump_force(current_at(time, current, held, step), pump)
+    force = solenoid_force(current_at(time, current, held, step), pump)
     fill_rates(row, force, holds, machine, rates)
     return rates
 
 
-@kernel
+@lru_cache(maxsize=2)
+def rates_with_slopes(symmetric: Flag) -> Callable[..., None]:
+    """The compiled rates' derivatives by the five states, as rows of a matrix."""
+    made = derive(free_rates, by="state", options={"symmetric": symmetric})
+    text = "\n\n".join(f"@inlined\n{each}" for each in made.texts.values())
+    count = len(made.outputs)
+    lines = [
+        f"matrix[{(1, 2, 4)[row]}, {column}] = found[{count + place}]"
+        for place, (row, column) in enumerate(made.entries)
+    ]
+    text += "\n\n@kernel\ndef slopes(state, force, p, matrix):\n"
+    text += f"    found = {made.name}(state, force, p, {symmetric})\n    "
+    text += "\n    ".join(lines) + "\n"
+    return module("full_order_slopes", text, made.names)["slopes"]  # type: ignore[no-any-return]
+
+
 def jacobian_at(
     time: float,
     row: Array,
@@ -295,7 +318,7 @@ def jacobian_at(
     held: bool,
     step: float,
     holds: Holds,
-    machine: Machine,
+    machine: Plate,
     pump: Pump,
 ) -> Array:
     """Derivatives of the rates by the five states.
@@ -304,17 +327,20 @@ def jacobian_at(
     states settles them as well.
     """
     jacobian = np.zeros((N_ROW, N_ROW))
-    force = pump_force(current_at(time, current, held, step), pump)
-    by_v, by_p, by_r = free_rate_partials(row[0], row[1], row[2], row[3], row[4], force, machine)
+    force = force_at(time, current, held, step, pump)
+    rates_with_slopes(machine.symmetric)(Motion(*row[:N_STATES]), force, machine.p, jacobian)
     jacobian[0, 1] = 1.0
     jacobian[3, 4] = 1.0
-    if holds[0] == 0:
-        jacobian[1, 0], jacobian[1, 1], jacobian[1, 3] = by_v
-    if holds[1] == 0:
-        jacobian[2, 0], jacobian[2, 2], jacobian[2, 3], jacobian[2, 4] = by_p
-    if holds[2] == 0:
-        jacobian[4, 2], jacobian[4, 3], jacobian[4, 4] = by_r
+    for hold, at in zip(holds, (1, 2, 4), strict=True):
+        if hold != 0:
+            jacobian[at] = 0.0
     return jacobian
+
+
+@kernel
+def force_at(time: float, current: Array, held: bool, step: float, pump: Pump) -> float:
+    """Net solenoid force at any time of the record. [N]"""
+    return solenoid_force(current_at(time, current, held, step), pump)
 
 
 @kernel
@@ -325,11 +351,11 @@ def margin_at(
     held: bool,
     step: float,
     holds: Holds,
-    machine: Machine,
+    machine: Plate,
     pump: Pump,
 ) -> float:
     """`margin` at any time of the record, the event function of a library's solver."""
-    force = pump_force(current_at(time, current, held, step), pump)
+    force = solenoid_force(current_at(time, current, held, step), pump)
     return margin(row, force, holds, machine)
 
 
@@ -342,7 +368,7 @@ def first_short(
     held: bool,
     step: float,
     holds: Holds,
-    machine: Machine,
+    machine: Plate,
     pump: Pump,
 ) -> int:
     """First of the rows (m, N_ROW) at times (m,) whose margin is below `least`, or -1."""
@@ -360,10 +386,10 @@ def settle_at(
     held: bool,
     step: float,
     holds: Holds,
-    machine: Machine,
+    machine: Plate,
     pump: Pump,
     losses: Array,
 ) -> tuple[int, int, int]:
     """`settle` at any time of the record."""
-    force = pump_force(current_at(time, current, held, step), pump)
+    force = solenoid_force(current_at(time, current, held, step), pump)
     return settle(row, force, holds, machine, losses)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.full_order.machine import Plate
 from swashplate.full_order.march import N_STATES, jacobian_at
-from swashplate.physics.five_states import Machine
-from swashplate.simulation.constants import Pump
+from swashplate.models.pump import Pump
 
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
@@ -41,14 +41,14 @@ class Modes:
         return -mode.real / abs(mode)
 
 
-def state_matrix(row: Array, current: float, machine: Machine, pump: Pump) -> Array:
+def state_matrix(row: Array, current: float, machine: Plate, pump: Pump) -> Array:
     """Derivatives of the five rates by the five states, no limit holding. (5, 5)"""
     record = np.array([current, current])
     jacobian = jacobian_at(0.0, row, record, True, 1.0, (0, 0, 0), machine, pump)
     return np.ascontiguousarray(jacobian[:N_STATES, :N_STATES])
 
 
-def modes_at(row: Array, current: float, machine: Machine, pump: Pump) -> Modes:
+def modes_at(row: Array, current: float, machine: Plate, pump: Pump) -> Modes:
     """Modes about a row.
 
     The slow pole is the eigenvalue nearest zero. The spool's mode is the one in which position and

@@ -3,11 +3,17 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.physics.five_states import Machine, machine_flow, machine_opening
-from swashplate.physics.machine_accounts import machine_energies, machine_speed
-from swashplate.simulation.chain import pump_force
-from swashplate.simulation.compilation import kernel
-from swashplate.simulation.constants import Pump
+from swashplate.equations.cache import kernel
+from swashplate.equations.definition import Flag
+from swashplate.models.full_order import (
+    Machine,
+    Motion,
+    machine_energies,
+    machine_speed,
+    valve_flow,
+    valve_opening,
+)
+from swashplate.models.pump import Pump, solenoid_force
 
 Array = NDArray[np.float64]
 
@@ -20,23 +26,25 @@ def observe_speeds(rows: Array, machine: Machine, speed: Array) -> None:
 
 
 @kernel
-def observe_flows(rows: Array, machine: Machine, opening: Array, flow: Array) -> None:
+def observe_flows(
+    rows: Array, machine: Machine, symmetric: Flag, opening: Array, flow: Array
+) -> None:
     """Effective opening [m] and flow through the valve [m³/s] of each row."""
     for n in range(rows.shape[0]):
-        opening[n] = machine_opening(rows[n, 0], machine)
-        flow[n] = machine_flow(rows[n, 0], rows[n, 2], machine)
+        opening[n] = valve_opening(rows[n, 0], machine)
+        flow[n] = valve_flow(rows[n, 0], rows[n, 2], machine, symmetric)
 
 
 @kernel
 def stored_energies(rows: Array, machine: Machine, stored: Array) -> None:
     """`machine_energies` of each row. (n, 3) [J]"""
     for n in range(rows.shape[0]):
-        x, v, angle, r = rows[n, 0], rows[n, 1], rows[n, 3], rows[n, 4]
-        stored[n, 0], stored[n, 1], stored[n, 2] = machine_energies(x, v, angle, r, machine)
+        state = Motion(rows[n, 0], rows[n, 1], rows[n, 2], rows[n, 3], rows[n, 4])
+        stored[n, 0], stored[n, 1], stored[n, 2] = machine_energies(state, machine)
 
 
 @kernel
 def observe_force(current: Array, pump: Pump, force: Array) -> None:
     """Net solenoid force at each sample. [N]"""
     for n in range(current.size):
-        force[n] = pump_force(current[n], pump)
+        force[n] = solenoid_force(current[n], pump)

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate import maneuvers
+from swashplate.equations.record import SOURCE_RATE
 from swashplate.full_order.comparison import BANDS, Difference, compare
 from swashplate.full_order.drive import FullOrderDrive
-from swashplate.simulation.record import SOURCE_RATE
 
 if TYPE_CHECKING:
     import polars

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.equations.record import Record
+from swashplate.full_order.machine import Plate
 from swashplate.full_order.march import ACCOUNTS, N_STATES
 from swashplate.full_order.observe import observe_flows, observe_speeds
-from swashplate.physics.five_states import Machine
-from swashplate.simulation.record import Record
 from swashplate.simulation.result import read_only
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class FullOrderSimulation:
     """How it was integrated: ``"march"``, ``"radau"`` or ``"lsoda"``."""
     record: Record
     """The signed current, on the grid that was marched. [A]"""
-    machine: Machine
+    machine: Plate
     force: Array
     """Net solenoid force on that grid. [N]"""
     rows: Array
@@ -120,7 +120,7 @@ class FullOrderSimulation:
     def shaft_speed(self) -> Array:
         """Speed of the shaft, of the turret for slew. [rad/s]"""
         speed = np.empty(self.rows.shape[0])
-        observe_speeds(self.rows, self.machine, speed)
+        observe_speeds(self.rows, self.machine.p, speed)
         return self._sampled(speed)
 
     @cached_property
@@ -131,7 +131,7 @@ class FullOrderSimulation:
     @cached_property
     def _flows(self) -> tuple[Array, Array]:
         opening, flow = np.empty((2, self.rows.shape[0]))
-        observe_flows(self.rows, self.machine, opening, flow)
+        observe_flows(self.rows, self.machine.p, self.machine.symmetric, opening, flow)
         return self._sampled(opening), self._sampled(flow)
 
     @property
@@ -147,14 +147,16 @@ class FullOrderSimulation:
     @cached_property
     def motor_pressure_drop(self) -> Array:
         """Pressure drop across the motor, P_hi - P_lo, under load inertia and gravity. [Pa]"""
-        m = self.machine
-        torque = m.load_inertia * m.motor_constant * m.flow_gain * self.swash_rate + m.load_torque
+        m = self.machine.p
+        torque = (
+            m.load_inertia * m.motor_constant * m.pump_flow_gain * self.swash_rate + m.load_torque
+        )
         return read_only(m.motor_constant * torque)
 
     @cached_property
     def pump_flow(self) -> Array:
         """Flow of the pump to the motor. [m³/s]"""
-        return read_only(self.machine.flow_gain * self.swash_angle)
+        return read_only(self.machine.p.pump_flow_gain * self.swash_angle)
 
     def account(self, name: str) -> Array:
         """What has passed since the start, one of `swashplate.full_order.march.ACCOUNTS`."""

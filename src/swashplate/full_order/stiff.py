@@ -22,8 +22,8 @@ from swashplate.full_order.march import (
 from swashplate.full_order.stretches import Stretch, stretches_of
 
 if TYPE_CHECKING:
-    from swashplate.physics.five_states import Machine
-    from swashplate.simulation.constants import Pump
+    from swashplate.full_order.machine import Plate
+    from swashplate.models.pump import Pump
 
 Array = NDArray[np.float64]
 StiffMethod = Literal["radau", "lsoda"]
@@ -50,7 +50,7 @@ class Plant(NamedTuple):
     held: bool
     step: float
     holds: Holds
-    machine: Machine
+    machine: Plate
     pump: Pump
 
 
@@ -60,7 +60,7 @@ def solve(
     force: Array,
     held: bool,
     step: float,
-    machine: Machine,
+    machine: Plate,
     pump: Pump,
     start: Array,
     tolerance: float,

@@ -10,24 +10,21 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import exp, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
+from swashplate.equations.run import Start
 from swashplate.errors import InputError
 from swashplate.identification.drives import current_record, voltage_record
 from swashplate.identification.forces import Forces
 from swashplate.identification.unknowns import Unknown
-from swashplate.parameters.catalogue import CATALOGUE, COLUMNS
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.refinements import REFINEMENTS
-from swashplate.physics.card_dynamics import decay_factor
-from swashplate.simulation.limits import Limit
-from swashplate.simulation.refined import simulate_refined_drive, simulate_refined_pump
-from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import Start, simulate_drive, simulate_pump
+from swashplate.simulation.result import Limit, Simulation
+from swashplate.simulation.run import simulate_drive, simulate_pump
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -39,22 +36,8 @@ LEAST_CURRENT = 1e-4
 TILTED = 1e-4
 """Angle of the swash plate that counts as one. [rad]"""
 
-NEEDS: Mapping[str, str] = {
-    **dict.fromkeys(("V_dz", "J", "G1", "G2", "G3", "tau"), "a command beyond the dead zone"),
-    **dict.fromkeys(("zeta", "omega", "C"), "a current that changes"),
-    "lim1": "a current rising at its limit",
-    "lim2": "a current falling at its limit",
-    "I_t1": "a current held back at I_t1",
-    "I_t2": "a current that decays from I_t2",
-    "a": "a current that decays to its end",
-    "Z13": "the swash plate at its stop",
-    "Z14": "the spool at its stop",
-    "Z15": "the relief valve open",
-    "Z16": "an orifice limiting the flow",
-    **dict.fromkeys(("Z17", "Z19", "Z20", "Z21", "Z22"), "a current beyond Z17"),
-}
-"""What must happen for a parameter to matter, by its symbol."""
 OTHERS = "a tilted swash plate"
+"""What parameters need that say nothing of it, and single runs' numbers."""
 
 
 def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulation:
@@ -68,13 +51,14 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
         If the model does not hold under it.
     """
     start: Start = "steady" if experiment.start == "steady" else "rest"
-    refined = bool(parameters.refinements)
     try:
         if experiment.input.kind == "current":
-            march = simulate_refined_pump if refined else simulate_pump
-            return march(parameters, current_record(experiment), start, experiment.start_pressure)
-        drive = simulate_refined_drive if refined else simulate_drive
-        return drive(parameters, voltage_record(experiment), start, experiment.start_pressure)
+            return simulate_pump(
+                parameters, current_record(experiment), start, experiment.start_pressure
+            )
+        return simulate_drive(
+            parameters, voltage_record(experiment), start, experiment.start_pressure
+        )
     except InputError as error:
         raise InputError(f"{experiment.input.source}: {error}") from None
 
@@ -123,16 +107,16 @@ def _of_pump(simulation: Simulation, sign: float, Z17: float) -> dict[str, Mask]
 
 def _of_channel(simulation: Simulation, side: str, numbers: Mapping[str, float]) -> dict[str, Mask]:
     """Steps of the march at which the card's parameters of one channel act, by symbol."""
-    if simulation.card is None:
+    if not simulation.driven_by_voltage:
         return {}
     sign = 1.0 if side == "plus" else -1.0
     lim1, lim2, I_t1, I_t2, a, V_dz = (
         numbers[f"{symbol}_{side}"] for symbol in ("lim1", "lim2", "I_t1", "I_t2", "a", "V_dz")
     )
-    card, step = simulation.card, simulation.record.step
-    current = card.current_positive if sign > 0.0 else card.current_negative
+    step = simulation.record.step
+    current = simulation.fine("current_positive" if sign > 0.0 else "current_negative")
     before, after = current[:-1], current[1:]
-    limited = card.rate_limited[1:] > 0
+    limited = simulation.rate_limited()[1:]
     # where the current moves as fast as a limit lets it, that limit has set it; in the step in
     # which it passes I_t1 it does so for a part of the step alone
     passing = limited & (before <= I_t1) & (after > I_t1)
@@ -140,7 +124,7 @@ def _of_channel(simulation: Simulation, side: str, numbers: Mapping[str, float])
     falling = limited & (after >= I_t2) & (before - after >= lim2 * step - SAME)
     decaying = np.zeros(before.shape, dtype=np.bool_)
     if isfinite(a) and a > 0.0:
-        left = before * decay_factor(a, step)
+        left = before * exp(-a * step)
         decaying = (before <= I_t2) & (before > LEAST_CURRENT) & (np.abs(after - left) <= SAME)
     beyond = sign * simulation.record.values[1:] > V_dz
     return {
@@ -221,7 +205,7 @@ def need_of(name: str, forces: Forces | None = None) -> str:
     if forces is not None and name in forces.names:
         return f"{_current_of(name, forces)[0]:g} A beyond Z17"
     symbol = COLUMNS.get(name, name)
-    return NEEDS.get(symbol, OTHERS)
+    return (CATALOGUE[symbol].needs if symbol in CATALOGUE else "") or OTHERS
 
 
 def _current_of(name: str, forces: Forces) -> tuple[float, float]:

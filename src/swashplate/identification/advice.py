@@ -124,7 +124,8 @@ def advise(
     Parameters
     ----------
     present : (m, K) array
-        What the tests made so far tell, see `scaled_rows`; no rows if there are none.
+        What the tests made so far tell: derivatives of the weighted residuals over the deviation of
+        an independent one; no rows if there are none.
     candidates : sequence of Candidate
         Tests to choose from.
     variables : Variables
@@ -152,31 +153,6 @@ def advise(
             raise InputError(f"{each.name}: {each.inflation:g} samples cannot stand for one.")
     judged = [_judge(present, each, variables, tolerance) for each in candidates]
     return tuple(sorted(judged, key=lambda each: each.rank))
-
-
-def scaled_rows(derivatives: Array, deviation: float, inflation: float = 1.0) -> Array:
-    """Rows as `advise` wants them for tests at hand, from weighted residuals' derivatives.
-
-    Parameters
-    ----------
-    derivatives : (m, K) array
-        Of the weighted residuals, or their triangular factor.
-    deviation : float
-        Standard deviation of the weighted residuals.
-    inflation : float
-        Samples that stand for one independent one.
-
-    Raises
-    ------
-    InputError
-        If the deviation is not positive or the inflation below 1.
-    """
-    if not deviation > 0.0:
-        raise InputError("Without noise in the residuals any test would be perfect.")
-    if not 1.0 <= inflation < inf:
-        raise InputError(f"{inflation:g} samples cannot stand for one; 1 is the least.")
-    rows: Array = derivatives / (deviation * np.sqrt(inflation))
-    return rows
 
 
 def _judge(present: Array, candidate: Candidate, variables: Variables, tolerance: float) -> Advice:

@@ -22,8 +22,8 @@ from swashplate.identification.setup import Free, Setup, Stage
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.variables import Variables
 from swashplate.maneuvers import Maneuver, step
-from swashplate.parameters.catalogue import CATALOGUE
-from swashplate.parameters.parameter_set import ParameterSet, find
+from swashplate.parameters.definitions import CATALOGUE, find
+from swashplate.parameters.parameter_set import ParameterSet
 
 Array = NDArray[np.float64]
 

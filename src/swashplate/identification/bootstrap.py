@@ -76,34 +76,6 @@ class Bootstrap:
         return tuple(said)
 
 
-def linearised_bootstrap(resampling: Resampling, draws: int = 1000) -> Bootstrap:
-    """Bootstrap in which each draw is one linear step from the optimum.
-
-    Parameters
-    ----------
-    resampling : Resampling
-        Of the fit's residuals.
-    draws : int
-        How many, at least 2.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two draws.
-    """
-    _check(draws)
-    fit = resampling.fit
-    steps = np.empty((draws, fit.rank))
-    orthonormal = [run.jacobian @ fit.whitening for run in fit.runs]
-    for draw in range(draws):
-        steps[draw] = sum(
-            residual @ directions
-            for residual, directions in zip(resampling.residuals(draw), orthonormal, strict=True)
-        )
-    moves = np.where(fit.determined, -steps @ fit.whitening.T, 0.0)
-    return _collected(resampling, fit.variables.vector + moves, 0)
-
-
 def refit_bootstrap(
     resampling: Resampling,
     refit: Callable[[int], Array | None],
@@ -130,21 +102,18 @@ def refit_bootstrap(
     InputError
         If there are fewer than two draws, or fewer than two refits ended.
     """
-    _check(draws)
+    if draws < 2:
+        raise InputError(f"{draws} draws do not make a distribution; take 1000.")
     found = list(mapped(refit, range(draws)))
     ended = [vector for vector in found if vector is not None]
     if len(ended) < 2:
         raise InputError(f"{len(ended)} of {draws} refits ended; there is nothing to compare.")
-    return _collected(resampling, np.array(ended), draws - len(ended))
-
-
-def _check(draws: int) -> None:
-    if draws < 2:
-        raise InputError(f"{draws} draws do not make a distribution; take 1000.")
-
-
-def _collected(resampling: Resampling, vectors: Array, failed: int) -> Bootstrap:
     fit = resampling.fit
     return Bootstrap(
-        fit.variables, vectors, fit.determined, failed, resampling.blocks, resampling.seed
+        fit.variables,
+        np.array(ended),
+        fit.determined,
+        draws - len(ended),
+        resampling.blocks,
+        resampling.seed,
     )

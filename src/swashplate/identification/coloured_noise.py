@@ -60,8 +60,8 @@ def coloured_noise_covariance(
     1994). Its shape is common to all runs of a channel, its level each run's own. The residuals are
     the noise less what the fit took from it, so the autocovariance is too small, most of all at the
     low frequencies where the derivatives are; the expected loss follows from Γ itself, is given
-    back, and the new Γ taken. Against the HAC estimate this one needs noise that is alike all along
-    a run, and is then far less noisy: it also serves unknowns that one short stretch determines.
+    back, and the new Γ taken. It needs noise that is alike all along a run, and then also serves
+    unknowns that one short stretch determines.
     """
     model = noise_model(fit, colours=colours)
     return covariance_of(

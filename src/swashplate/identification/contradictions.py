@@ -7,11 +7,9 @@ from itertools import combinations
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.identification.motion import Motion, rms
 
-Array = NDArray[np.float64]
 Severity = Literal["refuse", "warn"]
 
 POINTS = 512

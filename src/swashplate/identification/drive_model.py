@@ -11,18 +11,17 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.kinds import ChannelKind
+from swashplate.equations.observation import Observation, ObservedRecord
+from swashplate.equations.record import Record
+from swashplate.equations.run import Start
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.drives import voltage_record
 from swashplate.identification.forces import Forces
 from swashplate.identification.model import Linearised, Reduced
-from swashplate.identification.refined_model import Differences, is_refined, refined_outputs
-from swashplate.parameters.catalogue import COLUMNS
+from swashplate.parameters.definitions import COLUMNS, REFINEMENTS
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.refinements import REFINEMENTS
-from swashplate.simulation.observation import Observation, ObservedRecord, Own, Signal
-from swashplate.simulation.record import Record
-from swashplate.simulation.residuals import START_PRESSURE, jacobian, residuals, triangle
-from swashplate.simulation.run import Start
+from swashplate.simulation.instance import START_PRESSURE
+from swashplate.simulation.residuals import Own, jacobian, residuals, triangle
 
 Array = NDArray[np.float64]
 Result = TypeVar("Result")
@@ -30,7 +29,7 @@ _Key = tuple[str, tuple[int, ...], tuple[str, ...]]
 Part = Literal["card", "pump", "chain"]
 """What of the drive is simulated: the card alone, pump and motor over a current, or all."""
 
-SIGNALS: Mapping[ChannelKind, Signal] = {
+SIGNALS: Mapping[ChannelKind, str] = {
     "signed_current": "current",
     "rectified_current": "current_sum",
     "current_plus": "current_positive",
@@ -58,7 +57,7 @@ class DriveModel:
     experiment [Pa], and of each channel ``"offset NAME"`` (its free zero) and ``"clock NAME"``
     (by how much the input's clock is ahead of the channel's [s]).
 
-    Derivatives are exact, unless the set has refinements: then they are differences.
+    Derivatives are exact, those by refinements as well.
     """
 
     parameters: ParameterSet
@@ -68,8 +67,6 @@ class DriveModel:
     """For the pump alone, the signed current of each experiment by its name. [A]"""
     forces: Forces | None = None
     """The forces that stand for the solenoids' coefficients."""
-    sizes: Mapping[str, float] = field(default_factory=dict)
-    """What counts as a change of an unknown whose value may be 0, for differences."""
     _observed: dict[_Key, tuple[Mapping[str, Array | None], ObservedRecord]] = field(
         default_factory=dict, repr=False
     )
@@ -86,9 +83,6 @@ class DriveModel:
         """Simulate the measured channels; see `model.Model`."""
         names = self._channels(experiment)
         observed = self._record(experiment, dict.fromkeys(names), ())
-        if is_refined(self.parameters, values):
-            by_steps = self._differences(observed, names)
-            return by_steps.split(by_steps.outputs(values))
         flat = self._computed(residuals, values, observed, self._own(values, names))
         return {name: flat[observed.rows_of(k)] for k, name in enumerate(names)}
 
@@ -98,8 +92,6 @@ class DriveModel:
         """Simulate with derivatives; see `model.Differentiable`."""
         channels = self._channels(experiment)
         observed = self._record(experiment, dict.fromkeys(channels), tuple(names))
-        if is_refined(self.parameters, values):
-            return self._differences(observed, channels).linearise(values, names)
         columns, chain = self._chain(names, channels, observed)
         found = self._computed(
             lambda p, o, own: jacobian(p, o, columns, own),
@@ -125,8 +117,6 @@ class DriveModel:
         observed = self._record(
             experiment, {name: weights[name] for name in channels}, tuple(names)
         )
-        if is_refined(self.parameters, values):
-            return self._differences(observed, channels).reduce(values, names)
         columns, chain = self._chain(names, channels, observed)
         found = self._computed(
             lambda p, o, own: triangle(p, o, columns, own),
@@ -164,17 +154,6 @@ class DriveModel:
         known = name in COLUMNS or name in REFINEMENTS
         return known or (self.forces is not None and name in self.forces.names)
 
-    def _differences(self, observed: ObservedRecord, channels: Sequence[str]) -> Differences:
-        """What answers for a set with refinements."""
-        return Differences(
-            lambda values: self._computed(
-                refined_outputs, values, observed, self._own(values, channels)
-            ),
-            observed,
-            channels,
-            self.sizes,
-        )
-
     def _computed(
         self,
         compute: Callable[[ParameterSet, ObservedRecord, Own], Result],
@@ -210,7 +189,11 @@ class DriveModel:
     ) -> tuple[list[str], Array]:
         """Columns to ask for, and their derivatives by the names."""
         forces = self.forces.columns if self.forces is not None else ()
-        asked = [name for name in names if name in COLUMNS or name == START_PRESSURE]
+        asked = [
+            name
+            for name in names
+            if name in COLUMNS or name in REFINEMENTS or name == START_PRESSURE
+        ]
         if self.forces is not None and any(name in self.forces.names for name in names):
             asked += [column for column in forces if column not in asked]
         own = []

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from swashplate.campaign.experiment import Experiment
+from swashplate.equations.record import SLOWEST, SOURCE_RATE, Record, record_of
+from swashplate.equations.run import Start
 from swashplate.errors import InputError
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.simulation.record import SLOWEST, SOURCE_RATE, Record, check_voltage, record_of
-from swashplate.simulation.run import Start, simulate_drive
+from swashplate.simulation.run import check_voltage, simulate_drive
 
 
 def voltage_record(experiment: Experiment) -> Record:
@@ -40,9 +41,7 @@ def simulated_current(experiment: Experiment, parameters: ParameterSet) -> Recor
     start: Start = "steady" if experiment.start == "steady" else "rest"
     # refinements begin behind the card
     run = simulate_drive(parameters.plain, record, start)
-    assert run.card is not None
-    current = run.card.current_positive - run.card.current_negative
-    return Record(current, record.start, record.rate, record.substeps)
+    return Record(run.fine("current"), record.start, record.rate, record.substeps)
 
 
 def _record(experiment: Experiment, what: str) -> Record:

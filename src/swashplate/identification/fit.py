@@ -17,7 +17,6 @@ from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.executors import Executor, Serial
 from swashplate.identification.prior_weights import weighed
 from swashplate.identification.problem import Problem
-from swashplate.identification.refined_model import is_refined
 from swashplate.identification.setup import Setup, Stage
 from swashplate.identification.solving import Loss, Method, Progress, Solution, solve
 from swashplate.identification.soundness import check_sound, refuse_unsound
@@ -26,10 +25,6 @@ from swashplate.identification.starts import StartResult, sobol_starts, solve_fr
 from swashplate.parameters.parameter_set import ParameterSet
 
 Array = NDArray[np.float64]
-
-
-BY_DIFFERENCES = "Derivatives by differences: the set has refinements, on or free."
-"""What a fit says of itself where the march with exact derivatives does not know the drive."""
 
 
 @dataclass(frozen=True)
@@ -129,8 +124,6 @@ def fit(
     """
     parameters, stages = smooth(nominal), []
     doubts = refuse_unsound(check_sound(experiments, parameters, setup))
-    if any(is_refined(parameters, stage.free) for stage in setup.stages):
-        doubts = (*doubts, BY_DIFFERENCES)
     for stage in setup.stages:
         problem = stage_problem(stage, parameters, experiments, threads=threads)
         begin: Array | None = None

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.identification.variables import Variables
+from swashplate.models.pump import ANGLE, FORCE, MOTION, PRESSURE, TILT, TRAVEL, ZERO
+from swashplate.parameters.definitions import CATALOGUE
 
 Array = NDArray[np.float64]
 Known = Mapping[str, float]
@@ -89,60 +91,60 @@ def _tangent_offset(value: float, t: float, known: Known) -> float:
     return value + known["Z1"] * known["Z9"] * (exp(t) - 1.0)
 
 
-_FORCES = ("Z19", "Z20", "Z21", "Z22", "force")
-_PRESSURES = ("Z9", "Z15", "initial pressure", "start_pressure", "start pressure")
+def _powers(symmetry: str, *others: str) -> dict[str, Move]:
+    """Moves of the parameters along one of the models' symmetries, and of others in proportion."""
+    powers = {
+        symbol: definition.symmetry[symmetry]
+        for symbol, definition in CATALOGUE.items()
+        if symmetry in definition.symmetry
+    }
+    return {name: scaled(power) for name, power in (powers | dict.fromkeys(others, 1.0)).items()}
+
+
+_PRESSURES = ("initial pressure", "start_pressure", "start pressure")
 
 GAUGES: Sequence[Gauge] = (
     Gauge(
         "scale of pressure",
-        {"Z1": scaled(-1.0), "Z8": scaled(0.5), **{name: scaled(1.0) for name in _PRESSURES}},
+        _powers(PRESSURE, *_PRESSURES),
         "only Z1·Z9, Z1·Z15 and Z8·√Z1 are determined",
         ("Z1", "Z9", "Z8"),
     ),
     Gauge(
         "zero of pressure",
-        {"Z9": scaled(1.0), "Z2": _tangent_offset},
+        {**_powers(ZERO), "Z2": _tangent_offset},
         "only Z9 - Z2/Z1 is determined",
         ("Z2", "Z9"),
         frozenset({"Z1", "Z9"}),
     ),
     Gauge(
         "scale of spool travel",
-        {
-            "Z5": scaled(1.0),
-            "Z4": scaled(2.0),
-            "Z14": scaled(1.0),
-            "Z16": scaled(1.0),
-            "Z18": scaled(1.0),
-            "Z8": scaled(-1.0),
-        },
+        _powers(TRAVEL),
         "only Z4/Z5², Z14/Z5, Z16/Z5, Z18/Z5 and Z8·Z5 are determined",
         ("Z5", "Z8", "Z16"),
     ),
     Gauge(
         "scale of force",
-        {"Z4": scaled(2.0), **{name: scaled(1.0) for name in _FORCES}},
+        _powers(FORCE, "force"),
         "only the solenoid force over √Z4 is determined",
         ("Z4", "Z19", "force"),
     ),
     Gauge(
         "piston motion against flow gain",
-        {"Z6": _plus_one(1.0), "Z8": scaled(1.0)},
+        {"Z6": _plus_one(1.0), **_powers(MOTION)},
         "only Z8/(1+Z6) is determined",
         ("Z6", "Z8"),
     ),
     Gauge(
         "scale of the spool's tilt",
-        {"Z3": scaled(1.0), "Z8": scaled(-1.0), "Z16": scaled(1.0), "Z18": scaled(1.0)}
-        | {name: scaled(1.0) for name in _FORCES},
+        _powers(TILT, "force"),
         "only the force, Z16 and Z18 over Z3 and Z8·Z3 are determined well: a small tilt is its "
         "own tangent",
         ("Z3", "Z8", "Z16"),
     ),
     Gauge(
         "scale of the swash angle",
-        {"Z1": scaled(1.0), "Z2": scaled(1.0), "Z3": scaled(-1.0), "Z13": scaled(1.0)}
-        | {"Z10": scaled(-1.0)},
+        _powers(ANGLE),
         "only Z1·Z10, Z3/Z10 and Z13·Z10 are determined well: a small angle is its own tangent",
         ("Z10", "Z13", "Z3"),
     ),

@@ -8,7 +8,8 @@ from swashplate.drive import Drive
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.setup import Setup
 from swashplate.identification.unknowns import Unknown
-from swashplate.parameters.parameter_set import ParameterSet, columns_of
+from swashplate.parameters.definitions import columns_of
+from swashplate.parameters.parameter_set import ParameterSet
 
 SPREAD = 0.05
 """Standard deviation of the logarithm by which a drawn parameter differs from the nominal one."""

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.ammeter import signed_by_command
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
+from swashplate.equations.record import Record
 from swashplate.errors import InputError
 from swashplate.identification.drives import current_record
-from swashplate.simulation.record import Record
 
 Array = NDArray[np.float64]
 SIGN_WIDTH = 0.05

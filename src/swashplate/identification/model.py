@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
-from swashplate.errors import DomainError
+from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
 
@@ -118,9 +118,22 @@ def linearised(
     ------
     DomainError
         If the model does not hold there, or yields a number that is not finite.
+    InputError
+        If it returns something else than it must.
     """
     if isinstance(model, Differentiable):
-        return model.linearise(values, experiment, names)
+        made = model.linearise(values, experiment, names)
+        _check_mapping(made, experiment, "linearise", "a Linearised")
+        for channel, part in made.items():
+            shape = (*experiment[channel].time.shape, len(names))
+            if not isinstance(part, Linearised):
+                raise InputError(
+                    f"{experiment.name}: linearise must return a Linearised for {channel}, not "
+                    f"{_said(part)}."
+                )
+            _check_array(part.values, experiment, channel, shape[:1], "linearise")
+            _check_array(part.by, experiment, channel, shape, "linearise")
+        return made
     middle = simulated(model, values, experiment)
     columns: dict[str, list[Array]] = {channel: [] for channel in middle}
     for name in names:
@@ -146,16 +159,15 @@ def simulated(
     Raises
     ------
     DomainError
-        If a channel has the wrong number of samples, or one that is not finite.
+        If a number is not finite.
+    InputError
+        If what it returns is no array of real numbers for each channel, one a sample.
     """
     outputs = model.simulate(values, experiment)
+    _check_mapping(outputs, experiment, "simulate", "an array of floats")
     for name, output in outputs.items():
         channel = experiment[name]
-        if np.shape(output) != channel.time.shape:
-            raise DomainError(
-                f"{experiment.name}: the model gives {np.shape(output)} samples of {name}, which "
-                f"has {channel.time.size}; simulate at the channel's own time stamps."
-            )
+        _check_array(output, experiment, name, channel.time.shape, "simulate")
         if not np.isfinite(output).all():
             row = int(np.argmax(~np.isfinite(output)))
             raise DomainError(
@@ -163,3 +175,36 @@ def simulated(
                 f"{channel.time[row]:g} s."
             )
     return outputs
+
+
+def _check_mapping(made: object, experiment: Experiment, method: str, each: str) -> None:
+    if not isinstance(made, Mapping):
+        raise InputError(
+            f"{experiment.name}: {method} must return a mapping of channel names to {each}, such "
+            f"as {{'{next(iter(experiment.channels), 'speed')}': ...}}, not {_said(made)}."
+        )
+
+
+def _check_array(
+    made: object, experiment: Experiment, name: str, shape: tuple[int, ...], method: str
+) -> None:
+    if not isinstance(made, np.ndarray) or made.dtype.kind not in "fiu":
+        raise InputError(
+            f"{experiment.name}: {method} must return a NumPy array of real numbers for {name}, "
+            f"not {_said(made)}."
+        )
+    if made.shape != shape:
+        columns = "" if len(shape) == 1 else ", and a column for each name asked for"
+        raise InputError(
+            f"{experiment.name}: {method} returns an array of shape {made.shape} for {name}, but "
+            f"must return {shape}: a row for each of the channel's own time stamps{columns}."
+        )
+
+
+def _said(made: object) -> str:
+    """What something is, in words."""
+    if made is None:
+        return "None (is a return missing?)"
+    if isinstance(made, np.ndarray):
+        return f"an array of {made.dtype.name}"
+    return f"a {type(made).__name__}"

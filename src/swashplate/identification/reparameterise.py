@@ -14,7 +14,7 @@ from swashplate.identification.excitation import Outlook
 from swashplate.identification.forces import Forces
 from swashplate.identification.null_directions import NAMED
 from swashplate.identification.setup import Free, GivenForces, Setup, Stage
-from swashplate.parameters.catalogue import CATALOGUE
+from swashplate.parameters.definitions import CATALOGUE
 
 if TYPE_CHECKING:
     from tomlkit.items import InlineTable

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.errors import InputError
@@ -27,8 +26,6 @@ from swashplate.identification.unmoved import (
 )
 from swashplate.identification.variables import Variables
 from swashplate.parameters.parameter_set import ParameterSet
-
-Array = NDArray[np.float64]
 
 NAMED = 8
 """Unknowns that a sentence names."""

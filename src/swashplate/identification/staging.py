@@ -19,8 +19,9 @@ from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
 from swashplate.identification.stage_weights import check_weights, weighted
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
-from swashplate.parameters.parameter_set import ParameterSet, find
-from swashplate.simulation.residuals import START_PRESSURE
+from swashplate.parameters.definitions import find
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.simulation.instance import START_PRESSURE
 
 LARGEST_START_PRESSURE = 4e6
 """Bound of a free pressure at the start where the set-up gives none. [Pa]"""
@@ -114,13 +115,7 @@ def stage_problem(
         *_own(stage, runs, channels),
     )
     return DriveProblem(
-        DriveModel(
-            parameters,
-            stage.part,
-            currents,
-            forces,
-            {target: each.scale for each in unknowns for target in each.targets},
-        ),
+        DriveModel(parameters, stage.part, currents, forces),
         tuple(weighted(each, stage) for each in runs),
         Unknowns(unknowns),
         channels,

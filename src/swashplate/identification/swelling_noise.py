@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import rfft, rfftfreq
 
 from swashplate.identification.autocorrelation import grid_of
 from swashplate.identification.covariance import Covariance, covariance_of
 from swashplate.identification.linearised import LinearisedFit
-
-Array = NDArray[np.float64]
 
 BAND = 10.0
 """Width of the bands, within which noise may swell and fade in any way. [Hz]"""

@@ -11,11 +11,7 @@ from numpy.typing import NDArray
 from swashplate.identification.autocorrelation import NoiseColour, noise_colours
 from swashplate.identification.checked_ends import CheckedEnd
 from swashplate.identification.coloured_noise import coloured_noise_covariance
-from swashplate.identification.covariance import (
-    Covariance,
-    hac_covariance,
-    white_noise_covariance,
-)
+from swashplate.identification.covariance import Covariance, white_noise_covariance
 from swashplate.identification.handed_on import Handed, with_handed
 from swashplate.identification.intervals import Estimate, estimates, reach
 from swashplate.identification.linearised import LinearisedFit
@@ -42,7 +38,6 @@ class Uncertainty:
     """Stationary coloured noise."""
     swelling: Covariance
     """Noise that differs along the runs."""
-    hac: Covariance
     white: Covariance
     """Too small where residuals are coloured; to stand beside the others."""
     colours: tuple[NoiseColour, ...]
@@ -184,7 +179,6 @@ def uncertainty(
     clean = separated(fit)
     colours = noise_colours(clean.fit)
     coloured = _with(coloured_noise_covariance(clean.fit, colours=colours), clean.covariance)
-    hac = _with(hac_covariance(clean.fit), clean.covariance)
     swelling = swelling_noise_covariance(fit)
     own, uneven = _wider(coloured, swelling)
     worth = {m: colour for colour in colours for m in colour.members}
@@ -193,7 +187,6 @@ def uncertainty(
         own,
         coloured,
         swelling,
-        hac,
         white_noise_covariance(fit),
         colours,
         tuple(

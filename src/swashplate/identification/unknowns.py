@@ -251,11 +251,3 @@ class Unknowns(Sequence[Unknown]):
             elif number >= upper - reach:
                 sides[name] = "upper"
         return sides
-
-    def free_of(self, names: Sequence[str]) -> Unknowns:
-        """The same without some of them, which then stay as the model has them."""
-        return Unknowns(
-            tuple(
-                each for name, each in zip(self.names, self.items, strict=True) if name not in names
-            )
-        )

@@ -1,15 +1,29 @@
-"""Frequency response of a drive to sines of a size: its describing function."""
+"""Frequency responses to sines of a size: describing functions, by simulation.
+
+The drive is marched over whole cycles of each frequency until it repeats itself.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from swashplate.errors import InputError
+from swashplate.equations.record import FASTEST, SOURCE_RATE, Record
+from swashplate.equations.run import marched
+from swashplate.errors import DomainError, InputError
+from swashplate.linear.drive import slowest_lag
+from swashplate.linear.operating_point import without_ripple
+from swashplate.models.pump import Pump
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.simulation.instance import check_filter_stability, instance_of
+from swashplate.simulation.result import Simulation
+from swashplate.simulation.run import kept_of, started_at
 
 if TYPE_CHECKING:
     import polars
@@ -17,6 +31,27 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Counts = NDArray[np.int64]
+SweptInput = Literal["voltage", "current"]
+SweptOutput = Literal[
+    "shaft_speed",
+    "swash_angle",
+    "stroker_pressure",
+    "orifice_opening",
+    "spool_position",
+    "solenoid_force",
+    "current",
+]
+
+SWEPT_OUTPUTS: tuple[SweptOutput, ...] = get_args(SweptOutput)
+
+SLOWEST_CYCLE = 1e-3
+"""Lowest frequency. [Hz]"""
+FEWEST_STEPS, MOST_STEPS = 8, 1_000_000
+"""Steps of a cycle, which bound the frequencies from both sides."""
+MOST_BLOCKS = 96
+"""Blocks of cycles after which an answer that still changes is given up."""
+STILL = 1e-12
+"""Answers below this part of the output's size are none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,17 +126,13 @@ class FrequencyResponse:
                 f"{nearest:.6g} Hz."
             )
         near = slice(k, k + 1)
-        return FrequencyResponse(
-            self.name,
-            self.input,
-            self.output,
-            self.bias,
-            self.frequencies[near],
-            self.amplitudes,
-            self.ratio[:, near],
-            self.distortion[:, near],
-            self.mean[:, near],
-            self.cycles[:, near],
+        return replace(
+            self,
+            frequencies=self.frequencies[near],
+            ratio=self.ratio[:, near],
+            distortion=self.distortion[:, near],
+            mean=self.mean[:, near],
+            cycles=self.cycles[:, near],
         )
 
     def to_polars(self) -> polars.DataFrame:
@@ -133,3 +164,175 @@ class FrequencyResponse:
         from swashplate.tables import write_table
 
         write_table(self.to_polars(), path)
+
+
+# --- sweep ----------------------------------------------------------------------------------------
+
+
+def sweep(
+    parameters: ParameterSet,
+    frequencies: ArrayLike,
+    amplitudes: ArrayLike,
+    *,
+    bias: float = 0.0,
+    input: SweptInput = "voltage",
+    output: SweptOutput = "shaft_speed",
+    rate: float = SOURCE_RATE,
+    tolerance: float = 1e-4,
+) -> FrequencyResponse:
+    """Describing function by sine sweep; see `Drive.frequency_response`."""
+    f, a = _checked(frequencies, "frequencies"), _checked(amplitudes, "amplitudes")
+    if not SOURCE_RATE <= rate <= FASTEST:
+        raise InputError(
+            f"The rate is {rate:g} Hz, but must be between {SOURCE_RATE:g} and {FASTEST:g} Hz."
+        )
+    lowest, highest = max(SLOWEST_CYCLE, rate / MOST_STEPS), rate / FEWEST_STEPS
+    if (np.diff(f) <= 0.0).any() or f[0] < lowest or f[-1] > highest:
+        raise InputError(
+            f"The frequencies must rise from {lowest:g} Hz or above to at most {highest:g} Hz, an "
+            "eighth of the rate."
+        )
+    if not 0.0 < tolerance < 1.0:
+        raise InputError(f"The tolerance is {tolerance:g}, but must be between 0 and 1.")
+    if input not in ("voltage", "current"):
+        raise InputError(f"The input is '{input}'; it is 'voltage' or 'current'.")
+    if output not in SWEPT_OUTPUTS or output == input:
+        raise InputError(
+            f"'{output}' is no output of a sweep of the {input}; there are "
+            f"{', '.join(name for name in SWEPT_OUTPUTS if name != input)}."
+        )
+    largest = abs(bias) + float(a.max())
+    if not np.isfinite(bias) or (input == "voltage" and largest > FULL_VOLTAGE):
+        raise InputError(
+            f"Bias and amplitude reach {largest:g} V, but the card takes ±10 V."
+            if np.isfinite(bias)
+            else f"The bias is {bias}, but must be a finite number."
+        )
+    shape = (a.size, f.size)
+    ratio = np.zeros(shape, dtype=np.complex128)
+    distortion, mean, cycles = np.zeros(shape), np.zeros(shape), np.zeros(shape, dtype=np.int64)
+    block = 3.0 * slowest_lag(parameters)
+    for j, frequency in enumerate(f.tolist()):
+        steps = ceil(rate / frequency * (1.0 - 1e-12))
+        wave = np.sin(2.0 * np.pi * np.arange(steps) / steps)
+        for i, amplitude in enumerate(a.tolist()):
+            command = bias + amplitude * wave
+            found = _settled(parameters, command, bias, frequency, block, input, output, tolerance)
+            ratio[i, j], distortion[i, j], mean[i, j], cycles[i, j] = found
+            ratio[i, j] /= amplitude
+    if not ratio.any():
+        raise DomainError(
+            f"{parameters.name}: nothing moves about {bias:g} {'V' if input == 'voltage' else 'A'} "
+            f"with amplitudes up to {a.max():g}: all stay in a dead zone or at a stop; take larger "
+            "ones or another bias."
+        )
+    return FrequencyResponse(
+        parameters.name, input, output, float(bias), f, a, ratio, distortion, mean, cycles
+    )
+
+
+def _settled(
+    parameters: ParameterSet,
+    command: Array,
+    bias: float,
+    frequency: float,
+    block: float,
+    input: SweptInput,
+    output: SweptOutput,
+    tolerance: float,
+) -> tuple[complex, float, float, int]:
+    """First harmonic as a multiple of the sine, distortion, mean and cycles.
+
+    The cycles come in blocks that last long enough for most of a transient to die out. The last
+    cycles of the last two blocks must agree, or else the march starts again, twice as long.
+    """
+    a_block = max(1, ceil(frequency * block))
+    blocks = 3
+    while True:
+        count = blocks * a_block
+        before, last = _march(parameters, command, frequency, count, a_block, input)
+        size = _size(last.pump, output)
+        earlier, _, _ = _harmonic(before.fine(output), size)
+        harmonic, distortion, mean = _harmonic(last.fine(output), size)
+        if abs(harmonic - earlier) <= tolerance * abs(harmonic):
+            return harmonic, distortion, mean, count
+        if blocks >= MOST_BLOCKS:
+            raise DomainError(
+                f"{parameters.name}: at {frequency:g} Hz and an amplitude of "
+                f"{command.max() - bias:g} the answer has not settled to {tolerance:g} within "
+                f"{count} cycles; allow a larger tolerance, or look at it with a simulation."
+            )
+        blocks *= 2
+
+
+def _march(
+    parameters: ParameterSet,
+    cycle: Array,
+    frequency: float,
+    count: int,
+    apart: int,
+    input: SweptInput,
+) -> tuple[Simulation, Simulation]:
+    """The last cycle of several, from the steady state at the bias on, and one some cycles before.
+
+    A cycle has a whole number of steps, so that its first harmonic is exact.
+    """
+    n = cycle.size
+    step = 1.0 / (frequency * n)
+    if input == "voltage":
+        check_filter_stability(parameters, step)
+    instance = without_ripple(instance_of(parameters, input == "voltage"))
+    records: dict[str, Array] = {input: np.tile(cycle, count)}
+    kept = kept_of(instance.model, (input,), instance.options)
+    started = started_at(instance, records, step, "steady")
+    out, flags = marched(instance, records, step, started, kept, input)
+    ends = out.shape[1] - apart * n, out.shape[1]
+    record = Record(cycle, 0.0, 1.0 / step, 1)
+    before, last = (
+        Simulation(
+            parameters.name,
+            record,
+            instance,
+            input,
+            kept,
+            np.ascontiguousarray(out[:, end - n : end]),
+            np.ascontiguousarray(flags[:, end - n : end]),
+        )
+        for end in ends
+    )
+    return before, last
+
+
+def _size(pump: Pump, output: SweptOutput) -> float:
+    """Natural size of a signal, beside which rounding is told from motion."""
+    sizes: dict[str, float] = {
+        "shaft_speed": pump.Z10,
+        "stroker_pressure": 1.0 / pump.Z1,
+        "solenoid_force": pump.Z4**0.5 / pump.Z5,
+        "spool_position": pump.Z5,
+        "orifice_opening": pump.Z5,
+    }
+    return sizes.get(output, 1.0)
+
+
+def _harmonic(signal: Array, size: float) -> tuple[complex, float, float]:
+    """First harmonic by that of a unit sine, distortion and mean of one whole cycle."""
+    n = signal.size
+    mean = float(signal.mean())
+    turn = np.exp(-2j * np.pi * np.arange(n) / n)
+    first = complex(2.0 / n * ((signal - mean) @ turn))
+    if abs(first) <= STILL * size:
+        return 0j, 0.0, mean
+    rest = signal - mean - np.real(first * np.conj(turn))
+    distortion = float(np.sqrt(2.0 * np.mean(rest * rest))) / abs(first)
+    return 1j * first, distortion, mean
+
+
+def _checked(values: ArrayLike, what: str) -> Array:
+    try:
+        data = np.atleast_1d(np.array(values, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise InputError(f"The {what} must be a sequence of numbers.") from None
+    if data.ndim != 1 or data.size == 0 or not (np.isfinite(data) & (data > 0.0)).all():
+        raise InputError(f"The {what} must be one or more finite numbers above 0, in one row.")
+    return data

@@ -1,8 +1,8 @@
-"""A linear drive: state space at an operating point, and what follows from it."""
+"""Linear models: state space with a delay before its input, and what follows from it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from math import log
@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.errors import DomainError
+from swashplate.equations.record import Interpolation
+from swashplate.errors import DomainError, InputError
 from swashplate.linear.margins import LoopMargins, bandwidth, largest_gain, loop_margins
-from swashplate.linear.operating_point import Input, OperatingPoint
-from swashplate.linear.state_space import state_space_response
+from swashplate.linear.operating_point import OperatingPoint
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.simulation.record import Interpolation
 
 if TYPE_CHECKING:
     from scipy.signal import StateSpace
@@ -27,59 +26,64 @@ ComplexArray = NDArray[np.complex128]
 Coulomb = Literal["ignored", "tangent"]
 Controller = float | Callable[[Array], ComplexArray]
 
-_MOVING = ("current_rate", "current_before", "current", "stroker_pressure")
-"""States of card and pump; the others of a sampled model are commands on their way."""
+PLATE_STATES = ("stroker_pressure", "plate_pressure", "spool_deflection")
+"""States between current and swash angle."""
 
 
 @dataclass(frozen=True, eq=False)
-class LinearDrive:
+class LinearModel:
     """Small motions about an operating point.
 
-    Continuous (`sample_time` None): x' = A x + B u(t - delay), y = C x + D u(t - delay). Sampled:
-    x[n+1] = A x[n] + B u[n - k], y[n] = C x[n] + D u[n - k], where the delay is k samples. All are
-    deviations from the operating point, in SI.
+    Continuous (`sample_time` None): x' = A x + B u, y = C x + D u. Sampled: x[n+1] = A x[n] +
+    B u[n], y[n] = C x[n] + D u[n]. All are deviations from the operating point, in SI. The first of
+    the inputs u comes late by `delay`.
     """
 
     A: Array
     """(n, n)"""
     B: Array
-    """(n, 1)"""
+    """(n, k)"""
     C: Array
     """(m, n)"""
     D: Array
-    """(m, 1)"""
+    """(m, k)"""
     states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    """The first is the one that loops, gains and responses are about unless told otherwise."""
     outputs: tuple[str, ...]
-    input: Input
     delay: float
-    """What stands exactly before the input; of a sampled model whole samples. [s]"""
+    """What stands exactly before the first input; of a sampled model whole samples. [s]"""
     sample_time: float | None
     """Interval of a sampled model, None of a continuous one. [s]"""
-    operating_point: OperatingPoint
-    coulomb: Coulomb
-    """Whether the card's Coulomb term is left out or counts with its slope at rest."""
-    parameters: ParameterSet
-    """The drive that was linearised."""
+    name: str
+    """Name of the machine."""
+    memory: tuple[str, ...]
+    """States that are inputs of earlier samples."""
 
     def __repr__(self) -> str:
         time = "continuous" if self.sample_time is None else f"sampled at {self.sample_time:g} s"
-        return f"LinearDrive({self.name!r}, {self.input} to {', '.join(self.outputs)}, {time})"
+        kind, said = type(self).__name__, ", ".join(self.inputs)
+        return f"{kind}({self.name!r}, {said} to {', '.join(self.outputs)}, {time})"
 
     @property
-    def name(self) -> str:
-        """Name of the drive."""
-        return self.parameters.name
+    def input(self) -> str:
+        """The first input."""
+        return self.inputs[0]
+
+    def _poles(self, states: Iterable[str]) -> ComplexArray:
+        """Poles of some of the states, the slowest first."""
+        kept = [k for k, name in enumerate(self.states) if name in states]
+        poles = np.linalg.eigvals(self.A[np.ix_(kept, kept)])
+        slowness = poles.real if self.sample_time is None else np.abs(poles)
+        return np.asarray(poles[np.lexsort((poles.imag, -slowness))], dtype=np.complex128)
 
     @cached_property
     def poles(self) -> ComplexArray:
-        """Poles of card and pump, the slowest first; the delay's, all at z = 0, are left out.
+        """Poles of the machine, the slowest first; those of delays, all at z = 0, are left out.
 
         Of a continuous model in the s-plane [rad/s], of a sampled one in the z-plane [1].
         """
-        dynamic = [k for k, name in enumerate(self.states) if name in _MOVING]
-        found = np.linalg.eigvals(self.A[np.ix_(dynamic, dynamic)]).astype(np.complex128)
-        slowness = found.real if self.sample_time is None else np.abs(found)
-        return np.asarray(found[np.lexsort((found.imag, -slowness))])
+        return self._poles([name for name in self.states if name not in self.memory])
 
     @property
     def is_stable(self) -> bool:
@@ -88,57 +92,64 @@ class LinearDrive:
             return bool((self.poles.real < 0.0).all())
         return bool((np.abs(self.poles) < 1.0).all())
 
-    @property
-    def time_constant(self) -> float:
-        """Time constant of the pump's lag, from current to swash angle. [s]
-
-        At rest without plussing τ = (1 + Z6)/(Z1 Z3 Z5 Z8 √(Z9/2)); Kruse (2001), eqs. 6.72-6.74
-        with errata 4 and 23. Of a sampled model that of the lag with the same pole.
-
-        Raises
-        ------
-        DomainError
-            If a sampled model's lag is shorter than its step.
-        """
-        k = self.states.index("stroker_pressure")
-        pole = float(self.A[k, k])
-        if self.sample_time is None:
-            return -1.0 / pole
-        if not 0.0 < pole < 1.0:
-            raise DomainError(
-                f"{self.name}: sampled at {self.sample_time:g} s the pump's pole is at z = "
-                f"{pole:g}, which is no lag's; take a smaller sample time."
-            )
-        return -self.sample_time / log(pole)
-
     @cached_property
     def gains(self) -> Array:
-        """Steady gain to each output, in the output's unit by the input's, (m,)."""
+        """Steady gain of the first input to each output, in the output's unit by the input's, (m,).
+
+        Those of the other inputs are the `response` to them at 0 Hz.
+        """
         n = self.A.shape[0]
         rest = -self.A if self.sample_time is None else np.eye(n) - self.A
         return np.asarray((self.C @ np.linalg.solve(rest, self.B) + self.D)[:, 0])
 
     @property
     def gain(self) -> float:
-        """Steady gain to the first output, which is the shaft speed unless chosen otherwise."""
+        """Steady gain to the first output."""
         return float(self.gains[0])
 
-    def response(self, frequency: ArrayLike) -> ComplexArray:
-        """Frequency response of the outputs by the input, with the exact delay.
+    def response(self, frequency: ArrayLike, input: str | None = None) -> ComplexArray:
+        """Frequency response of the outputs, with the exact delay.
 
         Parameters
         ----------
         frequency : float or (f,) array_like
             At or above 0, of a sampled model at or below 1/(2 h). [Hz]
+        input : str, optional
+            By default the first.
 
         Returns
         -------
         (m,) or (m, f) complex array
-            Amplitude and phase of each output.
+            Amplitude and phase of each output: G e^(-jω delay) with G = C (p - A)⁻¹ B + D, p being
+            jω or, sampled, e^(jωh).
         """
-        return state_space_response(
-            self.A, self.B, self.C, self.D, self.delay, self.sample_time, frequency
-        )
+        f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+        h = self.sample_time
+        highest = np.inf if h is None else 0.5 / h
+        # half the rate may have been computed in another way
+        if f.ndim != 1 or not (np.isfinite(f) & (f >= 0.0) & (f <= highest * (1.0 + 1e-12))).all():
+            raise InputError(
+                "Frequencies must be one row of finite numbers from 0 on"
+                + ("." if h is None else f" to 1/(2 h) = {highest:g} Hz.")
+            )
+        at = self.index_of_input(input)
+        s = 2j * np.pi * f
+        point = s if h is None else np.exp(s * h)
+        n = self.A.shape[0]
+        system = point[:, np.newaxis, np.newaxis] * np.eye(n) - self.A
+        into = np.broadcast_to(self.B[:, at : at + 1], (f.size, n, 1))
+        found = (self.C @ np.linalg.solve(system, into))[:, :, 0].T + self.D[:, at : at + 1]
+        if at == 0:
+            found = found * np.exp(-s * self.delay)
+        return np.asarray(found[:, 0] if np.ndim(frequency) == 0 else found, dtype=np.complex128)
+
+    def index_of_input(self, input: str | None) -> int:
+        """Number of an input, of the first if None."""
+        if input is not None and input not in self.inputs:
+            raise InputError(
+                f"The model of {self.name} has no input '{input}'; it has {', '.join(self.inputs)}."
+            )
+        return 0 if input is None else self.inputs.index(input)
 
     def _first(self, frequency: Array) -> ComplexArray:
         return np.asarray(self.response(frequency)[0])
@@ -201,44 +212,19 @@ class LinearDrive:
         """Delay more than the model's own that the loop of `margins` bears before it swings. [s]"""
         return self.margins(controller).delay_margin
 
-    def discrete(self, sample_time: float, interpolation: Interpolation = "linear") -> LinearDrive:
-        """The model at a sample time, with the recurrences of the march.
-
-        Parameters
-        ----------
-        sample_time : float
-            10 µs to 0.1 s; above 1/512 s the march's own sub-steps are taken. [s]
-        interpolation : {"linear", "previous"}
-            What the input is between samples: a straight line or held, as in `Drive.simulate`.
-
-        Returns
-        -------
-        LinearDrive
-            Agrees with a small motion of `Drive.simulate` or `Drive.stepper` sample for sample.
-        """
-        from swashplate.linear.sampled import sampled
-
-        return sampled(
-            self.parameters,
-            self.operating_point,
-            self.input,
-            self.outputs,
-            self.coulomb,
-            sample_time,
-            interpolation,
-        )
-
-    def transfer_function(self, output: str | None = None) -> tuple[Array, Array]:
+    def transfer_function(
+        self, output: str | None = None, input: str | None = None
+    ) -> tuple[Array, Array]:
         """Numerator and denominator, highest power first, without the delay.
 
         Parameters
         ----------
-        output : str, optional
+        output, input : str, optional
             By default the first.
         """
-        from swashplate.linear.transfer import polynomials
+        from swashplate.linear.export import polynomials
 
-        return polynomials(self, self.outputs[0] if output is None else output)
+        return polynomials(self, self.outputs[0] if output is None else output, input)
 
     def to_scipy(self, pade: int | None = None) -> StateSpace:
         """The model as `scipy.signal.StateSpace`, continuous or sampled.
@@ -277,6 +263,62 @@ class LinearDrive:
         FileError
             For another ending or a place that cannot be written.
         """
-        from swashplate.linear.files import write_model
+        from swashplate.linear.export import write_model
 
         write_model(self, path)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearDrive(LinearModel):
+    """Small motions of a drive about an operating point."""
+
+    operating_point: OperatingPoint
+    coulomb: Coulomb
+    """Whether the card's Coulomb term is left out or counts with its slope at rest."""
+    parameters: ParameterSet
+    """The drive that was linearised."""
+
+    __repr__ = LinearModel.__repr__
+
+    @property
+    def time_constant(self) -> float:
+        """Time constant of the pump's lag, from current to swash angle. [s]
+
+        At rest without plussing τ = (1 + Z6)/(Z1 Z3 Z5 Z8 √(Z9/2)); Kruse (2001), eqs. 6.72-6.74
+        with errata 4 and 23. Of a sampled model that of the lag with the same pole. Where friction
+        or damping give it more poles than one, that of the slowest.
+
+        Raises
+        ------
+        DomainError
+            If a sampled model's lag is shorter than its step.
+        """
+        slowest = self._poles(PLATE_STATES)[0]
+        if self.sample_time is None:
+            return -1.0 / float(slowest.real)
+        pole = float(abs(slowest) if slowest.imag else slowest.real)
+        if not 0.0 < pole < 1.0:
+            raise DomainError(
+                f"{self.name}: sampled at {self.sample_time:g} s the pump's pole is at z = "
+                f"{pole:g}, which is no lag's; take a smaller sample time."
+            )
+        return -self.sample_time / log(pole)
+
+    def discrete(self, sample_time: float, interpolation: Interpolation = "linear") -> LinearDrive:
+        """The model at a sample time, with the recurrences of the march.
+
+        Parameters
+        ----------
+        sample_time : float
+            10 µs to 0.1 s; above 1/512 s the march's own sub-steps are taken. [s]
+        interpolation : {"linear", "previous"}
+            What the input is between samples: a straight line or held, as in `Drive.simulate`.
+
+        Returns
+        -------
+        LinearDrive
+            Agrees with a small motion of `Drive.simulate` or `Drive.stepper` sample for sample.
+        """
+        from swashplate.linear.drive import sampled
+
+        return sampled(self, sample_time, interpolation)

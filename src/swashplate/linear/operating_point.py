@@ -1,32 +1,44 @@
-"""Where a drive is linearised: the steady state of a voltage, a current or a speed."""
+"""Where a drive is linearised: a steady state at which small motions have an answer."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite, nextafter
-from typing import Literal
+from math import ceil, isfinite, nextafter
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.equations.equation import interpreted
+from swashplate.equations.run import Instance, called
 from swashplate.errors import DomainError, InputError
-from swashplate.linear.dead_zone import check_card, check_solenoid
-from swashplate.linear.slopes import solenoid_slope
+from swashplate.models.card import Card, channel_level
+from swashplate.models.drive import overpowered
+from swashplate.models.pump import (
+    Pump,
+    moment_sine,
+    pump_sample,
+    pump_settled,
+    settled_speed,
+    solenoid_force,
+)
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.build import build_channel, build_pump
-from swashplate.simulation.constants import Channel, Pump
-from swashplate.simulation.march import observe_inside, observe_speed
-from swashplate.simulation.record import SOURCE_RATE
-from swashplate.simulation.run import check_domain
-from swashplate.simulation.steady import steady_pump_start, steady_start, steady_states
+from swashplate.simulation.instance import card_of, instance_of
+from swashplate.simulation.steady import pump_arguments, steady_states
 
 Array = NDArray[np.float64]
-Input = Literal["voltage", "current", "solenoid_force"]
+Input = Literal[
+    "voltage", "current", "solenoid_force", "load_torque", "pump_speed", "supply_pressure"
+]
 
-INPUTS: tuple[Input, ...] = ("voltage", "current", "solenoid_force")
+INPUTS: tuple[Input, ...] = get_args(Input)
+COMMANDS = INPUTS[:3]
+"""Of which one moves at a time; the others can move beside it."""
 _SEARCHED = 4001
 """Voltages among which a speed is looked for, before the place is found exactly."""
+_DECIMALS = 4
+"""Of the voltage that is proposed; rounded away from 0 V, so that it does have a model."""
 
 
 @dataclass(frozen=True)
@@ -46,14 +58,30 @@ class OperatingPoint:
     swash_angle: float
     """[rad]"""
     shaft_speed: float
-    """[rad/s]"""
+    """The mean of a turn. [rad/s]"""
     one_sided: tuple[str, ...] = ()
     """Switches that the point lies on, and the side whose slope is taken."""
 
 
+class DeadZoneError(DomainError):
+    """A point in a dead zone, where the gain is 0, and where there is a model instead.
+
+    Parameters
+    ----------
+    where : str
+        The point and its dead zone. Kept with what follows from it.
+    instead : str
+        What to linearise at: ``"linearise at +0.2064 V or more"``.
+    """
+
+    def __init__(self, where: str, instead: str) -> None:
+        self.where, self.instead = f"{where}, so the gain is 0", instead
+        super().__init__(f"{self.where}; {instead}, or the pump alone with input='solenoid_force'.")
+
+
 def operating_point(
     parameters: ParameterSet,
-    input: Input,
+    input: str,
     *,
     voltage: float | None = None,
     current: float | None = None,
@@ -65,8 +93,8 @@ def operating_point(
     ----------
     parameters : ParameterSet
         The drive.
-    input : {"voltage", "current", "solenoid_force"}
-        What moves.
+    input : str
+        What moves, one of `INPUTS`.
     voltage, current, speed : float
         One of them. [V, A, rad/s]
 
@@ -75,8 +103,9 @@ def operating_point(
     InputError
         If not exactly one is given, or it cannot be had.
     DomainError
-        Where nothing moves: in a dead zone, at a stop of the swash plate, at the relief pressure,
-        behind a saturated orifice; or where the solenoid overpowers the feedback spring.
+        Where nothing moves: in a dead zone, within the solenoids' hysteresis, at a stop of the
+        swash plate, at the relief pressure, behind a saturated orifice, in the grip of a friction
+        without presliding; or where the solenoid overpowers the feedback spring.
     """
     given = {"voltage": voltage, "current": current, "speed": speed}
     chosen = {name: value for name, value in given.items() if value is not None}
@@ -87,60 +116,134 @@ def operating_point(
     ((name, value),) = chosen.items()
     if not isfinite(value):
         raise InputError(f"The {name} to linearise at is {value}, but must be a finite number.")
-    pump = build_pump(parameters)
-    plus, minus = (build_channel(parameters, s, 1.0 / SOURCE_RATE) for s in ("plus", "minus"))
+    if input == "voltage" and current is not None:
+        raise InputError(
+            "A model from the voltage needs a voltage or a speed to linearise at, not a current."
+        )
     if speed is not None:
-        voltage = _voltage_of(parameters.name, speed, plus, minus, pump)
+        voltage = _voltage_of(parameters, speed)
+    instance = instance_of(parameters, False)
+    pump: Pump = instance.parts[1].p
     sides: list[str] = []
     if voltage is not None:
         if abs(voltage) > FULL_VOLTAGE:
             raise InputError(f"The voltage is {voltage:g} V, but the card takes ±10 V.")
         if input == "voltage":
-            sides += check_card(parameters.name, voltage, plus, minus, pump)
-        positive, negative, pressure = steady_start(voltage, plus, minus, pump)
-        current = positive - negative
-    else:
-        assert current is not None
-        if input == "voltage":
-            raise InputError(
-                "A model from the voltage needs a voltage or a speed to linearise at, not a "
-                "current."
-            )
-        pressure = steady_pump_start(current, pump)
-    force, _ = solenoid_slope(current, pump)
-    check_domain(parameters.name, pump.Z5**2 * force**2 / pump.Z4, "current")
-    if input != "solenoid_force":
-        sides += check_solenoid(parameters.name, current, voltage, plus, minus, pump)
-    _check_limits(parameters.name, pressure, pump)
-    inside = [np.empty(1) for _ in range(5)]
-    at = (np.array([current]), np.array([pressure]))
-    observe_inside(*at, pump, *inside[:4])
-    observe_speed(*at, pump, inside[4])
-    _, position, opening, angle, shaft_speed = (float(each[0]) for each in inside)
-    if pump.leaky is None:
+            sides += _check_card(parameters, voltage)
+        current = _level(voltage, card_of(parameters))
+    assert current is not None
+    sine = interpreted(moment_sine)(interpreted(solenoid_force)(current, pump), pump)
+    if not 1.0 - sine * sine > 0.0:
+        raise DomainError(f"{parameters.name}: {overpowered(1.0 - sine * sine, 'current')}")
+    if input in ("voltage", "current"):
+        sides += _check_solenoid(instance, parameters, current, voltage)
+    _check_friction(instance)
+    known = pump_arguments(instance, current)
+    known["state"] = called(pump_settled, known)
+    _check_limits(instance.name, known["state"].pressure, known["k"])
+    signals = called(pump_sample, known)
+    opening, position = signals.orifice_opening, signals.spool_position
+    options = instance.parts[1].options
+    if options.leaky is None:
         opening = 0.0  # and not what rounding leaves of it
     elif not -min(pump.Z14, pump.Z16_minus) < position < min(pump.Z14, pump.Z16_plus):
         raise DomainError(
             f"{parameters.name}: at {current:.6g} A the leakage takes all that the open orifice "
             "lets through, so the gain is 0; linearise at a smaller speed."
         )
-    if pump.symmetric is not None and opening == 0.0:
+    if options.symmetric is not None and opening == 0.0:
         sides.append("flow root at a closed spool: the side of positive opening")
     return OperatingPoint(
-        voltage, current, force, pressure, opening, angle, shaft_speed, tuple(sides)
+        voltage,
+        current,
+        signals.solenoid_force,
+        known["state"].pressure,
+        opening,
+        signals.swash_angle,
+        called(settled_speed, known),
+        tuple(sides),
     )
 
 
-def card_command(voltage: float, channel: Channel) -> float:
-    """Command in the channel's direction, kept beyond its dead zone by a hair. [V]"""
-    return max(abs(voltage), nextafter(channel.V_dz, np.inf))
+def beyond_dead_zone(voltage: float, card: Card) -> float:
+    """A voltage kept beyond its channel's dead zone by a hair. [V]"""
+    if voltage >= 0.0:
+        return max(voltage, nextafter(card.plus.V_dz, np.inf))
+    return min(voltage, -nextafter(card.minus.V_dz, np.inf))
 
 
-def _check_limits(name: str, pressure: float, pump: Pump) -> None:
-    if pump.lower < pressure < pump.upper:
+def without_ripple(instance: Instance) -> Instance:
+    """The drive at the mean of a turn: the cam ring's ripple does not change it."""
+    card, pump = instance.parts
+    smooth = pump._replace(options=pump.options._replace(ripple=None))
+    return Instance(instance.model, (card, smooth), instance.name)
+
+
+def _level(voltage: float, card: Card) -> float:
+    """Signed current that the card settles at. [A]"""
+    level = interpreted(channel_level)
+    return float(level(voltage, card.plus) - level(-voltage, card.minus))
+
+
+# --- where nothing moves --------------------------------------------------------------------------
+
+
+def _check_card(parameters: ParameterSet, voltage: float) -> tuple[str, ...]:
+    """Switches that a voltage lies on; refused in the dead zone of the card."""
+    card = card_of(parameters)
+    channel = card.plus if voltage >= 0.0 else card.minus
+    if abs(voltage) > channel.V_dz:
+        return ()
+    if channel.V_dz == 0.0 and channel.J == 0.0:
+        return ("card at 0 V: the side of positive voltage",)
+    raise DeadZoneError(
+        f"{parameters.name}: {voltage:g} V lies in the card's dead zone",
+        _proposed(parameters, voltage),
+    )
+
+
+def _check_solenoid(
+    instance: Instance, parameters: ParameterSet, current: float, voltage: float | None
+) -> tuple[str, ...]:
+    """Switches that a signed current lies on; refused where small motions change no force."""
+    pump, options, _ = instance.parts[1]
+    name = instance.name
+    if options.hysteresis is not None:
+        raise DeadZoneError(
+            f"{name}: a current that moves by less than the solenoids' hysteresis of "
+            f"±{pump.solenoid_hysteresis:g} A moves no force",
+            "linearise the drive without it (solenoid_hysteresis=0) for larger motions, or sweep "
+            "sines of a size with frequency_response",
+        )
+    if abs(current) > pump.Z17:
+        return ()
+    if pump.Z17 == 0.0:
+        return ("solenoids at 0 A: the side of positive current",)
+    zone = f"in the solenoids' dead zone of Z17 = ±{pump.Z17:g} A"
+    if voltage is None:
+        raise DeadZoneError(
+            f"{name}: {current:.6g} A lies {zone}", f"linearise beyond ±{pump.Z17:g} A"
+        )
+    raise DeadZoneError(
+        f"{name}: {voltage:g} V gives {current:.6g} A, which lies {zone}",
+        _proposed(parameters, voltage),
+    )
+
+
+def _check_friction(instance: Instance) -> None:
+    pump, options, _ = instance.parts[1]
+    if options.friction is not None and pump.spool_presliding == 0.0:
+        raise DomainError(
+            f"{instance.name}: without spool_presliding the spool_friction of "
+            f"{pump.spool_friction:g} N holds the spool fast under small motions, so the gain is "
+            "0; give a presliding, or sweep sines of a size with frequency_response."
+        )
+
+
+def _check_limits(name: str, pressure: float, k: Any) -> None:
+    if k.lower < pressure < k.upper:
         return
-    high = pressure >= pump.upper
-    stop = pump.upper >= pump.upper_stop if high else pump.lower <= pump.lower_stop
+    stop = k.upper >= k.upper_stop if pressure >= k.upper else k.lower <= k.lower_stop
     what = "the swash plate is at its stop" if stop else "the pressure is at its limit Z15"
     raise DomainError(
         f"{name}: {what}, so the gain is 0; linearise at a smaller command, where the speed still "
@@ -148,18 +251,31 @@ def _check_limits(name: str, pressure: float, pump: Pump) -> None:
     )
 
 
-def _voltage_of(name: str, speed: float, plus: Channel, minus: Channel, pump: Pump) -> float:
+# --- other voltages -------------------------------------------------------------------------------
+
+
+def _proposed(parameters: ParameterSet, voltage: float) -> str:
+    """The first voltage of a side that has a model."""
+    way, sign, side = (1.0, "+", "plus") if voltage >= 0.0 else (-1.0, "-", "minus")
+    # a zone's end is part of it, so that the first step beyond has a model
+    steps = np.arange(1, ceil(FULL_VOLTAGE * 10**_DECIMALS) + 1) / 10**_DECIMALS
+    current, _ = steady_states(parameters, way * steps)
+    numbers = parameters.numbers
+    answers = (steps > numbers[f"V_dz_{side}"]) & (np.abs(current) > numbers["Z17"])
+    if not answers.any():
+        return f"no voltage up to {sign}{FULL_VOLTAGE:g} V leaves it: linearise on the other side"
+    return f"linearise at {sign}{steps[int(np.argmax(answers))]:.{_DECIMALS}f} V or beyond"
+
+
+def _voltage_of(parameters: ParameterSet, speed: float) -> float:
     """The voltage nearest to zero that settles at a speed."""
     from scipy.optimize import brentq
 
     def error(volts: float) -> float:
-        found = np.empty(2)
-        steady_states(np.array([volts]), plus, minus, pump, found[:1], found[1:])
-        return float(found[1] - speed)
+        return float(steady_states(parameters, np.array([volts]))[1][0] - speed)
 
     volts = np.linspace(-FULL_VOLTAGE, FULL_VOLTAGE, _SEARCHED)
-    current, speeds = np.empty(volts.size), np.empty(volts.size)
-    steady_states(volts, plus, minus, pump, current, speeds)
+    _, speeds = steady_states(parameters, volts)
     crossing = np.flatnonzero(np.diff(np.signbit(speeds - speed)))
     size = max(abs(float(speeds[0])), abs(float(speeds[-1])))
     found = [float(brentq(error, volts[k], volts[k + 1], xtol=1e-14)) for k in crossing]
@@ -168,8 +284,8 @@ def _voltage_of(name: str, speed: float, plus: Channel, minus: Channel, pump: Pu
     if not roots:
         lowest, highest = float(np.degrees(speeds.min())), float(np.degrees(speeds.max()))
         raise InputError(
-            f"{name}: no constant voltage settles at {float(np.degrees(speed)):.6g} deg/s; speeds "
-            f"lie between {lowest:.6g} and {highest:.6g} deg/s, without what the jump at the end "
-            "of the dead zone leaves out."
+            f"{parameters.name}: no constant voltage settles at {float(np.degrees(speed)):.6g} "
+            f"deg/s; speeds lie between {lowest:.6g} and {highest:.6g} deg/s, without what the "
+            "jump at the end of the dead zone leaves out."
         )
     return min(roots, key=abs)

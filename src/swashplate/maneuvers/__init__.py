@@ -8,6 +8,12 @@ Most take three keywords, all in seconds: `start`, the rest before the command; 
 the cubic return to (0 V, 0 V/s) lasts at the end, None or 0 for none; `length`, the whole. Every
 function raises InputError, one sentence, for a number that is not finite or out of its range. What
 goes beyond the ±10 V of a joystick is for the simulation to refuse.
+
+No voltage exceeds the manoeuvre's `amplitude`, at any instant: that of a step, sine, chirp or
+multisine, a ramp's `limit`, the largest of stairs and recorded voltages; of manoeuvres one after
+another it is the largest, of superposed ones the sum. The return starts with the slope that the
+command ends with. Where the cubic would then leave the amplitude, as after a fast sine, it starts
+with the steepest slope of that sign with which it stays within, at the amplitude itself with none.
 """
 
 from swashplate.maneuvers.composition import SplineReturn as SplineReturn

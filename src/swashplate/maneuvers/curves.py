@@ -18,6 +18,8 @@ NEAR = 1e-9
 Decimal durations do not add up exactly (0.1 + 0.2 > 0.3), and a step must not miss the sample meant
 for it.
 """
+HALVINGS = 60
+"""Of the slope of a return until it is found, to the last bits."""
 
 
 def interval(starts: npt.ArrayLike, time: Array) -> npt.NDArray[np.intp]:
@@ -66,6 +68,37 @@ class Hermite:
         done = time / self.duration
         mean = self.level / self.duration
         return (1.0 - done) * (self.rise * (1.0 - 3.0 * done) - 6.0 * mean * done)
+
+    @property
+    def peak(self) -> float:
+        """Largest magnitude. [V]"""
+        change = self.rise * self.duration
+        turn = 3.0 * (2.0 * self.level + change)
+        # where its one extremum beside the end lies, as a part of the duration
+        part = change / turn if turn else 0.0
+        if not 0.0 < part < 1.0:
+            return abs(self.level)
+        return max(abs(self.level), (1.0 - part) ** 2 * abs(self.level + change / 3.0))
+
+
+def return_within(amplitude: float, level: float, rise: float, duration: float) -> Hermite:
+    """Return from `level` [V] to rest that stays within ±`amplitude` [V], not below ±`level`.
+
+    It starts with the slope `rise` [V/s] where the cubic then stays within, else with the steepest
+    slope of that sign with which it does, which is 0 at the amplitude itself.
+    """
+    whole = Hermite(level, rise, duration)
+    bound = max(amplitude, abs(level))
+    if whole.peak <= bound:
+        return whole
+    low, high = 0.0, 1.0 if abs(level) < bound else 0.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if Hermite(level, middle * rise, duration).peak <= bound:
+            low = middle
+        else:
+            high = middle
+    return Hermite(level, low * rise, duration)
 
 
 @dataclass(frozen=True)

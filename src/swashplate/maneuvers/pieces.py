@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
@@ -44,15 +45,20 @@ class Maneuver:
         Duration. [s]
     pieces : tuple of Piece
         In the order of their starts, the first at 0. At a jump the later piece holds.
+    amplitude : float
+        What the manoeuvre states and its voltage never exceeds, inf where it states none. [V]
     """
 
     name: str
     length: float
     pieces: tuple[Piece, ...]
+    amplitude: float = math.inf
 
     def __call__(self, time: npt.ArrayLike) -> Array:
         """Voltage [V] at `time` [s] of any shape, zero outside [0, length]."""
-        return self._gather(time, (piece.curve for piece in self.pieces))
+        values = self._gather(time, (piece.curve for piece in self.pieces))
+        # the curves stay within the amplitude, rounding errors apart
+        return np.clip(values, 0.0 - self.amplitude, self.amplitude)
 
     def slope(self, time: npt.ArrayLike) -> Array:
         """Exact dV/dt [V/s] at `time` [s] of any shape, at a jump or kink of what follows it."""
@@ -90,12 +96,14 @@ class Maneuver:
             return NotImplemented
         moved = (replace(piece, start=self.length + piece.start) for piece in after.pieces)
         name, length = f"{self.name} + {after.name}", self.length + after.length
-        return Maneuver(name, length, (*self.pieces, *moved))
+        amplitude = max(self.amplitude, after.amplitude)
+        return Maneuver(name, length, (*self.pieces, *moved), amplitude)
 
     def __mul__(self, factor: float) -> Maneuver:
         factor = finite("factor", factor)
         pieces = (replace(piece, curve=Scaled(factor, piece.curve)) for piece in self.pieces)
-        return Maneuver(f"{factor:g} * ({self.name})", self.length, tuple(pieces))
+        amplitude = abs(factor) * self.amplitude if factor else 0.0
+        return Maneuver(f"{factor:g} * ({self.name})", self.length, tuple(pieces), amplitude)
 
     __rmul__ = __mul__
 
@@ -104,11 +112,12 @@ class Maneuver:
 
     def _gather(self, time: npt.ArrayLike, functions: Iterable[Callable[[Array], Array]]) -> Array:
         """Let each piece's function say what it is at the times at which that piece holds."""
-        time = np.asarray(time, dtype=float)
-        values = np.where(np.isnan(time), np.nan, 0.0)
-        inside = (time >= 0.0) & (time <= self.length + NEAR)
-        holding = np.where(inside, interval([piece.start for piece in self.pieces], time), -1)
+        stamps = np.asarray(time, dtype=float)
+        values = np.where(np.isnan(stamps), np.nan, 0.0)
+        inside = (stamps >= 0.0) & (stamps <= self.length + NEAR)
+        stamps = np.minimum(stamps, self.length)
+        holding = np.where(inside, interval([piece.start for piece in self.pieces], stamps), -1)
         for index, (piece, function) in enumerate(zip(self.pieces, functions, strict=True)):
             here = holding == index
-            values[here] = function(np.maximum(time[here] - piece.start, 0.0))
+            values[here] = function(np.maximum(stamps[here] - piece.start, 0.0))
         return values[()]  # a number for a number

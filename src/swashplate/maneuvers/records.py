@@ -88,7 +88,9 @@ def recorded(
         )
     curve = _CURVES[interpolation](times, volts)
     end = float(times[-1]) if length is None else positive("length", length)
-    return Maneuver(f"recorded {times.size} rows", end, (Piece(0.0, curve),))
+    return Maneuver(
+        f"recorded {times.size} rows", end, (Piece(0.0, curve),), float(np.abs(volts).max())
+    )
 
 
 def recorded_file(

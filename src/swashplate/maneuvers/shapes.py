@@ -16,7 +16,7 @@ from swashplate.maneuvers.pieces import Maneuver, Piece
 def rest(duration: float) -> Maneuver:
     """Nothing, 0 V, for `duration` [s]; it raises InputError if that is negative."""
     duration = not_negative("duration", duration)
-    return Maneuver(f"rest {duration:g} s", duration, (Piece(0.0, Line()),))
+    return Maneuver(f"rest {duration:g} s", duration, (Piece(0.0, Line()),), 0.0)
 
 
 def step(
@@ -36,7 +36,7 @@ def step(
             f"a step needs 0 <= start < stop <= length, not {start:g}, {stop:g}, {length:g} s."
         )
     pieces = [Piece(start, Line(amplitude)), Piece(stop, Line())]
-    return settled(f"step {amplitude:g} V", pieces, length, length)
+    return settled(f"step {amplitude:g} V", amplitude, pieces, length, length)
 
 
 def ramp(
@@ -66,7 +66,7 @@ def ramp(
     pieces = [Piece(start, Line(rise=slope))]
     if abs(slope) * (end - start) > limit:
         pieces.append(Piece(start + limit / abs(slope), Line(math.copysign(limit, slope))))
-    return settled(f"ramp {slope:g} V/s", pieces, end, length)
+    return settled(f"ramp {slope:g} V/s", limit, pieces, end, length)
 
 
 def stairs(
@@ -91,4 +91,5 @@ def stairs(
     pieces = [Piece(start + dwell * index, Line(level)) for index, level in enumerate(volts)]
     end = start + dwell * len(pieces)
     name = f"stairs {'/'.join(f'{level:g}' for level in volts)} V"
-    return settled(name, pieces, end, end + settle if volts[-1] != 0.0 else end)
+    amplitude = max(abs(level) for level in volts)
+    return settled(name, amplitude, pieces, end, end + settle if volts[-1] != 0.0 else end)

@@ -14,8 +14,7 @@ from swashplate.maneuvers.composition import settled
 from swashplate.maneuvers.curves import Array, Scaled, Sum, Tone
 from swashplate.maneuvers.pieces import Maneuver, Piece
 
-# Points on the shortest period when the peak of a multisine is sought; between two of them a
-# periodic one rises above the peak found by a factor of 1/cos(π/256), 0.0076 %, at most.
+# Points on the shortest period when the peak of a multisine is sought.
 _POINTS_PER_PERIOD = 256
 
 
@@ -44,7 +43,7 @@ def sine(
     amplitude, frequency = finite("amplitude", amplitude), positive("frequency", frequency)
     start, end, length = window(start, settle, length)
     name = f"sine {amplitude:g} V {frequency:g} Hz"
-    return settled(name, [Piece(start, Tone(amplitude, frequency))], end, length)
+    return settled(name, amplitude, [Piece(start, Tone(amplitude, frequency))], end, length)
 
 
 def chirp(
@@ -75,7 +74,7 @@ def chirp(
     start, end, length = window(start, settle, length)
     curve = Tone(amplitude, first, growth=(last - first) / (end - start))
     name = f"chirp {amplitude:g} V {first:g} to {last:g} Hz"
-    return settled(name, [Piece(start, curve)], end, length)
+    return settled(name, amplitude, [Piece(start, curve)], end, length)
 
 
 def multisine(
@@ -92,7 +91,7 @@ def multisine(
     Parameters
     ----------
     amplitude : float
-        Largest magnitude on a grid of 256 points to the shortest period. [V]
+        Largest magnitude, reached to 0.1 %. [V]
     frequencies : list, array or tuple
         A list or array holds the frequencies, used as they are. A tuple is a band, (low, high,
         count), whose evenly spaced frequencies are rounded to whole periods between `start` and
@@ -115,9 +114,12 @@ def multisine(
     pairs = zip(lines.tolist(), phases.tolist(), strict=True)
     together = Sum(tuple(Tone(1.0, line, phase=phase) for line, phase in pairs))
     points = math.ceil(_POINTS_PER_PERIOD * high * (end - start)) + 1
-    peak = float(np.abs(together(np.linspace(0.0, end - start, points))).max())
+    time, spacing = np.linspace(0.0, end - start, points, retstep=True)
+    # between two points it rises above the peak found by half its curvature at most
+    curvature = float(((2.0 * np.pi * lines) ** 2).sum())
+    peak = float(np.abs(together(time)).max()) + 0.5 * curvature * (0.5 * float(spacing)) ** 2
     name = f"multisine {amplitude:g} V {low:g} to {high:g} Hz seed {seed}"
-    return settled(name, [Piece(start, Scaled(amplitude / peak, together))], end, length)
+    return settled(name, amplitude, [Piece(start, Scaled(amplitude / peak, together))], end, length)
 
 
 def _band(band: Sequence[float], period: float) -> Array:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.errors import InputError, ParameterError
-from swashplate.parameters.catalogue import Block
-from swashplate.parameters.parameter_set import Pair, Parameter, ParameterSet, find
+from swashplate.parameters.definitions import Block, find
+from swashplate.parameters.parameter_set import Pair, Parameter, ParameterSet
 from swashplate.parameters.schema import CardFile, Entry, SetFile
 from swashplate.units import to_si
 

@@ -6,11 +6,14 @@ from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 from swashplate.errors import InputError, ParameterError
-from swashplate.parameters.catalogue import CATALOGUE, Definition
-from swashplate.parameters.names import columns_of as columns_of
-from swashplate.parameters.names import find as find
-from swashplate.parameters.names import unknown_parameter as unknown_parameter
-from swashplate.parameters.refinements import REFINEMENTS
+from swashplate.parameters.definitions import (
+    CATALOGUE,
+    DEFAULTS,
+    REFINEMENTS,
+    Definition,
+    find,
+    unknown_parameter,
+)
 from swashplate.parameters.rules import check_bounds, check_rules
 
 PressureRoot = Literal["published", "symmetric"]
@@ -117,8 +120,7 @@ class ParameterSet(Mapping[str, Parameter]):
         if symbol in self.parameters:
             return self.parameters[symbol]
         if symbol in REFINEMENTS:
-            definition = REFINEMENTS[symbol]
-            return Parameter(definition, definition.default, status="inactive")
+            return Parameter(REFINEMENTS[symbol], DEFAULTS[symbol], status="inactive")
         raise unknown_parameter(symbol)
 
     def __contains__(self, symbol: object) -> bool:

@@ -7,13 +7,18 @@ by the same lines as a single one.
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from math import isfinite, isinf, isnan
+from typing import Any
 
 import numpy as np
+from numba import config
+from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
+from swashplate.equations.cache import kernel
 from swashplate.errors import ParameterError
-from swashplate.parameters.catalogue import CATALOGUE, COLUMNS, Definition
-from swashplate.parameters.refinements import REFINEMENTS
+from swashplate.models.card import Channel, channel_level
+from swashplate.models.pump import Pump, moment_sine, solenoid_force
+from swashplate.parameters.definitions import DEFAULTS, REFINEMENTS, Definition, find
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -24,6 +29,16 @@ FULL_VOLTAGE = 10.0
 """Largest command, either way. [V]"""
 VOLTAGES = np.linspace(0.0, FULL_VOLTAGE, 101)
 """Commands at which the static rules are checked. [V]"""
+SIDES = ("plus", "minus")
+N_CHANNEL, N_PUMP = len(Channel._fields), len(Pump._fields)
+
+
+def _plain_tuple(values: Array, length: int) -> tuple[float, ...]:
+    return tuple(float(each) for each in values)
+
+
+# compiled code needs to know the length; Numba's function for it does not run uncompiled
+tuple_of: Any = _plain_tuple if config.DISABLE_JIT else to_fixed_tuple  # type: ignore[attr-defined]
 
 
 def check_rules(owner: str, numbers: Mapping[str, float]) -> None:
@@ -67,7 +82,7 @@ def broken_rules(numbers: Mapping[str, Array]) -> Iterator[Broken]:
         Every value by column, one element a set.
     """
     for column, values in numbers.items():
-        definition = REFINEMENTS[column] if column in REFINEMENTS else CATALOGUE[COLUMNS[column]]
+        definition = find(column)
         yield (
             _out_of_range(definition, values),
             partial(_range_sentence, column, definition, values),
@@ -77,16 +92,16 @@ def broken_rules(numbers: Mapping[str, Array]) -> Iterator[Broken]:
         yield _line(numbers)
         yield _cam_ring(numbers)
     yield _rest(numbers)
-    for side in ("plus", "minus"):
+    lowest, moment = _static(numbers)
+    for k, side in enumerate(SIDES):
         yield _thresholds(numbers, side)
         yield _feedback_arm(numbers, side)
-        current = _steady(numbers, side)
-        yield _negative_current(current, side)
-        yield _solenoid_moment(numbers, current, side)
+        yield _negative_current(lowest[:, k], side)
+        yield _solenoid_moment(moment[:, k], side)
 
 
 def _out_of_range(definition: Definition, values: Array) -> Mask:
-    low = values <= definition.lower if definition.above else values < definition.lower
+    low = values < definition.lower if definition.above is None else values <= definition.lower
     high = np.isposinf(values) & (not definition.can_be_off)
     if isfinite(definition.upper):
         high = values >= definition.upper
@@ -142,7 +157,7 @@ def _cam_ring(numbers: Mapping[str, Array]) -> Broken:
 def _refinement(numbers: Mapping[str, Array], symbol: str) -> Array:
     """A refinement's values, of all sets, or what it is where none is given."""
     size = next(iter(numbers.values())).size
-    return numbers.get(symbol, np.full(size, REFINEMENTS[symbol].default))
+    return numbers.get(symbol, np.full(size, DEFAULTS[symbol]))
 
 
 def _rest(numbers: Mapping[str, Array]) -> Broken:
@@ -180,8 +195,7 @@ def _feedback_arm(numbers: Mapping[str, Array], side: str) -> Broken:
     )
 
 
-def _negative_current(current: Array, side: str) -> Broken:
-    lowest = current.min(axis=0)
+def _negative_current(lowest: Array, side: str) -> Broken:
     return (
         lowest < 0.0,
         lambda i: (
@@ -192,13 +206,7 @@ def _negative_current(current: Array, side: str) -> Broken:
     )
 
 
-def _solenoid_moment(numbers: Mapping[str, Array], current: Array, side: str) -> Broken:
-    effective = np.maximum(current - numbers["Z17"], 0.0)
-    signed = effective if side == "plus" else -effective
-    c1, c2, c3, c4 = (numbers[f"Z{k}_{side}"] for k in (19, 20, 21, 22))
-    force = signed * (c1 + signed * (c2 + signed * (c3 + signed * c4)))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        sine = np.abs(force).max(axis=0) * numbers["Z5"] / np.sqrt(numbers["Z4"])
+def _solenoid_moment(sine: Array, side: str) -> Broken:
     return (
         ~(sine < 1.0),
         lambda i: (
@@ -209,9 +217,56 @@ def _solenoid_moment(numbers: Mapping[str, Array], current: Array, side: str) ->
     )
 
 
-def _steady(numbers: Mapping[str, Array], side: str) -> Array:
-    """Steady current at `VOLTAGES` (rows) of every set (columns), the jump included. [A]"""
-    V_dz, J, G1, G2, G3 = (numbers[f"{name}_{side}"] for name in ("V_dz", "J", "G1", "G2", "G3"))
-    voltage = VOLTAGES[:, np.newaxis]
-    d = np.maximum(voltage - V_dz, 0.0)
-    return np.asarray(np.where(voltage > V_dz, J, 0.0) + d * (G1 + d * (G2 + d * G3)))
+def _static(numbers: Mapping[str, Array]) -> tuple[Array, Array]:
+    """Lowest steady current [A] and largest sin φ of every set (rows) and side (columns)."""
+    size = next(iter(numbers.values())).size
+    channels = np.stack(
+        [
+            np.stack([numbers[f"{name}_{side}"] for name in Channel._fields], axis=1)
+            for side in SIDES
+        ],
+        axis=1,
+    )
+    pumps = np.stack(
+        [
+            numbers[name] if name in numbers else np.full(size, Pump._field_defaults[name])
+            for name in Pump._fields
+        ],
+        axis=1,
+    )
+    lowest, moment = np.empty((size, 2)), np.empty((size, 2))
+    static_extremes(channels, pumps, VOLTAGES, lowest, moment)
+    return lowest, moment
+
+
+@kernel
+def static_extremes(
+    channels: Array, pumps: Array, voltages: Array, lowest: Array, moment: Array
+) -> None:
+    """Lowest steady current and largest sin φ within some voltages, of many sets.
+
+    Parameters
+    ----------
+    channels : (m, 2, 13) array
+        Fields of `Channel` of every set, plus and minus.
+    pumps : (m, 43) array
+        Fields of `Pump`.
+    voltages : (n,) array
+        Constant commands towards each side. [V]
+    lowest, moment : (m, 2) arrays
+        Outputs: current [A] and |sin φ| of both sides; not a number where any is none.
+    """
+    for i in range(pumps.shape[0]):
+        pump = Pump(*tuple_of(pumps[i], N_PUMP))
+        for side in range(2):
+            channel = Channel(*tuple_of(channels[i, side], N_CHANNEL))
+            least, most = np.inf, 0.0
+            for voltage in voltages:
+                current = channel_level(voltage, channel)
+                force = solenoid_force(-current if side == 1 else current, pump)
+                sine = abs(moment_sine(force, pump))
+                # what is no number stays
+                least = current if current < least or current != current else least
+                most = sine if sine > most or sine != sine else most
+            lowest[i, side] = least
+            moment[i, side] = most

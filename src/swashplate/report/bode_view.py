@@ -10,9 +10,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFo
 from numpy.typing import NDArray
 
 from swashplate.errors import InputError
-from swashplate.linear.frequency_response import FrequencyResponse
-from swashplate.linear.model import LinearDrive
-from swashplate.linear.units import UNITS
+from swashplate.linear import UNITS, FrequencyResponse, LinearDrive
 from swashplate.report.display_units import DisplayUnit, display_unit
 from swashplate.report.style import (
     FAINT,

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from swashplate.errors import InputError
 from swashplate.report.broken_lines import draw_broken
@@ -50,7 +49,6 @@ if TYPE_CHECKING:
     from swashplate.campaign.experiment import Channel, Encoder
     from swashplate.campaign.speed import Method
 
-Array = NDArray[np.float64]
 
 WIDTH = 8.6
 HEIGHTS, GAP, ROW = (1.9, 2.4), 0.28, 0.17

@@ -26,9 +26,8 @@ from swashplate.report.style import (
     write_title,
 )
 from swashplate.report.traces import fit_time
-from swashplate.simulation.limits import Limit
+from swashplate.simulation.result import Limit
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
 WIDTH = 8.6
@@ -101,7 +100,7 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
 
 def _panels(found: Comparison) -> list[Panel]:
     full, differ = found.full, found.difference
-    machine = full.machine
+    machine = full.machine.p
     command = (
         Panel("current\n(A)", (Trace(full.current, INK),))
         if found.voltage is None
@@ -112,8 +111,10 @@ def _panels(found: Comparison) -> list[Panel]:
         if differ.moves
         else Panel("difference\n(deg/s)", (Trace(np.degrees(found.error), INK),))
     )
-    stops = [degrees(angle) for angle in (machine.upper_angle, machine.lower_angle)]
-    openings = [1e3 * edge for edge in (machine.opening_plus, -machine.opening_minus)]
+    stops = [degrees(angle) for angle in (machine.swash_stop_plus, -machine.swash_stop_minus)]
+    openings = [
+        1e3 * edge for edge in (machine.orifice_opening_plus, -machine.orifice_opening_minus)
+    ]
     return [
         command,
         Panel(

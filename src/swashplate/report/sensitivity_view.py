@@ -7,7 +7,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from swashplate.analysis.sensitivity import OneAtATime
 from swashplate.analysis.sobol import SobolIndices
@@ -26,8 +25,6 @@ from swashplate.report.style import (
     put_legend,
     write_title,
 )
-
-Array = NDArray[np.float64]
 
 WIDTH, LEFT, RIGHT, BETWEEN = 8.6, 1.45, 0.3, 1.45
 BAR, HEAD, FOOT, TOP = 0.22, 0.4, 0.3, 0.75

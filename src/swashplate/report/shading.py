@@ -11,8 +11,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from swashplate.simulation.limits import Limit
-from swashplate.simulation.result import Simulation
+from swashplate.simulation.result import Limit, Simulation
 
 Array = NDArray[np.float64]
 

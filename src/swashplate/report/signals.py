@@ -25,8 +25,7 @@ from swashplate.report.style import (
     write_title,
 )
 from swashplate.report.traces import fit_time
-from swashplate.simulation.limits import Limit
-from swashplate.simulation.result import Simulation
+from swashplate.simulation.result import Limit, Simulation
 
 Array = NDArray[np.float64]
 

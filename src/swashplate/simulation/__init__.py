@@ -1,1 +1,1 @@
-"""Marching the equations through time: plain, with sensitivities, many sets at once."""
+"""The drive's simulation: from a parameter set and a record to signals, derivatives and batches."""

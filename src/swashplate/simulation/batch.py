@@ -1,33 +1,51 @@
 """Many parameter sets over one input: outputs of each, or only its cost."""
 
+from __future__ import annotations
+
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.equations.lanes import LANES, march_lanes
+from swashplate.equations.library import TAN_22_5
+from swashplate.equations.record import Record
 from swashplate.errors import InputError
-from swashplate.parameters.parameter_set import ParameterSet, columns_of
+from swashplate.models.pump import PumpOptions
+from swashplate.parameters.definitions import columns_of
+from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import broken_rules
-from swashplate.physics.card_dynamics import decay_factor
-from swashplate.physics.component import uncompiled
-from swashplate.physics.stroker import pressure_limits
-from swashplate.physics.swash import TAN_22_5
-from swashplate.simulation import side_by_side as lanes
-from swashplate.simulation.build import build_delay
-from swashplate.simulation.constants import CHANNEL_PARAMETERS, PUMP_PARAMETERS
-from swashplate.simulation.record import Record
+from swashplate.simulation.instance import (
+    OPTION_OF,
+    PATHS,
+    SIDES,
+    card_options,
+    model_of,
+    pump_options,
+    stability_limit,
+)
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-OBSERVED = {
-    "shaft_speed": lanes.SPEED,
-    "shaft_position": lanes.POSITION,
-    "current": lanes.CURRENT,
-}
+OVERPOWERED = "Z5·F/√Z4 reaches 1 under this input: the solenoid overpowers the feedback spring."
+OVERFLOW = (
+    "the numbers grow beyond all bounds under this input: a parameter is far larger or smaller "
+    "than any real drive's; compare the set with a packaged one."
+)
+OUTPUTS = (
+    "shaft_speed",
+    "shaft_position",
+    "current",
+    "current_sum",
+    "stroker_pressure",
+    "swash_angle",
+    "spool_position",
+    "orifice_opening",
+)
 """Signals that a batch can return or be compared by."""
 
 
@@ -40,7 +58,7 @@ class SquaredError:
     weight: ArrayLike = 1.0
     """(n,) or one number; samples of weight 0 do not count, whatever they are."""
     output: str = "shaft_speed"
-    """``"shaft_speed"``, ``"shaft_position"`` or ``"current"``."""
+    """One of `OUTPUTS`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +88,6 @@ def simulate_many(
     threads: int | None,
 ) -> Batch:
     """March many sets over one record; see `Drive.simulate_many`."""
-    parameters.refuse_refinements("Many sets at once")
     numbers, count = _columns(parameters, changes)
     failures = _failures(parameters.name, numbers, record.step, by_voltage)
     observed = _observed(cost.output if cost is not None else output)
@@ -78,47 +95,38 @@ def simulate_many(
     measured, weight = _comparison(cost, samples, record)
     costs = np.full(count, np.inf) if cost is not None else None
     outputs = np.full((count, samples), np.nan) if cost is None else None
-    literal = True if parameters.coulomb_sign == "literal" else None
-    split = True if parameters.card_switch == "split" else None
-    symmetric = True if parameters.pressure_root == "symmetric" else None
+    driver = "voltage" if by_voltage else "current"
+    model = model_of(by_voltage)
+    card = card_options(parameters) if by_voltage else None
 
-    def march(job: tuple[NDArray[np.intp], tuple[bool | None, ...]]) -> None:
-        chosen, (leaky, loaded, steep) = job
-        padded = np.resize(chosen, lanes.LANES)
-        sets = {column: values[padded] for column, values in numbers.items()}
-        block, whole, share_whole = _block(sets, record.step)
-        kept = np.empty((record.values.size if cost is None else 0, lanes.LANES))
-        options = (leaky, loaded, steep, symmetric)
-        compare = (observed, measured, weight, kept)
-        flat = block.reshape(-1)
-        if by_voltage:
-            lanes.march_drives(
-                record.values,
-                whole,
-                share_whole,
-                literal,
-                split,
-                *options,
-                record.step,
-                flat,
-                *compare,
-            )
-        else:
-            lanes.march_pumps(record.values, *options, record.step, flat, *compare)
-        good = block[lanes.WORST, : chosen.size] < 1.0
-        for number in chosen[~good]:
-            failures[int(number)] = (
-                f"{parameters.name}: Z5·F/√Z4 reaches 1 under this input: the solenoid "
-                "overpowers the feedback spring."
-            )
+    def march(job: tuple[NDArray[np.intp], PumpOptions]) -> None:
+        chosen, options = job
+        padded, size = np.resize(chosen, LANES), chosen.size
+        found = march_lanes(
+            model,
+            (card, options),
+            {PATHS[column]: values[padded] for column, values in numbers.items()},
+            {driver: record.values},
+            record.step,
+            observed,
+            measured,
+            weight,
+            cost is None,
+        )
+        good = np.isfinite(found.end[:size])
+        inside = found.worst[:size] > 0.0
+        for number, within in zip(chosen[~(good & inside)], inside[~(good & inside)], strict=True):
+            sentence = OVERFLOW if within else OVERPOWERED
+            failures[int(number)] = f"{parameters.name}: {sentence}"
+        good &= inside
         if costs is not None:
-            costs[chosen[good]] = block[lanes.COST, : chosen.size][good]
+            costs[chosen[good]] = found.cost[:size][good]
         if outputs is not None:
-            outputs[chosen[good]] = kept[:: record.substeps, : chosen.size].T[good]
+            outputs[chosen[good]] = found.outputs[:: record.substeps, :size].T[good]
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         # each job writes its own sets' places, so the result does not depend on who is first
-        list(pool.map(march, _jobs(numbers, failures, count)))
+        list(pool.map(march, list(_jobs(parameters, numbers, failures, count, tuple(changes)))))
     return Batch(costs, outputs, dict(sorted(failures.items())))
 
 
@@ -141,8 +149,11 @@ def _columns(
         raise InputError(f"All parameters need the same number of sets, at least one: {listed}.")
     count = sizes.pop()
     return {
-        column: given.get(column, np.full(count, value))
-        for column, value in parameters.numbers.items()
+        **{
+            column: given.get(column, np.full(count, value))
+            for column, value in parameters.numbers.items()
+        },
+        **given,
     }, count
 
 
@@ -154,9 +165,9 @@ def _failures(
     for mask, sentence in broken_rules(numbers):
         for i in np.flatnonzero(mask):
             failures.setdefault(int(i), f"{name}: {sentence(int(i))}")
-    for side in ("plus", "minus") if by_voltage else ():
-        zeta, w = numbers[f"zeta_{side}"], numbers[f"omega_{side}"] * step
-        for i in np.flatnonzero(~((w < 2.0) & (zeta * w < 1.0 + 0.25 * w * w))):
+    for side in SIDES if by_voltage else ():
+        limit = stability_limit(numbers[f"zeta_{side}"])
+        for i in np.flatnonzero(~(numbers[f"omega_{side}"] * step < limit)):
             failures.setdefault(
                 int(i),
                 f"{name}: the current filter of the {side} channel is unstable at this step.",
@@ -164,10 +175,10 @@ def _failures(
     return failures
 
 
-def _observed(output: str) -> int:
-    if output not in OBSERVED:
-        raise InputError(f"A batch has no output '{output}'; it has {', '.join(OBSERVED)}.")
-    return OBSERVED[output]
+def _observed(output: str) -> str:
+    if output not in OUTPUTS:
+        raise InputError(f"A batch has no output '{output}'; it has {', '.join(OUTPUTS)}.")
+    return output
 
 
 def _comparison(cost: SquaredError | None, samples: int, record: Record) -> tuple[Array, Array]:
@@ -201,41 +212,33 @@ def _comparison(cost: SquaredError | None, samples: int, record: Record) -> tupl
 
 
 def _jobs(
-    numbers: Mapping[str, Array], failures: Mapping[int, str], count: int
-) -> Iterator[tuple[NDArray[np.intp], tuple[bool | None, ...]]]:
+    parameters: ParameterSet,
+    numbers: Mapping[str, Array],
+    failures: Mapping[int, str],
+    count: int,
+    changed: Sequence[str],
+) -> Iterator[tuple[NDArray[np.intp], PumpOptions]]:
     """Blocks of sets that share the options which the kernels are compiled for."""
     good = np.ones(count, dtype=bool)
     good[list(failures)] = False
-    leaky, loaded = numbers["Z7"] != 0.0, numbers["Z12"] != 0.0
-    steep = np.tan(np.maximum(numbers["Z13_plus"], numbers["Z13_minus"])) >= TAN_22_5
-    kind = leaky + 2 * loaded + 4 * steep
+    base = pump_options(parameters)
+    masks: dict[str, NDArray[np.bool_]] = {
+        "steep": np.tan(np.maximum(numbers["Z13_plus"], numbers["Z13_minus"])) >= TAN_22_5
+    }
+    for column in changed:
+        option = OPTION_OF.get(column)
+        if option is not None:
+            on = numbers[column] != 0.0
+            masks[option] = masks[option] | on if option in masks else on
+    names = list(masks)
+    kind = sum(
+        (masks[name].astype(np.int64) << k for k, name in enumerate(names)),
+        np.zeros(count, np.int64),
+    )
     for each in np.unique(kind[good]):
         members = np.flatnonzero(good & (kind == each))
-        options = tuple(True if each & bit else None for bit in (1, 2, 4))
-        for first in range(0, members.size, lanes.LANES):
-            yield members[first : first + lanes.LANES], options
-
-
-def _block(sets: Mapping[str, Array], step: float) -> tuple[Array, Indices, Indices]:
-    """Parameters and states at rest of LANES sets, a row for each number, and whole delays."""
-    block = np.zeros((lanes.N_ROWS, lanes.LANES))
-    block[lanes.PRESSURE] = sets["Z2"] / sets["Z1"]
-    for first, side in ((lanes.PLUS, "plus"), (lanes.MINUS, "minus")):
-        for k, name in enumerate(CHANNEL_PARAMETERS):
-            block[first + k] = sets[f"{name}_{side}"]
-        block[first + len(CHANNEL_PARAMETERS)] = [
-            uncompiled(decay_factor)(a, step) for a in sets[f"a_{side}"]
-        ]
-    for k, name in enumerate(PUMP_PARAMETERS):
-        block[lanes.PUMP + k] = sets[name]
-    limited = zip(
-        *(sets[name] for name in ("Z1", "Z2", "Z13_plus", "Z13_minus", "Z15")), strict=True
-    )
-    limits = [uncompiled(pressure_limits)(*each) for each in limited]
-    block[lanes.PUMP + len(PUMP_PARAMETERS) :] = np.transpose(limits)
-    delays = [build_delay(tau, step) for tau in sets["tau"]]
-    block[lanes.FRACTION] = [delay.fraction for delay in delays]
-    block[lanes.SHARE_FRACTION] = [delay.share_fraction for delay in delays]
-    whole = np.array([delay.whole for delay in delays], dtype=np.int64)
-    share_whole = np.array([delay.share_whole for delay in delays], dtype=np.int64)
-    return block, whole, share_whole
+        options = base._replace(
+            **{name: True if each >> k & 1 else None for k, name in enumerate(names)}
+        )
+        for first in range(0, members.size, LANES):
+            yield members[first : first + LANES], options

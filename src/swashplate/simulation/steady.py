@@ -1,95 +1,97 @@
-"""Steady states: the pressure at which the valve is closed, and the speed that goes with it."""
+"""Steady states of a drive: the pressure at which the valve is closed, and the speed with it."""
 
-from math import asin, atan, pi, sin
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.physics.component import component
-from swashplate.physics.control_card import steady_current
-from swashplate.physics.spool import moment_sine, orifice_opening
-from swashplate.physics.stroker import pressure_rate
-from swashplate.simulation.chain import pump_force, pump_speed, pump_spool
-from swashplate.simulation.compilation import kernel
-from swashplate.simulation.constants import Channel, Pump
+from swashplate.equations import expressions as ex
+from swashplate.equations.lowering import generating
+from swashplate.equations.march import Sampler, function_source, indented, value_of
+from swashplate.equations.program import Tuple, leaves
+from swashplate.equations.run import Instance, called, module
+from swashplate.equations.scalars import Code, text
+from swashplate.models.card import channel_level
+from swashplate.models.drive import drive
+from swashplate.models.pump import (
+    PumpConstants,
+    PumpInputs,
+    PumpState,
+    pump_constants,
+    pump_settled,
+    settled_speed,
+)
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.simulation.instance import instance_of
 
 Array = NDArray[np.float64]
 
-BISECTIONS = 200
-"""Enough to halve any interval of doubles down to neighbours."""
 
-
-@component
-def channel_level(voltage: float, channel: Channel) -> float:
-    """Current at which one channel settles; `voltage` in the channel's direction. [A]"""
-    share = 1.0 if voltage > channel.V_dz else 0.0
-    return steady_current(
-        voltage, share, channel.V_dz, channel.J, channel.G1, channel.G2, channel.G3
+@generating
+def _kernel(options: tuple[Any, ...]) -> Callable[..., None]:
+    """The compiled map from constant voltages to currents and speeds."""
+    sampler = Sampler(drive, ("voltage",), options, [])
+    card, pump = sampler.parts
+    code = Code()
+    code.taken = pump.code.taken
+    volts = ex.name("volts")
+    plus = card.call(code, channel_level, {"voltage": volts, "p": card.p.items[0]})  # type: ignore[union-attr]
+    minus = card.call(
+        code,
+        channel_level,
+        {"voltage": ex.make("neg", volts), "p": card.p.items[1]},  # type: ignore[union-attr]
     )
+    current = ex.make("-", plus, minus)  # type: ignore[arg-type]
+    given = (current, *(value_of(pump.p, name) for name in ("pump_speed", "load_torque", "Z9")))
+    speed = pump.call(code, settled_speed, {**pump.known, "inputs": Tuple(PumpInputs, given)})
+    results = [current, speed]
+    sampler.ends = [[ex.name(node.value) for _, node in leaves(part.p)] for part in sampler.parts]
+    read = code.reads(results)  # type: ignore[arg-type]
+    for part in sampler.parts:
+        sampler.ends[part.part] = [ex.name(name) for name in sorted(read)]
+    lines = [
+        *sampler.ahead(),
+        "for n in range(voltage.size):",
+        "    volts = voltage[n]",
+        *indented(code.lines(results)),  # type: ignore[arg-type]
+        f"    current[n] = {text(current)}",
+        f"    speed[n] = {text(speed)}",  # type: ignore[arg-type]
+    ]
+    source = function_source(
+        "settled(voltage, params, given, h, current, speed)",
+        "Signed current and speed that each of many constant voltages settles at.",
+        lines,
+    )
+    return module("drive_settled", source, sampler.names | code.names)["settled"]  # type: ignore[no-any-return]
 
 
-@component
-def closed_pressure(current: float, pump: Pump) -> float:
-    """δP at which the spool closes, held within the limits.
-
-    Without leakage sin α = sin(φ + atan(Z18/Z5)), so δP = (sin α/Z3 + Z2)/Z1. [Pa]
-    """
-    a = min(max(moment_sine(pump_force(current, pump), pump.Z4, pump.Z5), -1.0), 1.0)
-    angle = min(max(asin(a) + atan(pump.Z18 / pump.Z5), -0.5 * pi), 0.5 * pi)
-    closed = (sin(angle) / pump.Z3 + pump.Z2) / pump.Z1
-    return min(max(closed, pump.lower), pump.upper)
-
-
-@component
-def leaking_pressure(current: float, pump: Pump) -> float:
-    """δP at which the flow through the spool equals the leakage, by bisection. [Pa]
-
-    The pressure's rate falls with the pressure, so there is one such point or a limit.
-    """
-    force = pump_force(current, pump)
-    low, high = pump.lower, pump.upper
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        free = pump_spool(force, middle, pump)
-        opening = orifice_opening(free, pump.Z14, pump.Z16_plus, pump.Z16_minus)
-        rate = pressure_rate(middle, opening, pump.Z6, pump.Z7, pump.Z8, pump.Z9, pump.symmetric)
-        if rate > 0.0:
-            low = middle
-        else:
-            high = middle
-    # the ends are neighbours now; a limit, where one of them still is it, counts exactly
-    return high if high >= pump.upper else low
-
-
-@component
-def steady_pressure(current: float, pump: Pump) -> float:
-    """δP that the pump settles at under a constant signed current. [Pa]"""
-    if pump.leaky is None:
-        return closed_pressure(current, pump)
-    return leaking_pressure(current, pump)
-
-
-@kernel
-def steady_states(
-    voltage: Array, plus: Channel, minus: Channel, pump: Pump, current: Array, speed: Array
-) -> None:
+def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Array]:
     """Signed current [A] and speed [rad/s] that each of many constant voltages settles at."""
-    for n in range(voltage.size):
-        current[n] = channel_level(voltage[n], plus) - channel_level(-voltage[n], minus)
-        speed[n] = pump_speed(steady_pressure(current[n], pump), current[n], pump)
+    instance = instance_of(parameters, True)
+    current, speed = np.empty(voltage.size), np.empty(voltage.size)
+    _kernel(instance.options)(voltage, instance.params, instance.given, 1.0, current, speed)
+    return current, speed
 
 
-@kernel
-def steady_start(
-    voltage: float, plus: Channel, minus: Channel, pump: Pump
-) -> tuple[float, float, float]:
-    """Currents of both channels [A] and pressure [Pa] that a constant voltage settles at."""
-    current_plus = channel_level(voltage, plus)
-    current_minus = channel_level(-voltage, minus)
-    return current_plus, current_minus, steady_pressure(current_plus - current_minus, pump)
+def pump_arguments(instance: Instance, current: float, step: float = 1.0) -> dict[str, Any]:
+    """What the pump's equations take under a constant current, by the arguments' names."""
+    p, options, _ = instance.parts[1]
+    known: dict[str, Any] = {"p": p, "options": options, "h": step}
+    known["k"] = called(pump_constants, known)
+    known["inputs"] = PumpInputs(current, p.pump_speed, p.load_torque, p.Z9)
+    return known
 
 
-@kernel
-def steady_pump_start(current: float, pump: Pump) -> float:
-    """Pressure that a constant signed current settles at. [Pa]"""
-    return steady_pressure(current, pump)
+def settled_state(instance: Instance, current: float) -> PumpState:
+    """State of the pump that a constant signed current settles at."""
+    made: PumpState = called(pump_settled, pump_arguments(instance, current))
+    return made
+
+
+def pressure_limits(instance: Instance) -> PumpConstants:
+    """Pressures at which stops and relief valve act, with the other constants. [Pa]"""
+    made: PumpConstants = pump_arguments(instance, 0.0)["k"]
+    return made

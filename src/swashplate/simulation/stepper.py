@@ -2,127 +2,23 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.equations.lowering import generating
+from swashplate.equations.march import Stored, advance_source
+from swashplate.equations.record import Interpolation, least_substeps
+from swashplate.equations.run import Start, check_domain, check_start, module
 from swashplate.errors import InputError
+from swashplate.models.drive import drive
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.physics.control_card import interpolated
-from swashplate.physics.spool import orifice_opening, stopped_spool
-from swashplate.physics.swash import swash_angle, swash_tangent
-from swashplate.simulation.build import build
-from swashplate.simulation.chain import (
-    channel_sample,
-    channel_steady,
-    moment_squared,
-    pump_force,
-    pump_speed,
-    pump_spool,
-    pump_step,
-)
-from swashplate.simulation.compilation import kernel
-from swashplate.simulation.constants import Channel, Delay, Pump
-from swashplate.simulation.record import Interpolation, least_substeps
-from swashplate.simulation.run import Start, check_domain, check_start, rest_pressure
-from swashplate.simulation.steady import steady_start
+from swashplate.simulation.instance import check_filter_stability, instance_of
 
 Array = NDArray[np.float64]
-
-(PRESSURE, STATE_P, PREVIOUS_P, OUTPUT_P, STATE_M, PREVIOUS_M, OUTPUT_M) = range(7)
-(SPEED, POSITION, BEGUN, LAST) = range(7, 11)
-N_STATES = 11
-
-
-@kernel
-def step_drive(
-    voltage: float,
-    held: bool,
-    substeps: int,
-    delay: Delay,
-    plus: Channel,
-    minus: Channel,
-    pump: Pump,
-    step: float,
-    state: Array,
-    line: Array,
-    sample: Array,
-) -> float:
-    """Advance a drive by one sample.
-
-    Parameters
-    ----------
-    voltage : float
-        Command at the new sample. [V]
-    held : bool
-        Whether the command held its last value until now, or went in a straight line.
-    substeps : int
-        Steps of the march a sample.
-    state : (N_STATES,) array
-        Advanced in place.
-    line : (m,) array
-        The delay line, newest command first; shifted in place. [V]
-    sample : (9,) array
-        Filled with what `Sample` holds from `current_positive` on.
-
-    Returns
-    -------
-    float
-        Largest sin²φ met.
-    """
-    first = state[BEGUN] == 0.0
-    state[BEGUN] = 1.0
-    last = state[LAST]
-    worst = 0.0
-    for j in range(1 if first else substeps):
-        if not first:
-            current = state[OUTPUT_P] - state[OUTPUT_M]
-            state[PRESSURE] = pump_step(state[PRESSURE], current, pump, step)
-        for k in range(line.size - 1, 0, -1):
-            line[k] = line[k - 1]
-        if first or j == substeps - 1:
-            line[0] = voltage
-        elif held:
-            line[0] = last
-        else:
-            line[0] = interpolated(last, voltage, (j + 1) / substeps)
-        delayed = interpolated(line[delay.whole], line[delay.whole + 1], delay.fraction)
-        at = delay.share_whole
-        f = delay.share_fraction
-        steady = channel_steady(1.0, delayed, line[at], line[at + 1], line[at + 2], f, plus)
-        output, following, _ = channel_sample(
-            steady, state[STATE_P], state[PREVIOUS_P], state[OUTPUT_P], plus, step
-        )
-        state[PREVIOUS_P], state[STATE_P], state[OUTPUT_P] = state[STATE_P], following, output
-        steady = channel_steady(-1.0, delayed, line[at], line[at + 1], line[at + 2], f, minus)
-        output, following, _ = channel_sample(
-            steady, state[STATE_M], state[PREVIOUS_M], state[OUTPUT_M], minus, step
-        )
-        state[PREVIOUS_M], state[STATE_M], state[OUTPUT_M] = state[STATE_M], following, output
-        current = state[OUTPUT_P] - state[OUTPUT_M]
-        worst = max(worst, moment_squared(current, pump))
-        speed = pump_speed(state[PRESSURE], current, pump)
-        if not first:
-            state[POSITION] = state[POSITION] + 0.5 * step * (state[SPEED] + speed)
-        state[SPEED] = speed
-    state[LAST] = voltage
-
-    current = state[OUTPUT_P] - state[OUTPUT_M]
-    force = pump_force(current, pump)
-    free = pump_spool(force, state[PRESSURE], pump)
-    tangent = swash_tangent(state[PRESSURE], pump.Z1, pump.Z2)
-    sample[0] = state[OUTPUT_P]
-    sample[1] = state[OUTPUT_M]
-    sample[2] = current
-    sample[3] = force
-    sample[4] = stopped_spool(free, pump.Z14)
-    sample[5] = orifice_opening(free, pump.Z14, pump.Z16_plus, pump.Z16_minus)
-    sample[6] = state[PRESSURE]
-    sample[7] = swash_angle(tangent, pump.Z13_plus, pump.Z13_minus, pump.steep)
-    sample[8] = state[SPEED]
-    return worst
 
 
 class Sample(NamedTuple):
@@ -139,6 +35,42 @@ class Sample(NamedTuple):
     swash_angle: float
     shaft_speed: float
     shaft_position: float
+
+
+SHOWN = (
+    Stored(0, "signals", "current_positive"),
+    Stored(0, "signals", "current_negative"),
+    *(Stored(1, "signals", name) for name in Sample._fields[4:10]),
+)
+"""What one sample leaves, in this order; the rest follows from it."""
+DRIVER = '''
+
+
+@kernel
+def steps(last, voltage, held, substeps, begun, h, machine, states, lines, out):
+    """Advance by one sample of a record, or take the first one."""
+    whole, fraction, params, given, constants = machine
+    values = np.empty(1)
+    worst = inf
+    for j in range(substeps if begun else 1):
+        values[0] = voltage
+        if begun and j < substeps - 1:
+            values[0] = last if held else last + (j + 1) / substeps * (voltage - last)
+        before = out[7]
+        margin = advance(values, lines, whole, fraction, params, given, h, constants, states, out)
+        worst = min(worst, margin)
+        if begun:
+            out[8] = out[8] + 0.5 * h * (before + out[7])
+    return worst
+'''
+
+
+@generating
+def _kernels(options: tuple[Any, ...]) -> tuple[Callable[..., int], Callable[..., float]]:
+    """The compiled constants and steps of a drive."""
+    text, names = advance_source(drive, ("voltage",), options, SHOWN)
+    made = module("drive_step", text + DRIVER, {**names, "np": np})
+    return made["prepare"], made["steps"]
 
 
 class StepperState(NamedTuple):
@@ -165,30 +97,40 @@ class Stepper:
         rate = 1.0 / h
         if abs(rate - round(rate)) < 1e-9 * rate:
             rate = float(round(rate))  # 1/(1/49) is not 49, but the user means 49 Hz
-        self._name = parameters.name
         self._substeps = least_substeps(rate)
         self._held = interpolation == "previous"
-        self._constants = build(parameters, 1.0 / (rate * self._substeps))
+        self._step = 1.0 / (rate * self._substeps)
+        check_filter_stability(parameters, self._step)
+        self._instance = instance_of(parameters, True)
         self._start = start
-        delay, _, _, pump, _ = self._constants
-        self._numbers = np.zeros(N_STATES)
-        self._numbers[PRESSURE] = rest_pressure(pump)
-        self._line = np.zeros(max(delay.whole + 2, delay.share_whole + 3))
-        self._sample = np.empty(9)
+        prepare, self._steps = _kernels(self._instance.options)
+        places = self._instance.places(("voltage",), self._step)
+        constants = np.zeros(64)
+        params, given = self._instance.params, self._instance.given
+        prepare(params, given, self._step, constants)
+        self._machine = (places.whole, places.fraction, params, given, constants)
+        self._states = self._instance.start({"voltage": 0.0}, self._step).flat
+        self._lines = np.zeros((1, int(places.whole.max()) + 3))
+        self._out = np.zeros(len(SHOWN) + 1)
+        self._last, self._begun = 0.0, False
 
     @property
     def state(self) -> StepperState:
         """A copy of the present state; assign it to return to that instant."""
-        numbers, line = self._numbers.copy(), self._line.copy()
+        numbers = np.concatenate([self._states, self._out, [self._last, float(self._begun)]])
+        line = self._lines[0].copy()
         numbers.flags.writeable = line.flags.writeable = False
         return StepperState(numbers, line)
 
     @state.setter
     def state(self, state: StepperState) -> None:
-        if state.line.shape != self._line.shape:
-            raise InputError("This state belongs to a stepper of another delay or rate.")
-        self._numbers[:] = state.numbers
-        self._line[:] = state.line
+        size = self._states.size + self._out.size + 2
+        if state.line.shape != self._lines[0].shape or state.numbers.size != size:
+            raise InputError("This state belongs to a stepper of another drive, delay or rate.")
+        self._states[:] = state.numbers[: self._states.size]
+        self._out[:] = state.numbers[self._states.size : -2]
+        self._last, self._begun = float(state.numbers[-2]), bool(state.numbers[-1])
+        self._lines[0] = state.line
 
     def step(self, voltage: float) -> Sample:
         """Advance by one sample interval.
@@ -208,34 +150,27 @@ class Stepper:
         InputError
             For a command that is not finite or beyond ±10 V; the state stays as it was.
         DomainError
-            If the solenoid overpowers the feedback spring.
+            If the solenoid overpowers the feedback spring, or a number grows beyond all bounds.
         """
         voltage = float(voltage)
         if not -FULL_VOLTAGE <= voltage <= FULL_VOLTAGE:
             raise InputError(f"The voltage is {voltage:g} V, but the card takes ±10 V.")
-        delay, plus, minus, pump, step = self._constants
-        if self._start == "steady" and self._numbers[BEGUN] == 0.0:
-            self._settle(voltage)
-        worst = step_drive(
+        if self._start == "steady" and not self._begun:
+            self._states[:] = self._instance.start({"voltage": voltage}, self._step, "steady").flat
+            self._lines[0] = voltage
+        worst = self._steps(
+            self._last,
             voltage,
             self._held,
             self._substeps,
-            delay,
-            plus,
-            minus,
-            pump,
-            step,
-            self._numbers,
-            self._line,
-            self._sample,
+            self._begun,
+            self._step,
+            self._machine,
+            self._states,
+            self._lines,
+            self._out,
         )
-        check_domain(self._name, worst, "voltage")
-        return Sample._make([voltage, *self._sample.tolist(), float(self._numbers[POSITION])])
-
-    def _settle(self, voltage: float) -> None:
-        _, plus, minus, pump, _ = self._constants
-        current_plus, current_minus, pressure = steady_start(voltage, plus, minus, pump)
-        self._numbers[[STATE_P, PREVIOUS_P, OUTPUT_P]] = current_plus
-        self._numbers[[STATE_M, PREVIOUS_M, OUTPUT_M]] = current_minus
-        self._numbers[PRESSURE] = pressure
-        self._line[:] = voltage
+        check_domain(self._instance, self._states, worst, "voltage")
+        self._last, self._begun = voltage, True
+        plus, minus, *inside, position = self._out.tolist()
+        return Sample._make([voltage, plus, minus, plus - minus, *inside, position])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.campaign.recognition.recognised import Window
 from swashplate.campaign.recognition.rounding import roundest
 from swashplate.campaign.recognition.trace import Trace
-from swashplate.maneuvers.curves import NEAR, Hermite
+from swashplate.maneuvers.curves import NEAR, Hermite, return_within
 
 Array = NDArray[np.float64]
 Curve = Callable[[Array], Array]
@@ -114,7 +114,8 @@ def _spline_return(
 
     def curve(ends: Array) -> Hermite:
         begin = ends[:1]
-        return Hermite(float(value(begin)[0]), float(slope(begin)[0]), float(ends[1] - ends[0]))
+        level, rise = float(value(begin)[0]), float(slope(begin)[0])
+        return return_within(trace.peak, level, rise, float(ends[1] - ends[0]))
 
     def residual(ends: Array) -> Array:
         begin, end = ends

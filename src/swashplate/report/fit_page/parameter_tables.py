@@ -12,11 +12,11 @@ from swashplate.identification.fit import Fit, StageFit
 from swashplate.identification.gauges import GAUGES
 from swashplate.identification.intervals import Estimate, estimates
 from swashplate.identification.unknowns import Unknown
-from swashplate.parameters.catalogue import CATALOGUE, COLUMNS
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_page.numbers import NONE, percent, plain, spread, unit_text
 from swashplate.report.fit_page.truth import SCALES, moved_columns, true_values
-from swashplate.simulation.residuals import START_PRESSURE
+from swashplate.simulation.instance import START_PRESSURE
 
 
 class ParameterRow(NamedTuple):

@@ -1,0 +1,205 @@
+"""Machine code and generated modules, kept on disk.
+
+Kernels inline the equations that they call, which Numba's disk cache does not know: it looks at a
+kernel's own file alone. Here the stamp is a hash of the kernel and of all that it reaches, so that
+a changed equation is never answered by old machine code, and leaves all others' alone.
+"""
+
+import os
+import pickle
+import re
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from functools import cache, cached_property
+from hashlib import blake2b
+from pathlib import Path
+from types import ModuleType
+from typing import Any, ParamSpec, TypeVar
+from warnings import warn
+
+from numba import __version__ as numba_version
+from numba import config, njit
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.misc.appdirs import AppDirs
+
+from swashplate.equations.equation import closure_hash, hash_of, is_function, known
+from swashplate.equations.syntax import plain
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+UNCACHED = (
+    "swashplate's compiled kernels cannot be kept, so that every session compiles them anew; set "
+    "NUMBA_CACHE_DIR to a folder that can be written."
+)
+DOCSTRING = re.compile(r'^ *""".*?"""\n', re.MULTILINE | re.DOTALL)
+
+
+# --- kernels --------------------------------------------------------------------------------------
+
+
+class _KernelCacheImpl(CompileResultCacheImpl):
+    pass
+
+
+class _Index(IndexDataCacheFile):
+    """Numba's index and data files, which survive damage and workers that write at once.
+
+    Data are named by what they are for, so that no two signatures share a file, and carry a hash.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        overloads = self._load_index()
+        digest = blake2b(self._dump(key), digest_size=6).hexdigest()  # type: ignore[no-untyped-call]
+        name = f"{self._index_name.removesuffix('.nbi')}.{digest}.nbc"
+        self._save_data(name, data)
+        overloads[key] = name
+        self._save_index(overloads)  # type: ignore[no-untyped-call]
+
+    def load(self, key: Any) -> Any:
+        try:
+            return super().load(key)  # type: ignore[no-untyped-call]
+        except Exception:  # whatever unpickling garbage may raise
+            return None
+
+    def _load_index(self) -> dict[Any, str]:
+        try:
+            index = super()._load_index()  # type: ignore[no-untyped-call]
+            return index if isinstance(index, dict) else {}
+        except Exception:
+            return {}
+
+    def _save_data(self, name: str, data: Any) -> None:
+        payload = self._dump(data)  # type: ignore[no-untyped-call]
+        path = self._data_path(name)  # type: ignore[no-untyped-call]
+        with self._open_for_write(path) as file:
+            file.write(blake2b(payload, digest_size=16).digest() + payload)
+
+    def _load_data(self, name: str) -> Any:
+        content = Path(self._data_path(name)).read_bytes()  # type: ignore[no-untyped-call]
+        if blake2b(content[16:], digest_size=16).digest() != content[:16]:
+            raise ValueError(name)
+        return pickle.loads(content[16:])
+
+
+class _KernelCache(FunctionCache):
+    """Numba's cache of a function, stamped by all that the function reaches, when first asked."""
+
+    _impl_class = _KernelCacheImpl
+
+    def __init__(self, function: Any) -> None:
+        self._name = repr(function)
+        self._py_func = function
+        self._impl = self._impl_class(function)  # type: ignore[no-untyped-call]
+        self._cache_path = self._impl.locator.get_cache_path()
+        self.enable()  # type: ignore[no-untyped-call]
+
+    @cached_property
+    def _cache_file(self) -> _Index:  # type: ignore[override]
+        stamp = f"{closure_hash(self._py_func)} {numba_version}"
+        return _Index(self._cache_path, self._impl.filename_base, stamp)  # type: ignore[no-untyped-call]
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except Exception:  # whole, and yet nothing that this Numba can use
+            return None
+
+
+def kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function of arrays: strict arithmetic, no interpreter lock, cached on disk.
+
+    Parameters
+    ----------
+    function : callable
+        A march. Its equations come in by inlining.
+
+    Returns
+    -------
+    callable
+        The compiled function, or the plain one under ``NUMBA_DISABLE_JIT=1``.
+
+    Warns
+    -----
+    RuntimeWarning
+        If there is no place for the cache; the function works all the same.
+    """
+    known[plain(function)] = None
+    compiled: Any = njit(nogil=True, error_model="numpy")(function)
+    if not config.DISABLE_JIT:  # type: ignore[attr-defined]
+        try:
+            compiled._cache = _KernelCache(function)
+        except RuntimeError:  # no folder to cache in can be written
+            warn(UNCACHED, RuntimeWarning, stacklevel=2)
+    return compiled  # type: ignore[no-any-return]
+
+
+# --- generated modules ----------------------------------------------------------------------------
+
+
+@cache
+def _folder(chosen: str) -> Path:
+    """Where generated modules are kept."""
+    if chosen:
+        wanted = Path(chosen) / "swashplate_generated"
+    else:
+        user = AppDirs(appname="swashplate", appauthor=False).user_cache_dir  # type: ignore[no-untyped-call]
+        wanted = Path(user) / "generated"
+    try:
+        wanted.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=wanted).close()
+    except OSError:
+        warn(UNCACHED, RuntimeWarning, stacklevel=3)
+        return Path(tempfile.mkdtemp(prefix="swashplate_generated_"))
+    return wanted
+
+
+def cache_folder() -> Path | None:
+    """Folder below which generated modules and their machine code are kept, None if nowhere."""
+    folder = _folder(str(config.CACHE_DIR or ""))  # type: ignore[attr-defined]
+    if folder.name.startswith("swashplate_generated_"):
+        return None
+    return folder.parent if config.CACHE_DIR else folder  # type: ignore[attr-defined]
+
+
+def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
+    """Write a generated module where it is kept, and execute it.
+
+    Parameters
+    ----------
+    name : str
+        What the file's name begins with.
+    text : str
+        The module. `kernel`s in it are cached on disk as those of any file.
+    names : mapping
+        What the text refers to: its globals, beside what it defines.
+
+    Returns
+    -------
+    dict
+        The module's globals.
+
+    Notes
+    -----
+    The file's name carries a hash of the text without its docstrings, and of all that its names
+    reach; many processes may write it at once.
+    """
+    used = {n: v for n, v in names.items() if re.search(rf"\b{re.escape(n)}\b", text)}
+    reached = {n: closure_hash(v) if is_function(v) else v for n, v in used.items()}
+    digest = blake2b(digest_size=8)
+    digest.update(DOCSTRING.sub("", text).encode())
+    digest.update(hash_of(reached).encode())
+    stem = f"{name}_{digest.hexdigest()}"
+    path = _folder(str(config.CACHE_DIR or "")) / f"{stem}.py"  # type: ignore[attr-defined]
+    if not path.exists() or path.read_text("utf-8") != text:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=stem, suffix=".tmp")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        Path(temporary).replace(path)
+    module = ModuleType(f"swashplate_generated.{stem}")
+    module.__file__ = str(path)
+    module.__dict__.update(names)
+    sys.modules[module.__name__] = module
+    exec(compile(text, str(path), "exec"), module.__dict__)
+    return module.__dict__

@@ -1,0 +1,315 @@
+"""Scalar expressions: each kept once, so that equal ones are the same object.
+
+`make` builds what an equation says, operation by operation and without changing anything, so that
+values keep their last bit. `times`, `plus` and their like build derivatives: zeros and ones in them
+are structural, and vanish.
+"""
+
+from collections.abc import Callable
+from math import isfinite
+from typing import Any
+
+ARITHMETIC = ("+", "-", "*", "/", "**", "neg")
+COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
+LOGIC = ("and", "or", "not")
+LEAVES = ("number", "name", "constant")
+CHEAP = {*LEAVES, *COMPARISONS, *LOGIC, "+", "-", "*", "neg", "min", "max", "abs", "if"}
+"""Operations that can be done for nothing on any numbers: no error, no call of a library."""
+
+_PRECEDENCE = {"if": 1, "or": 2, "and": 3, "not": 4, "+": 6, "-": 6, "*": 7, "/": 7, "neg": 8}
+_PRECEDENCE.update({"**": 9}, **dict.fromkeys(COMPARISONS, 5))
+ATOM = 10
+
+
+class Node:
+    """A scalar expression: an operation with its operands, a number, or a name.
+
+    Attributes
+    ----------
+    op : str
+        Operation; "number", "name" or "constant" (of a module) for a leaf.
+    args : tuple of Node
+    value : object
+        Of a number itself, of a name its text, of a constant its name and number.
+    kind : str
+        "float", "int" or "bool".
+    reads : frozenset of str
+        Names in it.
+    moves : frozenset of str
+        Those of them that its value follows continuously: not those of a decision.
+    cheap : bool
+        Whether all of it is `CHEAP`.
+    """
+
+    __slots__ = ("_same", "args", "cheap", "kind", "moves", "op", "reads", "serial", "value")
+
+    def __init__(self, op: str, args: "tuple[Node, ...]", value: Any, kind: str) -> None:
+        self.op, self.args, self.value, self.kind = op, args, value, kind
+        self.serial = len(_known)
+        self._same: Node | None = None
+        empty: frozenset[str] = frozenset()
+        if op == "name":
+            self.reads = frozenset((value,))
+            self.moves = self.reads if kind == "float" else empty
+        else:
+            self.reads = empty.union(*(a.reads for a in args)) if args else empty
+            moving = args[1:] if op == "if" else args
+            still = kind != "float" or op == "floor" or not moving
+            self.moves = empty if still else empty.union(*(a.moves for a in moving))
+        own = op in CHEAP or (op == "/" and args[1].op == "number" and args[1].value != 0.0)
+        self.cheap: bool = own and all(a.cheap for a in args)
+
+    @property
+    def same(self) -> "Node":
+        """One and the same node for all orders of the factors and summands in it."""
+        if self._same is None:
+            args = [a.same for a in self.args]
+            if self.op in ("+", "*"):
+                args.sort(key=lambda a: a.serial)
+            again = tuple(args) == self.args
+            self._same = self if again else make(self.op, *args, value=self.value)
+        return self._same
+
+    def __repr__(self) -> str:
+        return render(self, lambda node: None)
+
+
+_known: dict[tuple[Any, ...], Node] = {}
+
+
+def _kind(op: str, args: tuple[Node, ...]) -> str:
+    if op in COMPARISONS or op in LOGIC:
+        return "bool"
+    if op == "floor":
+        return "int"
+    if op == "if":
+        args = args[1:]
+    kinds = {a.kind for a in args}
+    if op in ("+", "-", "*", "neg", "min", "max", "abs", "if", "**") and kinds == {"int"}:
+        return "int"
+    if op == "if" and kinds == {"bool"}:
+        return "bool"
+    return "float"
+
+
+def make(op: str, *args: Node, value: Any = None, kind: str | None = None) -> Node:
+    """The expression of an operation and its operands."""
+    text = repr(value) if op in ("number", "constant") else value
+    key = (op, args, text, kind)
+    node = _known.get(key)
+    if node is None:
+        node = _known[key] = Node(op, args, value, kind or _kind(op, args))
+    return node
+
+
+def number(value: float) -> Node:
+    """A literal number."""
+    kind = {bool: "bool", int: "int"}.get(type(value), "float")
+    return make("number", value=value, kind=kind)
+
+
+def name(text: str, kind: str = "float") -> Node:
+    """A variable, or a field of an argument as `p.Z8`."""
+    return make("name", value=text, kind=kind)
+
+
+def constant(text: str, value: float) -> Node:
+    """A number that a module gives a name."""
+    kind = {bool: "bool", int: "int"}.get(type(value), "float")
+    return make("constant", value=(text, value), kind=kind)
+
+
+ZERO, ONE = number(0.0), number(1.0)
+
+
+def is_number(node: Node, value: float | None = None) -> bool:
+    """Whether an expression is a literal number, or that one."""
+    return node.op == "number" and (value is None or node.value == value)
+
+
+def substitute(node: Node, by: dict[str, Node]) -> Node:
+    """The expression with other expressions in place of names."""
+    if not node.reads & by.keys():
+        return node
+    if node.op == "name":
+        return by[node.value]
+    return make(node.op, *(substitute(a, by) for a in node.args), value=node.value)
+
+
+def size(node: Node) -> int:
+    """Number of operations in an expression."""
+    return sum(size(a) for a in node.args) + (node.op not in LEAVES)
+
+
+# --- derivatives: zeros and ones are structural ---------------------------------------------------
+
+
+def negative(a: Node) -> Node:
+    """-a."""
+    if a.op == "number":
+        return number(-a.value) if a.value else ZERO
+    if a.op == "neg":
+        return a.args[0]
+    if a.op == "-":
+        return make("-", a.args[1], a.args[0])
+    return make("neg", a)
+
+
+def plus(a: Node, b: Node) -> Node:
+    """a + b."""
+    if is_number(a, 0.0) or is_number(b, 0.0):
+        return b if is_number(a, 0.0) else a
+    if is_number(a) and is_number(b):
+        return number(a.value + b.value)
+    if b.op == "neg":
+        return minus(a, b.args[0])
+    if a.op == "neg":
+        return minus(b, a.args[0])
+    if a is b:
+        return times(number(2.0), a)
+    if a.op == "+" and a.args[1] is b:
+        return plus(a.args[0], times(number(2.0), b))
+    if a.op == "if" == b.op and a.args[0] is b.args[0]:
+        test, one, two = a.args
+        _, three, four = b.args
+        if ZERO in (one, three) and ZERO in (two, four):  # the two halves of one choice
+            return choose(test, plus(one, three), plus(two, four))
+    return make("+", a, b)
+
+
+def minus(a: Node, b: Node) -> Node:
+    """a - b."""
+    if is_number(b, 0.0):
+        return a
+    if is_number(a, 0.0):
+        return negative(b)
+    if is_number(a) and is_number(b):
+        return number(a.value - b.value)
+    if b.op == "neg":
+        return plus(a, b.args[0])
+    if a.op == "-" and a.args[1] is b:
+        return minus(a.args[0], times(number(2.0), b))
+    return make("-", a, b)
+
+
+def times(a: Node, b: Node) -> Node:
+    """a b."""
+    if is_number(b):
+        a, b = b, a
+    if is_number(a):
+        if a.value in (0.0, 1.0, -1.0):
+            return ZERO if not a.value else b if a.value > 0.0 else negative(b)
+        if is_number(b) and isfinite(a.value * b.value):
+            return number(float(a.value * b.value))
+        if b.op == "*" and is_number(b.args[0]):
+            return times(number(float(a.value * b.args[0].value)), b.args[1])
+        if b.op == "if" and (is_number(b.args[1]) or is_number(b.args[2])):
+            return choose(b.args[0], times(a, b.args[1]), times(a, b.args[2]))
+    if a.op == "neg":
+        return negative(times(a.args[0], b))
+    if b.op == "neg":
+        return negative(times(a, b.args[0]))
+    if b.op == "*" and is_number(b.args[0]) and not is_number(a):  # numbers to the front
+        return times(b.args[0], times(a, b.args[1]))
+    return make("*", a, b)
+
+
+def inverse(a: Node) -> Node:
+    """1/a."""
+    if is_number(a):
+        return number(1.0 / a.value)
+    if a.op == "/" and is_number(a.args[0], 1.0):
+        return a.args[1]
+    if a.op == "neg":
+        return negative(inverse(a.args[0]))
+    return make("/", ONE, a)
+
+
+def choose(test: Node, one: Node, two: Node) -> Node:
+    """`one if test else two`."""
+    if test.op == "number":
+        return one if test.value else two
+    return one if one is two else make("if", test, one, two)
+
+
+def masked(guards: "tuple[tuple[Node, bool], ...]", a: Node) -> Node:
+    """An amount that counts only where the tests come out as said."""
+    for test, wanted in reversed(guards):
+        a = choose(test, a, ZERO) if wanted else choose(test, ZERO, a)
+    return a
+
+
+def finite_inverse(a: Node) -> Node:
+    """1/a for a ≥ 0, and 0 in place of infinity."""
+    infinite = make("constant", value=("inf", float("inf")), kind="float")
+    return inverse(choose(make(">", a, ZERO), a, infinite))
+
+
+def positive(a: Node, definition: Callable[[str], Node | None], strict: bool = True) -> bool:
+    """Whether an expression is certainly above zero (or not below it, unless strict)."""
+    if a.op in ("number", "constant"):
+        value = a.value if a.op == "number" else a.value[1]
+        return bool(value > 0.0 if strict else value >= 0.0)
+    if a.op == "name":
+        meaning = definition(a.value)
+        return meaning is not None and positive(meaning, definition, strict)
+    if a.op == "exp":
+        return True
+    if a.op in ("abs", "sqrt"):
+        return not strict or (a.op == "sqrt" and positive(a.args[0], definition))
+    if a.op == "+":
+        weak = all(positive(each, definition, False) for each in a.args)
+        return weak and (not strict or any(positive(each, definition) for each in a.args))
+    if a.op in ("*", "/"):
+        if a.op == "*" and a.args[0] is a.args[1]:
+            return not strict or positive(a.args[0], definition)
+        return all(positive(each, definition, strict) for each in a.args)
+    return False
+
+
+# --- text -----------------------------------------------------------------------------------------
+
+
+def literal(value: Any) -> str:
+    """A number as Python writes it."""
+    return repr(value)
+
+
+def render(node: Node, known: Callable[[Node], str | None]) -> str:
+    """An expression as Python writes it, with the names that parts of it have."""
+    return _render(node, known)[0]
+
+
+def _render(node: Node, known: Callable[[Node], str | None]) -> tuple[str, int]:
+    given = known(node)
+    if given is not None:
+        return given, ATOM
+    op, args = node.op, node.args
+    if op == "number":
+        text = literal(node.value)
+        return text, _PRECEDENCE["neg"] if text.startswith("-") else ATOM
+    if op == "name":
+        return node.value, ATOM
+    if op == "constant":
+        return node.value[0], ATOM
+
+    def part(a: Node, level: int) -> str:
+        text, own = _render(a, known)
+        return text if own >= level else f"({text})"
+
+    level = _PRECEDENCE.get(op, ATOM)
+    if op == "if":
+        return f"{part(args[1], 2)} if {part(args[0], 2)} else {part(args[2], 1)}", level
+    if op in ("and", "or"):
+        return f" {op} ".join(part(a, level + 1) for a in args), level
+    if op == "not":
+        return f"not {part(args[0], level)}", level
+    if op == "neg":
+        return f"-{part(args[0], level + 1)}", level
+    if op == "**":
+        return f"{part(args[0], level + 1)}**{literal(node.value)}", level
+    if op in COMPARISONS:
+        return f"{part(args[0], level + 1)} {op} {part(args[1], level + 1)}", level
+    if op in ("+", "-", "*", "/"):
+        return f"{part(args[0], level)} {op} {part(args[1], level + 1)}", level
+    return f"{op}({', '.join(part(a, 1) for a in args)})", ATOM

@@ -1,0 +1,63 @@
+"""Nested named tuples of floats as flat lists of dotted paths, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, get_type_hints
+
+
+def is_named_tuple(kind: object) -> bool:
+    """Whether a type is a named tuple's."""
+    return isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
+
+
+_known: dict[Any, tuple[str, ...]] = {}
+
+
+def floats_of(kind: type[Any]) -> tuple[str, ...]:
+    """Dotted paths of all floats below a named tuple, e.g. ``plus.V_dz``, in its order."""
+    if kind not in _known:
+        _known[kind] = tuple(_paths(kind, ""))
+    return _known[kind]
+
+
+def _paths(kind: type[Any], prefix: str) -> Iterator[str]:
+    hints = get_type_hints(kind)
+    for name in kind._fields:
+        inner = hints[name]
+        if is_named_tuple(inner):
+            yield from _paths(inner, f"{prefix}{name}.")
+        elif inner is float:
+            yield f"{prefix}{name}"
+
+
+def value_at(value: Any, path: str) -> Any:
+    """What lies at a dotted path of a nested named tuple."""
+    for name in path.split(".") if path else ():
+        value = getattr(value, name)
+    return value
+
+
+def numbers_of(value: Any) -> list[float]:
+    """All floats of a nested named tuple, in the order of `floats_of`."""
+    return [float(value_at(value, path)) for path in floats_of(type(value))]
+
+
+def made(kind: type[Any], numbers: Mapping[str, float]) -> Any:
+    """A nested named tuple from numbers by path; others keep the type's defaults."""
+    return _made(kind, numbers, "")
+
+
+def _made(kind: type[Any], numbers: Mapping[str, float], prefix: str) -> Any:
+    hints = get_type_hints(kind)
+    defaults = getattr(kind, "_field_defaults", {})
+    values = []
+    for name in kind._fields:
+        path = f"{prefix}{name}"
+        if is_named_tuple(hints[name]):
+            values.append(_made(hints[name], numbers, f"{path}."))
+        elif path in numbers:
+            values.append(float(numbers[path]))
+        else:
+            values.append(defaults[name])
+    return kind(*values)

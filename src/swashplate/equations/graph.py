@@ -1,0 +1,790 @@
+"""Which derivative flows into which: the structure behind a model's Jacobian, and its kernels.
+
+A column of the Jacobian is the derivative of every state by one parameter, over all samples. It
+follows the linear recurrence ds[n+1] = A[n] ds[n] + b[n]. The partial derivatives A and b are known
+once the states are (`fill` kernels, without a wait between samples); which of them are zero
+whatever the numbers is known when the code is generated. So states fall into groups that wait for
+each other (`recur` kernels: strongly connected components), each behind those that it needs.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from graphlib import TopologicalSorter
+from typing import Any, NamedTuple
+
+from swashplate.equations import expressions as ex
+from swashplate.equations.derivatives import derive
+from swashplate.equations.derived import Derived
+from swashplate.equations.equation import equation_of_text
+from swashplate.equations.expressions import Node
+from swashplate.equations.march import (
+    PartCode,
+    Sampler,
+    Start,
+    Stored,
+    function_source,
+    indented,
+    march_source,
+    output_of,
+    rest_of,
+    settled_of,
+)
+from swashplate.equations.model import Model, Source, arguments_of
+from swashplate.equations.program import leaves
+from swashplate.equations.rows import ABREAST, STRIDE, carry, combine, deliver, finish
+from swashplate.equations.scalars import Code, text
+from swashplate.errors import InputError
+
+
+class Entry(NamedTuple):
+    """A partial derivative: a row of the block, or a number that is the same at every sample."""
+
+    row: int
+    value: float = 0.0
+
+
+class By(NamedTuple):
+    """What something is differentiated by."""
+
+    kind: str
+    """``p``, ``k``, ``state``, ``tap`` or ``signal``."""
+    path: str
+    """Of parameter or state; name of a constant; number of a tap; signal of another part."""
+    part: int = -1
+    """The other part."""
+
+
+@dataclass
+class Group:
+    """States of a part that wait for each other, in one recurrence."""
+
+    kernel: str
+    states: tuple[str, ...]
+    after: tuple[bool, ...]
+    """Whether a state's row holds the derivative behind the sample, as its signal needs it."""
+    stored: tuple[bool, ...]
+    """Whether anyone reads a state's row."""
+
+
+@dataclass
+class Component:
+    """States of a part that share no derivative with its others: one fill kernel."""
+
+    kernel: str
+    groups: list[Group]
+
+
+@dataclass
+class PartGraph:
+    """A part: its partial derivatives and the order in which they are used."""
+
+    part: int
+    entries: dict[tuple[str, By], Entry] = field(default_factory=dict)
+    """By result (``state.x``, ``signals.y``) and what it is derived by."""
+    components: list[Component] = field(default_factory=list)
+    signal_kernel: str = ""
+    value_kernel: str = ""
+    aliases: dict[str, str] = field(default_factory=dict)
+    """Signals that are a state behind the sample, as far as derivatives go."""
+    constants: list[tuple[str, str]] = field(default_factory=list)
+    """Constant and parameter that it depends on."""
+    delays: dict[int, str] = field(default_factory=dict)
+    """Path of the delay of each tap."""
+    started: set[tuple[str, str]] = field(default_factory=set)
+    """State and parameter that it depends on at the start."""
+
+
+Slopes = dict[str, dict[By, float]]
+"""Derivatives of results by what they depend on."""
+
+
+@dataclass(eq=False)
+class Local:
+    """A scalar function with its derivatives, for one evaluation in plain Python."""
+
+    results: tuple[str, ...]
+    arguments: tuple[str, ...]
+    by: Mapping[str, By]
+    derived: Derived
+
+    def at(
+        self, values: Mapping[str, float]
+    ) -> tuple[dict[str, float], dict[str, dict[By, float]]]:
+        """Results, and their derivatives, for values of the arguments."""
+        found = self.derived.python(*(values[name] for name in self.arguments))
+        slopes: Slopes = {name: {} for name in self.results}
+        partials = found[len(self.results) :]
+        for (out, inp), partial in zip(self.derived.entries, partials, strict=True):
+            slopes[self.results[out]][self.by[self.derived.inputs[inp]]] = partial
+        return dict(zip(self.results, found, strict=False)), slopes
+
+
+class Locals(NamedTuple):
+    """What is differentiated once at the start, of a part."""
+
+    names: Mapping[str, By]
+    """What a name in the part's code stands for."""
+    constants: Local | None
+    rest: Local | None
+    settled: Local | None
+    sources: Local | None
+    """Signals that others need, by state, parameters and constants."""
+
+
+@dataclass(eq=False)
+class Graph:
+    """A model's whole structure."""
+
+    parts: list[PartGraph]
+    stored: list[Stored]
+    """Numbers that the march leaves in the first rows of the block."""
+    rows: int
+    """Rows of numbers and partial derivatives together."""
+    links: dict[str, dict[str, float]]
+    """Partial derivatives of observed links by their sources."""
+    observed: list[tuple[Stored, bool]]
+    """What is observed, and whether as an integral."""
+    values: dict[tuple[int, str], int]
+    """Row of each signal that the march does not leave, by part and path."""
+    sources: list[Source]
+    """Signals that other parts or observed links need."""
+    locals: list[Locals]
+    codes: list[PartCode]
+    """The parts' code."""
+    signals: tuple[str, ...]
+    """External signals that are given as records."""
+
+
+def graph_source(
+    model: Model, signals: Sequence[str], options: Sequence[Any], observed: Sequence[str]
+) -> tuple[str, dict[str, Any], Graph]:
+    """Kernels of the Jacobian, what their names mean, and the structure.
+
+    Parameters
+    ----------
+    model : Model
+        What is marched.
+    signals : sequence of str
+        External signals given as records.
+    options : sequence
+        Options of each part.
+    observed : sequence of str
+        Signals whose derivatives are wanted.
+    """
+    return _Builder(model, tuple(signals), tuple(options), tuple(observed)).build()
+
+
+class _Builder:
+    def __init__(
+        self,
+        model: Model,
+        signals: tuple[str, ...],
+        options: tuple[Any, ...],
+        observed: tuple[str, ...],
+    ) -> None:
+        self.model, self.signals, self.options = model, signals, options
+        self.observed = [output_of(model, each) for each in observed]
+        self.sampler = Sampler(
+            model, signals, options, [place for place, _ in self.observed], ruled=True
+        )
+        self.parts = self.sampler.used()
+        self.texts: dict[str, str] = {}
+        self.names: dict[str, Any] = {}
+        self.stored: list[Stored] = []
+        self.row_of: dict[str, int] = {}
+        """Row of each number by its name in the code."""
+        self.rows = 0
+        self.graphs: list[PartGraph] = []
+        self.values: dict[tuple[int, str], int] = {}
+
+    def build(self) -> tuple[str, dict[str, Any], Graph]:
+        flows = [self._flows(part) for part in self.parts]
+        for graph, part in zip(self.graphs, self.parts, strict=True):
+            self._keep(graph, part)
+        for place, _ in self.observed:
+            if place.kind == "link":
+                self.stored.append(place)
+        self.rows = len(self.stored)
+        for graph, part in zip(self.graphs, self.parts, strict=True):
+            self._values(graph, part)
+        for graph, part, partials in zip(self.graphs, self.parts, flows, strict=True):
+            self._part(graph, part, partials)
+        march, names = march_source(self.model, self.signals, self.options, self.stored)
+        self.names |= {"combine": combine, "carry": carry, "deliver": deliver, "finish": finish}
+        whole = Graph(
+            self.graphs,
+            self.stored,
+            self.rows,
+            self._links(),
+            self.observed,
+            self.values,
+            list(self.sampler.sources),
+            [self._locals(part) for part in self.parts],
+            self.parts,
+            self.signals,
+        )
+        return (
+            "\n\n".join([march, *self.texts.values(), self._driver()]),
+            {**self.names, **names, **self.sampler.names},
+            whole,
+        )
+
+    # -- scalar functions ----------------------------------------------------------------------
+
+    def _signals(self, part: PartCode) -> list[str]:
+        """Signals of a part whose derivatives somebody needs."""
+        found = {s.signal: None for s in self.sampler.sources if s.part == part.part}
+        for place, _ in self.observed:
+            if place.part == part.part and place.kind == "signals":
+                found[place.path] = None
+        return list(found)
+
+    def _results(self, part: PartCode) -> dict[str, Node]:
+        """States behind the sample and signals that are needed, by result."""
+        following = dict(leaves(part.following))
+        made = {f"state.{path}": following[path] for path in self._states(part)}
+        for signal in self._signals(part):
+            if f"state.{signal}" not in made or signal not in dict(leaves(part.state)):
+                made[f"signals.{signal}"] = part.signal(signal)
+        return made
+
+    def _states(self, part: PartCode) -> list[str]:
+        observed = [
+            place.path
+            for place, _ in self.observed
+            if place.part == part.part and place.kind == "state"
+        ]
+        carried = self.sampler.carried[part.part]
+        return [*carried, *(each for each in observed if each not in carried)]
+
+    def _by(self, part: PartCode) -> dict[str, By]:
+        """What a part's results may be differentiated by, by the name in its code."""
+        found = {name: By("p", path) for name, path in part.parameters.items()}
+        if "k" in part.known:
+            every = {each for _, node in leaves(part.known["k"]) for each in node.reads}
+            found |= {name: By("k", name) for name in every if name not in found}
+        found |= {node.value: By("state", path) for path, node in leaves(part.state)}
+        for tap in part.taps:
+            if tap.tap.delay:
+                found[part.fraction(tap)] = By("tap", str(tap.number))
+        for source in self.sampler.sources:
+            found[part.source(source)] = By("signal", source.signal, source.part)
+        return found
+
+    def _derived(self, part: PartCode, name: str, results: Mapping[str, Node]) -> Derived | None:
+        """Some results of a part with their derivatives, as a function of the scalars it reads."""
+        nodes = list(results.values())
+        known = self._by(part)
+        read = part.code.reads(nodes)
+        arguments = sorted(each for each in read if each in known or self._plain(part, each))
+        active = [each for each in arguments if each in known]
+        if not active:
+            return None
+        function = scalar_function(name, arguments, part.code.lines(nodes), nodes, part.code.names)
+        return derive(function, tuple(active))
+
+    def _plain(self, part: PartCode, name: str) -> bool:
+        """Whether a name comes from outside, without being differentiated by."""
+        samples = {each for tap in part.taps for each in part.tap_samples(tap)}
+        fractions = {part.fraction(tap) for tap in part.taps}
+        given = {node.value for _, node in leaves(part.given)}
+        return name in samples | fractions | given or name == "h" or name.startswith("x_")
+
+    def _arguments(self, part: PartCode, read: Iterable[str]) -> tuple[list[str], list[str]]:
+        """Lines ahead of a loop over known samples, and those at the head of its body."""
+        names = set(read)
+        ahead = [
+            line for line in self.sampler.ahead([part]) if line.split(" = ")[0] not in self.row_of
+        ]
+        ahead += [
+            f"{part.fraction(tap)} = fraction[{tap.number}]"
+            for tap in part.taps
+            if part.fraction(tap) in names
+        ]
+        rows = [
+            f"{name} = flat[{self.row_of[name] * STRIDE} + m]"
+            for name in sorted(names)
+            if name in self.row_of
+        ]
+        return ahead, rows
+
+    # -- what flows ----------------------------------------------------------------------------
+
+    def _flows(self, part: PartCode) -> dict[str, dict[By, str]]:
+        """Partial derivatives of a part's states, as texts; its aliases are found on the way."""
+        graph = PartGraph(part.part)
+        self.graphs.append(graph)
+        graph.delays = {tap.number: tap.tap.delay for tap in part.taps if tap.tap.delay}
+        results = self._results(part)
+        derived = self._derived(part, f"{part.own.name}_advance", results)
+        if derived is None:
+            return {}
+        partials = self._partials(part, results, derived)
+        states = [each for each in results if each.startswith("state.")]
+        for signal in [each for each in results if each.startswith("signals.")]:
+            for state in states:
+                if results[signal] is results[state]:
+                    graph.aliases[signal.removeprefix("signals.")] = state.removeprefix("state.")
+        return {each: partials[each] for each in states if partials[each]}
+
+    def _partials(
+        self, part: PartCode, results: Mapping[str, Node], derived: Derived
+    ) -> dict[str, dict[By, str]]:
+        known, texts = self._by(part), returned(derived)
+        order = list(results)
+        found: dict[str, dict[By, str]] = {each: {} for each in order}
+        for k, (out, inp) in enumerate(derived.entries):
+            said = " | ".join(each[len(derived.outputs) + k] for each in texts)
+            found[order[out]][known[derived.inputs[inp]]] = said
+        return found
+
+    def _keep(self, graph: PartGraph, part: PartCode) -> None:
+        """Numbers of a part that the march leaves: states, inputs as they come, known signals."""
+        names = dict(leaves(part.state))
+        for path in self._states(part):
+            self._store(Stored(part.part, "state", path), names[path].value)
+        read = self.sampler.read(part)
+        for tap in part.taps:
+            for j, name in enumerate(part.tap_samples(tap)):
+                if name in read:
+                    self._store(Stored(part.part, "tap", f"{tap.input}.{j}"), name)
+        for name in part.own.input_types:
+            signal = part.own.tap(name).signal
+            if f"x_{signal}" in read and signal in self.signals:
+                self._store(Stored(part.part, "input", name), f"x_{signal}")
+        for source in self.sampler.sources:
+            if source.part == part.part:
+                stored = Stored(part.part, "signals", source.signal)
+                if source.signal in names:
+                    stored = stored._replace(kind="state")
+                self._store(stored, part.source(source))
+        for signal in self._signals(part):
+            if signal in graph.aliases and (part.part, signal) not in self.values:
+                stored = Stored(part.part, "signals", signal)
+                if stored not in self.stored:
+                    self._store(stored, f"signal {part.part} {signal}")
+
+    def _store(self, stored: Stored, name: str) -> None:
+        if stored in self.stored:
+            self.row_of[name] = self.stored.index(stored)
+            return
+        self.row_of[name] = len(self.stored)
+        self.stored.append(stored)
+
+    def _values(self, graph: PartGraph, part: PartCode) -> None:
+        """Kernel that computes signals which the march does not leave, at known states."""
+        late = []
+        for place, _ in self.observed:
+            asked = place.part == part.part and place.kind == "signals"
+            if asked and place not in self.stored and place.path not in late:
+                late.append(place.path)
+        if not late:
+            return
+        nodes = [part.signal(signal) for signal in late]
+        ahead, rows = self._arguments(part, part.code.reads(nodes))
+        inner = [*rows, *part.code.lines(nodes)]
+        for signal, node in zip(late, nodes, strict=True):
+            self.values[part.part, signal] = self.rows
+            inner.append(f"flat[{self.rows * STRIDE} + m] = {text(node)}")
+            self.rows += 1
+        graph.value_kernel = f"values_{part.own.name}"
+        self.texts[graph.value_kernel] = function_source(
+            f"{graph.value_kernel}(count, params, given, fraction, h, flat)",
+            f"Signals of {part.own.name} at known states.",
+            [*ahead, "for m in range(count):", *indented(inner)],
+        )
+
+    def _part(
+        self, graph: PartGraph, part: PartCode, partials: Mapping[str, Mapping[By, str]]
+    ) -> None:
+        results, own = self._results(part), part.own.name
+        signals = {
+            each: node
+            for each, node in results.items()
+            if each.startswith("signals.") and each.removeprefix("signals.") not in graph.aliases
+        }
+        if signals:
+            graph.signal_kernel = f"fill_{own}_signals"
+            self._fill(graph, part, graph.signal_kernel, signals)
+        states = list(partials)
+        flows = {
+            out: {f"state.{by.path}" for by in each if by.kind == "state"} & {*states}
+            for out, each in partials.items()
+        }
+        at_sample = {
+            by.path
+            for out, by in graph.entries
+            if out.startswith("signals.") and by.kind == "state"
+        } | {place.path for place, _ in self.observed if place.kind == "state"}
+        at_sample |= {s.signal for s in self.sampler.sources if s.part == part.part}
+        graph.aliases = {s: path for s, path in graph.aliases.items() if path not in at_sample}
+        for c, outs in enumerate(_weakly_connected(states, flows)):
+            name = f"{own}_{c}" if len(outs) < len(states) else own
+            self._fill(graph, part, f"fill_{name}", {each: results[each] for each in outs})
+            groups = []
+            for g, members in enumerate(_strongly_connected(outs, flows)):
+                bare = tuple(each.removeprefix("state.") for each in members)
+                elsewhere = {
+                    path
+                    for path in bare
+                    if any(f"state.{path}" in flows[out] for out in outs if out not in members)
+                }
+                after = tuple(
+                    path in graph.aliases.values() and path not in elsewhere for path in bare
+                )
+                stored = tuple(
+                    path in at_sample or path in elsewhere or behind
+                    for path, behind in zip(bare, after, strict=True)
+                )
+                group = Group(f"recur_{name}_{g}", bare, after, stored)
+                groups.append(group)
+                self.texts[group.kernel] = self._recurrence(graph, group)
+            graph.components.append(Component(f"fill_{name}", groups))
+        constants = self._constants(part)
+        if constants is not None:
+            graph.constants = [
+                (constants.results[out], constants.by[constants.derived.inputs[inp]].path)
+                for out, inp in constants.derived.entries
+            ]
+        for local in (self._start(part, rest_of(part)), self._settled(part)):
+            if local is not None:
+                graph.started |= {
+                    (local.results[out], local.by[local.derived.inputs[inp]].path)
+                    for out, inp in local.derived.entries
+                    if local.by[local.derived.inputs[inp]].kind == "p"
+                }
+
+    def _local(
+        self, part: PartCode, name: str, code: Code, results: Mapping[str, Node]
+    ) -> Local | None:
+        """Some results with their derivatives, None where they depend on nothing."""
+        nodes, known = list(results.values()), self._by(part)
+        if code is part.prologue:  # what it makes is not what it takes
+            known = {each: by for each, by in known.items() if by.kind == "p"}
+        read = code.reads(nodes)
+        arguments = sorted(each for each in read if each in known or self._plain(part, each))
+        active = tuple(each for each in arguments if each in known)
+        if not nodes or not active:
+            return None
+        function = scalar_function(name, arguments, code.lines(nodes), nodes, code.names)
+        by = {each: known[each] for each in active}
+        return Local(tuple(results), tuple(arguments), by, derive(function, active))
+
+    def _constants(self, part: PartCode) -> Local | None:
+        results = {name: ex.name(name) for name in self._constant_names(part)}
+        return self._local(part, f"{part.own.name}_constants", part.prologue, results)
+
+    def _constant_names(self, part: PartCode) -> list[str]:
+        """Constants that the part's sample or its start reads."""
+        names = dict.fromkeys(self.sampler.constants(part))
+        if "k" in part.known:
+            every = {each for _, node in leaves(part.known["k"]) for each in node.reads}
+            own = {*part.parameters}
+            for start in (rest_of(part), settled_of(part)):
+                if start is not None:
+                    nodes = [node for _, node in leaves(start.value)]
+                    read = start.code.reads(nodes)
+                    names |= dict.fromkeys(sorted((every & read) - own))
+        return list(names)
+
+    def _start(self, part: PartCode, start: Start | None) -> Local | None:
+        if start is None:
+            return None
+        found = dict(leaves(start.value))
+        results = {path: found[path] for path in self._states(part)}
+        return self._local(part, f"{part.own.name}_start", start.code, results)
+
+    def _settled(self, part: PartCode) -> Local | None:
+        return self._start(part, settled_of(part))
+
+    def _locals(self, part: PartCode) -> Locals:
+        sources = {
+            s.signal: part.signal(s.signal) for s in self.sampler.sources if s.part == part.part
+        }
+        return Locals(
+            self._by(part),
+            self._constants(part),
+            self._start(part, rest_of(part)),
+            self._settled(part),
+            self._local(part, f"{part.own.name}_sources", part.code, sources),
+        )
+
+    def _links(self) -> dict[str, dict[str, float]]:
+        """Partial derivatives of observed links: numbers, or refused."""
+        found: dict[str, dict[str, float]] = {}
+        for place, _ in self.observed:
+            if place.kind != "link":
+                continue
+            link = self.model.links[place.path]
+            assert link.equation is not None
+            derived = derive(link.equation, arguments_of(link.equation))
+            numbers = literals(derived)
+            if len(numbers) < len(derived.entries):
+                raise InputError(
+                    f"Model {self.model.name}: the link {link.name} must be a sum of signals with "
+                    "constant factors; put anything else into a part's sample."
+                )
+            found[link.name] = {
+                derived.inputs[inp]: numbers[k] for k, (_, inp) in enumerate(derived.entries)
+            }
+        return found
+
+    # -- kernels -------------------------------------------------------------------------------
+
+    def _fill(
+        self, graph: PartGraph, part: PartCode, kernel: str, results: Mapping[str, Node]
+    ) -> None:
+        """Kernel that writes partial derivatives at known states into rows of the block."""
+        derived = self._derived(part, f"{kernel.removeprefix('fill_')}_part", results)
+        inner, ahead = ["pass"], list[str]()
+        if derived is not None:
+            known, order, literal = self._by(part), list(results), literals(derived)
+            self.names.update(derived.names)
+            targets, stores = ["_"] * len(derived.outputs), []
+            for k, (out, inp) in enumerate(derived.entries):
+                key = (order[out], known[derived.inputs[inp]])
+                if k in literal:
+                    graph.entries[key] = Entry(-1, literal[k])
+                    targets.append("_")
+                    continue
+                graph.entries[key] = Entry(self.rows)
+                targets.append(f"e{k}")
+                stores.append(f"flat[{self.rows * STRIDE} + m] = e{k}")
+                self.rows += 1
+            arguments = argument_names(derived)
+            ahead, rows = self._arguments(part, arguments)
+            if stores:
+                called = f"{derived.name}({', '.join(arguments)})"
+                inner = [*rows, f"{', '.join(targets)} = {called}", *stores]
+            for name, each in derived.texts.items():
+                self.texts.setdefault(f"derived {name}", f"@inlined\n{each}")
+        self.texts[kernel] = function_source(
+            f"{kernel}(count, params, given, fraction, h, flat)",
+            "Partial derivatives at known states.",
+            [*ahead, "for m in range(count):", *indented(inner)],
+        )
+
+    def _recurrence(self, graph: PartGraph, group: Group) -> str:
+        """Kernel that runs the recurrences of a group's columns, ABREAST at a time."""
+        k = len(group.states)
+        carried = [
+            _shift_of(graph, group, i) for i in range(k)
+        ]  # index of the member that a state simply takes over, -1 otherwise
+        lines = [f"for c in range(0, columns.shape[1], {ABREAST}):"]
+        body: list[str] = []
+        for i in range(k):
+            for j in range(ABREAST):
+                body.append(f"y{i}{j} = tangent[columns[{3 * i + 2}, c + {j}]]")
+                if carried[i] < 0 or _has_direct(graph, group, group.states[i]):
+                    body.append(f"g{i}{j} = table[columns[{3 * i}, c + {j}]]")
+                if group.stored[i]:
+                    body.append(f"d{i}{j} = table[columns[{3 * i + 1}, c + {j}]]")
+        inner: list[str] = []
+        factor: dict[tuple[int, int], str] = {}
+        for i in range(k):
+            for l in range(k):
+                entry = graph.entries.get(
+                    (f"state.{group.states[i]}", By("state", group.states[l]))
+                )
+                if entry is None:
+                    continue
+                if entry.row >= 0:
+                    factor[i, l] = f"a{i}{l}"
+                    inner.append(f"a{i}{l} = flat[{entry.row * STRIDE} + m]")
+                else:
+                    factor[i, l] = "" if entry.value == 1.0 else repr(entry.value)
+        for j in range(ABREAST):
+            new = []
+            for i in range(k):
+                terms = [
+                    f"{factor[i, l]} * y{l}{j}" if factor[i, l] else f"y{l}{j}"
+                    for l in range(k)
+                    if (i, l) in factor
+                ]
+                if carried[i] < 0 or _has_direct(graph, group, group.states[i]):
+                    terms.append(f"g{i}{j}[m]")
+                # what has long been known first: the chain then waits for one product alone
+                own = [t for t in terms if t.endswith(f"y{i}{j}")]
+                rest = [t for t in terms if t not in own]
+                total = " + ".join(rest) if rest else "0.0"
+                new.append(f"{own[0]} + ({total})" if own and rest else (own or [total])[0])
+            inner += [f"n{i}{j} = {new[i]}" for i in range(k)]
+            inner += [
+                f"d{i}{j}[m] = {'n' if group.after[i] else 'y'}{i}{j}"
+                for i in range(k)
+                if group.stored[i]
+            ]
+            inner += [f"y{i}{j} = n{i}{j}" for i in range(k)]
+        body += ["for m in range(count):", *indented(inner)]
+        for i in range(k):
+            for j in range(ABREAST):
+                body.append(f"tangent[columns[{3 * i + 2}, c + {j}]] = y{i}{j}")
+        lines += indented(body)
+        return function_source(
+            f"{group.kernel}(count, columns, flat, table, tangent)",
+            f"Derivatives of {', '.join(group.states)}.",
+            lines,
+        )
+
+    def _driver(self) -> str:
+        """Kernel that marches a record block by block, with the wanted derivatives."""
+        stored = len(self.stored)
+        known = "count, params, given, fraction, h, flat"
+        lines = [
+            "worst, used, count = inf, int(plan.first[0]), 0",
+            "progress = plan.first.copy()",
+            "flat, table = room.flat, room.table",
+            "for first in range(0, records[0].size, block):",
+        ]
+        inner = [
+            "carry(room, count)",
+            "count = min(block, records[0].size - first)",
+            "met = march(records, before, whole, fraction, params, given, h, states, "
+            f"(first, first + count), table[:{stored}], room.flags)",
+            "worst = min(worst, met)",
+        ]
+        inner += [f"{graph.value_kernel}({known})" for graph in self.graphs if graph.value_kernel]
+        fills: list[str] = []
+        component = group = stage = 0
+        for graph in self.graphs:
+            for each in graph.components:
+                block = [f"{each.kernel}({known})"]
+                for recurrence in each.groups:
+                    block += [
+                        f"combine(table, program.terms[{stage}], count, table, 0)",
+                        f"{recurrence.kernel}(count, program.columns[{group}], flat, table, "
+                        "tangent)",
+                    ]
+                    group, stage = group + 1, stage + 1
+                fills += [f"if program.active[{component}]:", *indented(block)]
+                component += 1
+            if graph.signal_kernel:
+                fills += [
+                    f"if program.active[{component}]:",
+                    f"    {graph.signal_kernel}({known})",
+                ]
+                component += 1
+            fills.append(f"combine(table, program.terms[{stage}], count, table, 0)")
+            stage += 1
+        inner += ["if program.derived > 0:", *indented(fills)]
+        inner.append(
+            "used = deliver(program, plan, sink, room, progress, used, "
+            "(first, count, records[0].size), h)"
+        )
+        lines += [*indented(inner), "finish(sink, room, used)", "return worst"]
+        return function_source(
+            "march_observed(records, before, whole, fraction, params, given, h, block, states, "
+            "tangent, program, plan, sink, room)",
+            f"March {self.model.name}, and compare it with what was observed.",
+            lines,
+        )
+
+
+def scalar_function(
+    name: str,
+    arguments: Sequence[str],
+    lines: Sequence[str],
+    results: Sequence[Node],
+    names: Mapping[str, Any],
+) -> Any:
+    """An equation of scalars from straight code."""
+    returned_type = ", ".join("float" for _ in results)
+    returned_type = f"tuple[{returned_type}]" if len(results) != 1 else "float"
+    made = ", ".join(text(node) for node in results)
+    body = [*lines, f"return {made}" if len(results) == 1 else f"return ({made},)"]
+    head = f"def {name}({', '.join(f'{each}: float' for each in arguments)}) -> {returned_type}:"
+    return equation_of_text("\n".join([head, *indented(body), ""]), name, dict(names))
+
+
+def argument_names(derived: Derived) -> list[str]:
+    """Names of a derived function's arguments."""
+    tree = ast.parse(derived.source).body[0]
+    assert isinstance(tree, ast.FunctionDef)
+    return [each.arg for each in tree.args.args]
+
+
+def literals(derived: Derived) -> dict[int, float]:
+    """Partial derivatives that are the same number wherever the function returns."""
+    found, texts = {}, returned(derived)
+    for k in range(len(derived.entries)):
+        values = {each[len(derived.outputs) + k] for each in texts}
+        if len(values) == 1:
+            try:
+                found[k] = float(ast.literal_eval(values.pop()))
+            except (ValueError, SyntaxError):
+                continue
+    return found
+
+
+def returned(derived: Derived) -> list[list[str]]:
+    """Texts of what a generated function returns, for each of its returns."""
+    found = []
+    for node in ast.walk(ast.parse(derived.source)):
+        if isinstance(node, ast.Return) and node.value is not None:
+            value = node.value
+            elements = value.elts if isinstance(value, ast.Tuple) else [value]
+            found.append([ast.unparse(each) for each in elements])
+    return found
+
+
+def _weakly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> list[list[str]]:
+    """States in groups that share no derivative."""
+    group = {each: {each} for each in states}
+    for out, inputs in flows.items():
+        for inp in inputs:
+            if group[out] is not group[inp]:
+                merged = group[out] | group[inp]
+                for each in merged:
+                    group[each] = merged
+    found: list[list[str]] = []
+    for each in states:
+        members = [other for other in states if other in group[each]]
+        if members not in found:
+            found.append(members)
+    return found
+
+
+def _strongly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> list[list[str]]:
+    """States in groups that wait for each other, each group behind those that it needs."""
+    reach = {each: {each} for each in states}
+    changed = True
+    while changed:
+        changed = False
+        for out in states:
+            wider = set().union(reach[out], *(reach[inp] for inp in flows[out] if inp in reach))
+            if wider != reach[out]:
+                reach[out], changed = wider, True
+    group = {
+        each: tuple(other for other in states if other in reach[each] and each in reach[other])
+        for each in states
+    }
+    order = TopologicalSorter(
+        {
+            group[each]: {group[i] for i in flows[each] if i in group} - {group[each]}
+            for each in states
+        }
+    )
+    for each in states:
+        order.add(group[each], *({group[i] for i in flows[each] if i in group} - {group[each]}))
+    return [list(members) for members in order.static_order()]
+
+
+def _has_direct(graph: PartGraph, group: Group, state: str) -> bool:
+    """Whether anything but the states of its group moves a state."""
+    return any(
+        out == f"state.{state}" and not (by.kind == "state" and by.path in group.states)
+        for out, by in graph.entries
+    )
+
+
+def _shift_of(graph: PartGraph, group: Group, index: int) -> int:
+    """Member that a state simply takes over, -1 where it does more."""
+    state = f"state.{group.states[index]}"
+    by = [each for out, each in graph.entries if out == state]
+    if len(by) != 1 or graph.entries[state, by[0]] != Entry(-1, 1.0):
+        return -1
+    known = by[0].kind == "state" and by[0].path in group.states
+    return group.states.index(by[0].path) if known else -1

@@ -1,0 +1,678 @@
+"""Residuals of what was observed, their Jacobian and its triangular factor, for any model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.equations.fields import floats_of, value_at
+from swashplate.equations.graph import By, Entry, Graph, Group, PartGraph, graph_source
+from swashplate.equations.lowering import generating
+from swashplate.equations.model import Model, Source
+from swashplate.equations.observation import ObservedRecord, Own
+from swashplate.equations.program import leaves
+from swashplate.equations.rows import (
+    ABREAST,
+    BLOCK,
+    Indices,
+    Program,
+    Sink,
+    Terms,
+    room_for,
+)
+from swashplate.equations.run import Instance, Places, Start, check_domain, module
+from swashplate.equations.triangle import ROWS, aligned, upright
+from swashplate.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+class Slot(NamedTuple):
+    """A factor that is known only with the parameters: by a constant, or by a tap's delay."""
+
+    kind: str
+    part: int
+    first: str
+    second: str = ""
+
+
+class Term(NamedTuple):
+    """A product of one or two rows and a number."""
+
+    a: int
+    b: int
+    scale: float
+    slot: Slot | None = None
+
+
+class Reference(NamedTuple):
+    """A row that holds a derivative, but for a factor."""
+
+    row: int
+    scale: float
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A program without the numbers that depend on parameters, and the memory it needs."""
+
+    program: Program
+    slots: tuple[tuple[tuple[int, Slot], ...], ...]
+    """For each list of terms, and last for the observed ones: terms with a factor of this kind."""
+    rows: int
+    zeros: int
+    ones: int
+    tangents: int
+    """Numbers in the vector of tangents."""
+    places: Mapping[tuple[int, str, int], int]
+    """Place of a tangent by part, state and column."""
+
+
+@generating
+def layout_of(
+    graph: Any, model: Model, columns: tuple[str, ...], observed: tuple[int, ...]
+) -> Layout:
+    """What to do in every block for some columns.
+
+    Parameters
+    ----------
+    graph : Graph
+        Structure of the model.
+    model : Model
+        The model.
+    columns : tuple of str
+        Paths of parameters, and ``start.`` with the path of a state.
+    observed : tuple of int
+        For each observation, which of the graph's observed signals it is.
+    """
+    return _Planner(graph, model, columns).layout(observed)
+
+
+class _Planner:
+    def __init__(self, graph: Graph, model: Model, columns: tuple[str, ...]) -> None:
+        self.graph, self.model, self.columns = graph, model, columns
+        self.zeros, self.ones, self.idle = graph.rows, graph.rows + 1, graph.rows + 2
+        self.rows = graph.rows + 3
+        self.tangents = 1  # the first belongs to idle columns
+        self.places: dict[tuple[int, str, int], int] = {}
+        self.references: dict[tuple[str, int, str], dict[int, Reference]] = {}
+        self.stages: list[list[tuple[int, list[Term]]]] = []
+        self.columns_of: list[Indices] = []
+        self.active: list[bool] = []
+        self.linked = set(graph.sources)
+
+    def layout(self, observed: tuple[int, ...]) -> Layout:
+        for part in self.graph.parts:
+            by_result = _by_result(part)
+            for component in part.components:
+                groups = [self._group(part, group, by_result) for group in component.groups]
+                self.active.append(any(groups))
+            if part.signal_kernel:
+                self.active.append(bool(self.columns))
+            self._signals(part, by_result)
+        width = len(self.columns) + 2
+        seen: list[tuple[int, list[Term]]] = []
+        for r, number in enumerate(observed):
+            seen += [(r * width + c, self._observed(number, c)) for c in range(len(self.columns))]
+        made = [_terms(stage) for stage in [*self.stages, seen]]
+        program = Program(
+            len(self.columns),
+            np.array(self.active, dtype=np.bool_),
+            tuple(terms for terms, _ in made[:-1]),
+            tuple(self.columns_of),
+            made[-1][0],
+            np.array([self._value_row(number) for number in observed], dtype=np.int64),
+            np.array([self.graph.observed[number][1] for number in observed], dtype=np.bool_),
+        )
+        slots = tuple(slots for _, slots in made)
+        return Layout(program, slots, self.rows, self.zeros, self.ones, self.tangents, self.places)
+
+    def _row(self) -> int:
+        self.rows += 1
+        return self.rows - 1
+
+    def _prefix(self, part: int) -> str:
+        return f"{self.model.parts[part].name}." if len(self.model.parts) > 1 else ""
+
+    def _terms(
+        self, part: PartGraph, entries: Mapping[By, Entry], c: int, within: Sequence[str] = ()
+    ) -> Iterator[Term]:
+        """What moves a result with a column, apart from the states of its own group."""
+        prefix, column = self._prefix(part.part), self.columns[c]
+        name = column.removeprefix(prefix) if column.startswith(prefix) else ""
+        for by, entry in entries.items():
+            row, scale = (entry.row, 1.0) if entry.row >= 0 else (self.ones, entry.value)
+            if by.kind == "p":
+                if by.path == name:
+                    yield Term(row, -1, scale)
+            elif by.kind == "k":
+                if (by.path, name) in part.constants:
+                    yield Term(row, -1, scale, Slot("k", part.part, by.path, name))
+            elif by.kind == "tap":
+                if part.delays[int(by.path)] == name:
+                    yield Term(row, -1, scale, Slot("tap", part.part, by.path))
+            elif by.kind == "signal":
+                yield from self._through(entry, ("signal", by.part, by.path), c)
+            elif by.path not in within:
+                yield from self._through(entry, ("state", part.part, by.path), c)
+
+    def _through(self, entry: Entry, node: tuple[str, int, str], c: int) -> Iterator[Term]:
+        """A known derivative, multiplied by a partial one."""
+        found = self.references.get(node, {}).get(c)
+        if found is None:
+            return
+        if entry.row < 0:
+            yield Term(found.row, -1, entry.value * found.scale)
+        else:
+            yield Term(entry.row, found.row, found.scale)
+
+    def _made(
+        self, stage: list[tuple[int, list[Term]]], terms: list[Term], whole: bool = False
+    ) -> Reference | None:
+        """Row that holds a sum of terms: one that is there already, or a new one.
+
+        With `whole` the row needs no factor any more.
+        """
+        if not terms:
+            return None
+        only = terms[0]
+        alone = len(terms) == 1 and only.b < 0 and only.slot is None
+        if alone and (not whole or only.scale == 1.0):
+            return Reference(only.a, only.scale)
+        row = self._row()
+        stage.append((row, terms))
+        return Reference(row, 1.0)
+
+    def _group(
+        self, part: PartGraph, group: Group, by_result: Mapping[str, Mapping[By, Entry]]
+    ) -> bool:
+        """Columns of a recurrence, and rows that they need."""
+        stage: list[tuple[int, list[Term]]] = []
+        self.stages.append(stage)
+        found: list[list[tuple[int, int, int]]] = []
+        prefix = self._prefix(part.part)
+        for c, column in enumerate(self.columns):
+            terms = [
+                list(self._terms(part, by_result.get(f"state.{path}", {}), c, group.states))
+                for path in group.states
+            ]
+            own = column.removeprefix(prefix) if column.startswith(prefix) else ""
+            starts = any(
+                path in started_by(self.model, part.part, column) or (path, own) in part.started
+                for path in group.states
+            )
+            if not (any(terms) or starts):
+                continue
+            each = []
+            for i, path in enumerate(group.states):
+                result = self._row() if group.stored[i] else self.idle
+                made = self._made(stage, terms[i], whole=True)
+                place = self.tangents
+                self.tangents += 1
+                self.places[part.part, path, c] = place
+                each.append((made.row if made else self.zeros, result, place))
+                if group.stored[i]:
+                    rows = self.references.setdefault(("state", part.part, path), {})
+                    rows[c] = Reference(result, 1.0)
+            found.append(each)
+        some = bool(found)
+        found += [[(self.zeros, self.idle, 0)] * len(group.states)] * (-len(found) % ABREAST)
+        columns = np.zeros((3 * len(group.states), len(found)), dtype=np.int64)
+        for c, each in enumerate(found):
+            for i, numbers in enumerate(each):
+                columns[3 * i : 3 * i + 3, c] = numbers
+        self.columns_of.append(columns)
+        return some
+
+    def _signals(self, part: PartGraph, by_result: Mapping[str, Mapping[By, Entry]]) -> None:
+        """Derivatives of the signals of a part that others need."""
+        stage: list[tuple[int, list[Term]]] = []
+        self.stages.append(stage)
+        for signal, path in part.aliases.items():
+            rows = self.references.get(("state", part.part, path), {})
+            self.references["signal", part.part, signal] = rows
+        for source in self.linked:
+            node = ("signal", source.part, source.signal)
+            if source.part != part.part or node in self.references:
+                continue
+            entries = by_result.get(f"signals.{source.signal}")
+            if entries is None:
+                rows = self.references.get(("state", source.part, source.signal), {})
+                self.references[node] = rows
+                continue
+            found = self.references.setdefault(node, {})
+            for c in range(len(self.columns)):
+                made = self._made(stage, list(self._terms(part, entries, c)))
+                if made is not None:
+                    found[c] = made
+
+    def _observed(self, number: int, c: int) -> list[Term]:
+        """What an observed signal's derivative by a column is."""
+        place, _ = self.graph.observed[number]
+        if place.kind == "link":
+            terms = []
+            for source in self.model.links[place.path].sources:
+                known = self.references.get(("signal", *source), {}).get(c)
+                factor = self.graph.links[place.path].get(source.signal, 0.0)
+                if known is not None and factor != 0.0:
+                    terms.append(Term(known.row, -1, factor * known.scale))
+            return terms
+        kind = "state" if place.kind == "state" else "signal"
+        node = (kind, place.part, place.path)
+        if node in self.references:
+            known = self.references[node].get(c)
+            return [] if known is None else [Term(known.row, -1, known.scale)]
+        part = next(each for each in self.graph.parts if each.part == place.part)
+        return list(self._terms(part, _by_result(part).get(f"signals.{place.path}", {}), c))
+
+    def _value_row(self, number: int) -> int:
+        place, _ = self.graph.observed[number]
+        if place in self.graph.stored:
+            return self.graph.stored.index(place)
+        return self.graph.values[place.part, place.path]
+
+
+def _by_result(part: PartGraph) -> dict[str, dict[By, Entry]]:
+    found: dict[str, dict[By, Entry]] = {}
+    for (out, by), entry in part.entries.items():
+        found.setdefault(out, {})[by] = entry
+    return found
+
+
+def _terms(
+    stage: Sequence[tuple[int, list[Term]]],
+) -> tuple[Terms, tuple[tuple[int, Slot], ...]]:
+    flat = [term for _, terms in stage for term in terms]
+    made = Terms(
+        np.array([target for target, _ in stage], dtype=np.int64),
+        np.cumsum([0, *(len(terms) for _, terms in stage)]).astype(np.int64),
+        np.array([term.a for term in flat], dtype=np.int64),
+        np.array([term.b for term in flat], dtype=np.int64),
+        np.array([term.scale for term in flat], dtype=np.float64),
+    )
+    return made, tuple((k, term.slot) for k, term in enumerate(flat) if term.slot is not None)
+
+
+# --- numbers --------------------------------------------------------------------------------------
+
+
+@generating
+def graph_of(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], observed: tuple[str, ...]
+) -> tuple[Graph, Callable[..., float]]:
+    """A model's structure, and its compiled march with derivatives."""
+    text, names, graph = graph_source(model, signals, options, observed)
+    return graph, module(f"{model.name}_jacobian", text, names)["march_observed"]
+
+
+Slopes = dict[str, float]
+"""Derivatives by the paths of columns."""
+
+
+class StartSlopes(NamedTuple):
+    """Derivatives at the start, of all parts."""
+
+    constants: dict[Slot, float]
+    """Of constants by parameters."""
+    states: dict[tuple[int, str], Slopes]
+    """Of states by parameters, by part and path."""
+
+
+@generating
+def rest_slopes(graph: Graph, instance: Instance, h: float) -> StartSlopes:
+    """Derivatives of a start at rest, which depends on no record."""
+    return start_slopes(graph, instance, dict.fromkeys(graph.signals, 0.0), h, "rest")
+
+
+def start_slopes(
+    graph: Graph, instance: Instance, first: Mapping[str, float], h: float, start: Start
+) -> StartSlopes:
+    """Derivatives of the state at the start by all parameters.
+
+    Parameters
+    ----------
+    first : mapping of str to float
+        External signals as they were before the first sample.
+    """
+    model = instance.model
+    several = len(model.parts) > 1
+    constants: dict[Slot, float] = {}
+    states: dict[tuple[int, str], Slopes] = {}
+    signals: dict[tuple[int, str], tuple[float, Slopes]] = {}
+    for code, local in zip(graph.codes, graph.locals, strict=True):
+        i, own = code.part, instance.parts[code.part]
+        prefix = f"{model.parts[i].name}." if several else ""
+        values: dict[str, float] = {"h": h}
+        values |= {node.value: value_at(own.p, path) for path, node in leaves(code.p)}
+        values |= {node.value: value_at(own.given, path) for path, node in leaves(code.given)}
+        for tap in code.taps:
+            values |= dict.fromkeys(code.tap_samples(tap), first.get(tap.tap.signal, 0.0))
+            values[code.fraction(tap)] = 0.0
+        values |= {f"x_{name}": value for name, value in first.items()}
+        for (part, name), (value, _) in signals.items():
+            values[code.source(Source(part, name))] = value
+        by_constant: dict[str, Slopes] = {}
+        if local.constants is not None:
+            found, slopes = local.constants.at(values)
+            values |= found
+            for name, by in slopes.items():
+                by_constant[name] = {f"{prefix}{b.path}": s for b, s in by.items()}
+                constants |= {Slot("k", i, name, b.path): s for b, s in by.items()}
+
+        def total(
+            by: Mapping[By, float],
+            i: int = i,
+            prefix: str = prefix,
+            by_constant: Mapping[str, Slopes] = by_constant,
+            known_states: Mapping[tuple[int, str], Slopes] = states,
+        ) -> Slopes:
+            """Derivatives by parameters, through constants, states and signals."""
+            made: Slopes = {}
+            for each, slope in by.items():
+                inner: Slopes = {}
+                if each.kind == "p":
+                    inner = {f"{prefix}{each.path}": 1.0}
+                elif each.kind == "k":
+                    inner = by_constant.get(each.path, {})
+                elif each.kind == "state":
+                    inner = known_states.get((i, each.path), {})
+                elif each.kind == "signal":
+                    inner = signals[each.part, each.path][1]
+                for column, factor in inner.items():
+                    made[column] = made.get(column, 0.0) + slope * factor
+            return made
+
+        began = local.rest if start == "rest" else local.settled
+        if began is not None:
+            found, slopes = began.at(values)
+            states.update({(i, path): total(by) for path, by in slopes.items()})
+        asked = [source.signal for source in graph.sources if source.part == i]
+        if asked and local.sources is None:  # they depend on nothing that is differentiated by
+            known = instance.start(first, h, start).arguments[i]
+            for name in asked:
+                signals[i, name] = float(value_at(known.get("signals", known["state"]), name)), {}
+        elif asked and local.sources is not None:
+            state = instance.start(first, h, start).states[i]
+            values |= {node.value: value_at(state, path) for path, node in leaves(code.state)}
+            found, slopes = local.sources.at(values)
+            for name, by in slopes.items():
+                signals[i, name] = found[name], total(by)
+    return StartSlopes(constants, states)
+
+
+def tangents_of(
+    layout: Layout, slopes: StartSlopes, model: Model, columns: Sequence[str], own: Iterable[str]
+) -> Array:
+    """Derivatives of the states at the first sample, in their places.
+
+    Parameters
+    ----------
+    own : iterable of str
+        Paths of states that the run starts from as its own unknowns: nothing else moves them.
+    """
+    tangent = np.zeros(layout.tangents)
+    several = len(model.parts) > 1
+    free = set(own)
+    for (part, path, c), at in layout.places.items():
+        full = f"{model.parts[part].name}.{path}" if several else path
+        if full in free:
+            tangent[at] = 1.0 if path in started_by(model, part, columns[c]) else 0.0
+        else:
+            tangent[at] = slopes.states.get((part, path), {}).get(columns[c], 0.0)
+    return tangent
+
+
+def started_by(model: Model, part: int, column: str) -> tuple[str, ...]:
+    """Paths of a part's states that a column such as ``start.pump.pressure`` sets."""
+    prefix = f"start.{model.parts[part].name}." if len(model.parts) > 1 else "start."
+    if not column.startswith(prefix):
+        return ()
+    name = column.removeprefix(prefix)
+    return model.parts[part].free_start.get(name, (name,))
+
+
+# --- what a fit asks for --------------------------------------------------------------------------
+
+
+class Jacobian(NamedTuple):
+    """Weighted residuals and their derivatives."""
+
+    names: tuple[str, ...]
+    """Columns: those asked for, then the observations' own unknowns."""
+    rows: Array
+    """(k + 1, m): the columns one after the other, each over all m samples, residuals last."""
+    squares: Array
+    """Sum of squared residuals of each observation."""
+
+    @property
+    def columns(self) -> Array:
+        """(m, k) derivatives of the residuals, a view. [weighted signal/...]"""
+        return np.asarray(self.rows[:-1].T)
+
+    @property
+    def residuals(self) -> Array:
+        """(m,) weight · (simulated - measured), a view."""
+        return np.asarray(self.rows[-1])
+
+
+class Triangle(NamedTuple):
+    """The same problem in k + 1 rows."""
+
+    names: tuple[str, ...]
+    """Columns, as in `Jacobian`."""
+    factor: Array
+    """(k + 1, k + 1) upper triangle R of [J r], with RᵀR = [J r]ᵀ[J r]; no diagonal element is
+    negative."""
+    squares: Array
+    """Sum of squared residuals of each observation."""
+
+
+NOTHING_OWN = Own()
+
+
+def residuals(
+    instance: Instance, observed: ObservedRecord, own: Own = NOTHING_OWN, *, block: int = BLOCK
+) -> Array:
+    """Weighted residuals of all observations, one after the other.
+
+    Parameters
+    ----------
+    instance : Instance
+        The model with its numbers.
+    observed : ObservedRecord
+        The record, and what was measured under it.
+    own : Own
+        Values of the experiment's own unknowns.
+    block : int
+        Samples marched at a time, 2 to 512.
+
+    Returns
+    -------
+    (m,) array
+        weight · (simulated - measured) in the signals' SI units; 0 where the weight is.
+
+    Raises
+    ------
+    DomainError
+        If the model leaves its domain.
+    InputError
+        If the own unknowns do not fit.
+    """
+    sink = _all_rows(np.empty((1, observed.rows)), 0, (), observed)
+    _march(instance, observed, own, (), sink, block)
+    return np.asarray(sink.rows[0])
+
+
+def jacobian(
+    instance: Instance,
+    observed: ObservedRecord,
+    columns: Sequence[str],
+    own: Own = NOTHING_OWN,
+    *,
+    moved: Sequence[bool] | None = None,
+    out: Array | None = None,
+    block: int = BLOCK,
+) -> Jacobian:
+    """The same residuals with their exact derivatives.
+
+    Parameters
+    ----------
+    instance, observed, own, block :
+        As in `residuals`.
+    columns : sequence of str
+        Paths of parameters, and ``start.`` with the path of a state.
+    moved : sequence of bool, optional
+        Whether the record may depend on a column at all; the others give zeros.
+    out : (k + 1, m) array, optional
+        Where to write; the `rows` of an earlier call, for example. New memory takes longer to get
+        than the whole march.
+    """
+    count = len(columns)
+    places = np.flatnonzero(np.ones(count, dtype=bool) if moved is None else np.asarray(moved))
+    k = count + len(observed.own_columns)
+    shape = (k + 1, observed.rows)
+    if out is None:
+        out = np.empty(shape)
+    elif out.shape != shape or out.dtype != np.float64 or not out.flags.carray:
+        raise InputError(f"out must be a plain array of floats of shape {shape}.")
+    out[np.setdiff1d(np.arange(count), places)] = 0.0
+    sink = _all_rows(out, count, places, observed)
+    _march(instance, observed, own, tuple(columns[int(c)] for c in places), sink, block, count)
+    return Jacobian((*columns, *observed.own_columns), out, sink.squares)
+
+
+def triangle(
+    instance: Instance,
+    observed: ObservedRecord,
+    columns: Sequence[str],
+    own: Own = NOTHING_OWN,
+    *,
+    moved: Sequence[bool] | None = None,
+    block: int = BLOCK,
+) -> Triangle:
+    """Triangular factor of [J r]; arguments as in `jacobian`, which is never held.
+
+    Memory does not grow with the record, apart from the record and the observations themselves.
+    """
+    count = len(columns)
+    to = np.flatnonzero(np.ones(count, dtype=bool) if moved is None else np.asarray(moved))
+    derived, own_count = to.size, len(observed.own_columns)
+    size = derived + own_count + 1
+    sink = Sink(
+        rows=aligned(size, ROWS),
+        to=np.arange(derived),
+        own=derived + np.arange(own_count),
+        factor=np.zeros((size, size)),
+        squares=np.zeros(len(observed.observations)),
+    )
+    _march(instance, observed, own, tuple(columns[int(c)] for c in to), sink, block)
+    names = (*columns, *observed.own_columns)
+    places = np.concatenate([to, np.arange(count, len(names) + 1)])
+    factor = np.zeros((len(names) + 1, len(names) + 1))
+    factor[np.ix_(places, places)] = sink.factor
+    return Triangle(names, upright(factor), sink.squares)
+
+
+def _all_rows(rows: Array, count: int, to: ArrayLike, observed: ObservedRecord) -> Sink:
+    """A sink that keeps all rows."""
+    return Sink(
+        rows=rows,
+        to=np.asarray(to, dtype=np.int64),
+        own=np.arange(count, rows.shape[0] - 1),
+        factor=np.zeros((0, 0)),
+        squares=np.zeros(len(observed.observations)),
+    )
+
+
+def _march(
+    instance: Instance,
+    observed: ObservedRecord,
+    own: Own,
+    columns: tuple[str, ...],
+    sink: Sink,
+    block: int,
+    first_own: int | None = None,
+) -> None:
+    """March, and fill the sink."""
+    if not 2 <= block <= BLOCK:
+        raise InputError(f"block is {block}, but must be 2 to {BLOCK} samples.")
+    records, h = observed.records, observed.record.step
+    signals, seen = tuple(records), tuple(dict.fromkeys(o.signal for o in observed.observations))
+    graph, kernel = graph_of(instance.model, signals, instance.options, seen)
+    layout = layout_of(
+        graph,
+        instance.model,
+        columns,
+        tuple(seen.index(each.signal) for each in observed.observations),
+    )
+    first = {name: float(values[0]) for name, values in records.items()}
+    started = instance.start(first, h, observed.start)
+    missing = [c for c in columns if c.startswith("start.") and c[6:] not in own.start]
+    if missing:
+        raise InputError(f"{missing[0]} is a column, so Own needs a value of it.")
+    states = started.flat
+    paths = state_paths(instance.model)
+    for path, value in own.start.items():
+        if path not in paths:
+            raise InputError(f"There is no state '{path}' to start from; {', '.join(paths)}.")
+        states[paths.index(path)] = value
+    before = tuple(started.before[name] for name in signals)
+    if observed.start == "rest":
+        slopes = rest_slopes(graph, instance, h)
+    else:
+        slopes = start_slopes(graph, instance, first, h, observed.start)
+    tangent = tangents_of(layout, slopes, instance.model, columns, own.start)
+    places = instance.places(signals, h)
+    plan = observed.plan(own, len(columns) if first_own is None else first_own)
+    program = _with_numbers(layout, slopes.constants, places)
+    worst = kernel(
+        tuple(records.values()),
+        before,
+        places.whole,
+        places.fraction,
+        instance.params,
+        instance.given,
+        h,
+        block,
+        states,
+        tangent,
+        program,
+        plan,
+        sink,
+        room_for(layout.rows, layout.zeros, layout.ones, len(columns), plan),
+    )
+    check_domain(instance, states, worst, observed.driven_by)
+
+
+def _with_numbers(layout: Layout, constants: Mapping[Slot, float], places: Places) -> Program:
+    """The program with the factors that depend on parameters."""
+    program = layout.program
+
+    def scaled(terms: Terms, slots: Sequence[tuple[int, Slot]]) -> Terms:
+        if not slots:
+            return terms
+        scale = terms.scale.copy()
+        for at, slot in slots:
+            tap = slot.kind == "tap"
+            scale[at] *= places.slope[int(slot.first)] if tap else constants[slot]
+        return terms._replace(scale=scale)
+
+    made = [
+        scaled(terms, slots)
+        for terms, slots in zip((*program.terms, program.seen), layout.slots, strict=True)
+    ]
+    return program._replace(terms=tuple(made[:-1]), seen=made[-1])
+
+
+def state_paths(model: Model) -> list[str]:
+    """Paths of all states, in the order of the flat array."""
+    several = len(model.parts) > 1
+    return [
+        f"{part.name}.{path}" if several else path
+        for part in model.parts
+        for path in floats_of(part.state)
+    ]

@@ -1,0 +1,726 @@
+"""Marches: one model over its inputs, a sample after the other, for one set or many at once.
+
+Every march is generated as readable source in which the model's equations stand as straight code
+over scalars (`scalars`). `PartCode` has one sample of a part, and the functions below wrap it as
+
+- `march_source`: the plain march over whole records,
+- `observe_source`: signals at states that are known already,
+- `advance_source`: one sample, for steppers and for kernels that close loops.
+
+Many sets side by side are in `lanes`.
+
+Arithmetic is strict and in the order of the equations, so that all of them give the same bits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple, get_type_hints
+
+from swashplate.equations import expressions as ex
+from swashplate.equations.equation import inlined
+from swashplate.equations.expressions import Node
+from swashplate.equations.fields import floats_of
+from swashplate.equations.model import Equation, Link, Model, Source, Tap, arguments_of, plain
+from swashplate.equations.program import Flag, Tuple, Value, leaves, rebuilt
+from swashplate.equations.scalars import Code, text
+from swashplate.equations.windows import Window, linear, mean_over_sample, previous
+from swashplate.errors import InputError
+
+HOLDS: dict[str, Equation] = {
+    "linear": linear,
+    "previous": previous,
+    "mean": mean_over_sample,
+}
+
+
+_OWN = """
+n m j c lane first last worst h half value error total count span met used progress values lines
+whole fraction params given constants states out flags records before measured weight outputs flat
+table kept tangent columns program plan sink room block machine volts current speed voltage
+target counts
+"""
+RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
+"""Names that the kernels use themselves."""
+
+
+@inlined
+def sample_at(record: Any, index: int, before: float) -> float:
+    """Sample of a record, or what it was before the record began."""
+    return record[index] if index >= 0 else before
+
+
+class Stored(NamedTuple):
+    """A number of a part that is kept."""
+
+    part: int
+    kind: str
+    """``signals``, ``state``, ``limits``, ``input``, ``link``, or ``tap`` for a tap's sample."""
+    path: str = ""
+    """Of the number; name of the input or link; input and number of a tap's sample, ``at.0``."""
+
+
+class TapOf(NamedTuple):
+    """A tap of a part, with the number of its place among all taps of the model."""
+
+    part: int
+    input: str
+    number: int
+    tap: Tap
+
+
+def taps_of(model: Model, signals: Sequence[str]) -> list[TapOf]:
+    """All taps on signals that are given as records, numbered."""
+    found: list[TapOf] = []
+    for i, part in enumerate(model.parts):
+        for name in part.input_types:
+            tap = part.tap(name)
+            outside = model.link_of(i, name) is None and tap.signal in signals
+            if outside and part.looked_at(name):
+                found.append(TapOf(i, name, len(found), tap))
+    return found
+
+
+class PartCode:
+    """One sample of a part as straight code.
+
+    Parameters
+    ----------
+    model : Model
+        The whole model.
+    part : int
+        Number of the part.
+    signals : sequence of str
+        External signals that are given as records; for the others the default parameter counts.
+    options : object
+        Options of the part.
+    taken : set of str
+        Names that are in use already.
+    ruled : bool
+        Whether equations with declared derivatives stay calls, as differentiation needs it.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        part: int,
+        signals: Sequence[str],
+        options: Any,
+        taken: set[str] | None = None,
+        *,
+        ruled: bool = False,
+    ) -> None:
+        self.model, self.part, self.own = model, part, model.parts[part]
+        self.records, self.options = tuple(signals), options
+        self.prologue, self.code = Code(ruled=ruled), Code(ruled=ruled)
+        if taken is not None:
+            self.prologue.taken = taken
+        self.code.taken = self.prologue.taken
+        self.prefix = f"{self.own.name}_" if len(model.parts) > 1 else ""
+        self.code.taken.add("h")
+        self.taps = [each for each in taps_of(model, signals) if each.part == part]
+        for tap in self.taps:
+            self.code.taken |= {*self.tap_samples(tap), self.fraction(tap), self.whole(tap)}
+        self.p = self._names(self.own.parameters, "p")
+        self.given = self._names(self.own.given, "given") if self.own.given else Tuple(None, ())
+        self.state = self._names(self.own.state, "s")
+        self.known: dict[str, Value] = {"p": self.p, "h": ex.name("h"), "given": self.given}
+        self.known["state"] = self.state
+        if self.own.constants is not None:
+            self.known["k"] = self._call(self.prologue, self.own.constants)
+        self.inputs: dict[str, Value] = {}
+        for name in self.own.input_types:
+            self.inputs[name] = self._input(name)
+        self.known |= self.inputs
+        self.entry = list(self.code.items)
+        """Items that make the inputs; a start needs them, too."""
+        if self.own.inputs is not None:
+            self.known["inputs"] = Tuple(self.own.inputs, tuple(self.inputs.values()))
+        if self.own.sample is not None:
+            self.known["signals"] = self._call(self.code, self.own.sample)
+        self.following = self._call(self.code, self.own.step)
+
+    def _names(self, kind: Any, letter: str) -> Value:
+        hints = get_type_hints(kind)
+
+        def made(kind: Any, hints: Mapping[str, Any], path: str) -> Value:
+            items: list[Value] = []
+            for name in kind._fields:
+                inner = hints[name]
+                below = f"{path}{name}"
+                if isinstance(inner, type) and hasattr(inner, "_fields"):
+                    items.append(made(inner, get_type_hints(inner), f"{below}_"))
+                else:
+                    taken = self.code.fresh(f"{letter}_{self.prefix}{below}")
+                    items.append(ex.name(taken))
+            return Tuple(kind, tuple(items))
+
+        return made(kind, hints, "")
+
+    def _call(self, code: Code, equation: Equation, **more: Value) -> Value:
+        return self.call(code, equation, {**self.known, **more})
+
+    def call(self, code: Code, equation: Equation, known: Mapping[str, Value]) -> Value:
+        """Append a call of one of the part's equations, of what is known by argument."""
+        names = arguments_of(equation)
+        given = {name: known[name] for name in names if name in known}
+        options: dict[str, Any] = {}
+        if "options" in names:
+            options["options"] = self.options
+            given["options"] = Flag(None)
+        lengths = {}
+        for each in self.own.input_types:
+            if self.own.tap(each).width:
+                for start in (each, f"inputs.{each}"):
+                    lengths[f"{start}.s"] = self.own.tap(each).width
+        lengths["window.s"] = 3 if plain(equation) is plain(mean_over_sample) else 2
+        return code.called(equation, given, options, lengths)
+
+    def _input(self, name: str) -> Value:
+        """An input as a name, a window of names, or what a hold makes of one."""
+        link = self.model.link_of(self.part, name)
+        if link is not None:
+            return self.linked(link)
+        tap = self.own.tap(name)
+        found = next((each for each in self.taps if each.input == name), None)
+        if found is None:
+            if tap.signal in self.records:
+                return ex.name(f"x_{tap.signal}")
+            if name not in self.own.defaults:
+                # refused where the model is given its numbers; a constant keeps the code whole
+                return ex.ZERO
+            return value_of(self.p, self.own.defaults[name])
+        samples = [ex.name(each) for each in self.tap_samples(found)]
+        fraction = ex.name(self.fraction(found))
+        window = Tuple(Window, (Tuple(None, tuple(samples)), fraction))
+        if tap.width:
+            return window
+        return self._call(self.code, HOLDS[tap.hold], window=window)
+
+    def linked(self, link: Link) -> Node:
+        """A signal between parts, from the names of its sources."""
+        sources = {each.signal: ex.name(self.source(each)) for each in link.sources}
+        if link.equation is None:
+            return next(iter(sources.values()))
+        made = self.code.called(link.equation, sources)
+        assert isinstance(made, Node)
+        return made
+
+    def source(self, source: Source) -> str:
+        """Name of a signal that another part needs."""
+        return f"x_{self.model.parts[source.part].name}_{source.signal.replace('.', '_')}"
+
+    def tap_samples(self, tap: TapOf) -> list[str]:
+        """Names of a tap's samples, newest first."""
+        return [f"{self.prefix}{tap.input}_{j}" for j in range(tap.tap.samples)]
+
+    def fraction(self, tap: TapOf) -> str:
+        """Name of the rest of a tap's place."""
+        return f"{self.prefix}{tap.input}_f"
+
+    def whole(self, tap: TapOf) -> str:
+        """Name of the whole samples of a tap's place."""
+        return f"{self.prefix}{tap.input}_whole"
+
+    @cached_property
+    def margin(self) -> Node | None:
+        """Margin of the domain."""
+        if self.own.domain is None:
+            return None
+        made = self._call(self.code, self.own.domain)
+        assert isinstance(made, Node)
+        return made
+
+    @cached_property
+    def limits(self) -> list[Node]:
+        """The limits, in their order."""
+        if self.own.limits is None:
+            return []
+        return [node for _, node in leaves(self._call(self.code, self.own.limits))]
+
+    def signal(self, path: str) -> Node:
+        """A signal, or a number of the state, by its path."""
+        if "signals" in self.known and path in dict(leaves(self.known["signals"])):
+            return dict(leaves(self.known["signals"]))[path]
+        return dict(leaves(self.state))[path]
+
+    def node(self, stored: Stored) -> Node:
+        """A number that is kept."""
+        if stored.kind == "tap":
+            name, number = stored.path.split(".")
+            tap = next(each for each in self.taps if each.input == name)
+            return ex.name(self.tap_samples(tap)[int(number)])
+        if stored.kind == "input":
+            made = self.inputs[stored.path]
+            assert isinstance(made, Node)
+            return made
+        if stored.kind == "state":
+            return dict(leaves(self.state))[stored.path]
+        return self.signal(stored.path)
+
+    @cached_property
+    def parameters(self) -> dict[str, str]:
+        """Path of each parameter by the name that stands for it."""
+        return {node.value: path for path, node in leaves(self.p)}
+
+
+def value_of(value: Value, path: str) -> Node:
+    """What lies at a path."""
+    return dict(leaves(value))[path]
+
+
+class Numbers:
+    """Where a model's parameters, givens and states lie in flat arrays."""
+
+    def __init__(self, model: Model) -> None:
+        self.parameters = [
+            (i, path) for i, part in enumerate(model.parts) for path in floats_of(part.parameters)
+        ]
+        self.given = [
+            (i, path)
+            for i, part in enumerate(model.parts)
+            if part.given is not None
+            for path in floats_of(part.given)
+        ]
+        self.states = [
+            (i, path) for i, part in enumerate(model.parts) for path in floats_of(part.state)
+        ]
+
+
+class Sampler:
+    """One sample of a whole model: the code of its parts, and what of it is needed.
+
+    Parameters
+    ----------
+    model, signals, options :
+        As of `PartCode`; options of each part.
+    wanted : sequence of Stored
+        Numbers that are kept at every sample; parts that none of them needs are left out.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        signals: Sequence[str],
+        options: Sequence[Any],
+        wanted: Sequence[Stored],
+        *,
+        ruled: bool = False,
+    ) -> None:
+        self.model, self.signals = model, tuple(signals)
+        taken = {*RESERVED, *self.signals, *(f"{each}_before" for each in self.signals)}
+        self.parts = [
+            PartCode(model, i, signals, options[i], taken, ruled=ruled)
+            for i in range(len(model.parts))
+        ]
+        self.numbers = Numbers(model)
+        self.wanted = tuple(wanted)
+        self.ends: list[list[Node]] = [[] for _ in self.parts]
+        """Results of each part that are needed."""
+        self.carried: list[list[str]] = [[] for _ in self.parts]
+        """Paths of the states that are needed."""
+        self.sources: dict[Source, Node] = {}
+        self._settle()
+
+    def _settle(self) -> None:
+        """Find out what is needed: what is kept, what it follows from, and their margins."""
+        for part in self.parts:
+            for each in self.wanted:
+                if each.part == part.part and each.kind not in ("link", "limits"):
+                    self.ends[part.part].append(part.node(each))
+                if each.part == part.part and each.kind == "limits":
+                    self.ends[part.part] += part.limits
+        for each in self.wanted:
+            if each.kind == "link":
+                self._need(self.model.links[each.path].sources)
+        for i in range(len(self.parts) - 1, -1, -1):
+            part = self.parts[i]
+            if not self.ends[i]:
+                continue
+            if part.margin is not None:
+                self.ends[i].append(part.margin)
+            state, following = dict(leaves(part.state)), dict(leaves(part.following))
+            name_of = {node.value: path for path, node in state.items()}
+            while True:
+                read = part.code.reads(self.ends[i])
+                new = [
+                    path
+                    for name, path in name_of.items()
+                    if name in read and path not in self.carried[i]
+                ]
+                if not new:
+                    break
+                self.carried[i] += new
+                self.ends[i] += [following[path] for path in new]
+            self.carried[i] = [path for path in state if path in self.carried[i]]
+            for name in part.own.input_types:
+                link = self.model.link_of(i, name)
+                if link is not None and any(part.source(s) in read for s in link.sources):
+                    self._need(link.sources)
+
+    def _need(self, sources: Iterable[Source]) -> None:
+        for source in sources:
+            if source not in self.sources:
+                node = self.parts[source.part].signal(source.signal)
+                self.sources[source] = node
+                self.ends[source.part].append(node)
+
+    @property
+    def names(self) -> dict[str, Any]:
+        """What the text refers to."""
+        found: dict[str, Any] = {"sample_at": sample_at}
+        for part in self.parts:
+            found |= part.code.names | part.prologue.names
+        return found
+
+    def used(self) -> list[PartCode]:
+        """Parts that are needed."""
+        return [part for part in self.parts if self.ends[part.part]]
+
+    def read(self, part: PartCode) -> set[str]:
+        """Names from outside that a part needs."""
+        return part.code.reads(self.ends[part.part])
+
+    def ahead(self, parts: Iterable[PartCode] | None = None) -> list[str]:
+        """Lines ahead of a loop: parameters, givens and constants that are needed."""
+        lines = []
+        for part in parts if parts is not None else self.used():
+            read = self.read(part)
+            constants = [node for _, node in leaves(part.known["k"])] if "k" in part.known else []
+            wanted = [node for node in constants if node.reads & read]
+            outside = read | part.prologue.reads(wanted)
+            for names, array, prefix in (
+                (part.p, "params", self.numbers.parameters),
+                (part.given, "given", self.numbers.given),
+            ):
+                for path, node in leaves(names):
+                    if node.value in outside:
+                        lines.append(f"{node.value} = {array}[{prefix.index((part.part, path))}]")
+            lines += part.prologue.lines(wanted)
+        return lines
+
+    def constants(self, part: PartCode) -> list[str]:
+        """Names of a part's constants that its sample reads."""
+        if "k" not in part.known:
+            return []
+        read = self.read(part)
+        found: dict[str, None] = {}
+        for _, node in leaves(part.known["k"]):
+            found |= dict.fromkeys(sorted(node.reads & read))
+        own = {node.value for _, node in leaves(part.p)}
+        return [name for name in found if name not in own]
+
+    def places(self) -> list[str]:
+        """Lines that unpack records and the taps' places."""
+        lines = []
+        for k, signal in enumerate(self.signals):
+            lines += [f"{signal} = records[{k}]", f"{signal}_before = before[{k}]"]
+        for part in self.used():
+            for tap in part.taps:
+                lines.append(f"{part.whole(tap)} = whole[{tap.number}]")
+                lines.append(f"{part.fraction(tap)} = fraction[{tap.number}]")
+        return lines
+
+    def fetched(self, part: PartCode) -> list[str]:
+        """Lines that read a part's inputs from the records at sample n."""
+        lines, read = [], self.read(part)
+        for tap in part.taps:
+            for j, name in enumerate(part.tap_samples(tap)):
+                if name in read:
+                    back = f" - {j}" if j else ""
+                    lines.append(
+                        f"{name} = sample_at({tap.tap.signal}, n - {part.whole(tap)}{back}, "
+                        f"{tap.tap.signal}_before)"
+                    )
+        for name in part.own.input_types:
+            signal = part.own.tap(name).signal
+            if f"x_{signal}" in read and signal in self.signals:
+                lines.append(f"x_{signal} = {signal}[n]")
+        return lines
+
+    def body(self, part: PartCode) -> list[str]:
+        """Lines of a part's sample, and of the signals that other parts need of it."""
+        lines = part.code.lines(self.ends[part.part])
+        for source, node in self.sources.items():
+            if source.part == part.part:
+                lines.append(f"{part.source(source)} = {text(node)}")
+        return lines
+
+    def stored(self, part: PartCode, stored: Sequence[Stored], at: str) -> list[str]:
+        """Lines that write what is kept of a part into ``out`` and ``flags``."""
+        lines, row, flag = [], 0, 0
+        for each in stored:
+            if each.kind == "limits":
+                if each.part == part.part:
+                    packed = " | ".join(
+                        f"({1 << k} if {text(node)} else 0)" for k, node in enumerate(part.limits)
+                    )
+                    lines.append(f"flags[{flag}, {at}] = {packed}")
+                flag += 1
+                continue
+            if each.kind == "link" and self.model.links[each.path].after == part.part:
+                code = Code()
+                code.taken = part.code.taken
+                link = self.model.links[each.path]
+                sources: dict[str, Value] = {
+                    s.signal: ex.name(part.source(s)) for s in link.sources
+                }
+                assert link.equation is not None
+                made = code.called(link.equation, sources)
+                assert isinstance(made, Node)
+                lines += [*code.lines([made]), f"out[{row}, {at}] = {text(made)}"]
+            elif each.kind != "link" and each.part == part.part:
+                lines.append(f"out[{row}, {at}] = {text(part.node(each))}")
+            row += 1
+        return lines
+
+    def margin(self, part: PartCode) -> list[str]:
+        """Lines that keep the worst margin."""
+        if part.margin is None:
+            return []
+        return [f"worst = min(worst, {text(part.margin)})"]
+
+    def load(self, part: PartCode, array: str = "states") -> list[str]:
+        """Lines that take a part's state out of a flat array."""
+        names = dict(leaves(part.state))
+        return [
+            f"{names[path].value} = {array}[{self.numbers.states.index((part.part, path))}]"
+            for path in self.carried[part.part]
+        ]
+
+    def save(self, part: PartCode, array: str = "states") -> list[str]:
+        """Lines that put it back."""
+        names = dict(leaves(part.state))
+        return [
+            f"{array}[{self.numbers.states.index((part.part, path))}] = {names[path].value}"
+            for path in self.carried[part.part]
+        ]
+
+    def step(self, part: PartCode) -> list[str]:
+        """Lines that take a part's state to the next sample, all of it at once."""
+        names, following = dict(leaves(part.state)), dict(leaves(part.following))
+        if not self.carried[part.part]:
+            return []
+        left = ", ".join(names[path].value for path in self.carried[part.part])
+        right = ", ".join(text(following[path]) for path in self.carried[part.part])
+        return [f"{left} = {right}"]
+
+
+def indented(lines: Iterable[str], depth: int = 1) -> list[str]:
+    """Lines moved in."""
+    return [f"{'    ' * depth}{line}" for line in lines]
+
+
+def function_source(head: str, says: str, lines: Iterable[str], mark: str = "@kernel") -> str:
+    """Text of a function."""
+    return "\n".join([mark, f"def {head}:", f'    """{says}"""', *indented(lines), ""])
+
+
+def march_source(
+    model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[Stored]
+) -> tuple[str, dict[str, Any]]:
+    """Text of the plain march, and what its names mean.
+
+    The kernel ``march(records, before, whole, fraction, params, given, h, states, span, out,
+    flags)`` marches samples ``span[0]`` to ``span[1]`` - 1, fills rows of ``out`` and ``flags`` in
+    the order of `stored`, advances ``states`` in place, and returns the worst margin met.
+    """
+    sampler = Sampler(model, signals, options, stored)
+    parts = sampler.used()
+    lines = [*sampler.places(), *sampler.ahead()]
+    for part in parts:
+        lines += sampler.load(part)
+    lines += ["first, last = span", "worst = inf", "for n in range(first, last):"]
+    inner: list[str] = []
+    for part in parts:
+        inner += sampler.fetched(part)
+        inner += sampler.body(part)
+        inner += sampler.stored(part, stored, "n - first")
+        inner += sampler.margin(part)
+    for part in parts:
+        inner += sampler.step(part)
+    lines += indented(inner)
+    for part in parts:
+        lines += sampler.save(part)
+    lines.append("return worst")
+    head = "march(records, before, whole, fraction, params, given, h, states, span, out, flags)"
+    return function_source(head, f"March {model.name} over its inputs.", lines), sampler.names
+
+
+def advance_source(
+    model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[Stored]
+) -> tuple[str, dict[str, Any]]:
+    """Text of one sample, for steppers and for kernels that close loops, and what its names mean.
+
+    ``prepare(params, given, h, constants)`` computes constants once and returns how many there are.
+    ``advance(values, lines, whole, fraction, params, given, h, constants, states, out)`` shifts the
+    newest values into the delay lines (a row for each signal, newest first), fills ``out`` with the
+    numbers of this sample in the order of `stored`, takes ``states`` to the next one, and returns
+    the margin of the domain.
+    """
+    sampler = Sampler(model, signals, options, stored)
+    parts = sampler.used()
+    tapped = {tap.tap.signal for part in parts for tap in part.taps}
+    lines, shifted = [], []
+    for k, signal in enumerate(sampler.signals):
+        if signal in tapped:
+            shifted.append(f"lines[{k}, j] = lines[{k}, j - 1]")
+            lines.append(f"lines[{k}, 0] = values[{k}]")
+    if shifted:
+        lines = ["for j in range(lines.shape[1] - 1, 0, -1):", *indented(shifted), *lines]
+    prepare: list[str] = []
+    count = 0
+    for part in parts:
+        read = sampler.read(part)
+        prepare += sampler.ahead([part])
+        for name in sampler.constants(part):
+            prepare.append(f"constants[{count}] = {name}")
+            lines.append(f"{name} = constants[{count}]")
+            count += 1
+        for names, array, prefix in (
+            (part.p, "params", sampler.numbers.parameters),
+            (part.given, "given", sampler.numbers.given),
+        ):
+            for path, node in leaves(names):
+                if node.value in read:
+                    lines.append(f"{node.value} = {array}[{prefix.index((part.part, path))}]")
+        lines += sampler.load(part)
+        for tap in part.taps:
+            lines.append(f"{part.fraction(tap)} = fraction[{tap.number}]")
+            row = sampler.signals.index(tap.tap.signal)
+            for j, name in enumerate(part.tap_samples(tap)):
+                if name in read:
+                    lines.append(f"{name} = lines[{row}, whole[{tap.number}] + {j}]")
+        for k, signal in enumerate(sampler.signals):
+            if f"x_{signal}" in read:
+                lines.append(f"x_{signal} = values[{k}]")
+        lines += sampler.body(part)
+        lines += [line.replace(", 0] =", "] =") for line in sampler.stored(part, stored, "0")]
+    lines.append("worst = inf")
+    for part in parts:
+        lines += [*sampler.margin(part), *sampler.step(part), *sampler.save(part)]
+    lines.append("return worst")
+    texts = [
+        function_source(
+            "prepare(params, given, h, constants)",
+            f"Constants of {model.name}.",
+            [*prepare, f"return {count}"],
+        ),
+        function_source(
+            "advance(values, lines, whole, fraction, params, given, h, constants, states, out)",
+            f"One sample of {model.name}.",
+            lines,
+            "@inlined",
+        ),
+    ]
+    return "\n\n".join(texts), sampler.names
+
+
+class Start(NamedTuple):
+    """A part's state at the start as straight code."""
+
+    code: Code
+    value: Value
+
+
+def rest_of(part: PartCode) -> Start:
+    """State at rest: every signal is zero, or what its default parameter is."""
+    code = Code(ruled=part.code.ruled)
+    code.taken = part.code.taken
+    own = part.own
+    if own.rest is None:
+        defaults = own.state._field_defaults
+        nodes = [
+            ex.number(float(defaults.get(path.split(".")[0], 0.0)))
+            for path, _ in leaves(part.state)
+        ]
+        return Start(code, rebuilt(part.state, iter(nodes)))
+    inputs: dict[str, Value] = {}
+    for name in own.input_types:
+        if name in own.defaults:
+            inputs[name] = value_of(part.p, own.defaults[name])
+        elif own.tap(name).width:
+            zeros = (ex.ZERO,) * own.tap(name).width
+            inputs[name] = Tuple(Window, (Tuple(None, zeros), ex.ZERO))
+        else:
+            inputs[name] = ex.ZERO
+    known = {**part.known, **inputs}
+    if own.inputs is not None:
+        known["inputs"] = Tuple(own.inputs, tuple(inputs.values()))
+    return Start(code, part.call(code, own.rest, known))
+
+
+def settled_of(part: PartCode) -> Start | None:
+    """Steady state under the inputs as they come, None where the part has no equation for it."""
+    if part.own.settled is None:
+        return None
+    code = Code(ruled=part.code.ruled)
+    code.taken = part.code.taken
+    code.items = list(part.entry)
+    return Start(code, part.call(code, part.own.settled, part.known))
+
+
+def observe_source(
+    model: Model,
+    part: int,
+    signals: Sequence[str],
+    options: Sequence[Any],
+    kept: Sequence[Stored],
+    wanted: Sequence[Stored],
+) -> tuple[str, dict[str, Any]]:
+    """Text of a kernel that computes signals of one part where its states are known.
+
+    The kernel ``observe(params, given, h, kept, out, flags)`` takes rows of states, inputs and
+    taps' samples in the order of `kept`.
+    """
+    sampler = Sampler(model, signals, options, wanted)
+    own = sampler.parts[part]
+    # neither what follows nor the margin is asked for here
+    sampler.ends[part] = [
+        node
+        for each in wanted
+        for node in (own.limits if each.kind == "limits" else [own.node(each)])
+    ]
+    read = sampler.read(own)
+    lines = [*sampler.ahead([own]), "for m in range(max(out.shape[1], flags.shape[1])):"]
+    inner = []
+    for row, each in enumerate(kept):
+        if each.part == part:
+            name = own.node(each).value if own.node(each).op == "name" else ""
+        else:
+            name = own.source(Source(each.part, each.path))
+        if name in read:
+            inner.append(f"{name} = kept[{row}, m]")
+    inner += own.code.lines(sampler.ends[part])
+    inner += sampler.stored(own, wanted, "m")
+    lines += indented(inner)
+    head = "observe(params, given, h, kept, out, flags)"
+    says = f"Signals of {own.own.name} at known states."
+    return function_source(head, says, lines), sampler.names
+
+
+def output_of(model: Model, output: str) -> tuple[Stored, bool]:
+    """Where a signal comes from, and whether it is that signal's integral.
+
+    Raises
+    ------
+    InputError
+        If the model has no such signal.
+    """
+    integral = output in model.integrals
+    name = model.integrals[output] if integral else output
+    if name in model.links:
+        return Stored(model.links[name].after, "link", name), integral
+    for i in range(len(model.parts) - 1, -1, -1):
+        own = model.parts[i]
+        if own.signals is not None and name in floats_of(own.signals):
+            return Stored(i, "signals", name), integral
+        if name in floats_of(own.state):
+            return Stored(i, "state", name), integral
+    known = [name for part in model.parts for name in part.signal_names]
+    raise InputError(
+        f"{model.name} has no signal '{output}'; it has "
+        f"{', '.join([*known, *model.links, *model.integrals])}."
+    )

@@ -1,0 +1,329 @@
+"""Models: what one's own machine and the package's drives are to the engine.
+
+A model is a value: types of parameters, state and inputs, and equations over them. At every sample
+the engine calls, in this order,
+
+    constants(p, h) -> k              once per simulation
+    sample(state, inputs, p, k, h) -> signals      all that is known at n, computed once
+    step(state, signals, inputs, p, k, h) -> state          from n to n + 1
+
+Equations name the arguments that they need; the names mean
+
+| argument | what the engine passes |
+|---|---|
+| ``state`` | the state at n, a named tuple |
+| ``signals`` | what ``sample`` returned at n |
+| ``inputs`` | all inputs as a named tuple, or an input's own name for one of them |
+| ``p`` | parameters |
+| ``k`` | constants |
+| ``h`` | step of the grid [s] |
+| ``options`` | options, None (off) or True (on): branches on them cost nothing |
+| ``given`` | numbers that belong to a run, not to the machine: a load, a rod's middle |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal, NamedTuple, get_type_hints
+
+from swashplate.equations.fields import floats_of, is_named_tuple
+from swashplate.equations.windows import Window
+from swashplate.errors import InputError
+
+Equation = Callable[..., Any]
+Hold = Literal["linear", "previous", "mean"]
+
+ARGUMENTS = ("state", "signals", "inputs", "p", "k", "h", "options", "given")
+"""Names that mean what the table above says; any other argument is an input."""
+
+
+class Tap(NamedTuple):
+    """How a model looks at a signal that comes from outside or from another model."""
+
+    signal: str
+    """Name of the signal."""
+    delay: str = ""
+    """Path of the parameter that delays it [s]; none if empty."""
+    ahead: float = 0.0
+    """Samples by which the window ends later than the delay says; never later than now."""
+    width: int = 0
+    """Samples of a `Window`; 0 passes the value itself, as `hold` makes it."""
+    hold: Hold = "linear"
+    """What the signal is between samples: a straight line, its last value, or, as the mean over the
+    last interval, what a logger or a controller averaged."""
+
+    @property
+    def samples(self) -> int:
+        """Samples that are read."""
+        return self.width or (3 if self.hold == "mean" else 2)
+
+
+class Place(NamedTuple):
+    """Where a tap reads at one step: whole samples back, the rest, and d(rest)/d(delay)."""
+
+    whole: int
+    fraction: float
+    slope: float
+
+
+class Source(NamedTuple):
+    """A signal of a part, or of its state."""
+
+    part: int
+    signal: str
+
+
+class Link(NamedTuple):
+    """A signal between parts: that of one part, or an equation over signals of several."""
+
+    name: str
+    sources: tuple[Source, ...]
+    equation: Equation | None = None
+
+    @property
+    def after(self) -> int:
+        """The part behind which it is known."""
+        return max(source.part for source in self.sources)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A machine as equations over named tuples of floats; see the module's text."""
+
+    name: str
+    parameters: type[Any]
+    state: type[Any]
+    step: Equation
+    sample: Equation | None = None
+    constants: Equation | None = None
+    rest: Equation | None = None
+    """State at rest, of ``inputs, p, k, options, given``; by default the state type's defaults or
+    zeros."""
+    settled: Equation | None = None
+    """Steady state under constant inputs, of the same arguments."""
+    inputs: type[Any] | None = None
+    taps: Mapping[str, Tap] = field(default_factory=dict)
+    """How each input is looked at; one that is not listed is read at n."""
+    defaults: Mapping[str, str] = field(default_factory=dict)
+    """Path of the parameter that stands for an input where no signal is given."""
+    options: type[Any] | None = None
+    given: type[Any] | None = None
+    limits: Equation | None = None
+    """Named tuple of bool: which limits act."""
+    domain: Equation | None = None
+    """Margin that is above 0 where the equations hold."""
+    outside: str | Callable[[float, str], str] = "the model's equations do not hold"
+    """What has happened where the margin is not above 0, for the sentence."""
+    outputs: Sequence[str] = ()
+    """Signals of most use; by default all."""
+    integrals: Mapping[str, str] = field(default_factory=dict)
+    """Signals that are trapezoidal integrals of others, zero at the start."""
+    free_start: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Numbers that a run may start from as its own unknowns, each with the paths of the states
+    that it sets; a path of the state that is not listed stands for itself."""
+    parts: tuple[Model, ...] = ()
+    """Models in series, this one alone if it is not joined."""
+    links: Mapping[str, Link] = field(default_factory=dict)
+    """Signals that are equations over the parts' signals, by name."""
+
+    def __post_init__(self) -> None:
+        if not self.parts:
+            object.__setattr__(self, "parts", (self,))
+            self._check()
+
+    def __repr__(self) -> str:
+        return f"Model({self.name!r}, {len(floats_of(self.parameters))} parameters)"
+
+    def __hash__(self) -> int:
+        return id(self)
+
+    @cached_property
+    def input_types(self) -> dict[str, type[Any]]:
+        """Inputs of a single model with their types, float or Window."""
+        if self.inputs is not None:
+            return dict(get_type_hints(self.inputs))
+        found: dict[str, type[Any]] = {}
+        for equation in self._equations:
+            for name in arguments_of(equation):
+                if name not in ARGUMENTS:
+                    tap = self.taps.get(name)
+                    found[name] = Window if tap is not None and tap.width else float
+        return found
+
+    @cached_property
+    def signals(self) -> type[Any] | None:
+        """Type of what ``sample`` returns."""
+        if self.sample is None:
+            return None
+        made = get_type_hints(plain(self.sample)).get("return")
+        return made if is_named_tuple(made) else None
+
+    @cached_property
+    def signal_names(self) -> tuple[str, ...]:
+        """Signals that a simulation of a single model has, integrals apart."""
+        own = floats_of(self.signals) if self.signals is not None else ()
+        states = tuple(path for path in floats_of(self.state) if path not in own)
+        return (*own, *states)
+
+    @cached_property
+    def limit_names(self) -> tuple[str, ...]:
+        """Names of the limits, bit by bit."""
+        if self.limits is None:
+            return ()
+        return tuple(get_type_hints(plain(self.limits))["return"]._fields)
+
+    @property
+    def external(self) -> tuple[str, ...]:
+        """Signals that come from outside, in the order in which the parts ask for them."""
+        found: dict[str, None] = {}
+        for i, part in enumerate(self.parts):
+            for name in part.input_types:
+                if self.link_of(i, name) is None:
+                    found[part.tap(name).signal] = None
+        return tuple(found)
+
+    def link_of(self, part: int, name: str) -> Link | None:
+        """Where an input of a part comes from, None if from outside."""
+        signal = self.parts[part].tap(name).signal
+        link = self.links.get(signal)
+        if link is not None and link.after < part:
+            return link
+        for j in range(part - 1, -1, -1):
+            if signal in self.parts[j].signal_names:
+                return Link(signal, (Source(j, signal),))
+        return None
+
+    @cached_property
+    def used_links(self) -> tuple[Link, ...]:
+        """Links that some part's input takes, each once."""
+        found: dict[str, Link] = {}
+        for i, part in enumerate(self.parts):
+            for name in part.input_types:
+                link = self.link_of(i, name)
+                if link is not None:
+                    found[link.name] = link
+        return tuple(found.values())
+
+    def tap(self, name: str) -> Tap:
+        """How an input is looked at."""
+        return self.taps.get(name, Tap(name))
+
+    def looked_at(self, name: str) -> bool:
+        """Whether an input is read through a tap, and not simply at n."""
+        return name in self.taps
+
+    @cached_property
+    def _equations(self) -> tuple[Equation, ...]:
+        all_of_them = (self.sample, self.step, self.limits, self.domain, self.rest, self.settled)
+        return tuple(each for each in all_of_them if each is not None)
+
+    def _check(self) -> None:
+        for type_ in (self.parameters, self.state, self.inputs, self.options, self.given):
+            if type_ is not None and not is_named_tuple(type_):
+                raise InputError(
+                    f"Model {self.name}: {type_!r} must be a named tuple, as in "
+                    "'class State(NamedTuple): position: float'."
+                )
+        known = set(self.input_types)
+        for equation in self._equations:
+            for name in arguments_of(equation):
+                if name not in ARGUMENTS and name not in known:
+                    raise InputError(
+                        f"Model {self.name}: {plain(equation).__name__} asks for '{name}', which "
+                        f"is none of {', '.join((*ARGUMENTS, *known))}."
+                    )
+        for name, tap in self.taps.items():
+            if name not in known:
+                raise InputError(f"Model {self.name}: there is a tap on '{name}', but no input.")
+            if tap.delay and tap.delay not in floats_of(self.parameters):
+                raise InputError(
+                    f"Model {self.name}: the delay of '{name}' is '{tap.delay}', but the "
+                    f"parameters are {', '.join(floats_of(self.parameters))}."
+                )
+        for name in [path for paths in self.free_start.values() for path in paths]:
+            if name not in floats_of(self.state):
+                raise InputError(
+                    f"Model {self.name}: free_start names '{name}', but the state has "
+                    f"{', '.join(floats_of(self.state))}."
+                )
+
+
+def join(
+    name: str, *parts: Model, links: Mapping[str, Equation] | None = None, **changes: Any
+) -> Model:
+    """Models in series: an input takes the signal of that name of a model before it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the whole.
+    *parts : Model
+        In the order of the flow. Their parameters, states and options become fields named as the
+        parts.
+    links : mapping of str to equation, optional
+        Further signals, made of the parts' signals that the equation's arguments name.
+    **changes
+        `integrals`, `outputs`, `free_start` of the whole.
+
+    Raises
+    ------
+    InputError
+        If two parts have one name, or an equation asks for a signal that there is not.
+
+    Notes
+    -----
+    A signal must be known before it is needed: loops without delay between parts are not possible.
+    """
+    single = tuple(inner for part in parts for inner in part.parts)
+    names = [part.name for part in single]
+    if len(set(names)) != len(names):
+        raise InputError(f"Joined models need names of their own, not {', '.join(names)}.")
+    linked = {}
+    for signal, made_by in (links or {}).items():
+        sources = tuple(_source(name, single, each) for each in arguments_of(made_by))
+        linked[signal] = Link(signal, sources, made_by)
+
+    def gathered(attribute: str) -> Any:
+        present = [(p.name, getattr(p, attribute)) for p in single if getattr(p, attribute)]
+        return NamedTuple(f"{name.title()}{attribute.title()}", present)
+
+    return Model(
+        name,
+        gathered("parameters"),
+        gathered("state"),
+        single[0].step,
+        options=gathered("options"),
+        given=gathered("given"),
+        parts=single,
+        links=linked,
+        **changes,
+    )
+
+
+def _source(name: str, parts: Sequence[Model], signal: str) -> Source:
+    for j in range(len(parts) - 1, -1, -1):
+        if signal in parts[j].signal_names:
+            return Source(j, signal)
+    known = ", ".join(each for part in parts for each in part.signal_names)
+    raise InputError(f"Model {name}: a link asks for '{signal}', but the parts have {known}.")
+
+
+def place(tap: Tap, delay: float, h: float) -> Place:
+    """Where a tap reads at a step of `h` for a delay [s]."""
+    samples = delay / h
+    end = max(samples, tap.ahead) - tap.ahead
+    whole = int(end // 1.0)
+    return Place(whole, end - whole, 1.0 / h if samples >= tap.ahead else 0.0)
+
+
+def plain(equation: Equation) -> Equation:
+    """The Python function behind a compiled one."""
+    return getattr(equation, "py_func", equation)
+
+
+def arguments_of(equation: Equation) -> tuple[str, ...]:
+    """Names of an equation's arguments."""
+    code = plain(equation).__code__
+    return code.co_varnames[: code.co_argcount]

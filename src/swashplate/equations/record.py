@@ -1,0 +1,187 @@
+"""Input records on the march's grid: uniform or with time stamps, any rate, sub-stepped."""
+
+from dataclasses import dataclass
+from math import ceil
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.errors import InputError
+
+Array = NDArray[np.float64]
+Interpolation = Literal["linear", "previous"]
+
+SOURCE_RATE = 512.0
+"""Rate of the source's logs; no step is longer than one of its samples. [Hz]"""
+LONGEST = 100_000_000
+"""Steps that a record may take: 54 hours at 512 Hz. More is a mistake, in a unit perhaps."""
+SLOWEST, FASTEST = 10.0, 100_000.0
+"""Range of record rates. [Hz]"""
+
+
+@dataclass(frozen=True)
+class Record:
+    """An input on the grid of the march."""
+
+    values: Array
+    """Input on the fine grid, `substeps` points a sample."""
+    start: float
+    """Time of the first sample. [s]"""
+    rate: float
+    """Samples a second. [Hz]"""
+    substeps: int
+    """Steps of the march from one sample to the next."""
+
+    @property
+    def step(self) -> float:
+        """h. [s]"""
+        return 1.0 / (self.rate * self.substeps)
+
+    @property
+    def time(self) -> Array:
+        """Time stamps of the samples. [s]"""
+        samples = (self.values.size - 1) // self.substeps + 1
+        return self.start + np.arange(samples) / self.rate
+
+
+def record_of(
+    values: ArrayLike,
+    rate: float,
+    *,
+    what: str,
+    time: ArrayLike | None = None,
+    interpolation: Interpolation | None = None,
+    substeps: int | None = None,
+) -> Record:
+    """Put an input record on the march's grid.
+
+    Parameters
+    ----------
+    values : (n,) array_like
+        Input samples.
+    rate : float
+        Rate of the samples or, with `time`, of the grid that they are put on. [Hz]
+    what : str
+        Name of the input, for errors: ``"voltage"`` or ``"current"``.
+    time : (n,) array_like, optional
+        Time stamps, increasing, in any distances. [s]
+    interpolation : {"linear", "previous"}, optional
+        What the input is between two samples: a straight line or held. Must be chosen with
+        `time`; otherwise ``"linear"``.
+    substeps : int, optional
+        Steps of the march a sample; by default as many as keep h at or below 1/512 s.
+
+    Raises
+    ------
+    InputError
+        For an empty, non-finite or unsorted record or a rate out of range, naming the sample.
+    """
+    data = _checked(values, what)
+    least = least_substeps(rate)
+    if substeps is None:
+        substeps = least
+    elif substeps < least:
+        raise InputError(
+            f"substeps is {substeps}, but at {rate:g} Hz at least {least} are needed to keep the "
+            "step at or below 1/512 s."
+        )
+    if interpolation not in (None, "linear", "previous"):
+        raise InputError(f"interpolation is '{interpolation}'; it is 'linear' or 'previous'.")
+    if time is not None:
+        if interpolation is None:
+            raise InputError(
+                "A record with time stamps needs interpolation='previous' (held between stamps) "
+                "or 'linear' (a straight line between them)."
+            )
+        stamps = _checked_stamps(time, data.size, what)
+        return _stamped(data, stamps, rate, interpolation, substeps)
+    _check_length(data.size * substeps, f"{data.size} samples at {rate:g} Hz")
+    return Record(_refined(data, interpolation, substeps), 0.0, float(rate), substeps)
+
+
+def least_substeps(rate: float) -> int:
+    """Steps a sample that keep h at or below 1/512 s.
+
+    Raises
+    ------
+    InputError
+        For a rate out of range.
+    """
+    if not SLOWEST <= rate <= FASTEST:
+        raise InputError(
+            f"The rate is {rate:g} Hz, but must be between {SLOWEST:g} and {FASTEST:g} Hz."
+        )
+    return max(ceil(SOURCE_RATE / rate - 1e-9), 1)
+
+
+def _checked(values: ArrayLike, what: str) -> Array:
+    try:
+        # a copy, so that a result never changes with the user's array
+        data = np.array(values, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise InputError(f"The {what} must be a sequence of numbers.") from None
+    if data.ndim != 1:
+        raise InputError(f"The {what} must be one column of samples, not {data.ndim}-dimensional.")
+    if data.size == 0:
+        raise InputError(f"The {what} is empty.")
+    # one pass: a sum is finite if and only if no sample is NaN or infinite, overflow apart
+    if not np.isfinite(data.sum()):
+        bad = np.flatnonzero(~np.isfinite(data))
+        if bad.size:
+            raise InputError(
+                f"The {what} has {bad.size} sample(s) that are not finite, the first {data[bad[0]]}"
+                f" at sample {bad[0]}; fill or cut them."
+            )
+    return data
+
+
+def _checked_stamps(time: ArrayLike, size: int, what: str) -> Array:
+    stamps = _checked(time, "time")
+    if stamps.size != size:
+        raise InputError(f"There are {stamps.size} time stamps for {size} samples of {what}.")
+    steps = np.diff(stamps)
+    if np.any(steps <= 0.0):
+        first = int(np.argmax(steps <= 0.0))
+        raise InputError(
+            f"The time must increase, but goes from {stamps[first]:g} s at sample {first} to "
+            f"{stamps[first + 1]:g} s at sample {first + 1}."
+        )
+    return stamps
+
+
+def _refined(data: Array, interpolation: Interpolation | None, substeps: int) -> Array:
+    """A uniform record on a grid of `substeps` points a sample."""
+    if substeps == 1:
+        return data
+    fine = np.empty((data.size - 1) * substeps + 1)
+    fine[::substeps] = data
+    for j in range(1, substeps):
+        rise = 0.0 if interpolation == "previous" else j / substeps
+        # written as the stepper does, so that both give the same bits
+        fine[j::substeps] = data[:-1] + rise * (data[1:] - data[:-1])
+    return fine
+
+
+def _check_length(steps: float, what: str) -> None:
+    if steps > LONGEST:
+        raise InputError(
+            f"The record with {what} takes {steps:.3g} steps, more than the {LONGEST:.0e} that are "
+            "simulated at once; check the unit of the time."
+        )
+
+
+def _stamped(
+    data: Array, stamps: Array, rate: float, interpolation: Interpolation, substeps: int
+) -> Record:
+    """A record with stamps, on a grid that starts at the first one."""
+    start = float(stamps[0])
+    span = float(stamps[-1]) - start
+    _check_length(span * rate * substeps, f"stamps from {start:g} s to {stamps[-1]:g} s")
+    samples = int((stamps[-1] - start) * rate + 1e-9) + 1
+    fine = start + np.arange((samples - 1) * substeps + 1) / (rate * substeps)
+    if interpolation == "linear":
+        return Record(np.interp(fine, stamps, data), start, float(rate), substeps)
+    # a stamp counts from the grid point that it falls on, rounding errors apart
+    held = np.searchsorted(stamps, fine + 1e-9 / rate, side="right") - 1
+    return Record(data[held], start, float(rate), substeps)

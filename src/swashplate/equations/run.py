@@ -1,0 +1,328 @@
+"""A model with numbers: its start, its march, and what lies inside."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.equations.cache import generated, kernel
+from swashplate.equations.equation import inlined, interpreted
+from swashplate.equations.fields import floats_of, made, numbers_of, value_at
+from swashplate.equations.lowering import generating
+from swashplate.equations.march import Stored, march_source, observe_source, taps_of
+from swashplate.equations.model import Link, Model, Place, arguments_of, place
+from swashplate.equations.windows import Window
+from swashplate.errors import DomainError, InputError
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Flags = NDArray[np.uint8]
+Start = Literal["rest", "steady"]
+
+STARTS = ("rest", "steady")
+
+
+def check_start(start: str) -> None:
+    """Refuse a start that is neither ``"rest"`` nor ``"steady"``."""
+    if start not in STARTS:
+        raise InputError(f"start is '{start}'; it is 'rest' or 'steady'.")
+
+
+class Part(NamedTuple):
+    """Numbers of a part of a model."""
+
+    p: Any
+    options: Any = None
+    given: Any = None
+
+
+class Started(NamedTuple):
+    """States of all parts at the first sample, and what they follow from."""
+
+    states: tuple[Any, ...]
+    before: Mapping[str, float]
+    """External signals before the record."""
+    arguments: tuple[Mapping[str, Any], ...]
+    """Of each part what its equations take, by the arguments' names."""
+
+    @property
+    def flat(self) -> Array:
+        """All states as numbers."""
+        return np.array([number for state in self.states for number in numbers_of(state)])
+
+
+class Places(NamedTuple):
+    """Where the taps read, all of them."""
+
+    whole: Indices
+    fraction: Array
+    slope: Array
+
+
+@dataclass(frozen=True)
+class Instance:
+    """A model with its numbers."""
+
+    model: Model
+    parts: tuple[Part, ...]
+    name: str
+
+    @property
+    def options(self) -> tuple[Any, ...]:
+        """Options of each part."""
+        return tuple(part.options for part in self.parts)
+
+    @property
+    def params(self) -> Array:
+        """All parameters as numbers, in the order of `march.Numbers`."""
+        return np.array([number for part in self.parts for number in numbers_of(part.p)])
+
+    @property
+    def given(self) -> Array:
+        """All givens as numbers."""
+        found = [part.given for part in self.parts if part.given is not None]
+        return np.array([number for each in found for number in numbers_of(each)])
+
+    def places(self, signals: Sequence[str], h: float) -> Places:
+        """Where every tap reads at a step of `h`."""
+        found: list[Place] = []
+        for each in taps_of(self.model, signals):
+            p, delay = self.parts[each.part].p, each.tap.delay
+            found.append(place(each.tap, float(value_at(p, delay)) if delay else 0.0, h))
+        return Places(
+            np.array([each.whole for each in found], dtype=np.int64),
+            np.array([each.fraction for each in found]),
+            np.array([each.slope for each in found]),
+        )
+
+    def start(
+        self,
+        first: Mapping[str, float],
+        h: float,
+        start: Start = "rest",
+        chosen: Sequence[Any] | None = None,
+    ) -> Started:
+        """States at the first sample.
+
+        Parameters
+        ----------
+        first : mapping of str to float
+            External signals at the first sample.
+        h : float
+            Step. [s]
+        start : {"rest", "steady"}
+            At rest, where signals that are read through taps were zero before; or settled at the
+            first values, which then held before, too.
+        chosen : sequence, optional
+            State of each part, in place of the one that `start` says.
+
+        Raises
+        ------
+        InputError
+            If a signal is missing, or the model cannot start settled.
+        """
+        check_start(start)
+        before = {name: value if start == "steady" else 0.0 for name, value in first.items()}
+        states: list[Any] = []
+        found: list[Mapping[str, Any]] = []
+        for i, (part, own) in enumerate(zip(self.model.parts, self.parts, strict=True)):
+            known: dict[str, Any] = {"p": own.p, "options": own.options, "given": own.given}
+            known["h"] = h
+            if part.constants is not None:
+                known["k"] = called(part.constants, known)
+            for name in part.input_types:
+                known[name] = self._input(i, name, first, before, states, found)
+            if part.inputs is not None:
+                known["inputs"] = part.inputs(*(known[name] for name in part.input_types))
+            known["state"] = self._state(part, known, start) if chosen is None else chosen[i]
+            states.append(known["state"])
+            if part.sample is not None:
+                known["signals"] = _sampled(part, known)
+            found.append(known)
+        return Started(tuple(states), before, tuple(found))
+
+    def _state(self, part: Model, known: Mapping[str, Any], start: Start) -> Any:
+        equation = part.rest if start == "rest" else part.settled
+        if equation is not None:
+            return called(equation, known)
+        if start == "steady" and floats_of(part.state):
+            raise InputError(
+                f"{self.name}: {part.name} has no equation for its steady state ('settled'), so "
+                "it cannot start settled."
+            )
+        defaults = part.state._field_defaults
+        empty = [path for path in floats_of(part.state) if path.split(".")[0] not in defaults]
+        return made(part.state, dict.fromkeys(empty, 0.0))
+
+    def _input(
+        self,
+        part: int,
+        name: str,
+        first: Mapping[str, float],
+        before: Mapping[str, float],
+        states: Sequence[Any],
+        found: Sequence[Mapping[str, Any]],
+    ) -> Any:
+        own = self.model.parts[part]
+        link = self.model.link_of(part, name)
+        if link is not None:
+            return linked(link, states, found)
+        tap = own.tap(name)
+        if tap.signal in first:
+            value = before[tap.signal] if own.looked_at(name) else first[tap.signal]
+        elif name in own.defaults:
+            value = float(value_at(self.parts[part].p, own.defaults[name]))
+        else:
+            raise InputError(f"{self.name}: {own.name} needs the signal '{tap.signal}'.")
+        return Window((value,) * tap.width, 0.0) if tap.width else value
+
+
+def called(equation: Callable[..., Any], known: Mapping[str, Any]) -> Any:
+    """What an equation gives for what is known by the names of its arguments."""
+    return interpreted(equation)(*(known[name] for name in arguments_of(equation)))
+
+
+def _sampled(part: Model, known: Mapping[str, Any]) -> Any:
+    """Signals of a part at its start; none of them a number outside the part's domain.
+
+    The march, which computes them again and asks for the domain's margin, says what is wrong.
+    """
+    assert part.sample is not None
+    assert part.signals is not None
+    try:
+        return called(part.sample, known)
+    except (ValueError, ZeroDivisionError, OverflowError):
+        return made(part.signals, dict.fromkeys(floats_of(part.signals), math.nan))
+
+
+def linked(link: Link, states: Sequence[Any], found: Sequence[Mapping[str, Any]]) -> float:
+    """A signal between parts, from the states and signals of those before."""
+    values = []
+    for source in link.sources:
+        signals = found[source.part].get("signals")
+        inside = signals is not None and source.signal in floats_of(type(signals))
+        values.append(value_at(signals if inside else states[source.part], source.signal))
+    if link.equation is None:
+        return float(values[0])
+    return float(interpreted(link.equation)(*values))
+
+
+# --- kernels --------------------------------------------------------------------------------------
+
+
+def module(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
+    """A generated module with what every one of them needs."""
+    mathematics = {k: v for k, v in vars(math).items() if not k.startswith("_")}
+    return generated(name, text, {**mathematics, "kernel": kernel, "inlined": inlined, **names})
+
+
+@generating
+def march_kernel(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], stored: tuple[Stored, ...]
+) -> Callable[..., float]:
+    """The compiled plain march."""
+    text, names = march_source(model, signals, options, stored)
+    return module(f"{model.name}_march", text, names)["march"]  # type: ignore[no-any-return]
+
+
+@generating
+def observe_kernel(
+    model: Model,
+    part: int,
+    signals: tuple[str, ...],
+    options: tuple[Any, ...],
+    kept: tuple[Stored, ...],
+    wanted: tuple[Stored, ...],
+) -> Callable[..., None]:
+    """The compiled kernel of signals at known states."""
+    text, names = observe_source(model, part, signals, options, kept, wanted)
+    return module(f"{model.parts[part].name}_observe", text, names)["observe"]  # type: ignore[no-any-return]
+
+
+def marched(
+    instance: Instance,
+    records: Mapping[str, Array],
+    h: float,
+    started: Started,
+    stored: tuple[Stored, ...],
+    cause: str = "input",
+) -> tuple[Array, Flags]:
+    """March over whole records.
+
+    Parameters
+    ----------
+    records : mapping of str to (n,) array
+        External signals on the grid.
+    started : Started
+        Where it begins.
+    stored : tuple of Stored
+        What is kept.
+    cause : str
+        What drives the model, for the sentence of a `DomainError`.
+
+    Returns
+    -------
+    out : (r, n) array
+        Numbers that are kept, in their order.
+    flags : (f, n) array
+        Limits that are kept, as bits.
+
+    Raises
+    ------
+    DomainError
+        If the model leaves its domain, or a number overflows.
+    """
+    signals = tuple(records)
+    size = next(iter(records.values())).size
+    packed = sum(each.kind == "limits" for each in stored)
+    out = np.empty((len(stored) - packed, size))
+    flags = np.empty((packed, size), dtype=np.uint8)
+    places, states = instance.places(signals, h), started.flat
+    worst = march_kernel(instance.model, signals, instance.options, stored)(
+        tuple(np.require(v, np.float64, ["C", "W"]) for v in records.values()),
+        tuple(started.before[name] for name in signals),
+        places.whole,
+        places.fraction,
+        instance.params,
+        instance.given,
+        h,
+        states,
+        (0, size),
+        out,
+        flags,
+    )
+    check_domain(instance, states, worst, cause)
+    return out, flags
+
+
+def check_domain(instance: Instance, states: Array, worst: float, cause: str) -> None:
+    """Refuse what was computed outside the model's equations.
+
+    Raises
+    ------
+    DomainError
+        If the worst margin is not above 0, or a state is not finite.
+    """
+    if not worst > 0.0:
+        raise DomainError(f"{instance.name}: {outside(instance.model, worst, cause)}")
+    if np.isfinite(states).all():
+        return
+    names = [
+        f"{part.name}'s {path}" for part in instance.model.parts for path in floats_of(part.state)
+    ]
+    bad = int(np.argmax(~np.isfinite(states)))
+    raise DomainError(
+        f"{instance.name}: {names[bad]} is {states[bad]} at the end of the record: the numbers "
+        f"overflow under this {cause}; check the size of the parameters."
+    )
+
+
+def outside(model: Model, worst: float, cause: str) -> str:
+    """What has happened where the margin is not above 0."""
+    said = next((part.outside for part in model.parts if part.domain is not None), model.outside)
+    return said(worst, cause) if callable(said) else f"{said} under this {cause}."

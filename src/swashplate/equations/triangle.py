@@ -1,0 +1,136 @@
+"""The triangular factor of a least-squares problem, made from blocks of its rows.
+
+With [J r] = Q R, the small triangle R holds all that a Gauss-Newton or trust-region step needs: RᵀR
+is [J r]ᵀ[J r], and J has the singular values of R's columns. R is made by Householder reflections,
+never from the normal equations, whose condition number is squared and which a zero column breaks.
+"""
+
+from collections.abc import Iterable
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.equations.cache import kernel
+from swashplate.equations.equation import inlined
+from swashplate.errors import InputError
+
+Array = NDArray[np.float64]
+
+ROWS = 512
+"""Rows of a block: known to the compiler, and few enough for a fast cache."""
+EIGHTH = ROWS // 8
+CACHE_LINE = 64
+"""Bytes. Vectors that lie across two lines take twice as long to load."""
+
+
+def aligned_room(size: int) -> Array:
+    """Memory, as it is, that begins with a cache line."""
+    room = np.empty(size + CACHE_LINE // 8)
+    skipped = -room.ctypes.data % CACHE_LINE // 8
+    return room[skipped : skipped + size]
+
+
+def aligned(*shape: int) -> Array:
+    """Zeros that begin with a cache line."""
+    room = aligned_room(int(np.prod(shape))).reshape(shape)
+    room[:] = 0.0
+    return room
+
+
+@inlined
+def dot(a: Array, b: Array, room: Array) -> float:
+    """Scalar product of two columns of ROWS numbers, folded in eighths.
+
+    Summed from left to right, one addition would wait for the other; folded, it vectorises without
+    leave to reorder sums (docs/decisions/0002), and rounds less.
+    """
+    for i in range(EIGHTH):
+        j, k, l = i + 2 * EIGHTH, i + 4 * EIGHTH, i + 6 * EIGHTH
+        room[i] = (
+            (a[i] * b[i] + a[i + EIGHTH] * b[i + EIGHTH])
+            + (a[j] * b[j] + a[j + EIGHTH] * b[j + EIGHTH])
+        ) + (
+            (a[k] * b[k] + a[k + EIGHTH] * b[k + EIGHTH])
+            + (a[l] * b[l] + a[l + EIGHTH] * b[l + EIGHTH])
+        )
+    for i in range(8):
+        room[i] = ((room[i] + room[i + 8]) + (room[i + 16] + room[i + 24])) + (
+            (room[i + 32] + room[i + 40]) + (room[i + 48] + room[i + 56])
+        )
+    return ((room[0] + room[1]) + (room[2] + room[3])) + (  # type: ignore[no-any-return]
+        (room[4] + room[5]) + (room[6] + room[7])
+    )
+
+
+@kernel
+def absorb(rows: Array, factor: Array, room: Array) -> None:
+    """Rotate a block of rows into the triangular factor of all rows before it.
+
+    Parameters
+    ----------
+    rows : (k, ROWS) array
+        The block, column by column; rows that it lacks are zeros. Used up.
+    factor : (k, k) array
+        Upper triangle, zeros before the first block; replaced by the factor of it and the block.
+    room : (EIGHTH,) array
+        Room to work in.
+    """
+    for j in range(rows.shape[0]):
+        pivot = rows[j]
+        square = dot(pivot, pivot, room)
+        if square == 0.0:
+            continue  # nothing to rotate, as with a parameter that the block does not depend on
+        corner = factor[j, j]
+        norm = sqrt(corner * corner + square)
+        diagonal = -norm if corner > 0.0 else norm
+        lead = corner - diagonal
+        # the reflection 1 - v vᵀ · scale with v = [lead, pivot]: no difference of like numbers
+        scale = 1.0 / (norm * (norm + abs(corner)))
+        factor[j, j] = diagonal
+        for k in range(j + 1, rows.shape[0]):
+            column = rows[k]
+            along = scale * (lead * factor[j, k] + dot(pivot, column, room))
+            factor[j, k] -= along * lead
+            for i in range(ROWS):
+                column[i] -= along * pivot[i]
+
+
+def combine(factors: Iterable[Array]) -> Array:
+    """Triangular factor of several problems stacked, from their factors.
+
+    Parameters
+    ----------
+    factors : iterable of (m, k) arrays
+        Triangles, or any rows [J r], with columns of the same meaning.
+
+    Returns
+    -------
+    (k, k) array
+        Upper triangle R, no diagonal element negative, with RᵀR the sum of the given ones' FᵀF.
+
+    Raises
+    ------
+    InputError
+        If there is none, or if their numbers of columns differ.
+    """
+    rows = [np.asarray(factor, dtype=np.float64) for factor in factors]
+    widths = sorted({each.shape[1] for each in rows})
+    if len(widths) != 1:
+        given = "there are none" if not rows else f"they have {' and '.join(map(str, widths))}"
+        raise InputError(f"Factors to combine need columns of the same meaning, but {given}.")
+    stacked = np.concatenate(rows)
+    factor = np.zeros((widths[0], widths[0]))
+    room = aligned(EIGHTH)
+    for first in range(0, stacked.shape[0], ROWS):
+        part = stacked[first : first + ROWS]
+        block = aligned(widths[0], ROWS)
+        block[:, : part.shape[0]] = part.T
+        absorb(block, factor, room)
+    return upright(factor)
+
+
+def upright(factor: Array) -> Array:
+    """The triangle with rows turned so that no diagonal element is negative."""
+    turned = np.where(np.diag(factor) < 0.0, -1.0, 1.0)
+    return np.asarray(turned[:, None] * factor)

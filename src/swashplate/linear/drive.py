@@ -1,0 +1,443 @@
+"""The linear model of a drive: continuous, and at a sample time as the march has it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cache
+from math import isfinite
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.equations.derivatives import derive
+from swashplate.equations.model import join
+from swashplate.equations.record import Interpolation, least_substeps
+from swashplate.equations.run import Instance, Started
+from swashplate.errors import InputError
+from swashplate.linear.discrete import Recurrence, recurrence
+from swashplate.linear.export import Matrices, with_line
+from swashplate.linear.model import Coulomb, LinearDrive
+from swashplate.linear.operating_point import (
+    COMMANDS,
+    INPUTS,
+    Input,
+    OperatingPoint,
+    beyond_dead_zone,
+    operating_point,
+    without_ripple,
+)
+from swashplate.models.card import Card, Channel, current_acceleration, steady_current
+from swashplate.models.drive import current_sum, pump, source
+from swashplate.models.pump import PumpState, pump_rates
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.simulation.instance import card_of, check_filter_stability, instance_of
+
+Array = NDArray[np.float64]
+
+OUTPUTS = (
+    "shaft_speed",
+    "swash_angle",
+    "stroker_pressure",
+    "orifice_opening",
+    "spool_position",
+    "solenoid_force",
+    "current",
+    "motor_torque",
+    "motor_pressure_drop",
+)
+"""Signals that a linear model can have as outputs."""
+FLOWING = join(
+    "pump_drive",
+    source,
+    replace(pump, step=pump_rates, parts=()),
+    links={"current_sum": current_sum},
+)
+"""Pump and motor behind a signed current, with rates in place of the step."""
+FORCE = {"Z17": 0.0, "Z19_plus": 1.0, "Z19_minus": 1.0} | dict.fromkeys(
+    ("Z20_plus", "Z20_minus", "Z21_plus", "Z21_minus", "Z22_plus", "Z22_minus"), 0.0
+)
+"""Solenoids whose force is the current, for a model whose input is the force."""
+
+
+def linearize_drive(
+    parameters: ParameterSet,
+    *,
+    voltage: float | None = None,
+    current: float | None = None,
+    speed: float | None = None,
+    input: Input | Sequence[Input] | None = None,
+    outputs: Sequence[str] = ("shaft_speed",),
+    coulomb: Coulomb = "ignored",
+) -> LinearDrive:
+    """Linear model of small motions about a steady state; see `Drive.linearize`."""
+    if input is None:
+        input = "voltage" if current is None else "current"
+    inputs = _checked_inputs((input,) if isinstance(input, str) else tuple(input))
+    if coulomb not in ("ignored", "tangent"):
+        raise InputError(f"coulomb is '{coulomb}'; it is 'ignored' or 'tangent'.")
+    if coulomb == "tangent" and parameters.coulomb_sign == "literal":
+        raise InputError(
+            "The literal sign of the card's Coulomb term has no slope; linearise with "
+            "coulomb='ignored'."
+        )
+    point = operating_point(parameters, inputs[0], voltage=voltage, current=current, speed=speed)
+    names = _checked_outputs(outputs, inputs[0])
+    matrices, states = _pump(parameters, point, inputs, names)
+    delay = 0.0
+    if inputs[0] == "voltage":
+        matrices, states = _behind_filter(parameters, point, coulomb, matrices, states)
+        delay = parameters.numbers["tau"]
+    name = parameters.name
+    kept = point, coulomb, parameters
+    return LinearDrive(*matrices, states, inputs, names, delay, None, name, (), *kept)
+
+
+def _checked_inputs(inputs: tuple[str, ...]) -> tuple[str, ...]:
+    for name in inputs:
+        if name not in INPUTS:
+            raise InputError(f"The input is '{name}', but must be one of {', '.join(INPUTS)}.")
+    if not inputs or len(set(inputs)) != len(inputs) or set(inputs[1:]) & set(COMMANDS):
+        raise InputError(
+            "A linear model needs one input or several different ones, of which the first alone "
+            f"may be a command: {', '.join(COMMANDS)}."
+        )
+    return inputs
+
+
+def _checked_outputs(outputs: Sequence[str], input: str) -> tuple[str, ...]:
+    """Names of outputs, refused where the input is all there is before them."""
+    names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
+    possible = [name for name in OUTPUTS if name != input]
+    if input == "solenoid_force":
+        possible.remove("current")
+    for name in names:
+        if name not in possible:
+            raise InputError(
+                f"'{name}' is no output of a model from {input.replace('_', ' ')}; it has "
+                f"{', '.join(possible)}."
+            )
+    if not names or len(set(names)) != len(names):
+        raise InputError("A linear model needs one output or several different ones.")
+    return names
+
+
+# --- the pump -------------------------------------------------------------------------------------
+
+
+class _Known(NamedTuple):
+    """A drive with numbers at its operating point."""
+
+    instance: Instance
+    started: Started
+    records: tuple[str, ...]
+    """External signals that stand for the inputs."""
+    step: float
+    """0 in continuous time. [s]"""
+
+    @property
+    def friction(self) -> float:
+        """How far friction can hold the spool, by the travel over which it builds up. [1]"""
+        p, k = self.started.arguments[1]["p"], self.started.arguments[1]["k"]
+        return float(k.friction_width / p.spool_presliding)
+
+    def matrices(self, outputs: tuple[str, ...]) -> Recurrence:
+        """Matrices of step or rates."""
+        return recurrence(self.instance, self.started, self.step, self.records, outputs)
+
+
+def _known(
+    parameters: ParameterSet,
+    point: OperatingPoint,
+    inputs: tuple[str, ...],
+    step: float,
+    coulomb: Coulomb = "ignored",
+) -> _Known:
+    """The equations at the point, with whatever small motions leave out."""
+    by_voltage = inputs[0] == "voltage" and step > 0.0
+    instance = without_ripple(instance_of(parameters, by_voltage))
+    card, machine = instance.parts
+    command = "current"
+    at = {"current": point.current}
+    if by_voltage:
+        command = "voltage"
+        assert point.voltage is not None
+        if coulomb == "ignored":
+            plus, minus = (each._replace(C=0.0) for each in (card.p.plus, card.p.minus))
+            card = card._replace(p=Card(plus, minus, card.p.tau))
+        at = {"voltage": beyond_dead_zone(point.voltage, card.p)}
+    elif inputs[0] == "solenoid_force":
+        options = machine.options._replace(hysteresis=None)
+        machine = machine._replace(p=machine.p._replace(**FORCE), options=options)
+        at = {"current": point.solenoid_force}
+    model = instance.model if step > 0.0 else FLOWING
+    instance = Instance(model, (card, machine), instance.name)
+    p = machine.p
+    at |= {"load_torque": p.load_torque, "pump_speed": p.pump_speed, "supply_pressure": p.Z9}
+    records = tuple(command if name in COMMANDS else name for name in inputs)
+    return _Known(instance, _standing(instance, at, step, point), records, step)
+
+
+def _standing(
+    instance: Instance, at: dict[str, float], step: float, point: OperatingPoint
+) -> Started:
+    """A drive that has stood at its operating point for longer than a sample."""
+    card = instance.start(at, step, "steady").states[0]
+    pressure = point.stroker_pressure
+    apart = float(np.spacing(abs(pressure)))
+    while True:
+        state = PumpState(pressure, pressure, point.current)
+        started = instance.start(at, step, "steady", (card, state))
+        signals = started.arguments[1]["signals"]
+        if point.orifice_opening != 0.0 or signals.orifice_opening >= 0.0:
+            break
+        # closed but for rounding: the side of positive opening, in case its root is another one
+        pressure, apart = pressure - apart, 2.0 * apart
+    state = state._replace(
+        spool=signals.spool_free,
+        torque=signals.motor_torque,
+        speed=signals.shaft_speed,
+        flow_speed=signals.flow_speed,
+        load_torque=at["load_torque"],
+        begun=1.0,
+    )
+    return instance.start(at, step, "steady", (card, state))
+
+
+def _pump_states(known: _Known) -> dict[str, str]:
+    """States of the pump that move, and what they are called."""
+    p, options, _ = known.instance.parts[1]
+    sampled = known.step > 0.0
+    found = {"pressure": "stroker_pressure"}
+    if options.damping is not None:
+        found["plate_pressure"] = "plate_pressure"
+    if options.friction is not None and isfinite(p.dither_time):
+        found["deflection"] = "spool_deflection"
+    if options.line is not None:
+        ending = "_before" if sampled else ""
+        found |= {"torque": f"motor_torque{ending}", "speed": f"shaft_speed{ending}"}
+        if sampled:
+            found["flow_speed"] = "flow_speed_before"
+        if sampled and "load_torque" in known.records:
+            found["load_torque"] = "load_torque_before"
+    return {f"pump.{path}": name for path, name in found.items()}
+
+
+def _one_deflection(found: Recurrence, known: _Known) -> Recurrence:
+    """The same with one state of the friction in place of two, place and deflection of the spool.
+
+    The next sample knows them only as d e^(-h/T) - x w/x_s: the deflection that would be left if
+    the spool came back to where it was balanced. In continuous time it is the state itself.
+    """
+    if known.step == 0.0 or known.instance.parts[1].options.friction is None:
+        return found
+    A, B, C = found.A.copy(), found.B.copy(), found.C.copy()
+    spool, deflection = (found.states.index(f"pump.{name}") for name in ("spool", "deflection"))
+    fades = known.started.arguments[1]["k"].dither_factor
+    for matrix in (A, C):
+        matrix[:, deflection] = -matrix[:, spool] / known.friction
+    for matrix in (A, B):
+        matrix[deflection] = fades * matrix[deflection] - known.friction * matrix[spool]
+    return found._replace(A=A, B=B, C=C)
+
+
+def _pump(
+    parameters: ParameterSet,
+    point: OperatingPoint,
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+    step: float = 0.0,
+) -> tuple[Matrices, tuple[str, ...]]:
+    """The pump alone; a voltage counts as the current that it gives."""
+    known = _known(parameters, point, inputs, step)
+    found = _one_deflection(known.matrices(outputs), known)
+    names = _pump_states(known)
+    at = [found.states.index(path) for path in names]
+    return (
+        (found.A[np.ix_(at, at)], found.B[at], found.C[:, at], found.D),
+        tuple(names.values()),
+    )
+
+
+def slowest_lag(parameters: ParameterSet) -> float:
+    """Time within which a drive at rest forgets most: pump's and card's lags and the delay. [s]"""
+    numbers = parameters.numbers
+    changes = {"Z18": 0.0}
+    if "spool_friction" in numbers and numbers.get("spool_presliding", 0.0) == 0.0:
+        changes["spool_friction"] = 0.0  # it holds the spool fast, for ever
+    rest = OperatingPoint(None, 0.0, 0.0, numbers["Z2"] / numbers["Z1"], 0.0, 0.0, 0.0)
+    (A, *_), _ = _pump(parameters.replace(changes), rest, ("solenoid_force",), ("swash_angle",))
+    poles = np.linalg.eigvals(A)
+    lasting = poles[-poles.real > 1e-6 * np.abs(poles)]
+    lag = 1.0 / float(-lasting.real.max())
+    card = card_of(parameters)
+    cards = (_slopes(channel, 0.0)[1] / channel.omega**2 for channel in (card.plus, card.minus))
+    return numbers["tau"] + lag + max(cards)
+
+
+# --- the card before it ---------------------------------------------------------------------------
+
+
+def _slopes(channel: Channel, command: float) -> tuple[float, float]:
+    """dI_ss/dV [A/V] of a channel, and the damping of its filter at rest [1/s]."""
+    steady, moving = _derived_filter()
+    return steady(command, 1.0, channel)[1], -moving(0.0, 0.0, 0.0, channel, None)[1]
+
+
+@cache
+def _derived_filter() -> tuple[Callable[..., Any], Callable[..., Any]]:
+    steady = derive(steady_current, by="command")
+    moving = derive(current_acceleration, by="rate", options={"literal": None})
+    return steady.python, moving.python
+
+
+def _channel(parameters: ParameterSet, point: OperatingPoint, coulomb: Coulomb) -> Channel:
+    assert point.voltage is not None
+    card = card_of(parameters)
+    channel = card.plus if point.voltage >= 0.0 else card.minus
+    return channel._replace(C=0.0) if coulomb == "ignored" else channel
+
+
+def _behind_filter(
+    parameters: ParameterSet,
+    point: OperatingPoint,
+    coulomb: Coulomb,
+    matrices: Matrices,
+    states: tuple[str, ...],
+) -> tuple[Matrices, tuple[str, ...]]:
+    """The pump behind the card's filter, whose rate limits are taken as not active."""
+    assert point.voltage is not None
+    channel = _channel(parameters, point, coulomb)
+    command = abs(beyond_dead_zone(point.voltage, card_of(parameters)))
+    by_voltage, damping = _slopes(channel, command)
+    square = channel.omega * channel.omega
+    A1, B1, C1, D1 = matrices
+    n, k, m = A1.shape[0], B1.shape[1], C1.shape[0]
+    A = np.zeros((n + 2, n + 2))
+    A[:2, :2] = [[-damping, -square], [1.0, 0.0]]
+    A[2:, 1], A[2:, 2:] = B1[:, 0], A1
+    B = np.zeros((n + 2, k))
+    B[0, 0] = square * by_voltage
+    B[2:, 1:] = B1[:, 1:]
+    C = np.hstack((np.zeros((m, 1)), D1[:, :1], C1))
+    D = np.hstack((np.zeros((m, 1)), D1[:, 1:]))
+    return (A, B, C, D), ("current_rate", "current", *states)
+
+
+# --- at a sample time -----------------------------------------------------------------------------
+
+
+def sampled(
+    model: LinearDrive, sample_time: float, interpolation: Interpolation = "linear"
+) -> LinearDrive:
+    """Linear model at a sample time; see `LinearDrive.discrete`.
+
+    Raises
+    ------
+    InputError
+        For a sample time outside 10 µs to 0.1 s, or one at which the card's filter is unstable.
+    """
+    if interpolation not in ("linear", "previous"):
+        raise InputError(f"interpolation is '{interpolation}'; it is 'linear' or 'previous'.")
+    if not sample_time > 0.0:
+        raise InputError(f"The sample time is {sample_time:g} s, but must be above 0.")
+    rate = 1.0 / sample_time
+    substeps = least_substeps(round(rate) if abs(rate - round(rate)) < 1e-9 * rate else rate)
+    step = sample_time / substeps
+    inputs, whole = model.inputs, 0
+    memory: tuple[str, ...] = ()
+    if model.input == "voltage":
+        matrices, states, memory, whole = _behind_card(model, step)
+    else:
+        matrices, states = _pump(
+            model.parameters, model.operating_point, inputs, model.outputs, step
+        )
+    delay = whole * step
+    if substeps > 1:
+        before = len(states)
+        matrices, states = with_line(matrices, states, model.input, whole)
+        line, last = states[: len(states) - before], tuple(f"{name}_last" for name in inputs)
+        # what is measured beside the command goes straight from sample to sample
+        held = [interpolation == "previous", *(False for _ in inputs[1:])]
+        matrices = _lifted(*matrices, substeps, held)
+        states, memory, delay = (*states, *last), (*line, *memory, *last), 0.0
+    A, B, C, D = matrices
+    found = replace(model, A=A, B=B, C=C, D=D, states=states, memory=memory)
+    return replace(found, delay=delay, sample_time=sample_time)
+
+
+def _behind_card(
+    model: LinearDrive, step: float
+) -> tuple[Matrices, tuple[str, ...], tuple[str, ...], int]:
+    """One step of the march behind the whole samples of the delay.
+
+    States: the command one sample ago (the delay's fraction lies between it and the present one),
+    what the filter remembers, the pump.
+    """
+    check_filter_stability(model.parameters, step)
+    known = _known(model.parameters, model.operating_point, model.inputs, step, model.coulomb)
+    found = _one_deflection(known.matrices(model.outputs), known)
+    side = _side(model)
+    exact = known.instance.parts[0].options.exact is not None
+    names = {
+        f"card.{side}.before": "current_rate" if exact else "current_before",
+        f"card.{side}.now": "current",
+        **_pump_states(known),
+    }
+    at = [found.states.index(path) for path in names]
+    # a channel counts in its own direction, the model in that of the speed
+    sign = np.ones(len(at))
+    sign[:2] = 1.0 if side == "plus" else -1.0
+    A, C = found.A[np.ix_(at, at)] * np.outer(sign, sign), found.C[:, at] * sign
+    B, D = found.B[at] * sign[:, np.newaxis], found.D
+    whole = int(known.instance.places(known.records, step).whole[0])
+    late = {late: k for k, (of, late) in enumerate(found.columns) if of == "voltage"}
+    others = [k for k, (of, _) in enumerate(found.columns) if of != "voltage"]
+    read = [k for lag, k in late.items() if lag > whole + 1 and (B[:, k].any() or D[:, k].any())]
+    past = [late[whole + 1], *read]
+    count = len(past)
+    memory = ("voltage_before", *(f"voltage_before_{j}" for j in range(2, count + 1)))
+    line = np.eye(count, k=-1)
+    into = np.hstack((np.eye(count, 1), np.zeros((count, len(others)))))
+    now = [late[whole], *others]
+    return (
+        (
+            np.block([[line, np.zeros((count, len(at)))], [B[:, past], A]]),
+            np.vstack((into, B[:, now])),
+            np.hstack((D[:, past], C)),
+            D[:, now],
+        ),
+        (*memory, *names.values()),
+        memory,
+        whole,
+    )
+
+
+def _side(model: LinearDrive) -> str:
+    voltage = model.operating_point.voltage
+    assert voltage is not None
+    return "plus" if voltage >= 0.0 else "minus"
+
+
+def _lifted(
+    A: Array, B: Array, C: Array, D: Array, substeps: int, held: Sequence[bool]
+) -> Matrices:
+    """Several steps as one sample.
+
+    The state is that of the step after the sample before, together with the inputs at that sample:
+    from there on the steps up to this sample know their inputs.
+    """
+    n, k = B.shape
+    # columns: the state, the last inputs, the present ones
+    z = np.eye(n, n + 2 * k)
+    y = np.empty(0)
+    for j in range(1, substeps + 1):
+        rise = np.array([float(j == substeps) if each else j / substeps for each in held])
+        u = np.hstack((np.zeros((k, n)), np.diag(1.0 - rise), np.diag(rise)))
+        y = C @ z + D @ u
+        z = A @ z + B @ u
+    longer = np.zeros((n + k, n + k))
+    longer[:n] = z[:, : n + k]
+    into = np.vstack((z[:, n + k :], np.eye(k)))
+    return longer, into, y[:, : n + k], y[:, n + k :]

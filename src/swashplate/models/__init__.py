@@ -1,0 +1,1 @@
+"""The machines: their equations, parameters and states, as values of the engine."""

@@ -1,0 +1,116 @@
+"""Every parameter of the drive: symbol, plain name, unit, range, as the models declare them.
+
+The symbols are those of Kruse (2001). A directional parameter has a plus and a minus value, chosen
+by the sign of the signal it acts on; both are stored as magnitudes.
+
+A definition stands once, on the field of `swashplate.models.card.Card` or
+`swashplate.models.pump.Pump` that holds the value.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from difflib import get_close_matches
+from typing import Literal
+
+from swashplate.equations.definition import Declared, declared_by
+from swashplate.equations.definition import Definition as Meaning
+from swashplate.errors import ParameterError
+from swashplate.models.card import Card
+from swashplate.models.pump import Pump
+
+Block = Literal["control_card", "pump_motor", "refinements"]
+
+INPUTS = ("pump_speed",)
+"""Fields of the models that no set has: what drives the machine, not what it is."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Definition(Meaning):
+    """What a parameter is, whatever its value, and where a set has it."""
+
+    symbol: str
+    block: Block
+    directional: bool = False
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of its values: one, or one for each direction."""
+        if self.directional:
+            return (f"{self.symbol}_plus", f"{self.symbol}_minus")
+        return (self.symbol,)
+
+
+def _definition(each: Declared, block: Block) -> Definition:
+    meaning = {field.name: getattr(each.definition, field.name) for field in fields(Meaning)}
+    return Definition(**meaning, symbol=each.symbol, block=block, directional=len(each.fields) == 2)
+
+
+def _collected() -> Iterator[Definition]:
+    """All parameters in the order of the source's tables, the refinements last."""
+    for each in declared_by(Card):
+        yield _definition(each, "control_card")
+    for each in declared_by(Pump):
+        if each.symbol not in INPUTS:
+            optional = each.definition.default is not None
+            yield _definition(each, "refinements" if optional else "pump_motor")
+
+
+_ALL = tuple(_collected())
+
+CATALOGUE: dict[str, Definition] = {d.symbol: d for d in _ALL if d.block != "refinements"}
+"""Definitions of what every set has, by symbol, the card's first."""
+
+REFINEMENTS: dict[str, Definition] = {d.symbol: d for d in _ALL if d.block == "refinements"}
+"""Definitions of what a set may leave out, by symbol, along the chain; each has one value."""
+
+COLUMNS: dict[str, str] = {
+    column: symbol for symbol, each in CATALOGUE.items() for column in each.columns
+}
+"""Symbol of every single value that every set has, e.g. ``Z16_plus`` → ``Z16``."""
+
+DEFAULTS: dict[str, float] = {s: d.default for s, d in REFINEMENTS.items() if d.default is not None}
+"""What a refinement is where a set does not give it."""
+
+
+def find(name: str) -> Definition:
+    """Definition of a symbol (``Z16``, ``spool_friction``) or column (``Z16_plus``).
+
+    Raises
+    ------
+    ParameterError
+        If there is none of that name; the sentence lists the right ones.
+    """
+    if name in CATALOGUE:
+        return CATALOGUE[name]
+    if name in COLUMNS:
+        return CATALOGUE[COLUMNS[name]]
+    if name in REFINEMENTS:
+        return REFINEMENTS[name]
+    raise unknown_parameter(name)
+
+
+def unknown_parameter(name: str) -> ParameterError:
+    """Error for a name that no parameter has."""
+    close = get_close_matches(name, [*CATALOGUE, *COLUMNS, *REFINEMENTS], n=1)
+    hint = f" (did you mean {close[0]}?)" if close else ""
+    return ParameterError(
+        f"There is no parameter '{name}'{hint}; the parameters are {', '.join(CATALOGUE)}, "
+        "those with two directions also as e.g. Z16_plus and Z16_minus, and the refinements "
+        f"{', '.join(REFINEMENTS)}."
+    )
+
+
+def columns_of(names: Mapping[str, object] | tuple[str, ...] | list[str]) -> list[str]:
+    """Columns that a list of symbols and columns stands for, in its order.
+
+    Raises
+    ------
+    ParameterError
+        For a name that no parameter has.
+    """
+    columns: list[str] = []
+    for name in names:
+        definition = find(name)
+        wanted = definition.columns if name == definition.symbol else (name,)
+        columns.extend(column for column in wanted if column not in columns)
+    return columns

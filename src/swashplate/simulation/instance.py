@@ -1,0 +1,169 @@
+"""From a parameter set to a model with numbers: options, columns and paths, the filter's limit."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import floor, tan
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.equations.fields import floats_of
+from swashplate.equations.library import TAN_22_5
+from swashplate.equations.model import Model
+from swashplate.equations.run import Instance, Part
+from swashplate.errors import InputError
+from swashplate.models.card import Card, CardOptions, Channel
+from swashplate.models.drive import Source as CurrentSource
+from swashplate.models.drive import drive, pump_drive
+from swashplate.models.pump import Pump, PumpOptions
+from swashplate.parameters.parameter_set import ParameterSet
+
+SIDES: Final = ("plus", "minus")
+MOST_SUBSTEPS = 1000
+"""Steps a sample that anyone would wait for."""
+
+
+def _paths() -> dict[str, str]:
+    found = {path: f"pump.{path}" for path in floats_of(Pump)}
+    for side in SIDES:
+        found |= {f"{name}_{side}": f"card.{side}.{name}" for name in Channel._fields}
+    return {**found, "tau": "card.tau"}
+
+
+PATHS = _paths()
+"""Path in the model of every column such as ``Z16_plus``."""
+START_PRESSURE = "start_pressure"
+"""Column of δP at the first sample, where it is an unknown of the experiment."""
+START_PATHS = {START_PRESSURE: ("pump.pressure", "pump.plate_pressure")}
+OPTION_OF = {
+    "Z7": "leaky",
+    "Z12": "loaded",
+    "spool_friction": "friction",
+    "solenoid_hysteresis": "hysteresis",
+    "cam_ripple": "ripple",
+    "cam_ripple_per_torque": "ripple",
+    "swash_damping": "damping",
+    "motor_leakage": "leakage",
+    "line_stiffness": "line",
+}
+"""Option of the pump that a parameter belongs to."""
+
+
+def path_of(column: str) -> str:
+    """Path in the model of a column, or of the pressure at the start."""
+    return "start.pump.pressure" if column == START_PRESSURE else PATHS[column]
+
+
+def card_of(parameters: ParameterSet) -> Card:
+    """The card's numbers."""
+    numbers = parameters.numbers
+    plus, minus = (
+        Channel(*(numbers[f"{name}_{side}"] for name in Channel._fields)) for side in SIDES
+    )
+    return Card(plus, minus, numbers["tau"])
+
+
+def pump_of(parameters: ParameterSet) -> Pump:
+    """The pump's numbers; of the refinements those that are given."""
+    return Pump(
+        **{name: parameters.numbers[name] for name in Pump._fields if name in parameters.numbers}
+    )
+
+
+def card_options(parameters: ParameterSet) -> CardOptions:
+    """Forms of the card."""
+    return CardOptions(
+        literal=True if parameters.coulomb_sign == "literal" else None,
+        split=True if parameters.card_switch == "split" else None,
+    )
+
+
+def pump_options(parameters: ParameterSet, also: frozenset[str] = frozenset()) -> PumpOptions:
+    """Forms of the pump; `also` names columns whose options are on whatever their values are."""
+    numbers = parameters.numbers
+    on = {
+        option
+        for name, option in OPTION_OF.items()
+        if numbers.get(name, 0.0) != 0.0 or (name in also and name != "Z7")
+    }
+    if tan(max(numbers["Z13_plus"], numbers["Z13_minus"])) >= TAN_22_5:
+        on.add("steep")
+    if parameters.pressure_root == "symmetric":
+        on.add("symmetric")
+    return PumpOptions(**{name: True for name in PumpOptions._fields if name in on})
+
+
+@lru_cache(maxsize=256)
+def instance_of(
+    parameters: ParameterSet, by_voltage: bool, also: frozenset[str] = frozenset()
+) -> Instance:
+    """The drive behind a voltage, or the pump alone behind a signed current.
+
+    Parameters
+    ----------
+    parameters : ParameterSet
+        The numbers.
+    by_voltage : bool
+        Whether the card is part of it.
+    also : frozenset of str
+        Columns whose options are on whatever their values are: those that are differentiated by.
+    """
+    pump = Part(pump_of(parameters), pump_options(parameters, also))
+    if by_voltage:
+        card = Part(card_of(parameters), card_options(parameters))
+        return Instance(drive, (card, pump), parameters.name)
+    return Instance(pump_drive, (Part(CurrentSource()), pump), parameters.name)
+
+
+def model_of(by_voltage: bool) -> Model:
+    """The model behind `instance_of`."""
+    return drive if by_voltage else pump_drive
+
+
+# --- the card's recursion -------------------------------------------------------------------------
+
+
+def stability_limit(zeta: ArrayLike) -> NDArray[np.float64]:
+    """Largest ωh, itself excluded, at which the card's explicit filter is stable, for each ζ.
+
+    Notes
+    -----
+    Jury's criterion for z² - 2(1 - ζωh) z + 1 - 2ζωh + ω²h² is ωh < 2ζ and ζωh < 1 + ω²h²/4. The
+    first condition is the stricter one where damping is small: an explicit step adds to a swing
+    what the damping has to take away. From ζ = 1 on the second gives ωh < 2(ζ - √(ζ² - 1)), here
+    written without cancellation.
+    """
+    damping = np.asarray(zeta, dtype=np.float64)
+    over = np.maximum(damping, 1.0)
+    slow = 2.0 / (over + np.sqrt(over - 1.0) * np.sqrt(over + 1.0))
+    limit: NDArray[np.float64] = np.minimum(2.0 * damping, slow)
+    return limit
+
+
+def check_filter_stability(parameters: ParameterSet, step: float) -> None:
+    """Refuse a step at which the explicit filter would settle on wrong values without a word.
+
+    Raises
+    ------
+    InputError
+        Unless ωh is below `stability_limit`; the sentence says how many steps a sample would do.
+    """
+    owner, numbers = parameters.name, parameters.numbers
+    for side in SIDES:
+        zeta, omega = numbers[f"zeta_{side}"], numbers[f"omega_{side}"]
+        steps = omega * step / float(stability_limit(zeta))
+        if steps < 1.0:
+            continue
+        if not steps < MOST_SUBSTEPS:
+            much, change = ("little", "raise") if zeta < 1.0 else ("much", "lower")
+            raise InputError(
+                f"{owner}: the current filter of the {side} channel (zeta = {zeta:g}) has so "
+                f"{much} damping that {MOST_SUBSTEPS} steps a sample would not do; {change} zeta."
+            )
+        raise InputError(
+            f"{owner}: the current filter of the {side} channel (zeta = {zeta:g}, omega = "
+            f"{omega:g} rad/s) is unstable at a step of 1/{1.0 / step:g} s; simulate with "
+            f"substeps={floor(steps) + 1} or more or at a higher rate, or lower omega."
+        )

@@ -1,0 +1,455 @@
+"""Every equation's partial derivatives by every float, against Richardson-extrapolated differences.
+
+Equations are found by looking, so that a new one is tested or missed aloud. Points at which another
+branch is taken within reach of the differences are drawn again.
+"""
+
+import importlib
+import inspect
+import pkgutil
+import sys
+from collections.abc import Callable, Iterator
+from functools import cache
+from math import inf, isfinite
+from random import Random
+from types import CodeType, FrameType, FunctionType
+from typing import Any, get_type_hints
+
+import pytest
+
+import swashplate.equations
+import swashplate.models
+from swashplate import Drive, PhysicalSet
+from swashplate.equations import derive
+from swashplate.equations.equation import interpreted, is_function
+from swashplate.equations.syntax import plain
+from swashplate.equations.windows import Window
+from swashplate.models import card, full_order, pump
+
+POINTS, FEWER = 100, 30
+SLOW = 25
+"""Floats among the arguments from which on fewer points do."""
+H = 1.0 / 512.0
+
+IMPLICIT = {"tight_step": {"Z7"}, "pump_step": {"p.Z7"}}
+"""Declared as that at zero leakage, of an equation that leaves leakage out."""
+
+
+# --- equations ------------------------------------------------------------------------------------
+
+
+def equations() -> dict[str, Any]:
+    """All equations of the models and of the engine's library, by module and name."""
+    found = {}
+    for package in (swashplate.models, swashplate.equations):
+        for each in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+            module = importlib.import_module(each.name)
+            for name, thing in vars(module).items():
+                if not is_function(thing) or plain(thing).__module__ != each.name:
+                    continue
+                if inspect.getsource(plain(thing)).startswith("@equation\n"):
+                    found[f"{each.name.rpartition('.')[2]}.{name}"] = thing
+    return found
+
+
+EQUATIONS = equations()
+
+
+# --- arguments ------------------------------------------------------------------------------------
+
+INSTEAD = {
+    "Z2": 3e-3, "Z7": 0.3, "Z11": 0.02, "Z12": 0.2, "Z14": 3e-4, "Z15": 2e6, "Z16_plus": 1.5e-4,
+    "Z16_minus": 1.5e-4, "Z17": 0.05, "Z18": 1e-5, "Z20_plus": 3.0, "Z20_minus": 3.0,
+    "Z21_plus": 2.0, "Z21_minus": 2.0, "Z22_plus": 1.0, "Z22_minus": 1.0, "spool_friction": 0.1,
+    "spool_presliding": 5e-5, "dither_time": 0.6, "solenoid_hysteresis": 0.005, "load_torque": 3e4,
+    "load_inertia": 5e3, "motor_leakage": 1e-6, "cam_ripple": 0.01, "cam_ripple_per_torque": 5e-7,
+    "cam_phase": 0.3, "swash_damping": 0.02, "line_stiffness": 1e6, "motor_constant": 250.0,
+    "G2": 1e-3, "G3": 1e-5, "C": 2.0, "lim1": 2.3, "lim2": 2.3, "I_t1": 0.35, "I_t2": 0.14,
+    "a": 20.0, "Z6": 0.07,
+}  # fmt: skip
+"""Usual sizes of what a packaged set leaves off."""
+
+VOLTS, AMPERES = (-9.0, 9.0), (0.0, 0.7)
+RANGES = {
+    "at": VOLTS, "voltage": VOLTS, "command": VOLTS, "first": (-1.0, 2.0), "last": (-1.0, 2.0),
+    "newest": (-1.0, 2.0), "middle": (-1.0, 2.0), "oldest": (-1.0, 2.0), "threshold": (0.0, 1.0),
+    "newer": (-2.0, 2.0), "older": (-2.0, 2.0), "share": (0.0, 1.0), "fraction": (0.02, 0.98),
+    "length": (0.1, 1.0), "centre": (-0.5, 0.5), "change": (-3e-5, 3e-5), "now": AMPERES,
+    "steady": AMPERES, "previous": AMPERES, "target": AMPERES, "output": AMPERES,
+    "fallen": AMPERES, "begins": AMPERES, "ends": AMPERES, "level": AMPERES, "before": AMPERES,
+    "current_positive": AMPERES, "current_negative": AMPERES, "current": (-0.7, 0.7),
+    "w": (0.05, 2.5), "decay": (0.8, 0.99), "value": (-1.0, 1.0), "width": (0.05, 0.5),
+    "t": (-0.41, 0.41), "rate": (-0.5, 0.5), "opening": (-2e-4, 2e-4), "position": (-3e-4, 3e-4),
+    "arm_sine": (-0.3, 0.3), "head": (1e5, 1e7), "gain": (1e2, 1e3), "root": (3e2, 3e3),
+    "tangent": (-0.35, 0.35), "swash_rate": (-1.0, 1.0), "pressure_rate": (-1e7, 1e7),
+    "angle": (-0.3, 0.3), "swash_angle": (-0.3, 0.3), "leakage": (-0.05, 0.05),
+    "deflection": (-1e-5, 1e-5), "balance": (-3e-5, 3e-5), "presliding": (1e-5, 1e-4),
+    "factor": (0.8, 1.0), "depth": (0.0, 0.3), "shaft_angle": (0.0, 20.0), "torque": (-3e4, 3e4),
+    "speed": (-3.0, 3.0), "flow_speed": (-3.0, 3.0), "load_torque": (-3e4, 3e4),
+    "velocity": (-0.3, 0.3), "flow": (-1e-4, 1e-4), "piston_speed": (-0.1, 0.1),
+    "motor_pressure": (-2e7, 2e7), "force": (-35.0, 35.0), "pressure": (-6e5, 6e5),
+    "plate": (-6e5, 6e5), "plate_pressure": (-6e5, 6e5),
+}  # fmt: skip
+"""Physical ranges of what is no parameter, by its name."""
+OWN_RANGES: dict[str, dict[str, tuple[float, float]]] = {
+    "refinements.held_back": {"before": (-3e-5, 3e-5), "width": (1e-6, 1e-5)},
+    "refinements.magnetising_current": {"current": (0.0, 0.02), "previous": (0.0, 0.02)},
+    "card.remaining_decay": {"previous": (0.25, 0.3), "fallen": (0.0, 0.05)},
+    "card.taken_over": {"previous": (0.0, 0.1), "target": (0.6, 0.8)},
+    "card.current_acceleration": {"rate": (-0.05, 0.05)},
+    "library.arctangent": {"tangent": (-4.0, 4.0)},
+    "pump.swash_angle": {"tangent": (-0.5, 0.5)},
+}
+
+
+class Draw:
+    """Arguments of one equation, one set after the other."""
+
+    def __init__(self, name: str, random: Random) -> None:
+        self.random = random
+        self.name = name
+        self.own = OWN_RANGES.get(name, {})
+        self.drive = Drive.preset(random.choice(["hoist", "slew", "luff"]))
+
+    def uniform(self, low: float, high: float) -> float:
+        return self.random.uniform(low, high)
+
+    def parameter(self, name: str) -> float:
+        """A value about that of a packaged set."""
+        numbers = self.drive.parameters.numbers
+        usual = INSTEAD.get(name, pump.Pump._field_defaults.get(name, 0.0))
+        value = numbers.get(name, numbers.get(f"{name}_plus", usual))
+        value = usual if value == 0.0 or abs(value) == inf else value
+        return value * self.uniform(0.7, 1.3)
+
+    def number(self, name: str) -> float:
+        if name in self.own or name in RANGES:
+            return self.uniform(*(self.own.get(name) or RANGES[name]))
+        if name == "h":
+            return H
+        if name in ("direction", "sign"):
+            return self.random.choice([1.0, -1.0])
+        if name in pump.Pump._fields or name in card.Channel._fields:
+            return self.parameter(name)
+        raise AssertionError(f"{self.name}: say in RANGES what '{name}' can be")
+
+    def flags(self, kind: Any) -> Any:
+        return kind(*(self.random.choice([None, True]) for _ in kind._fields))
+
+    def channel(self) -> card.Channel:
+        return card.Channel(*(self.parameter(name) for name in card.Channel._fields))
+
+    def filter(self) -> card.Filter:
+        now = self.uniform(0.0, 0.7)
+        before = now + self.uniform(-0.01, 0.01)
+        return card.Filter(now, before, max(now + self.uniform(-0.02, 0.02), 1e-3))
+
+    def window(self) -> Window:
+        middle = self.uniform(*VOLTS) * self.random.choice([1.0, 0.1])
+        near = [middle + self.uniform(-0.5, 0.5) for _ in range(2)]
+        return Window((near[0], middle, near[1]), self.uniform(0.02, 0.98))
+
+    def machine(self) -> full_order.Machine:
+        numbers = PhysicalSet.preset("hoist").numbers
+        usual = {"orifice_opening_plus": 1e-3, "orifice_opening_minus": 1e-3}
+        return full_order.Machine(
+            **{
+                name: (v if isfinite(v) and v != 0.0 else usual.get(name, 1e-3))
+                * self.uniform(0.9, 1.1)
+                for name, v in numbers.items()
+            }
+        )
+
+    def arguments(self, hints: dict[str, Any]) -> dict[str, Any]:
+        """One argument after the other, each consistent with those that it follows from."""
+        options = {name: self.flags(kind) for name, kind in hints.items() if name == "options"}
+        known: dict[str, Any] = {"h": H, **options}
+        known["p"] = self.parameters(hints.get("p", pump.Pump))
+        for name in (*[n for n in ("k", "state", "inputs", "signals") if n in hints], *hints):
+            if name not in known:
+                known[name] = self.argument(name, hints[name], known)
+        return {name: known[name] for name in hints}
+
+    def parameters(self, kind: Any) -> Any:
+        if kind is card.Card:
+            return card.Card(self.channel(), self.channel(), 0.014)
+        if kind is card.Channel:
+            return self.channel()
+        if kind is full_order.Machine:
+            return self.machine()
+        return pump.Pump(*(self.parameter(name) for name in pump.Pump._fields))
+
+    def argument(self, name: str, kind: Any, known: dict[str, Any]) -> Any:
+        p = known["p"]
+        if kind is float:
+            return self.number(name)
+        if kind == pump.Flag:
+            return self.random.choice([None, True])
+        if kind is Window:
+            return self.window()
+        if kind is card.CardInputs:
+            return card.CardInputs(self.window(), self.window())
+        if kind is card.Filter:
+            return self.filter()
+        if kind is card.CardState:
+            return card.CardState(self.filter(), self.filter())
+        if kind is card.CardConstants:
+            options = known.get("options") or self.flags(card.CardOptions)
+            return interpreted(card.card_constants)(p, H, options)
+        if kind is card.ChannelConstants:
+            channel = p if isinstance(p, card.Channel) else self.channel()
+            options = known.get("options") or card.CardOptions(exact=True)
+            return interpreted(card.channel_constants)(channel, H, options)
+        if kind is card.ChannelSignals:
+            return kind(*(self.uniform(*AMPERES) for _ in kind._fields))
+        if kind is card.CardSignals:
+            return kind(*(self.uniform(*AMPERES) for _ in kind._fields))
+        if kind is pump.PumpInputs:
+            supply = p.Z9 * self.uniform(0.9, 1.1)
+            return kind(
+                self.number("current"), self.uniform(0.8, 1.2), self.number("load_torque"), supply
+            )
+        if kind is pump.PumpConstants:
+            options = known.get("options") or self.flags(pump.PumpOptions)
+            return interpreted(pump.pump_constants)(p, H, options)
+        if kind is pump.PumpState:
+            return self.pump_state(known)
+        if kind is pump.PumpSignals:
+            return self.pump_signals(known)
+        if kind is full_order.Motion:
+            return kind(
+                *(self.number(n) for n in ("position", "velocity", "pressure", "angle")),
+                self.number("swash_rate"),
+            )
+        if not getattr(kind, "_fields", None) and hasattr(kind, "_fields"):
+            return kind()
+        raise AssertionError(f"{self.name}: say how a {kind} is drawn")
+
+    def pump_state(self, known: dict[str, Any]) -> pump.PumpState:
+        k = known.get("k") or interpreted(pump.pump_constants)(
+            known["p"], H, known.get("options") or pump.PumpOptions()
+        )
+        pressures = [self.uniform(0.98 * k.lower, 0.98 * k.upper) for _ in range(2)]
+        return pump.PumpState(
+            pressure=pressures[0],
+            plate_pressure=pressures[1],
+            magnetising_current=self.number("current"),
+            spool=self.number("position"),
+            deflection=self.number("deflection"),
+            torque=self.number("torque"),
+            speed=self.number("speed"),
+            flow_speed=self.number("speed"),
+            load_torque=self.number("load_torque"),
+            shaft_angle=self.number("shaft_angle"),
+            begun=1.0,
+        )
+
+    def pump_signals(self, known: dict[str, Any]) -> pump.PumpSignals:
+        p = known["p"]
+        options = known.get("options") or pump.PumpOptions()
+        state = known.get("state") or self.pump_state(known)
+        inputs = known.get("inputs") or self.argument("inputs", pump.PumpInputs, known)
+        k = known.get("k") or interpreted(pump.pump_constants)(p, H, options)
+        made: pump.PumpSignals = interpreted(pump.pump_sample)(state, inputs, p, k, H, options)
+        return made
+
+
+def leaves(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    """What is at the ends of nested tuples, by dotted paths."""
+    if isinstance(value, tuple):
+        names = getattr(value, "_fields", None) or [str(i) for i in range(len(value))]
+        for name, each in zip(names, value, strict=True):
+            yield from leaves(each, f"{path}.{name}")
+    else:
+        yield path, value
+
+
+def changed(value: Any, path: list[str], to: float) -> Any:
+    """A nested tuple with one number replaced."""
+    if not path:
+        return to
+    fields = getattr(value, "_fields", None)
+    at = fields.index(path[0]) if fields else int(path[0])
+    values = [changed(v, path[1:], to) if i == at else v for i, v in enumerate(value)]
+    return type(value)(*values) if fields else tuple(values)
+
+
+# --- branches -------------------------------------------------------------------------------------
+
+
+def lower(*values: float) -> float:
+    """`min` whose choice is a branch."""
+    found = values[0]
+    for each in values[1:]:
+        if each < found:
+            found = each
+    return found
+
+
+def upper(*values: float) -> float:
+    """`max` whose choice is a branch."""
+    found = values[0]
+    for each in values[1:]:
+        if each > found:
+            found = each
+    return found
+
+
+def size_of(value: float) -> float:
+    """`abs` whose choice is a branch."""
+    if value < 0.0:
+        return -value
+    return value
+
+
+class Pattern:
+    """Runs equations and sums up which instructions they went through."""
+
+    def __init__(self) -> None:
+        self.codes: set[CodeType] = set()
+        self.sum = 0
+
+    def trace(self, frame: FrameType, event: str, _: Any) -> Any:
+        if frame.f_code not in self.codes:
+            return None
+        frame.f_trace_opcodes = True
+        frame.f_trace_lines = False
+        if event == "opcode":
+            self.sum = hash((self.sum, frame.f_code.co_firstlineno, frame.f_lasti))
+        return self.trace
+
+    def untraced(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        def run(*arguments: Any) -> Any:
+            before = sys.gettrace()
+            sys.settrace(None)
+            try:
+                return function(*arguments)
+            finally:
+                sys.settrace(before)
+
+        return run
+
+    @cache  # noqa: B019
+    def copy(self, function: Any) -> Any:
+        """The plain function and all that it calls, with choices that can be seen."""
+        f = plain(function)
+        space = {**f.__globals__, "min": lower, "max": upper, "abs": size_of}
+        made = FunctionType(f.__code__, space, f.__name__, f.__defaults__, f.__closure__)
+        self.codes |= {f.__code__, lower.__code__, upper.__code__, size_of.__code__}
+        for name in f.__code__.co_names:
+            if name == "root":
+                space[name] = self.untraced(interpreted(space[name]))
+            elif is_function(space.get(name)):
+                space[name] = self.copy(space[name])
+        return made
+
+    def of(self, function: Any, arguments: dict[str, Any]) -> int:
+        made = self.copy(function)
+        self.sum, before = 0, sys.gettrace()
+        sys.settrace(self.trace)
+        try:
+            made(*arguments.values())
+        finally:
+            sys.settrace(before)
+        return self.sum
+
+
+PATTERN = Pattern()
+
+
+# --- comparison -----------------------------------------------------------------------------------
+
+
+def compared(function: Any, arguments: dict[str, Any], implicit: set[str]) -> bool:
+    """Compare all partial derivatives at one point, unless it has to be drawn again."""
+    run = interpreted(function)
+    options, lengths, floats = {}, {}, {}
+    for name, value in arguments.items():
+        if value is None or value is True or name == "options":
+            options[name] = value
+            continue
+        for path, number in leaves(value, name):
+            floats[path] = number
+            if path.endswith(".s.0"):
+                lengths[path.removesuffix(".0")] = 3
+
+    def values(path: str, to: float) -> list[float]:
+        name, *rest = path.split(".")
+        moved = {**arguments, name: changed(arguments[name], rest, to)}
+        return [float(v) for _, v in leaves(run(*moved.values()), "")]
+
+    try:
+        base = [float(v) for _, v in leaves(run(*arguments.values()), "")]
+        pattern = PATTERN.of(function, arguments)
+        for path, number in floats.items():
+            h = 1e-3 * (abs(number) or 1e-3)
+            for to in (number - h, number + h):
+                name, *rest = path.split(".")
+                moved = {**arguments, name: changed(arguments[name], rest, to)}
+                if PATTERN.of(function, moved) != pattern:
+                    return False
+    except (ValueError, ZeroDivisionError, OverflowError):
+        return False
+    if not all(isfinite(v) for v in base):
+        return False
+    derived = derived_of(function, tuple(floats), tuple(options.items()), tuple(lengths.items()))
+    got = derived.python(*arguments.values())
+    assert got[: len(derived.outputs)] == tuple(base)
+    slopes = dict(zip(derived.entries, got[len(derived.outputs) :], strict=True))
+    for i, path in enumerate(derived.inputs):
+        number = floats[path]
+        size = abs(number) or 1e-3
+        h = 1e-3 * size
+        at = {k: values(path, number + k * h) for k in (-1.0, -0.5, -0.25, 0.25, 0.5, 1.0)}
+        for o, value in enumerate(base):
+            slope_of = {k: (at[k][o] - at[-k][o]) / (2.0 * k * h) for k in (1.0, 0.5, 0.25)}
+            whole, half, quarter = slope_of.values()
+            coarse, fine = (4.0 * half - whole) / 3.0, (4.0 * quarter - half) / 3.0
+            tolerance = 1e-6 * abs(fine) + 1e-9 * abs(value) / size
+            if abs(coarse - fine) > tolerance:
+                return False  # too curved for the differences
+            if path in implicit:
+                continue
+            slope = slopes.get((o, i), 0.0)
+            assert abs(slope - fine) <= tolerance, (derived.outputs[o], path, slope, fine)
+    return True
+
+
+@cache
+def derived_of(function: Any, by: Any, options: Any, lengths: Any) -> Any:
+    return derive(function, by, options=dict(options), lengths=dict(lengths))
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
+def test_partials_are_those_of_differences(name: str) -> None:
+    function = EQUATIONS[name]
+    hints = get_type_hints(plain(function))
+    hints.pop("return", None)
+    random = Random(name)
+    several = [Draw(name, random) for _ in range(6)]
+    wanted, accepted, tries = POINTS, 0, 0
+    kinds = [draw.flags(hints["options"]) for draw in several[:3]] if "options" in hints else []
+    if kinds:
+        kinds[0] = type(kinds[0])()
+    while accepted < wanted and tries < 40 * POINTS:
+        draw = several[tries % 6]
+        tries += 1
+        if kinds:
+            chosen = kinds[tries % 3]
+            draw.flags = lambda kind, chosen=chosen: (  # type: ignore[method-assign]
+                chosen if isinstance(chosen, kind) else kind()
+            )
+        arguments = draw.arguments(hints)
+        floats = sum(1 for v in arguments.values() for _ in leaves(v, ""))
+        if floats == 0:
+            return  # nothing to differentiate by
+        wanted = FEWER if floats > SLOW else POINTS
+        accepted += compared(function, arguments, IMPLICIT.get(name.split(".")[1], set()))
+    assert accepted >= wanted, f"{accepted} of {tries} points could be compared"
+
+
+def test_no_equation_is_missed() -> None:
+    """Those that the models name, and the library's, are among what was found."""
+    for package in ("card", "pump", "refinements", "full_order", "library", "windows"):
+        assert any(name.startswith(f"{package}.") for name in EQUATIONS), package
+    assert len(EQUATIONS) > 100

@@ -1,0 +1,274 @@
+"""Machine code and generated modules on disk: kept as long as what they reach is unchanged."""
+
+import inspect
+import json
+import os
+import subprocess
+import sys
+import traceback
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import config
+
+from swashplate.equations import closure, closure_hash, derive, equation, generated, kernel, source
+from swashplate.equations.cache import UNCACHED
+
+SLOPE = 2.0
+
+EQUATIONS = '''
+"""Two kernels of three equations."""
+from typing import NamedTuple
+
+from swashplate.equations import equation, kernel
+
+GAIN = 2.0
+
+
+class Spring(NamedTuple):
+    stiffness: float
+
+
+@equation
+def pull(x: float, s: Spring) -> float:
+    """Docstring."""
+    return GAIN * s.stiffness * x
+
+
+@equation
+def push(x: float) -> float:
+    return x + 1.0
+
+
+@equation
+def both(x: float, s: Spring) -> float:
+    return pull(x, s) + push(x)
+
+
+@kernel
+def inner(x, s):
+    return both(x, s)
+
+
+@kernel
+def march(n, s):
+    total = 0.0
+    for i in range(n):
+        total += inner(i * 1.0, s)
+    return total
+
+
+@kernel
+def other(n):
+    return push(n * 1.0)
+'''
+
+RUN = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+import machine
+from swashplate.equations import closure_hash
+s = machine.Spring(3.0)
+out = {"march": machine.march(4, s), "other": machine.other(4)}
+for name in ("march", "other"):
+    stats = getattr(machine, name).stats
+    out[name + " hits"] = sum(stats.cache_hits.values())
+    out[name + " hash"] = closure_hash(getattr(machine, name))
+print(json.dumps(out))
+"""
+
+
+def run(folder: Path, text: str = EQUATIONS) -> dict[str, Any]:
+    """Values and cache hits of the kernels in a process of their own."""
+    (folder / "machine.py").write_text(text)
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, str(folder)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache"), "NUMBA_DISABLE_JIT": "0"},
+    )
+    return json.loads(done.stdout)
+
+
+def test_kernels_are_kept_until_what_they_reach_changes(tmp_path: Path) -> None:
+    first = run(tmp_path)
+    assert (first["march"], first["march hits"]) == (46.0, 0)
+    again = run(tmp_path)
+    assert (again["march"], again["march hits"], again["other hits"]) == (46.0, 1, 1)
+
+    remarked = run(tmp_path, EQUATIONS.replace("Docstring", "Another docstring"))
+    assert (remarked["march hits"], remarked["other hits"]) == (1, 1)
+
+    changed = run(tmp_path, EQUATIONS.replace("GAIN * s", "4.0 * s"))
+    assert (changed["march"], changed["march hits"], changed["other hits"]) == (82.0, 0, 1)
+    assert changed["march hash"] != first["march hash"]
+    assert changed["other hash"] == first["other hash"]
+
+    constant = run(tmp_path, EQUATIONS.replace("GAIN = 2.0", "GAIN = 3.0"))
+    assert (constant["march"], constant["march hits"], constant["other hits"]) == (64.0, 0, 1)
+
+
+@pytest.mark.parametrize("damage", ["empty index", "cut data", "garbage", "a changed byte"])
+def test_damaged_files_are_dropped(tmp_path: Path, damage: str) -> None:
+    run(tmp_path)
+    for path in (tmp_path / "cache").rglob("*.nbi" if damage == "empty index" else "*.nbc"):
+        content = path.read_bytes()
+        middle = len(content) // 2
+        path.write_bytes(
+            {
+                "empty index": b"",
+                "cut data": content[:middle],
+                "garbage": b"\x80\x05" + bytes(range(256)) * 8,
+                "a changed byte": content[:middle]
+                + bytes([content[middle] ^ 1])
+                + content[middle + 1 :],
+            }[damage]
+        )
+    after = run(tmp_path)
+    assert (after["march"], after["march hits"]) == (46.0, 0)
+    again = run(tmp_path)
+    assert (again["march"], again["march hits"], again["other hits"]) == (46.0, 1, 1)
+
+
+# --- closures -------------------------------------------------------------------------------------
+
+
+@equation
+def line(x: float) -> float:
+    return SLOPE * x
+
+
+@equation
+def bend(x: float) -> float:
+    return line(x) * line(x + 1.0)
+
+
+def test_closure_names_what_is_reached() -> None:
+    reached = closure(bend)
+    assert list(reached) == ["bend", "line", "SLOPE"]
+    assert reached["SLOPE"] == 2.0
+    assert closure_hash(bend) == closure_hash(bend) != closure_hash(line)
+
+
+def test_source_of_an_equation_and_of_what_is_derived() -> None:
+    assert source(line).startswith("@equation\ndef line(x: float)")
+    derived = derive(bend, "x")
+    assert source(derived) == derived.texts["bend_by_x"]
+    assert inspect.getsource(derived.python) == derived.source
+    assert derived.source.isascii()
+
+
+# --- generated modules ----------------------------------------------------------------------------
+
+MODULE = '''
+@inlined
+{derived}
+
+@kernel
+def fill(x, out):
+    """Filled."""
+    for i in range(x.size):
+        out[i, 0], out[i, 1] = bend_by_x(x[i])
+
+
+def failing():
+    raise ValueError("here")
+'''
+
+
+def made() -> dict[str, Any]:
+    from swashplate.equations import inlined
+
+    derived = derive(bend, "x")
+    texts = "\n\n@inlined\n".join(derived.texts.values())
+    names = {**derived.names, "kernel": kernel, "inlined": inlined}
+    return generated("bends", MODULE.format(derived=texts), names)
+
+
+@pytest.mark.interpreted
+def test_a_generated_module_computes_and_can_be_read() -> None:
+    space = made()
+    x, out = np.array([1.0, 2.0]), np.zeros((2, 2))
+    space["fill"](x, out)
+    assert out.tolist() == [[8.0, 12.0], [24.0, 20.0]]
+    path = Path(space["__file__"])
+    assert path.name.startswith("bends_")
+    assert "def fill(x, out):" in path.read_text()
+    assert inspect.getsource(space["failing"]) == 'def failing():\n    raise ValueError("here")\n'
+    with pytest.raises(ValueError, match="here") as raised:
+        space["failing"]()
+    assert 'raise ValueError("here")' in "".join(traceback.format_tb(raised.value.__traceback__))
+    assert made()["__file__"] == space["__file__"]
+    assert not list(path.parent.glob("*.tmp"))
+
+
+GENERATE = """
+import sys
+import numpy as np
+from swashplate.equations import derive, generated, inlined, kernel
+sys.path.insert(0, sys.argv[1])
+import machine
+d = derive(machine.both, ("x", "s"))
+texts = "\\n".join("@inlined\\n" + t for t in d.texts.values())
+text = texts + "\\n@kernel\\ndef fill(x, s):\\n    return " + d.name + "(x, s)\\n"
+space = generated("machine", text, {**d.names, "inlined": inlined, "kernel": kernel})
+print(space["fill"](2.0, machine.Spring(3.0)), sum(space["fill"].stats.cache_hits.values()))
+"""
+
+
+def generate(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    (folder / "machine.py").write_text(EQUATIONS)
+    env = {**os.environ, "NUMBA_DISABLE_JIT": "0", **environment}
+    return subprocess.run(
+        [sys.executable, "-c", GENERATE, str(folder)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=env,
+    )
+
+
+def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
+    cache = str(tmp_path / "cache")
+    assert generate(tmp_path, NUMBA_CACHE_DIR=cache).stdout == "(15.0, 7.0, 4.0) 0\n"
+    assert generate(tmp_path, NUMBA_CACHE_DIR=cache).stdout == "(15.0, 7.0, 4.0) 1\n"
+    assert len(list((tmp_path / "cache" / "swashplate_generated").glob("*.py"))) == 1
+
+
+def test_many_workers_at_once(tmp_path: Path) -> None:
+    (tmp_path / "machine.py").write_text(EQUATIONS)
+    env = {**os.environ, "NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    workers = [
+        subprocess.Popen(
+            [sys.executable, "-c", GENERATE, str(tmp_path)], stdout=subprocess.PIPE, env=env
+        )
+        for _ in range(3)
+    ]
+    for each in workers:
+        out, _ = each.communicate()
+        assert out.startswith(b"(15.0, 7.0, 4.0)")
+        assert each.returncode == 0
+
+
+def test_kept_with_the_user_where_no_folder_is_named(tmp_path: Path) -> None:
+    home = {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "home" / "cache")}
+    generate(tmp_path, NUMBA_CACHE_DIR="", **home)
+    assert list((tmp_path / "home").rglob("generated/machine_*.py"))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a file is no folder everywhere, but not by this name")
+def test_without_a_place_it_works_with_a_warning(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done = generate(tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "file"))
+    assert done.stdout.startswith("(15.0, 7.0, 4.0)")
+    assert UNCACHED in done.stderr
+
+
+@pytest.mark.skipif(bool(config.DISABLE_JIT), reason="there is nothing to inline")
+def test_equations_are_compiled_strictly() -> None:
+    assert line.targetoptions["error_model"] == "numpy"
+    assert line.targetoptions["forceinline"]
+    assert line.py_func(2.0) == line(2.0) == 4.0

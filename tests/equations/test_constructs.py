@@ -1,0 +1,642 @@
+"""Every construct that an equation may use: value and derivatives against differences."""
+
+import math
+from collections.abc import Callable
+from math import acos, asin, atan2, cos, exp, floor, hypot, log, pi, sin, sqrt, tan
+from typing import Any, NamedTuple
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swashplate.equations import declared, derive, equation, interpolate, root, soft_threshold
+from swashplate.equations.program import leaves
+from swashplate.errors import EquationError
+
+pytestmark = pytest.mark.interpreted
+
+OFF, ON = None, True
+GAIN = 1.5
+KNOTS = (-1.0, 0.0, 0.5, 2.0)
+
+
+class Options(NamedTuple):
+    damped: bool | None = OFF
+    doubled: bool | None = OFF
+
+
+class Spring(NamedTuple):
+    stiffness: float
+    rest: float = 0.25
+
+
+class Body(NamedTuple):
+    mass: float
+    spring: Spring
+    drag: float = 0.5
+
+
+class State(NamedTuple):
+    position: float
+    speed: float
+
+
+class Pair(NamedTuple):
+    left: State
+    right: State
+
+
+def flat(value: Any) -> list[float]:
+    """All numbers of a nested tuple."""
+    if isinstance(value, tuple):
+        return [x for each in value for x in flat(each)]
+    return [] if value is None else [value]
+
+
+def placed(value: Any, path: list[str], number: float) -> Any:
+    """The nested tuple with another number at a path."""
+    if not path:
+        return number
+    fields = getattr(value, "_fields", tuple(map(str, range(len(value)))))
+    items = [
+        placed(item, path[1:], number) if field == path[0] else item
+        for field, item in zip(fields, value, strict=True)
+    ]
+    return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
+
+
+def at(arguments: dict[str, Any], path: str) -> float:
+    first, *rest = path.split(".")
+    value = arguments[first]
+    for each in rest:
+        value = value[int(each)] if each.isdigit() else getattr(value, each)
+    return value
+
+
+def check(
+    function: Any,
+    derivative: Callable[..., float],
+    by: tuple[str, ...] | str,
+    options: dict | None = None,
+    lengths: dict | None = None,
+    **arguments: Any,
+) -> Any:
+    """Compare value and partials with the function itself; return what was derived."""
+    plain = getattr(function, "py_func", function)
+    derived = derive(function, by, options=options, lengths=lengths)
+    zero = {(o, i) for o in range(len(derived.outputs)) for i in range(len(derived.inputs))}
+    decided = derive(function, (), options=options, lengths=lengths)
+    for run, own in ((derived.python, plain), (derived.compiled, decided.compiled)):
+        values = flat(own(*arguments.values()))
+        got = run(*arguments.values())
+        assert len(got) == len(derived.outputs) + len(derived.entries)
+        assert list(got[: len(values)]) == values
+        for (o, i), partial in zip(derived.entries, got[len(values) :], strict=True):
+            zero.discard((o, i))
+            expected = difference(plain, arguments, derived.inputs[i], o, derivative)
+            assert partial == pytest.approx(expected, rel=1e-7, abs=1e-8), (o, derived.inputs[i])
+    for o, i in zero:
+        assert abs(difference(plain, arguments, derived.inputs[i], o, derivative)) < 1e-9
+    return derived
+
+
+def difference(
+    plain: Any, arguments: dict, path: str, output: int, derivative: Callable[..., float]
+) -> float:
+    first, *rest = path.split(".")
+
+    def along(x: float) -> float:
+        moved = {**arguments, first: placed(arguments[first], rest, x)}
+        return float(flat(plain(*moved.values()))[output])
+
+    return derivative(along, [at(arguments, path)], 0, 1e-3)
+
+
+# --- statements -----------------------------------------------------------------------------------
+
+
+@equation
+def reassigned(x: float, y: float) -> float:
+    """A name's second value, of an argument too."""
+    z = x * y
+    x = z + sin(x)
+    z = x * z
+    x += y
+    x *= 2.0
+    return z / x
+
+
+@equation
+def unpacked(x: float, y: float) -> tuple[float, float]:
+    a, b = x * y, x + y
+    a, b = b, a
+    (c, d), e = (a * b, a - b), 3.0
+    f = g = c * e
+    return f + d, g - b
+
+
+@equation
+def merging(x: float, y: float) -> float:
+    a = 1.0
+    if x > y:
+        a = sqrt(x) / y
+        b = a * x
+    elif x > 0.5 * y:
+        b = exp(y)
+    else:
+        a = y
+        b = log(x)
+    return a * b + x
+
+
+@equation
+def returning(x: float, y: float) -> float:
+    if x > 1.0:
+        if y > 1.0:
+            return x * y
+        z = x / y
+    else:
+        z = exp(x)
+        if y < 0.5:
+            return z
+    return z * z * y
+
+
+@equation
+def looped(x: float, s: tuple[float, float, float]) -> float:
+    total = 0.0
+    for i in range(3):
+        total = total * x + s[i]
+        if total > 100.0:
+            total = 100.0 / x
+    for i in range(1, -1, -1):
+        total += s[i + 1] * s[i] * x
+    return total
+
+
+@equation
+def cheap_branches(x: float, y: float) -> tuple[float, float]:
+    a = x
+    b = y
+    if x > y:
+        a = 2.0 * y
+        b = a + x
+    return a * b, max(a, b)
+
+
+def test_statements(derivative: Callable[..., float]) -> None:
+    check(reassigned, derivative, ("x", "y"), x=0.7, y=1.3)
+    check(unpacked, derivative, ("y", "x"), x=0.7, y=1.3)
+    for x, y in ((2.0, 1.0), (0.8, 1.0), (0.3, 1.0)):
+        check(merging, derivative, ("x", "y"), x=x, y=y)
+        check(cheap_branches, derivative, ("x", "y"), x=x, y=y)
+    for x, y in ((2.0, 1.5), (2.0, 0.7), (0.3, 0.2), (0.3, 0.7)):
+        check(returning, derivative, ("x", "y"), x=x, y=y)
+    check(looped, derivative, ("x", "s"), x=0.7, s=(1.0, -0.4, 0.3))
+    check(looped, derivative, ("x", "s.1"), x=30.0, s=(1.0, -0.4, 0.3))
+
+
+# --- expressions ----------------------------------------------------------------------------------
+
+
+@equation
+def arithmetic(x: float, y: float) -> float:
+    """Divisions by literals and names, powers, constants of a module."""
+    return -x / 3.0 + x**2 - y**3 / x + y**-1 + x**0 - x**1 * GAIN + pi * y - +x + 2 * y / (x - 5)
+
+
+@equation
+def functions(x: float, y: float) -> tuple[float, float]:
+    first = sqrt(x) + exp(-x) * log(y) + sin(x * y) - cos(x) / tan(y) + math.atan(x)
+    second = asin(x / 2.0) * acos(y / 3.0) + atan2(y, x) + hypot(x, 2.0 * y) + floor(x) * y
+    return first, second
+
+
+@equation
+def choices(x: float, y: float, z: float) -> float:
+    smallest = min(x * y, y + z, z)
+    largest = max(x, y * y, z * x, 0.25)
+    return smallest * largest + abs(x - y) * (x if y > z else -z) + (x - floor(x))
+
+
+@equation
+def decisions(x: float, y: float) -> float:
+    high = x > 1.0 or not y > 0.5
+    both = 0.0 < x < 2.0 and y != 3.0
+    never = x == y
+    a = x * y if high and both else y / x
+    return a if not never else 0.0
+
+
+@equation
+def careful(x: float, y: float) -> float:
+    """What must not be done unless the test says so."""
+    a = 1.0 / x if x != 0.0 else 5.0 * y
+    b = sqrt(x) if x > 0.0 else y
+    if x > 0.0 and log(x) > 0.1:
+        return a * b + log(x)
+    if x <= 0.0 or 1.0 / x < 2.0:
+        return a + b
+    return a - b
+
+
+def test_expressions(derivative: Callable[..., float]) -> None:
+    check(arithmetic, derivative, ("x", "y"), x=0.7, y=1.3)
+    check(functions, derivative, ("x", "y"), x=0.7, y=1.3)
+    for x, y, z in ((0.7, 1.3, 0.2), (1.7, -1.3, 0.4), (-0.7, 0.2, 2.3), (0.1, 0.2, 0.3)):
+        check(choices, derivative, ("x", "y", "z"), x=x, y=y, z=z)
+        check(decisions, derivative, ("x", "y"), x=x, y=y)
+    for x in (2.0, 1.05, 0.7, 0.3, -1.0):
+        check(careful, derivative, ("x", "y"), x=x, y=0.6)
+
+
+def test_what_is_not_done_is_not_divided_by() -> None:
+    derived = derive(careful, ("x", "y"))
+    for run in (derived.python, derived.compiled):
+        assert run(0.0, 0.6) == (3.6, 0.0, 6.0)
+
+
+# --- tuples ---------------------------------------------------------------------------------------
+
+
+@equation
+def accelerated(s: State, force: float, b: Body) -> float:
+    return (force - b.spring.stiffness * (s.position - b.spring.rest) - b.drag * s.speed) / b.mass
+
+
+@equation
+def stepped(s: State, force: float, b: Body, h: float) -> State:
+    a = accelerated(s, force, b)
+    half = State(s.position + 0.5 * h * s.speed, speed=s.speed + 0.5 * h * a)
+    again = accelerated(half, force, b._replace(drag=2.0 * b.drag))
+    return half._replace(position=s.position + h * half.speed, speed=s.speed + h * again)
+
+
+@equation
+def coupled(p: Pair, b: Body, h: float) -> Pair:
+    pull = b.spring.stiffness * (p.right.position - p.left.position)
+    left = stepped(p.left, pull, b, h)
+    return Pair(left, stepped(p.right, -pull, Body(b.mass, Spring(b.spring.stiffness)), h))
+
+
+@equation
+def passed(p: Pair, b: Body) -> Pair:
+    return Pair(p.right, p.left)
+
+
+def test_named_tuples(derivative: Callable[..., float]) -> None:
+    body = Body(2.0, Spring(3.0, 0.1), 0.4)
+    pair = Pair(State(0.3, -0.2), State(0.5, 0.7))
+    derived = check(stepped, derivative, ("s", "b"), s=pair.left, force=0.3, b=body, h=0.1)
+    assert derived.outputs == ("position", "speed")
+    assert derived.inputs[:3] == ("s.position", "s.speed", "b.mass")
+    derived = check(coupled, derivative, ("p", "b.spring"), p=pair, b=body, h=0.1)
+    assert derived.outputs[2] == "right.position"
+    assert "b.spring.rest" in derived.inputs
+    assert (2, derived.inputs.index("b.spring.rest")) not in derived.entries  # a default there
+    derived = check(passed, derivative, ("p", "b"), p=pair, b=body)
+    assert derived.entries == ((0, 2), (1, 3), (2, 0), (3, 1))
+
+
+def test_wanted_results_alone_are_computed() -> None:
+    derived = derive(coupled, "p.left", outputs=("right.speed", "left"))
+    assert derived.outputs == ("right.speed", "left.position", "left.speed")
+    body, pair = Body(2.0, Spring(3.0, 0.1), 0.4), Pair(State(0.3, -0.2), State(0.5, 0.7))
+    whole = derive(coupled, "p.left").python(pair, body, 0.1)
+    assert derived.python(pair, body, 0.1)[:3] == (whole[3], whole[0], whole[1])
+    alone = derive(unpacked, "x", outputs="0")
+    assert len(alone.source) < len(derive(unpacked, "x").source)
+
+
+@equation
+def windowed(s: tuple[float, ...], f: float) -> float:
+    return s[0] + f * (s[1] - s[0])
+
+
+@equation
+def looked(s: tuple[float, ...], f: float, gain: float) -> float:
+    return gain * windowed(s, f)
+
+
+def test_tuples_of_any_length(derivative: Callable[..., float]) -> None:
+    derived = check(looked, derivative, ("s", "f"), s=(1.0, 2.0, 3.0), f=0.3, gain=2.0)
+    assert derived.inputs == ("s.0", "s.1", "f")
+    lengths = {"s": 3}
+    derived = check(looked, derivative, "s", lengths=lengths, s=(1.0, 2.0, 3.0), f=0.3, gain=2.0)
+    assert derived.inputs == ("s.0", "s.1", "s.2")
+    assert derived.entries == ((0, 0), (0, 1))
+
+
+# --- options --------------------------------------------------------------------------------------
+
+
+@equation
+def optional(x: float, y: float, o: Options, extra: bool | None = None) -> float:
+    z = x
+    if o.damped is not None:
+        z = z * exp(-y)
+    factor = 2.0 if o.doubled is None else 4.0
+    if extra is None and o.doubled is None:
+        return z
+    return factor * z * x
+
+
+@equation
+def forwarding(x: float, y: float, o: Options) -> float:
+    return optional(x, y, o) + optional(x, y, Options(doubled=ON), True)
+
+
+@pytest.mark.parametrize("damped", [OFF, ON])
+@pytest.mark.parametrize("doubled", [OFF, ON])
+def test_options_decide_what_there_is(
+    damped: bool | None, doubled: bool | None, derivative: Callable[..., float]
+) -> None:
+    o = Options(damped, doubled)
+    derived = check(
+        optional, derivative, ("x", "y"), {"o": o, "extra": None}, x=0.7, y=1.3, o=o, extra=None
+    )
+    assert len(derived.entries) == (1 if damped is None else 2)
+    assert "exp" not in derived.source or damped
+    said = {"o.damped": damped, "o.doubled": doubled}
+    check(forwarding, derivative, ("x", "y"), said, x=0.7, y=1.3, o=o)
+
+
+def test_an_option_that_is_tested_has_to_be_known() -> None:
+    with pytest.raises(EquationError, match=r'option o.damped.*options=\{"o.damped": None\}'):
+        derive(optional, "x")
+    with pytest.raises(EquationError, match=r"The option extra is False"):
+        derive(optional, "x", options={"o": Options(), "extra": False})
+
+
+# --- activity -------------------------------------------------------------------------------------
+
+
+def test_what_does_not_move_costs_nothing() -> None:
+    derived = derive(stepped, "force")
+    first, second, _ = derived.texts
+    assert (first.rpartition("_")[0], second.rpartition("_")[0]) == (
+        "accelerated_by_force",
+        "accelerated_by_speed_force",
+    )
+    assert "b" not in {name.split(".")[0] for name in derived.callees[1].inputs}
+    derived = derive(looked, "gain")
+    assert len(derived.texts) == 1
+    assert "windowed(s, f)" in derived.source
+
+
+def test_unknown_paths_are_refused() -> None:
+    with pytest.raises(EquationError, match=r"no float at b\.size.*b\.mass"):
+        derive(stepped, "b.size")
+    with pytest.raises(EquationError, match=r"no float at q.*s, force, b, h"):
+        derive(stepped, "q")
+    with pytest.raises(EquationError, match=r"no result angle.*position, speed"):
+        derive(stepped, "force", outputs="angle")
+
+
+# --- rules and primitives -------------------------------------------------------------------------
+
+
+@equation
+def bent(x: float, y: float) -> float:
+    return x * abs(x) + y
+
+
+@declared(bent)
+def _(x: float, y: float) -> tuple[float, float]:
+    return 2.0 * abs(x), 1.0
+
+
+@equation
+def bent_twice(x: float, y: float) -> float:
+    return bent(bent(x, y) * y, x)
+
+
+def test_declared_rules(derivative: Callable[..., float]) -> None:
+    check(bent_twice, derivative, ("x", "y"), x=0.7, y=1.3)
+    assert "bent_rule(x, y)" in derive(bent, "x").source
+
+
+@equation
+def misruled(x: float, y: float) -> float:
+    return x * y
+
+
+@declared(misruled)
+def _(x: float, y: float) -> float:
+    return y
+
+
+def test_a_rule_has_to_name_all_derivatives() -> None:
+    with pytest.raises(EquationError, match=r"is not 2 in _: return those by x, y, in order"):
+        derive(misruled, "x")
+
+
+@equation
+def table(x: float, a: float, v: tuple[float, float, float, float]) -> float:
+    return a * interpolate(x * a, KNOTS, v)
+
+
+@equation
+def moving_table(x: float, k: tuple[float, float, float], v: tuple[float, float, float]) -> float:
+    return interpolate(x, k, v) * x
+
+
+@pytest.mark.parametrize("x", [-3.0, -0.6, 0.1, 1.1, 4.0])
+def test_interpolation(x: float, derivative: Callable[..., float]) -> None:
+    check(table, derivative, ("x", "a", "v"), x=x, a=1.1, v=(0.3, -1.0, 2.0, 0.5))
+    k, v = (-1.0, 0.5, 2.0), (0.3, -1.0, 2.0)
+    check(moving_table, derivative, ("x", "k", "v"), x=x, k=k, v=v)
+
+
+def test_a_knot_counts_to_its_right_and_ends_hold() -> None:
+    derived = derive(moving_table, "x")
+    k, v = (-1.0, 0.5, 2.0), (0.0, 1.5, 1.5)
+    assert derived.python(0.5, k, v) == (0.75, 1.5)
+    assert interpolate(-5.0, k, v) == 0.0
+    assert interpolate(9.0, k, v) == 1.5
+
+
+@equation
+def excess(x: float, a: float, s: Spring) -> float:
+    return x * x * x + s.stiffness * x - a - s.rest
+
+
+@equation
+def balanced(a: float, b: float, s: Spring) -> float:
+    return b * root(excess, -b, 2.0 * b, a * a, s)
+
+
+def test_roots(derivative: Callable[..., float]) -> None:
+    spring = Spring(1.5, 0.1)
+    x = root(excess, -3.0, 3.0, 0.7, spring)
+    assert abs(excess(x, 0.7, spring)) < 4e-16
+    check(balanced, derivative, ("a", "b", "s"), a=0.7, b=1.3, s=spring)
+    # where there is no change of sign, an end of the bracket
+    check(balanced, derivative, ("a", "b", "s"), a=9.0, b=1.3, s=spring)
+
+
+@given(st.floats(-50.0, 50.0), st.floats(0.01, 9.0), st.floats(1e-6, 1e6))
+def test_roots_to_the_last_bits(a: float, low: float, stiffness: float) -> None:
+    spring = Spring(stiffness, 0.0)
+    x = root(excess, -50.0 - low, 60.0, a, spring)
+    scale = abs(x) ** 3 + stiffness * abs(x) + abs(a)
+    assert abs(excess(x, a, spring)) <= 4e-15 * scale + 1e-30
+
+
+@equation
+def stuck(x: float, w: float) -> float:
+    return soft_threshold(x * w, w)
+
+
+def test_soft_threshold(derivative: Callable[..., float]) -> None:
+    assert soft_threshold(0.5, 0.7) == 0.0
+    assert soft_threshold(-0.9, 0.7) == pytest.approx(-0.2)
+    for x in (-2.0, -0.5, 0.5, 2.0):
+        check(stuck, derivative, ("x", "w"), x=x, w=0.7)
+
+
+# --- conventions ----------------------------------------------------------------------------------
+
+
+@equation
+def ties(x: float, y: float) -> tuple[float, float, float, float]:
+    return min(x, y), max(x, y), abs(x - y), max(x, y, x)
+
+
+def test_at_a_tie_the_last_argument_counts() -> None:
+    derived = derive(ties, ("x", "y"))
+    values = derived.python(2.0, 2.0)
+    slopes = dict(zip(derived.entries, values[4:], strict=True))
+    assert slopes == {
+        (0, 0): 0.0, (0, 1): 1.0, (1, 0): 0.0, (1, 1): 1.0, (2, 0): 1.0, (2, 1): -1.0,
+        (3, 0): 1.0, (3, 1): 0.0,
+    }  # fmt: skip
+
+
+@equation
+def endless(x: float) -> tuple[float, float, float, float, float]:
+    return sqrt(x), asin(1.0 - x), acos(1.0 - x), hypot(x, x), atan2(x, x)
+
+
+def test_an_infinite_slope_counts_as_none() -> None:
+    derived = derive(endless, "x")
+    for run in (derived.python, derived.compiled):
+        assert run(0.0)[5:] == (0.0, 0.0, 0.0, 0.0, 0.0)[: len(derived.entries)]
+
+
+@equation
+def unlimited(x: float, rate: float) -> float:
+    return min(x * 2.0, x + rate * x)
+
+
+def test_an_infinite_limit_does_no_harm() -> None:
+    derived = derive(unlimited, "x")
+    for run in (derived.python, derived.compiled):
+        assert run(0.5, math.inf) == (1.0, 2.0)
+
+
+def test_defaults_stay() -> None:
+    derived = derive(optional, "x", options={"o": Options(), "extra": None})
+    assert derived.python(0.7, 1.3, Options()) == (0.7, 1.0)
+
+
+def test_leaves_have_dotted_paths() -> None:
+    from swashplate.equations.expressions import name
+    from swashplate.equations.program import Flag, Tuple
+
+    value = Tuple(Options, (Flag(None), Tuple(None, (name("a"), name("b")))))
+    assert [p for p, _ in leaves(value)] == ["doubled.0", "doubled.1"]
+
+
+# --- what comes together --------------------------------------------------------------------------
+
+
+class Friction(NamedTuple):
+    force: float
+    width: float
+
+
+class Rubbing(NamedTuple):
+    mass: float
+    friction: Friction | None = None
+    bias: float | None = None
+
+
+@equation
+def rubbing(v: float, p: Rubbing) -> float:
+    a = v / p.mass
+    if p.friction is not None:
+        a = a - p.friction.force * min(max(v / p.friction.width, -1.0), 1.0)
+    return a if p.bias is None else a + p.bias
+
+
+@equation
+def rubbed(v: float, p: Rubbing) -> float:
+    return v + 0.1 * rubbing(v, p)
+
+
+def test_options_that_hold_parameters() -> None:
+    """Numba alone would type both ways of such a branch, and one of them has no fields."""
+    on, off = Rubbing(2.0, Friction(0.5, 3.0), 0.25), Rubbing(2.0)
+    derived = derive(rubbed, ("v", "p"), options={"p": on})
+    assert derived.inputs == ("v", "p.mass", "p.friction.force", "p.friction.width", "p.bias")
+    slopes = (1.0 + 0.1 * (0.5 - 0.5 / 3.0), -0.025, -0.1 / 3.0, 0.05 / 9.0, 0.1)
+    for run in (derived.python, derived.compiled):
+        assert run(1.0, on) == pytest.approx((1.0 + 0.1 * (0.75 - 0.5 / 3.0), *slopes))
+    derived = derive(rubbed, ("v", "p"), options={"p.friction": None, "p.bias": None})
+    assert derived.inputs == ("v", "p.mass")
+    for run in (derived.python, derived.compiled):
+        assert run(1.0, off) == pytest.approx((1.05, 1.05, -0.025))
+    decided = derive(rubbed, (), options={"p": on})
+    assert decided.entries == ()
+    for run in (decided.python, decided.compiled):
+        assert run(1.0, on) == pytest.approx((1.0 + 0.1 * (0.75 - 0.5 / 3.0),))
+
+
+class Signals(NamedTuple):
+    value: float
+    limited: bool
+    turns: int
+
+
+@equation
+def signals(x: float, gain: float) -> Signals:
+    y = gain * x
+    return Signals(min(y, 1.0), y > 1.0, floor(y))
+
+
+@equation
+def following(x: float, gain: float, scale: float) -> tuple[Pair, float]:
+    """Results of nested structure, from calls that move and calls that do not."""
+    s = signals(x, gain)
+    fixed = signals(0.5, 3.0)
+    pair, rest = mixed(State(s.value, fixed.value), scale)
+    again, _ = mixed(State(0.1, 0.2), 2.0)
+    total = 0.0
+    if s.limited:
+        inner, more = mixed(pair.left, s.value)
+        total = inner.right.speed * more * again.left.speed
+    else:
+        total = rest * fixed.value
+        if x > 0.2:
+            total = total * signals(x, scale).value
+    return Pair(pair.right, State(total, again.right.position)), total * rest
+
+
+@equation
+def mixed(s: State, scale: float) -> tuple[Pair, float]:
+    left = State(s.speed * scale, s.position / scale)
+    return Pair(left, State(s.position * s.speed, 2.0)), s.position + scale
+
+
+@pytest.mark.parametrize(("x", "gain"), [(0.3, 1.5), (0.1, 1.5), (0.9, 3.0)])
+def test_structures_through_calls_and_branches(
+    x: float, gain: float, derivative: Callable[..., float]
+) -> None:
+    derived = check(following, derivative, ("x", "gain", "scale"), x=x, gain=gain, scale=0.7)
+    assert derived.outputs[:2] == ("0.left.position", "0.left.speed")
+    check(following, derivative, "scale", x=x, gain=gain, scale=0.7)
+    derived = derive(signals, ("x", "gain"))
+    assert derived.outputs == ("value", "limited", "turns")
+    assert derived.entries == ((0, 0), (0, 1))
+    assert derived.compiled(2.0, 3.0)[:3] == (1.0, True, 6)

@@ -1,0 +1,135 @@
+"""Texts of derived functions: short, readable, and the same in every process."""
+
+import ast
+import inspect
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+
+from swashplate.equations import closure_hash, derive, equation, library
+from swashplate.equations.syntax import plain
+from swashplate.models import card, pump
+from swashplate.models.card import CardOptions
+from swashplate.models.pump import Pump, PumpOptions
+
+OPTIONS: dict[str, Any] = dict.fromkeys(("literal", "split", "steep", "symmetric"))
+CASES = [
+    (pump.pump_sample, ("state.pressure", "inputs.current", "p"), PumpOptions()),
+    (pump.pump_step, ("state.pressure", "signals", "p"), PumpOptions()),
+    (pump.spool_balance, ("force", "arm_sine", "p.Z4", "p.Z5", "p.Z18"), None),
+    (pump.orifice_opening, ("position", "p.Z14", "p.Z16_plus", "p.Z16_minus"), None),
+    (pump.solenoid_force, ("current", "p.Z17", "p.Z19_plus", "p.Z22_minus"), None),
+    (pump.leaky_step, ("pressure", "opening", "Z6", "Z7", "Z8", "Z9"), None),
+    (pump.pressure_rate, ("pressure", "opening", "Z6", "Z8", "Z9"), None),
+    (card.limited_current, ("target", "previous", "p.lim1", "p.lim2", "decay"), None),
+    (card.filtered_current, ("now", "before", "steady", "p"), None),
+    (card.card_sample, ("state", "p"), CardOptions()),
+    (library.interpolated, ("newer", "fraction"), None),
+]
+
+
+def chosen(function: Any, options: Any) -> dict[str, Any]:
+    """All options off, or as given."""
+    names = plain(function).__code__.co_varnames
+    given = {"options": options} if options is not None else {}
+    return {**{name: off for name, off in OPTIONS.items() if name in names}, **given}
+
+
+def code_lines(text: str) -> int:
+    """Lines of statements: without the head, the docstring and brackets' own lines."""
+    node = ast.parse(inspect.cleandoc("\n" + text)).body[0]
+    assert isinstance(node, ast.FunctionDef)
+    skipped = isinstance(node.body[0], ast.Expr)
+    return sum(s.end_lineno - s.lineno + 1 for s in node.body[skipped:])
+
+
+@pytest.mark.parametrize(
+    ("function", "by", "options"), CASES, ids=lambda case: getattr(case, "__name__", "")
+)
+def test_texts_are_short(function: Any, by: tuple[str, ...], options: Any) -> None:
+    derived = derive(function, by, options=chosen(function, options))
+    for name, text in derived.texts.items():
+        assert max(map(len, text.splitlines())) <= 100, name
+        assert text.startswith(f"def {name}(")
+        ast.parse(text)
+    assert code_lines(derived.source) <= 12 * code_lines(inspect.getsource(plain(function))) + 2
+    first = inspect.getdoc(derived.python)
+    assert first.startswith(f"{plain(function).__name__} with its derivatives by ")
+    assert f"{plain(function).__module__}, line " in first
+    compile("\n".join(derived.texts.values()), "all", "exec")
+    missing = {
+        n.id
+        for n in ast.walk(ast.parse("\n".join(derived.texts.values())))
+        if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)
+    } - {*derived.texts, *derived.names}
+    local = {
+        n.id if isinstance(n, ast.Name) else n.arg
+        for n in ast.walk(ast.parse("\n".join(derived.texts.values())))
+        if isinstance(n, ast.arg) or (isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store))
+    }
+    assert missing <= local
+
+
+PRINT = """
+import sys
+from swashplate.equations import derive
+from swashplate.models import pump
+cases = [
+    (pump.leaky_step, ("opening", "Z6", "Z7", "Z8", "Z9"), {"symmetric": None}),
+    (pump.spool_balance, ("p.Z5", "p.Z4", "force"), {}),
+    (pump.pump_step, ("state", "p"), {"options": pump.PumpOptions()}),
+]
+texts = [derive(f, by, options=o).texts for f, by, o in cases[:: int(sys.argv[1])]]
+print(sorted({t for each in texts for t in each.values()}))
+"""
+
+
+def test_texts_are_the_same_in_every_order() -> None:
+    first, second = (
+        subprocess.run(
+            [sys.executable, "-c", PRINT, order], capture_output=True, text=True, check=True
+        ).stdout
+        for order in ("1", "-1")
+    )
+    assert first == second
+    assert "def pump_step_by" in first
+
+
+def scaled(factor: float) -> Any:
+    @equation
+    def scaling(x: float) -> float:
+        return factor * x
+
+    return scaling
+
+
+double, triple = scaled(2.0), scaled(3.0)
+
+
+@equation
+def both(x: float) -> float:
+    return double(x) * triple(x)
+
+
+def test_functions_of_one_name_are_kept_apart() -> None:
+    derived = derive(both, "x")
+    assert len(derived.texts) == 3
+    for run in (derived.python, derived.compiled):
+        assert run(2.0) == (24.0, 24.0)
+    assert closure_hash(double) != closure_hash(triple)
+
+
+def test_exact_zeros_follow_the_options() -> None:
+    fields = set(Pump._fields)
+
+    def seen(**on: bool) -> set[str]:
+        derived = derive(pump.pump_sample, "p", options={"options": PumpOptions(**on)})
+        return {derived.inputs[i].removeprefix("p.") for _, i in derived.entries} & fields
+
+    off = seen()
+    ripple = {"cam_ripple", "cam_ripple_per_torque", "cam_cycles", "cam_phase"}
+    assert seen(ripple=True) - off == ripple
+    assert seen(hysteresis=True) - off == {"solenoid_hysteresis"}
+    assert not off & {*ripple, "solenoid_hysteresis", "spool_presliding", "line_stiffness"}

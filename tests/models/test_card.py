@@ -1,0 +1,334 @@
+"""The card's equations against what they stand for, worked out another way."""
+
+from itertools import pairwise
+from math import cos, cosh, exp, inf, sin, sinh, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numba import njit
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, least_squares
+
+from swashplate import Drive
+from swashplate.equations.library import interpolated
+from swashplate.equations.windows import Window
+from swashplate.models import card
+from swashplate.models.card import Channel, ChannelConstants, Filter
+
+Array = NDArray[np.float64]
+EXACT = card.CardOptions(exact=True)
+RATES = (200.0, 512.0, 600.0, 1000.0, 2000.0)
+
+
+# --- command to settled current ------------------------------------------------------------------
+
+
+@pytest.mark.interpreted
+def test_share_of_an_interval_above_the_dead_zone() -> None:
+    # a ramp from 0 to 2 V over the two intervals; the last 0.5 V lie above 1.5 V
+    assert card.share_above(0.0, 2.0, 1.5) == 0.25
+    assert card.share_above(2.0, 0.0, 1.5) == 0.25
+    assert card.share_above(1.0, 1.0, 1.0) == 0.0
+    assert card.share_above(2.0, 3.0, 1.0) == 1.0
+    # the interval ends 0.3 samples before the newest: it sees 1.3..2 of 0..1 and 1..2 of 1..2
+    assert card.jump_share(2.0, 1.0, 0.0, 0.3, 1.0) == pytest.approx(0.7)
+
+
+@pytest.mark.interpreted
+def test_the_settled_current_is_a_jump_and_a_cubic(channel: Channel) -> None:
+    p = channel._replace(V_dz=0.5, J=0.3, G1=0.1, G2=0.01, G3=-0.002)
+    assert card.steady_current(2.5, 1.0, p) == pytest.approx(0.3 + 0.2 + 0.04 - 0.016)
+    assert card.steady_current(0.4, 0.25, p) == 0.075
+    assert card.channel_level(0.5, p) == 0.0
+    assert card.channel_level(-3.0, p) == 0.0
+
+
+def test_published_levels() -> None:
+    """Currents of the source's drives at 1, 4, 6.5 and 9 V."""
+    expected = {
+        ("hoist", "plus"): (0.3184, 0.4754, 0.6106, 0.7452),
+        ("hoist", "minus"): (0.3447, 0.5093, 0.6374, 0.7474),
+        ("slew", "plus"): (0.2048, 0.3185, 0.4132, 0.5079),
+        ("slew", "minus"): (0.1979, 0.3071, 0.3980, 0.4890),
+    }
+    for (axis, side), currents in expected.items():
+        numbers = Drive.preset(axis).parameters.numbers
+        p = Channel(*(numbers[f"{name}_{side}"] for name in Channel._fields))
+        found = [card.channel_level(voltage, p) for voltage in (1.0, 4.0, 6.5, 9.0)]
+        assert found == pytest.approx(currents, abs=5e-5)
+
+
+# --- the source's recursion ----------------------------------------------------------------------
+
+
+@pytest.mark.interpreted
+def test_the_recursion_is_the_printed_difference_equation(channel: Channel) -> None:
+    """Eq. 3.6 with ζ = 0.5, ω = 64, h = 1/64 (ωh = 1), C = 2 by hand."""
+    h, p = 1.0 / 64.0, channel._replace(zeta=0.5, omega=64.0, C=2.0)
+    # 2(1 - 0.5) 0.3 + (2·0.5 - 1 - 1) 0.2 - 2 h² sign + 1·0.7
+    plain = 0.3 - 0.2 + 0.7
+    friction = 2.0 / 64.0**2
+    found = card.filtered_current(0.3, 0.2, 0.7, p, h, None)
+    assert found == pytest.approx(plain - friction, rel=1e-15)
+    assert card.filtered_current(0.2, 0.2, 0.7, p, h, None) == pytest.approx(0.7)
+    assert card.coulomb_sign(0.005 * h, h, None) == pytest.approx(0.5)
+    assert card.coulomb_sign(0.005 * h, h, True) == 1.0
+    assert card.coulomb_sign(-0.005 * h, h, True) == -1.0
+    assert card.coulomb_sign(0.0, h, True) == 0.0
+
+
+@pytest.mark.interpreted
+@pytest.mark.parametrize(("zeta", "rate"), [(0.4, 100.0), (0.05, 100.0), (3.0, 100.0), (1.0, 30.0)])
+def test_the_margin_is_that_of_the_recursions_roots(
+    channel: Channel, zeta: float, rate: float
+) -> None:
+    p, h = channel._replace(zeta=zeta, omega=40.0), 1.0 / rate
+    w = p.omega * h
+    roots = np.roots([1.0, -2.0 * (1.0 - zeta * w), 1.0 - 2.0 * zeta * w + w * w])
+    assert (card.filter_margin(p, h) > 0.0) == bool((np.abs(roots) < 1.0).all())
+
+
+# --- the filter's differential equation ----------------------------------------------------------
+
+
+def marched(p: Channel, steady: Array, h: float) -> Array:
+    """I* of the exact filter under an I_ss straight between samples, settled at the first."""
+    k = card.channel_constants(p, h, EXACT)
+    state, found = Filter(float(steady[0]), 0.0, 0.0), []
+    for begins, ends in pairwise([float(steady[0]), *map(float, steady)]):
+        filtered, rate = card.exact_filter(state, begins, ends, k)
+        found.append(filtered)
+        state = Filter(filtered, rate, 0.0)
+    return np.array(found)
+
+
+@pytest.mark.interpreted
+@given(st.floats(0.01, 3.0), st.floats(1e-3, 20.0))
+def test_the_waves_are_cosh_and_sinh(zeta: float, w: float) -> None:
+    q, e = (zeta * zeta - 1.0) * w * w, exp(-zeta * w)
+    r = sqrt(abs(q))
+    even, odd = (cosh(r), sinh(r)) if q > 0.0 else (cos(r), sin(r))
+    found = card.damped_waves(zeta, w)
+    expected = (e * even, e * odd / r if r > 0.0 else e)
+    assert found == pytest.approx(expected, rel=1e-13, abs=1e-15)
+
+
+@pytest.mark.interpreted
+def test_nothing_happens_at_critical_damping() -> None:
+    """Value and slope by ζ go through ζ = 1 as those of the power series, known there."""
+    for w in (0.03, 0.3, 0.99, 1.0, 2.0):
+        e, s = exp(-w), 1e-5
+        assert card.damped_waves(1.0, w) == pytest.approx((e, e), rel=1e-15)
+        below, above = card.damped_waves(1.0 - s, w), card.damped_waves(1.0 + s, w)
+        slopes = [(b - a) / (2.0 * s) for a, b in zip(below, above, strict=True)]
+        # cosh r is 1 + r²/2 and sinh r/r is 1 + r²/6 there, with r² = (ζ² - 1) w²
+        expected = (e * (w * w - w), e * (w * w / 3.0 - w))
+        assert slopes == pytest.approx(expected, rel=1e-8, abs=1e-10)
+
+
+@pytest.mark.parametrize("axis_side", ["hoist_plus", "slew_plus", "slew_minus"])
+def test_it_converges_with_order_two(axis_side: str) -> None:
+    """A command on the rise, solved by SciPy from the moment at which it overcomes C."""
+    name, side = axis_side.split("_")
+    numbers = Drive.preset(name).parameters.numbers
+    p = Channel(*(numbers[f"{each}_{side}"] for each in Channel._fields))
+
+    def command(t: Array | float) -> Array | float:
+        return 0.5 * t**2 * (3.0 - 2.0 * t) + 0.05 * t
+
+    begins = brentq(lambda t: p.omega**2 * command(t) - p.C, 0.0, 1.0) if p.C else 0.0
+    truth = solve_ivp(
+        lambda t, y: [y[1], p.omega**2 * (command(t) - y[0]) - 2 * p.zeta * p.omega * y[1] - p.C],
+        (begins, 1.0),
+        [0.0, 0.0],
+        rtol=1e-11,
+        atol=1e-13,
+        dense_output=True,
+    ).sol
+    errors = []
+    for rate in (200.0, 400.0, 800.0):
+        time = np.arange(0.0, 1.0, 1.0 / rate)
+        found = marched(p, np.asarray(command(time)), 1.0 / rate)
+        moving = time > 0.3
+        errors.append(np.abs(found - truth(time)[0])[moving].max())
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.02)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.02)
+
+
+@pytest.mark.parametrize("zeta", [0.1, 1.0, 1.1014, 1.4157])
+def test_it_is_stable_and_sticks_at_any_rate(zeta: float) -> None:
+    """After a step it comes to rest within C/ω² of I_ss, and stays there exactly."""
+    p = Channel(0.1, 0.1, 0.1, 0.0, 0.0, zeta, 98.377, 4.8368, inf, inf, inf, 0.0, inf)
+    for rate in (50.0, *RATES):
+        if card.exact_filter_margin(p, 1.0 / rate) < 0.5:
+            continue
+        found = marched(p, np.r_[0.0, np.full(round(3.0 * rate), 0.5)], 1.0 / rate)
+        assert abs(found[-1] - 0.5) <= p.C / p.omega**2 * (1.0 + 1e-9)
+        assert found[-1] == pytest.approx(found[-5], abs=1e-15)
+        assert np.abs(found).max() < 1.0
+
+
+@njit(error_model="numpy")
+def currents(command: Array, p: card.Card, h: float, options: card.CardOptions) -> Array:
+    """Signed current under a command that is zero before the first sample."""
+    made = np.empty(command.size)
+    k = card.card_constants(p, h, options)
+    behind, ahead = p.tau / h, p.tau / h - 0.5
+    back, late = int(behind), int(ahead)
+    padded = np.concatenate((np.zeros(back + 3), command))
+    still = card.CardInputs(Window((0.0, 0.0, 0.0), 0.0), Window((0.0, 0.0, 0.0), 0.0))
+    state = card.card_rest(p, k, options, still)
+    for n in range(command.size):
+        at, end = n + 3, n + back + 3 - late
+        inputs = card.CardInputs(
+            Window((padded[at], padded[at - 1], padded[at - 2]), behind - back),
+            Window((padded[end], padded[end - 1], padded[end - 2]), ahead - late),
+        )
+        signals = card.card_sample(state, inputs, p, k, h, options)
+        made[n] = signals.current
+        state = card.card_step(state, signals, inputs, p, k, h, options)
+    return made
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_the_same_parameters_describe_the_response_at_every_rate(rate: float) -> None:
+    """ζ, ω and C of a truth at 16 kHz, with jumps between the samples, by least squares."""
+    channel = Channel(0.5, 0.2, 0.05, 0.0, 0.0, 1.1014, 135.39, 4.8368, inf, inf, inf, 0.0, inf)
+    # straight between the samples of every rate, which are multiples of 8 Hz
+    corners = ([0.0, 0.125, 0.25, 0.5, 0.625, 0.75, 1.0], [0.0, 0.0, 6.0, 2.0, 2.0, 0.0, 0.0])
+    fine, time = np.arange(0.0, 1.0, 1.0 / 16000.0), np.arange(0.0, 1.0, 1.0 / rate)
+    truth = card.Card(channel, channel, 0.014)
+    response = currents(np.interp(fine, *corners), truth, 1.0 / 16000.0, EXACT)
+    measured, command = np.interp(time, fine, response), np.interp(time, *corners)
+
+    def misfit(x: Array) -> Array:
+        mine = channel._replace(zeta=x[0], omega=100.0 * x[1], C=x[2])
+        return currents(command, card.Card(mine, mine, 0.014), 1.0 / rate, EXACT) - measured
+
+    zeta, omega, _ = least_squares(misfit, [0.9, 1.1, 3.0], xtol=1e-12).x
+    assert 100.0 * omega == pytest.approx(channel.omega, rel=1e-3)
+    assert zeta == pytest.approx(channel.zeta, rel=1e-3)
+
+
+@pytest.mark.interpreted
+def test_friction_takes_the_rate_and_stops_at_zero(channel: Channel) -> None:
+    k = ChannelConstants(1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, coulomb=0.5, lost=0.1)
+    assert card.exact_filter(Filter(0.2, 0.8, 0.0), 0.0, 0.0, k) == pytest.approx((0.15, 0.3))
+    assert card.exact_filter(Filter(0.2, -0.4, 0.0), 0.0, 0.0, k) == pytest.approx((0.24, 0.0))
+
+
+@pytest.mark.interpreted
+@given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3), st.floats(0.0, 1.0))
+def test_the_course_over_a_step_keeps_integral_and_moment(samples: list[float], f: float) -> None:
+    p = Channel(0.5, 0.3, 0.1, 0.0, 0.0, 1.0, 1.0, 0.0, inf, inf, inf, 0.0, inf)
+    begins, ends = card.steady_course(-1.0, Window(tuple(samples), f), p)
+    # time in samples back from the newest; the step goes from f + 1 to f
+    back = f + (np.arange(100_000) + 0.5) / 100_000
+    command = -np.interp(back, [0.0, 1.0, 2.0], samples)
+    steady = np.where(command > 0.5, 0.3 + 0.1 * (command - 0.5), 0.0)
+    assert 0.5 * (begins + ends) == pytest.approx(steady.mean(), abs=1e-5)
+    moment = (steady * (f + 0.5 - back)).mean()
+    assert (ends - begins) / 12.0 == pytest.approx(moment, abs=1e-5)
+
+
+@pytest.mark.parametrize("exact", [None, True])
+def test_a_settled_card_stays(channel: Channel, exact: bool | None) -> None:
+    p = card.Card(channel, channel._replace(C=3.0, zeta=1.2), 0.014)
+    options = card.CardOptions(exact=exact)
+    k = card.card_constants(p, 1.0 / 512.0, options)
+    for voltage in (6.0, -6.0):
+        inputs = card.CardInputs(Window((voltage,) * 3, 0.2), Window((voltage,) * 3, 0.7))
+        state = card.card_settled(inputs, p, k, options)
+        for _ in range(50):
+            signals = card.card_sample(state, inputs, p, k, 1.0 / 512.0, options)
+            level = card.channel_level(6.0, p.plus if voltage > 0.0 else p.minus)
+            assert signals.current == pytest.approx(np.sign(voltage) * level, rel=1e-14)
+            assert not card.card_limits(state, signals, inputs, p, k, options).current_rate
+            state = card.card_step(state, signals, inputs, p, k, 1.0 / 512.0, options)
+
+
+# --- filter to output ----------------------------------------------------------------------------
+
+LIMITS = {"lim1": 2.0, "lim2": 3.0, "I_t1": 0.3, "I_t2": 0.1}
+
+
+@pytest.mark.interpreted
+@pytest.mark.parametrize(
+    ("target", "previous", "steady", "output", "limited"),
+    [
+        (0.25, 0.1, 0.5, 0.25, False),  # below I_t1 the filter passes
+        (0.9, 0.5, 0.9, 0.52, True),  # above it lim1 counts, from the last output on
+        (0.9, 0.1, 0.9, 0.32, True),  # or from I_t1, when a sample jumps over it
+        (0.51, 0.5, 0.9, 0.51, False),  # slower than the limit
+        (0.2, 0.5, 0.0, 0.47, True),  # towards zero lim2
+        (0.49, 0.5, 0.4, 0.49, False),
+        (-0.1, 0.08, 0.0, 0.072, False),  # gone below I_t2: decay, whatever the filter does
+        (0.05, 0.08, 0.04, 0.072, False),  # still commanded: the higher of filter and decay
+        (0.075, 0.08, 0.04, 0.075, False),
+    ],
+)
+def test_limiter_branches(
+    channel: Channel, target: float, previous: float, steady: float, output: float, limited: bool
+) -> None:
+    p = channel._replace(**LIMITS)
+    found = card.limited_current(target, previous, steady, p, 0.9, 0.01, None)
+    assert found == pytest.approx(output)
+    assert card.rate_limit_active(output, target, previous, p.I_t2) is limited
+
+
+@pytest.mark.interpreted
+@pytest.mark.parametrize(
+    ("target", "previous", "steady", "output"),
+    [
+        (0.0, 0.14, 0.0, 0.11),  # I_t2 is not reached
+        (0.0, 0.12, 0.0, 0.1 * (0.9 + 2 / 3 * 0.1)),  # reached after two thirds of the step
+        (0.095, 0.12, 0.0, 0.1 * (0.9 + 0.8 * 0.1)),  # after four fifths, led by the filter
+        (0.097, 0.104, 0.5, 0.097),  # still commanded, and the filter is higher than the decay
+        (-0.1, 0.1, 0.0, 0.09),  # reached already
+        (0.9, 0.1, 0.9, 0.3 + 0.75 * 0.02),  # on the way up I_t1 is passed after a quarter
+        (0.31, 0.1, 0.9, 0.3 + 0.02 / 21.0),  # shortly before the step's end
+        (0.31, 0.295, 0.9, 0.31),  # the filter is slower than the limit
+        (0.9, 0.5, 0.9, 0.52),  # passed already
+    ],
+)
+def test_switches_from_within_a_step(
+    channel: Channel, target: float, previous: float, steady: float, output: float
+) -> None:
+    p = channel._replace(**LIMITS)
+    found = card.limited_current(target, previous, steady, p, 0.9, 0.01, True)
+    assert found == pytest.approx(output)
+
+
+@pytest.mark.interpreted
+def test_limits_can_be_off(channel: Channel) -> None:
+    p = channel._replace(lim1=inf, lim2=inf, I_t1=inf, I_t2=0.0, a=inf)
+    decay = card.channel_constants(p, 0.01, card.CardOptions()).decay
+    assert decay == 0.0
+    assert card.limited_current(1.3, 0.2, 1.0, p, decay, 0.01, None) == 1.3
+    assert card.limited_current(0.1, 0.9, 0.0, p, decay, 0.01, None) == 0.1
+    assert card.limited_current(-0.1, 0.9, 0.0, p, decay, 0.01, None) == 0.0
+
+
+@pytest.mark.interpreted
+def test_declared_rules_are_the_slopes() -> None:
+    """Of the jump's share, by central differences where the command crosses the dead zone."""
+    at = [2.0, 1.2, 0.1, 0.3, 1.0]
+    for values in (at, [0.1, 1.2, 2.0, 0.3, 1.4], [2.0, 0.7, 0.1, 0.6, 1.0]):
+        declared = card._jump_share(*values)
+        for index, slope in enumerate(declared):
+            above, below = list(values), list(values)
+            above[index] += 1e-6
+            below[index] -= 1e-6
+            difference = (card.jump_share(*above) - card.jump_share(*below)) / 2e-6
+            assert slope == pytest.approx(difference, rel=1e-6, abs=1e-8)
+    assert card._jump_share(0.5, 0.5, 0.5, 0.3, 0.5) == (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.interpreted
+@given(st.floats(-10.0, 10.0), st.floats(-10.0, 10.0), st.floats(0.0, 1.0))
+def test_interpolation_lies_between(newer: float, older: float, fraction: float) -> None:
+    value = interpolated(newer, older, fraction)
+    assert min(newer, older) - 1e-12 <= value <= max(newer, older) + 1e-12

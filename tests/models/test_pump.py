@@ -1,0 +1,297 @@
+"""The pump's equations against what they stand for, worked out another way."""
+
+from math import asin, atan, cos, inf, sin, sqrt, tan
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from swashplate import Drive
+from swashplate.equations.library import (
+    TAN_22_5,
+    arctangent,
+    faded,
+    small_arctangent,
+    soft_threshold,
+)
+from swashplate.models import pump as model
+from swashplate.models.pump import Pump, PumpInputs, PumpOptions
+
+H = 1.0 / 512.0
+interpreted = pytest.mark.interpreted
+
+
+def inputs_of(p: Pump, current: float, **others: float) -> PumpInputs:
+    given = {"pump_speed": p.pump_speed, "load_torque": p.load_torque, "supply_pressure": p.Z9}
+    return PumpInputs(current, **{**given, **others})
+
+
+# --- solenoids and spool -------------------------------------------------------------------------
+
+
+@interpreted
+@given(st.floats(-TAN_22_5, TAN_22_5))
+def test_small_arctangent_is_within_one_unit_in_the_last_place(t: float) -> None:
+    assert abs(small_arctangent(t) - atan(t)) <= np.spacing(abs(atan(t)))
+
+
+@interpreted
+@given(st.floats(-1e6, 1e6))
+def test_arctangent_is_within_two_units_in_the_last_place(t: float) -> None:
+    assert abs(arctangent(t) - atan(t)) <= 2.0 * np.spacing(abs(atan(t)))
+
+
+@interpreted
+def test_steep_and_flat_swash_plates_give_the_same_angle(pump: Pump) -> None:
+    p = pump._replace(Z13_plus=0.39, Z13_minus=0.39)
+    for tangent in np.linspace(-TAN_22_5, TAN_22_5, 101):
+        assert model.swash_angle(tangent, p, None) == model.swash_angle(tangent, p, True)
+
+
+@interpreted
+@given(st.floats(-0.95, 0.95), st.floats(-0.95, 0.95), st.floats(-1e-3, 1e-3))
+def test_spool_is_the_tangent_of_the_angles_difference(
+    pump: Pump, a: float, s: float, plus: float
+) -> None:
+    assume(cos(asin(a) - asin(s)) > 0.05)
+    p = pump._replace(Z4=0.05, Z5=0.008, Z18=plus)
+    expected = p.Z5 * tan(asin(a) - asin(s)) + plus
+    x = model.spool_balance(a * sqrt(p.Z4) / p.Z5, s, p)
+    assert x == pytest.approx(expected, rel=1e-10, abs=1e-13)
+
+
+@interpreted
+@given(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6))
+def test_spool_solves_the_force_balance(pump: Pump, a: float, s: float) -> None:
+    """Kruse eq. 6.19 at rest: k_f d3² [d1 sin α + x cos α]/√(d1² + x²) = (d1² + x²)/d1 · F ...
+
+    ... where the right-hand side is the moment d1 F once the spool's own tilt is neglected
+    (tan²β ≪ 1, the assumption below eq. 6.57).
+    """
+    spring, d1 = 0.23, 0.008
+    force = a * spring / d1
+    x = model.spool_balance(force, s, pump._replace(Z4=spring**2, Z5=d1, Z18=0.0))
+    moment = spring * (d1 * s + x * sqrt(1 - s * s)) / sqrt(d1**2 + x**2)
+    assert moment == pytest.approx(d1 * force, rel=1e-9, abs=1e-12)
+
+
+@interpreted
+def test_the_other_form_of_the_spool_takes_over_where_angles_are_large(pump: Pump) -> None:
+    a, s = sin(1.2), sin(1.1)
+    assert a * a + s * s > 1.0
+    x = model.spool_balance(a * sqrt(0.05) / 0.008, s, pump._replace(Z4=0.05, Z5=0.008, Z18=0.0))
+    assert x == pytest.approx(0.008 * tan(0.1), rel=1e-12)
+
+
+@interpreted
+def test_force_keeps_the_sign_of_even_powers(pump: Pump) -> None:
+    """Erratum 1: -0.5 A, dead zone 0.1: e = -0.4; 10 e + 4 e² + 2 e³ - 50 e⁴ by hand."""
+    p = pump._replace(Z17=0.1, Z19_minus=10.0, Z20_minus=4.0, Z21_minus=2.0, Z22_minus=-50.0)
+    expected = -4.0 + 0.64 - 0.128 - 1.28
+    assert model.solenoid_force(-0.5, p) == pytest.approx(expected, rel=1e-14)
+
+
+@interpreted
+@given(st.floats(-2.0, 2.0), st.floats(0.0, 1.0))
+def test_effective_current_is_beyond_a_symmetric_dead_zone(i: float, Z17: float) -> None:
+    found = model.effective_current(i, Z17)
+    assert found == pytest.approx(np.sign(i) * max(abs(i) - Z17, 0.0))
+    assert faded(found) == pytest.approx(found, abs=1e-30)
+    assert soft_threshold(i, 0.0) == i
+
+
+@interpreted
+@pytest.mark.parametrize(
+    ("position", "opening"),
+    [(5e-3, 2e-4), (1e-4, 1e-4), (-1e-4, -1e-4), (-5e-3, -3e-4), (0.0, 0.0)],
+)
+def test_opening_stops_at_the_orifices(pump: Pump, position: float, opening: float) -> None:
+    p = pump._replace(Z14=3e-3, Z16_plus=2e-4, Z16_minus=3e-4)
+    assert model.orifice_opening(position, p) == opening
+
+
+@interpreted
+def test_opening_stops_at_the_spool_without_orifices(pump: Pump) -> None:
+    p = pump._replace(Z14=3e-3, Z16_plus=inf, Z16_minus=inf)
+    assert model.orifice_opening(5e-3, p) == 3e-3
+    assert model.orifice_opening(-5e-3, p) == -3e-3
+
+
+# --- stroking piston -----------------------------------------------------------------------------
+
+
+@interpreted
+@pytest.mark.parametrize("symmetric", [None, True])
+@pytest.mark.parametrize("opening", [1.5e-4, -1.5e-4])
+def test_tight_step_integrates_the_rate_exactly(opening: float, symmetric: bool | None) -> None:
+    args = (0.1, 0.0, 1.6e6, 1.0e7)
+    solution = solve_ivp(
+        lambda _, p: [model.pressure_rate(p[0], opening, *args, symmetric)],
+        (0.0, 20 * H),
+        [4e5],
+        rtol=1e-11,
+        atol=1e-3,
+    )
+    p = 4e5
+    for _ in range(20):
+        p = model.tight_step(p, opening, *args, H, symmetric)
+    assert p == pytest.approx(solution.y[0, -1], rel=1e-9)
+
+
+@interpreted
+@pytest.mark.parametrize("symmetric", [None, True])
+def test_leaky_step_integrates_the_rate(symmetric: bool | None) -> None:
+    args = (0.1, 2.0, 1.6e6, 1.0e7)
+    solution = solve_ivp(
+        lambda _, p: [model.pressure_rate(p[0], -1e-4, *args, symmetric)],
+        (0.0, H),
+        [4e5],
+        rtol=1e-12,
+        atol=1e-4,
+    )
+    p = model.leaky_step(4e5, -1e-4, *args, H, symmetric)
+    assert p == pytest.approx(solution.y[0, -1], rel=1e-10)
+
+
+@interpreted
+def test_pressure_cannot_be_pumped_beyond_the_supply() -> None:
+    p = 0.0
+    for _ in range(5):
+        p = model.tight_step(p, 1.0, 0.0, 0.0, 1e6, 1e6, H, None)
+    assert p == 1e6
+    for _ in range(5):
+        p = model.tight_step(p, -1.0, 0.0, 0.0, 1e6, 1e6, H, True)
+    assert p == -1e6
+
+
+@interpreted
+def test_leakage_has_a_derivative_at_zero() -> None:
+    """By the second-order forward difference, as negative leakage does not exist."""
+    p, x, Z6, Z8, Z9 = 3e5, 2e-4, 0.1, 1.6e6, 1.0e7
+    e = 1e-3
+    base = model.tight_step(p, x, Z6, 0.0, Z8, Z9, H, None)
+    one, two = (model.leaky_step(p, x, Z6, k * e, Z8, Z9, H, None) for k in (1, 2))
+    difference = (-3.0 * base + 4.0 * one - two) / (2.0 * e)
+    declared = model._tight_step(p, x, Z6, 0.0, Z8, Z9, H, None)
+    assert declared[3] == pytest.approx(difference, rel=1e-6)
+
+
+@interpreted
+@pytest.mark.parametrize("symmetric", [None, True])
+def test_declared_rule_of_the_tight_step_is_its_slope(symmetric: bool | None) -> None:
+    at = [3e5, -2e-4, 0.1, 0.0, 1.6e6, 1e7, H]
+    declared = model._tight_step(*at, symmetric)
+    for index in (0, 1, 2, 4, 5, 6):
+        above, below, width = list(at), list(at), 1e-4 * abs(at[index])
+        above[index] += width
+        below[index] -= width
+        difference = model.tight_step(*above, symmetric) - model.tight_step(*below, symmetric)
+        assert declared[index] == pytest.approx(difference / (2.0 * width), rel=1e-6)
+
+
+# --- the pump ------------------------------------------------------------------------------------
+
+
+def test_published_speed_limits_and_accelerations() -> None:
+    """Fastest speeds and accelerations at rest with the orifice open [deg/s, deg/s²]."""
+    expected = {
+        "hoist": ((196.0, -185.0), (136.8, 177.8)),
+        "slew": ((4.242, -4.292), (5.81, 5.87)),
+        "luff": ((155.9, -190.8), (35.9, 88.9)),
+    }
+    options = PumpOptions()
+    for axis, (speeds, accelerations) in expected.items():
+        numbers = Drive.preset(axis).parameters.numbers
+        p = Pump(**{name: numbers[name] for name in Pump._fields if name in numbers})
+        k = model.pump_constants(p, H, options)
+        for sign, speed, acceleration in zip((1.0, -1.0), speeds, accelerations, strict=True):
+            inputs = inputs_of(p, sign * 0.75)
+            found = np.degrees(model.settled_speed(inputs, p, k, options))
+            assert found == pytest.approx(speed, rel=3e-4)
+            state = model.pump_rest(p, k, options, inputs)
+            rate = model.pump_sample(state, inputs, p, k, H, options).swash_rate
+            assert np.degrees(p.Z10 * abs(rate)) == pytest.approx(acceleration, rel=2e-3)
+
+
+@pytest.mark.parametrize("leaky", [None, True])
+def test_a_settled_pump_stays(pump: Pump, leaky: bool | None) -> None:
+    p = pump._replace(Z7=0.0 if leaky is None else 0.2)
+    options = PumpOptions(leaky=leaky)
+    k = model.pump_constants(p, H, options)
+    for current in (0.0, 0.5, -0.6):
+        inputs = inputs_of(p, current)
+        state = model.pump_settled(inputs, p, k, options)
+        signals = model.pump_sample(state, inputs, p, k, H, options)
+        after = model.pump_step(state, signals, inputs, p, k, H, options)
+        assert after.pressure == pytest.approx(state.pressure, rel=1e-12, abs=1e-6)
+        speed = model.settled_speed(inputs, p, k, options)
+        assert signals.shaft_speed == pytest.approx(speed, rel=1e-12, abs=1e-12)
+
+
+def test_the_prime_movers_speed_scales_flow_and_speed(pump: Pump) -> None:
+    p = pump._replace(Z12=0.02, load_inertia=5e3, motor_leakage=1e-6)
+    options = model.options_of(p)
+    k = model.pump_constants(p, H, options)
+    state = model.PumpState(4e5)
+    slow = model.pump_sample(state, inputs_of(p, 0.6), p, k, H, options)
+    fast = model.pump_sample(state, inputs_of(p, 0.6, pump_speed=1.5), p, k, H, options)
+    assert fast.shaft_speed == pytest.approx(1.5 * slow.shaft_speed, rel=1e-14)
+    assert fast.motor_torque == pytest.approx(1.5 * slow.motor_torque, rel=1e-14)
+    assert fast.swash_angle == slow.swash_angle
+
+
+def test_a_load_alone_moves_torque_and_pressure_drop_but_no_speed(pump: Pump) -> None:
+    """With a stiff line and no leakage the flow sets the speed, whatever the load."""
+    p = pump._replace(load_torque=3e4, motor_constant=250.0)
+    options = model.options_of(p)
+    k = model.pump_constants(p, H, options)
+    state = model.PumpState(4e5)
+    loaded = model.pump_sample(state, inputs_of(p, 0.6), p, k, H, options)
+    free = model.pump_sample(state, inputs_of(p, 0.6, load_torque=0.0), p, k, H, options)
+    assert loaded.shaft_speed == free.shaft_speed
+    assert loaded.motor_torque - free.motor_torque == pytest.approx(3e4)
+    assert loaded.motor_pressure_drop == pytest.approx(250.0 * 3e4)
+
+
+def test_a_weaker_supply_makes_the_pump_slower(pump: Pump) -> None:
+    options = PumpOptions()
+    k = model.pump_constants(pump, H, options)
+    rises = []
+    for share in (1.0, 0.5):
+        inputs = inputs_of(pump, 0.7, supply_pressure=share * pump.Z9)
+        state = model.pump_rest(pump, k, options, inputs)
+        signals = model.pump_sample(state, inputs, pump, k, H, options)
+        rises.append(model.pump_step(state, signals, inputs, pump, k, H, options).pressure)
+    assert rises[1] / rises[0] == pytest.approx(sqrt(0.5), rel=1e-3)
+
+
+REFINEMENTS = {
+    "friction": {"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6},
+    "hysteresis": {"solenoid_hysteresis": 0.005},
+    "ripple": {"cam_ripple": 0.01},
+    "damping": {"swash_damping": 0.02},
+    "leakage": {"motor_leakage": 1e-6},
+}
+
+
+@pytest.mark.parametrize("name", REFINEMENTS)
+def test_next_to_nothing_of_a_refinement_is_next_to_off(pump: Pump, name: str) -> None:
+    """At 1e-9 of its size, within 1e-6 of off after a second of a sine."""
+    loaded = pump._replace(load_torque=3e4, load_inertia=500.0)
+    values = dict(REFINEMENTS[name])
+    first = next(iter(values))
+    values[first] *= 1e-9
+    speeds = []
+    for p in (loaded, loaded._replace(**values)):
+        options = model.options_of(p)
+        k = model.pump_constants(p, H, options)
+        state = model.pump_rest(p, k, options, inputs_of(p, 0.0))
+        for n in range(512):
+            inputs = inputs_of(p, 0.6 * sin(0.02 * n))
+            signals = model.pump_sample(state, inputs, p, k, H, options)
+            state = model.pump_step(state, signals, inputs, p, k, H, options)
+        speeds.append(signals.shaft_speed)
+    # a damped plate takes its oil after the flow, not with it, however light the damper
+    assert speeds[1] == pytest.approx(speeds[0], rel=2e-4 if name == "damping" else 1e-6)
