@@ -962,6 +962,21 @@ def closed_pressure(force: float, p: Pump, k: PumpConstants) -> float:
 
 
 @equation
+def leaked_pressure(pressure: float, Z9: float, p: Pump, k: PumpConstants, symmetric: Flag) -> float:
+    """What leakage around the stroking piston takes from the pressure at which the spool closes.
+
+    The spool opens by x = Z7 δP/(Z8 √head), and x falls by Z1 Z3 (Z5² + Z18²)/(Z5 cos α) for each
+    pascal: the first order, which is all that the derivative at Z7 = 0 needs. [Pa]
+    """
+    head, _ = flow_head(pressure, pressure, Z9, symmetric)
+    if not k.lower < pressure < k.upper or head <= 0.0:
+        return 0.0
+    s = arm_sine(pressure, p)
+    stiffness = p.Z1 * p.Z3 * (p.Z5 * p.Z5 + p.Z18 * p.Z18) / (p.Z5 * sqrt(1.0 - s * s))
+    return p.Z7 * pressure / (p.Z8 * sqrt(head) * stiffness)
+
+
+@equation
 def pressure_gain(pressure: float, force: float, Z9: float, p: Pump, options: PumpOptions) -> float:
     """Rate of the stroking pressure under a force; it falls with the pressure. [Pa/s]"""
     opening = orifice_opening(spool_balance(force, arm_sine(pressure, p), p), p)
@@ -976,7 +991,8 @@ def settled_pressure(inputs: PumpInputs, p: Pump, k: PumpConstants, options: Pum
     """
     force = solenoid_force(inputs.current, p)
     if options.leaky is None:
-        return closed_pressure(force, p, k)
+        closed = closed_pressure(force, p, k)
+        return closed - leaked_pressure(closed, inputs.supply_pressure, p, k, options.symmetric)
     return root(pressure_gain, k.lower, k.upper, force, inputs.supply_pressure, p, options)
 
 
