@@ -4,6 +4,7 @@ Every march is generated as readable source in which the model's equations stand
 over scalars (`scalars`). `PartCode` has one sample of a part, and the functions below wrap it as
 
 - `march_source`: the plain march over whole records,
+- `march_piece_source`: the march over a block of them, for the Jacobian,
 - `observe_source`: signals at states that are known already,
 - `advance_source`: one sample, for steppers and for kernels that close loops.
 
@@ -15,7 +16,7 @@ Arithmetic is strict and in the order of the equations, so that all of them give
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple, get_type_hints
 
@@ -24,6 +25,7 @@ from swashplate.equations.equation import inlined
 from swashplate.equations.expressions import Node
 from swashplate.equations.fields import floats_of
 from swashplate.equations.model import Equation, Link, Model, Source, Tap, arguments_of, plain
+from swashplate.equations.pieces import PIECE
 from swashplate.equations.program import Flag, Tuple, Value, leaves, rebuilt
 from swashplate.equations.scalars import Code, text
 from swashplate.equations.windows import Window, linear, mean_over_sample, previous
@@ -37,9 +39,9 @@ HOLDS: dict[str, Equation] = {
 
 
 _OWN = """
-n m j c lane first last worst h half value error total count span met used progress values lines
+n m j c lane first last worst h half value error total count span used progress values lines
 whole fraction params given constants states out flags records before measured weight outputs flat
-table kept tangent columns program plan sink room block machine volts current speed voltage
+table kept tangent columns program plan sink room block met machine volts current speed voltage
 target counts
 """
 RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
@@ -448,8 +450,17 @@ class Sampler:
                 lines.append(f"{part.source(source)} = {text(node)}")
         return lines
 
-    def stored(self, part: PartCode, stored: Sequence[Stored], at: str) -> list[str]:
-        """Lines that write what is kept of a part into ``out`` and ``flags``."""
+    def stored(
+        self,
+        part: PartCode,
+        stored: Sequence[Stored],
+        at: str,
+        into: Callable[[int], str] | None = None,
+    ) -> list[str]:
+        """Lines that write what is kept of a part into ``out`` and ``flags``, or elsewhere.
+
+        `into` says where a number goes, by its place in `stored`, instead of ``out[place, at]``.
+        """
         lines, row, flag = [], 0, 0
         for each in stored:
             if each.kind == "limits":
@@ -470,9 +481,11 @@ class Sampler:
                 assert link.equation is not None
                 made = code.called(link.equation, sources)
                 assert isinstance(made, Node)
-                lines += [*code.lines([made]), f"out[{row}, {at}] = {text(made)}"]
+                target = into(row) if into else f"out[{row}, {at}]"
+                lines += [*code.lines([made]), f"{target} = {text(made)}"]
             elif each.kind != "link" and each.part == part.part:
-                lines.append(f"out[{row}, {at}] = {text(part.node(each))}")
+                target = into(row) if into else f"out[{row}, {at}]"
+                lines.append(f"{target} = {text(part.node(each))}")
             row += 1
         return lines
 
@@ -528,25 +541,53 @@ def march_source(
     the order of `stored`, advances ``states`` in place, and returns the worst margin met.
     """
     sampler = Sampler(model, signals, options, stored)
+    lines = ["first, last = span", *_marching(sampler, stored), "return worst"]
+    head = "march(records, before, whole, fraction, params, given, h, states, span, out, flags)"
+    return function_source(head, f"March {model.name} over its inputs.", lines), sampler.names
+
+
+def march_piece_source(
+    model: Model, signals: Sequence[str], options: Sequence[Any], rows: Mapping[Stored, str]
+) -> tuple[str, dict[str, Any]]:
+    """Text of the march over a block of samples as a `piece`, and what its names mean.
+
+    Parameters
+    ----------
+    rows : mapping of Stored to str
+        What is kept, and where it goes at sample ``n - first`` of the block.
+    """
+    stored = tuple(rows)
+    sampler = Sampler(model, signals, options, stored)
+    lines = [
+        "last = first + count",
+        *_marching(sampler, stored, lambda row: rows[stored[row]]),
+        "met[0] = min(met[0], worst)",
+    ]
+    says = f"March {model.name} over a block of its inputs."
+    return function_source(f"march({PIECE})", says, lines, "@piece"), sampler.names
+
+
+def _marching(
+    sampler: Sampler, stored: Sequence[Stored], into: Callable[[int], str] | None = None
+) -> list[str]:
+    """Lines that march samples ``first`` to ``last`` - 1 and find the worst margin."""
     parts = sampler.used()
     lines = [*sampler.places(), *sampler.ahead()]
     for part in parts:
         lines += sampler.load(part)
-    lines += ["first, last = span", "worst = inf", "for n in range(first, last):"]
+    lines += ["worst = inf", "for n in range(first, last):"]
     inner: list[str] = []
     for part in parts:
         inner += sampler.fetched(part)
         inner += sampler.body(part)
-        inner += sampler.stored(part, stored, "n - first")
+        inner += sampler.stored(part, stored, "n - first", into)
         inner += sampler.margin(part)
     for part in parts:
         inner += sampler.step(part)
     lines += indented(inner)
     for part in parts:
         lines += sampler.save(part)
-    lines.append("return worst")
-    head = "march(records, before, whole, fraction, params, given, h, states, span, out, flags)"
-    return function_source(head, f"March {model.name} over its inputs.", lines), sampler.names
+    return lines
 
 
 def advance_source(
@@ -597,7 +638,7 @@ def advance_source(
             if f"x_{signal}" in read:
                 lines.append(f"x_{signal} = values[{k}]")
         lines += sampler.body(part)
-        lines += [line.replace(", 0] =", "] =") for line in sampler.stored(part, stored, "0")]
+        lines += sampler.stored(part, stored, "0", lambda row: f"out[{row}]")
     lines.append("worst = inf")
     for part in parts:
         lines += [*sampler.margin(part), *sampler.step(part), *sampler.save(part)]

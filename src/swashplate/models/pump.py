@@ -962,7 +962,9 @@ def closed_pressure(force: float, p: Pump, k: PumpConstants) -> float:
 
 
 @equation
-def leaked_pressure(pressure: float, Z9: float, p: Pump, k: PumpConstants, symmetric: Flag) -> float:
+def leaked_pressure(
+    pressure: float, Z9: float, p: Pump, k: PumpConstants, symmetric: Flag
+) -> float:
     """What leakage around the stroking piston takes from the pressure at which the spool closes.
 
     The spool opens by x = Z7 δP/(Z8 √head), and x falls by Z1 Z3 (Z5² + Z18²)/(Z5 cos α) for each
