@@ -86,8 +86,9 @@ class Code:
         for name, formal in program.arguments:
             if isinstance(formal, Flag) or not list(leaves(formal)):
                 continue
-            for (_, inner), (_, outer) in zip(leaves(formal), leaves(given[name]), strict=True):
-                env[inner.value] = outer
+            outer = dict(leaves(given[name]))  # it may have more fields than are asked for
+            for path, inner in leaves(formal):
+                env[inner.value] = outer[path]
         stem = plain(equation).__name__
         return self._named(self._body(program.body, env, self.items), stem, self.items)
 
