@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from operator import attrgetter
 from typing import Any, get_type_hints
 
 
@@ -40,7 +42,15 @@ def value_at(value: Any, path: str) -> Any:
 
 def numbers_of(value: Any) -> list[float]:
     """All floats of a nested named tuple, in the order of `floats_of`."""
-    return [float(value_at(value, path)) for path in floats_of(type(value))]
+    return [float(each) for each in _reader(type(value))(value)]
+
+
+@cache
+def _reader(kind: type[Any]) -> Callable[[Any], tuple[Any, ...]]:
+    paths = floats_of(kind)
+    if len(paths) < 2:
+        return lambda value: tuple(value_at(value, path) for path in paths)
+    return attrgetter(*paths)
 
 
 def made(kind: type[Any], numbers: Mapping[str, float]) -> Any:

@@ -102,7 +102,9 @@ def _extended(kind: type[Any], more: type[Any]) -> type[Any]:
     if bare:
         raise InputError(f"{more.__name__}.{bare[0]} needs a default: old numbers lack it.")
     order = sorted(hints, key=lambda name: name in defaults)
-    made: Any = namedtuple(kind.__name__, order, defaults=[defaults[n] for n in order if n in defaults])
+    made: Any = namedtuple(
+        kind.__name__, order, defaults=[defaults[n] for n in order if n in defaults]
+    )
     made.__annotations__ = {name: hints[name] for name in order}
     made.__module__ = more.__module__
     return made  # type: ignore[no-any-return]
@@ -139,9 +141,7 @@ def _called_like(old: Equation, new: Equation, part: str, kind: type[Any]) -> Eq
     return equation_of_text(text, name, names)  # type: ignore[no-any-return]
 
 
-def _rebuilt(
-    function: Any, old: Equation, made: dict[Any, Any], names: Mapping[str, Any]
-) -> Any:
+def _rebuilt(function: Any, old: Equation, made: dict[Any, Any], names: Mapping[str, Any]) -> Any:
     """A function that leads to the old equation, leading to the new one."""
     if plain(function) not in made:
         f: Any = parsed(function).function  # as it was written, before defaults were put in

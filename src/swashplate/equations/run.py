@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -72,17 +73,17 @@ class Instance:
     parts: tuple[Part, ...]
     name: str
 
-    @property
+    @cached_property
     def options(self) -> tuple[Any, ...]:
         """Options of each part."""
         return tuple(part.options for part in self.parts)
 
-    @property
+    @cached_property
     def params(self) -> Array:
         """All parameters as numbers, in the order of `march.Numbers`."""
         return np.array([number for part in self.parts for number in numbers_of(part.p)])
 
-    @property
+    @cached_property
     def given(self) -> Array:
         """All givens as numbers."""
         found = [part.given for part in self.parts if part.given is not None]
@@ -126,6 +127,9 @@ class Instance:
         InputError
             If a signal is missing, or the model cannot start settled.
         """
+        key = (tuple(first.items()), h, start)
+        if chosen is None and key in self._starts:
+            return self._starts[key]
         check_start(start)
         before = {name: value if start == "steady" else 0.0 for name, value in first.items()}
         states: list[Any] = []
@@ -144,7 +148,17 @@ class Instance:
             if part.sample is not None:
                 known["signals"] = _sampled(part, known)
             found.append(known)
-        return Started(tuple(states), before, tuple(found))
+        made_now = Started(tuple(states), before, tuple(found))
+        if chosen is None:
+            if len(self._starts) > 64:
+                self._starts.clear()
+            self._starts[key] = made_now
+        return made_now
+
+    @cached_property
+    def _starts(self) -> dict[Any, Started]:
+        """What `start` found lately: a fit asks for the same ones with every set."""
+        return {}
 
     def _state(self, part: Model, known: Mapping[str, Any], start: Start) -> Any:
         equation = part.rest if start == "rest" else part.settled
