@@ -167,13 +167,6 @@ class Model:
         states = tuple(path for path in floats_of(self.state) if path not in own)
         return (*own, *states)
 
-    @cached_property
-    def limit_names(self) -> tuple[str, ...]:
-        """Names of the limits, bit by bit."""
-        if self.limits is None:
-            return ()
-        return tuple(get_type_hints(plain(self.limits))["return"]._fields)
-
     @property
     def external(self) -> tuple[str, ...]:
         """Signals that come from outside, in the order in which the parts ask for them."""
@@ -194,17 +187,6 @@ class Model:
             if signal in self.parts[j].signal_names:
                 return Link(signal, (Source(j, signal),))
         return None
-
-    @cached_property
-    def used_links(self) -> tuple[Link, ...]:
-        """Links that some part's input takes, each once."""
-        found: dict[str, Link] = {}
-        for i, part in enumerate(self.parts):
-            for name in part.input_types:
-                link = self.link_of(i, name)
-                if link is not None:
-                    found[link.name] = link
-        return tuple(found.values())
 
     def tap(self, name: str) -> Tap:
         """How an input is looked at."""

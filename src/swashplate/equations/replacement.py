@@ -102,9 +102,8 @@ def _extended(kind: type[Any], more: type[Any]) -> type[Any]:
     if bare:
         raise InputError(f"{more.__name__}.{bare[0]} needs a default: old numbers lack it.")
     order = sorted(hints, key=lambda name: name in defaults)
-    made: Any = namedtuple(
-        kind.__name__, order, defaults=[defaults[n] for n in order if n in defaults]
-    )
+    make: Any = namedtuple
+    made = make(kind.__name__, order, defaults=[defaults[n] for n in order if n in defaults])
     made.__annotations__ = {name: hints[name] for name in order}
     made.__module__ = more.__module__
     return made  # type: ignore[no-any-return]
