@@ -46,7 +46,7 @@ def numbers_of(value: Any) -> list[float]:
 
 
 @cache
-def _reader(kind: type[Any]) -> Callable[[Any], tuple[Any, ...]]:
+def _reader(kind: Any) -> Callable[[Any], tuple[Any, ...]]:
     paths = floats_of(kind)
     if len(paths) < 2:
         return lambda value: tuple(value_at(value, path) for path in paths)
