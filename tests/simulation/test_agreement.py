@@ -180,6 +180,15 @@ def test_a_refinement_comes_on_in_some_sets_of_a_batch(hoist: Drive) -> None:
         assert np.array_equal(batch.output[i], one.simulate(voltage).shaft_speed), i
 
 
+def test_a_part_of_a_refinement_at_zero_does_not_switch_it_off_in_a_batch(hoist: Drive) -> None:
+    voltage = command()[:900]
+    drive = hoist.replace(cam_ripple_per_torque=1e-6, load_torque=2e4)
+    batch = drive.simulate_many({"cam_ripple": [0.0, 0.01]}, voltage=voltage)
+    for i, depth in enumerate((0.0, 0.01)):
+        one = drive.replace(cam_ripple=depth).simulate(voltage)
+        assert np.array_equal(batch.output[i], one.shaft_speed), i
+
+
 @pytest.mark.parametrize("refinement", ["stiction", "line", "everything"])
 def test_residuals_of_refined_drives_carry_the_same_bits(hoist: Drive, refinement: str) -> None:
     drive = hoist.replace(**REFINED[refinement])

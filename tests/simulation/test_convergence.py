@@ -2,6 +2,7 @@
 
 import itertools
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,9 +68,15 @@ def test_unstable_filter_is_refused_with_advice() -> None:
     assert settled == pytest.approx(slew.steady_current(2.0), abs=4.8368 / 196.754**2 + 1e-6)
 
 
+def recursive(zeta: float) -> Drive:
+    """The neutral drive with the recursion as its filter."""
+    parameters = Drive.preset("neutral").parameters.replace({"zeta": zeta})
+    return Drive(replace(parameters, rate=512.0))
+
+
 @pytest.mark.parametrize("zeta", [0.05, 0.3, 0.9, 1.0, 1.2, 5.0, 40.0])
 def test_an_unstable_filter_is_refused_with_the_least_substeps_that_do(zeta: float) -> None:
-    drive, voltage = Drive.preset("neutral").replace(zeta=zeta, omega=1500.0), np.full(64, 5.0)
+    drive, voltage = recursive(zeta).replace(omega=1500.0), np.full(64, 5.0)
     with pytest.raises(InputError, match="unstable") as refused:
         drive.simulate(voltage)
     least = int(re.findall(r"substeps=(\d+)", str(refused.value))[0])
@@ -84,7 +91,23 @@ def test_an_unstable_filter_is_refused_with_the_least_substeps_that_do(zeta: flo
 )
 def test_a_filter_that_no_step_would_do_for_is_refused(zeta: float, words: str) -> None:
     with pytest.raises(InputError, match=words):
-        Drive.preset("neutral").replace(zeta=zeta).simulate(np.ones(10))
+        recursive(zeta).simulate(np.ones(10))
+
+
+def test_the_differential_equation_bears_half_a_swing_in_a_step() -> None:
+    """By hand: ωh √(1 - ζ²) = π at ω = 512 π/0.8 = 2011 rad/s and ζ = 0.6."""
+    drive, voltage = Drive.preset("neutral").replace(zeta=0.6, omega=2012.0), np.full(512, 5.0)
+    with pytest.raises(InputError, match=r"swings too fast for a step of 1/512 s; .* substeps=2"):
+        drive.simulate(voltage)
+    for settled in (
+        drive.simulate(voltage, substeps=2),
+        drive.replace(omega=2e3).simulate(voltage),
+    ):
+        assert settled.current[-1] == pytest.approx(5.0, rel=1e-9)
+    with pytest.raises(InputError, match="swings so fast .* lower omega"):
+        drive.replace(omega=1e9).simulate(voltage)
+    batch = drive.simulate_many({"omega": [2e3, 2012.0]}, voltage=voltage)
+    assert list(batch.failures) == [1]
 
 
 def test_a_filter_with_little_damping_needs_short_steps() -> None:

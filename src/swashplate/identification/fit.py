@@ -225,8 +225,10 @@ def _fingerprint(stage: Stage, problem: Problem, search: Search, *settings: obje
     digest = blake2b(digest_size=16)
     model = problem.model
     assert isinstance(model, DriveModel)
-    numbers = sorted(model.parameters.numbers.items())
-    words = (__version__, stage.model_dump_json(), search.seed, settings, numbers)
+    known = model.parameters
+    forms = known.pressure_root, known.coulomb_sign, known.rate, sorted(known.options)
+    numbers = sorted(known.numbers.items())
+    words = (__version__, stage.model_dump_json(), search.seed, settings, numbers, forms)
     digest.update(repr(words).encode())
     for experiment, weights in zip(problem.experiments, problem.weights, strict=True):
         arrays = [experiment.input.time, experiment.input.values]
