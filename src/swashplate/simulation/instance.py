@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from cmath import log, sqrt
+from dataclasses import replace
 from functools import lru_cache
 from math import floor, tan
 from typing import Final
@@ -94,7 +96,7 @@ def model_of(by_voltage: bool) -> Model:
     return drive if by_voltage else pump_drive
 
 
-# --- steps that the card's filter bears -----------------------------------------------------------
+# --- the card's filter ----------------------------------------------------------------------------
 
 
 def step_limit(zeta: ArrayLike, exact: bool) -> NDArray[np.float64]:
@@ -155,3 +157,39 @@ def check_filter_stability(parameters: ParameterSet, step: float) -> None:
             f"1/{1.0 / step:g} s; simulate with "
             f"substeps={floor(steps) + 1} or more or at a higher rate, or lower omega."
         )
+
+
+def at_every_rate(parameters: ParameterSet) -> ParameterSet:
+    """The set with the filter's differential equation in place of the recursion for one rate.
+
+    Raises
+    ------
+    InputError
+        If the recursion changes its sign from sample to sample, as no differential equation does.
+
+    Notes
+    -----
+    Both have the same poles, z = e^(sh) at the recursion's rate, and the same band C/ω² in which
+    the Coulomb term holds the current. By that their delays are alike as well: 2ζ/ω of the
+    equation, a sample less by the old ζ and ω of the recursion.
+    """
+    if parameters.rate is None:
+        return parameters
+    changes: dict[str, float] = {}
+    for side in SIDES:
+        zeta, omega, C = (parameters.numbers[f"{name}_{side}"] for name in ("zeta", "omega", "C"))
+        w = omega / parameters.rate
+        middle, half = 1.0 - zeta * w, w * sqrt(complex(zeta * zeta - 1.0))
+        poles = middle + half, middle - half
+        if any(each.imag == 0.0 and each.real <= 0.0 for each in poles):
+            raise InputError(
+                f"{parameters.name}: the recursion of the {side} channel's filter (zeta = "
+                f"{zeta:g}, omega = {omega:g} rad/s at {parameters.rate:g} Hz) swings from sample "
+                "to sample, as no filter of another rate does; lower omega."
+            )
+        first, second = (parameters.rate * log(each) for each in poles)
+        made = float(sqrt(first * second).real)
+        changes[f"omega_{side}"] = made
+        changes[f"zeta_{side}"] = -float((first + second).real) / (2.0 * made)
+        changes[f"C_{side}"] = C * (made / omega) ** 2
+    return replace(parameters.replace(changes, parameters.options), rate=None)
