@@ -17,6 +17,7 @@ from swashplate.parameters.files import dump_set, load_preset, load_set
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.batch import Batch, SquaredError, simulate_many
+from swashplate.simulation.instance import at_every_rate
 from swashplate.simulation.result import Simulation
 from swashplate.simulation.run import (
     check_voltage,
@@ -137,6 +138,19 @@ class Drive:
         """The drive without refinements, itself if it has none."""
         plain = self.parameters.plain
         return self if plain is self.parameters else Drive(plain)
+
+    def at_every_rate(self) -> Drive:
+        """The drive with a card's filter that means the same at every rate.
+
+        The source's filter is a recursion at 512 Hz (`ParameterSet.rate`): marched at another rate
+        it is another filter. In its place comes the differential equation with the same poles.
+
+        Raises
+        ------
+        InputError
+            If there is none, since the recursion changes its sign from sample to sample.
+        """
+        return Drive(at_every_rate(self.parameters))
 
     def simulate(
         self,

@@ -101,15 +101,34 @@ def test_times_are_those_of_a_step(found, hoist: Drive) -> None:
         assert times.rise == pytest.approx(at[0.9] - at[0.1], abs=1.01 / 512)
 
 
-def test_accelerations_are_those_of_a_simulation(hoist: Drive) -> None:
+LEAKING = {"motor_leakage": 1e-6, "load_torque": 3e4}
+
+
+@pytest.mark.parametrize(
+    "refined", [{}, LEAKING, {"spool_friction": 0.1, "solenoid_hysteresis": 0.005}]
+)
+def test_accelerations_are_those_of_a_simulation(hoist: Drive, refined: dict[str, float]) -> None:
     """Under a held current the speed grows by acceleration times step."""
-    run = hoist.simulate_current(np.full(700, hoist.steady_current(10.0)))
-    curve = acceleration_curve(hoist, 10.0, points=2001)
+    drive = hoist.replace(**refined)
+    run = drive.simulate_current(np.full(700, drive.steady_current(10.0)))
+    curve = acceleration_curve(drive, 10.0, points=2001)
     middle = 0.5 * (run.shaft_speed[1:] + run.shaft_speed[:-1])
     found = np.interp(middle, curve.speed, curve.acceleration)
     moving = (middle < 0.99 * curve.speed[-1]) & (middle > 0.0)
     np.testing.assert_allclose(found[moving], 512.0 * np.diff(run.shaft_speed)[moving], rtol=2e-4)
     assert set(curve.by) == {"orifice"}
+
+
+def test_curves_of_refined_drives_are_those_of_their_mean_motion(hoist: Drive, found) -> None:
+    """What leaks under the load, 0.03 rad/s, shifts them; what swings about the mean does not."""
+    swinging = {"cam_ripple": 0.02, "swash_damping": 0.02, "solenoid_hysteresis": 0.005}
+    plain = acceleration_curve(hoist, 6.0)
+    for line in ({}, {"line_stiffness": 1e6, "load_inertia": 5e3}):
+        drive = hoist.replace(**LEAKING, **swinging, **line)
+        curve = acceleration_curve(drive, 6.0)
+        np.testing.assert_allclose(curve.speed, plain.speed - 0.03, rtol=0.0, atol=1e-12)
+        np.testing.assert_array_equal(curve.acceleration, plain.acceleration)
+        assert speed_limits(drive)[1] == pytest.approx(found["hoist"].plus.speed_limit - 0.03)
 
 
 def test_what_sets_the_acceleration(hoist: Drive) -> None:

@@ -17,6 +17,7 @@ from swashplate.equations.library import interpolated
 from swashplate.equations.windows import Window
 from swashplate.models import card
 from swashplate.models.card import Channel, ChannelConstants, Filter
+from swashplate.simulation.instance import step_limit
 
 Array = NDArray[np.float64]
 EXACT = card.CardOptions(exact=True)
@@ -82,13 +83,13 @@ def test_the_recursion_is_the_printed_difference_equation(channel: Channel) -> N
 
 @pytest.mark.interpreted
 @pytest.mark.parametrize(("zeta", "rate"), [(0.4, 100.0), (0.05, 100.0), (3.0, 100.0), (1.0, 30.0)])
-def test_the_margin_is_that_of_the_recursions_roots(
+def test_the_largest_step_is_that_of_the_recursions_roots(
     channel: Channel, zeta: float, rate: float
 ) -> None:
     p, h = channel._replace(zeta=zeta, omega=40.0), 1.0 / rate
     w = p.omega * h
     roots = np.roots([1.0, -2.0 * (1.0 - zeta * w), 1.0 - 2.0 * zeta * w + w * w])
-    assert (card.filter_margin(p, h) > 0.0) == bool((np.abs(roots) < 1.0).all())
+    assert (w < step_limit(zeta, exact=False)) == bool((np.abs(roots) < 1.0).all())
 
 
 # --- the filter's differential equation ----------------------------------------------------------
@@ -163,8 +164,7 @@ def test_it_is_stable_and_sticks_at_any_rate(zeta: float) -> None:
     """After a step it comes to rest within C/ω² of I_ss, and stays there exactly."""
     p = Channel(0.1, 0.1, 0.1, 0.0, 0.0, zeta, 98.377, 4.8368, inf, inf, inf, 0.0, inf)
     for rate in (50.0, *RATES):
-        if card.exact_filter_margin(p, 1.0 / rate) < 0.5:
-            continue
+        assert p.omega / rate < step_limit(zeta, exact=True)
         found = marched(p, np.r_[0.0, np.full(round(3.0 * rate), 0.5)], 1.0 / rate)
         assert abs(found[-1] - 0.5) <= p.C / p.omega**2 * (1.0 + 1e-9)
         assert found[-1] == pytest.approx(found[-5], abs=1e-15)

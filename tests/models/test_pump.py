@@ -18,9 +18,15 @@ from swashplate.equations.library import (
 )
 from swashplate.models import pump as model
 from swashplate.models.pump import Pump, PumpInputs, PumpOptions
+from swashplate.parameters import definitions
 
 H = 1.0 / 512.0
 interpreted = pytest.mark.interpreted
+
+
+def options_of(p: Pump) -> PumpOptions:
+    """Options that the values of a pump ask for."""
+    return PumpOptions(**dict.fromkeys(definitions.options_of(p._asdict()), True))
 
 
 def inputs_of(p: Pump, current: float, **others: float) -> PumpInputs:
@@ -232,7 +238,7 @@ def test_a_settled_pump_stays(pump: Pump, leaky: bool | None) -> None:
 
 def test_the_prime_movers_speed_scales_flow_and_speed(pump: Pump) -> None:
     p = pump._replace(Z12=0.02, load_inertia=5e3, motor_leakage=1e-6)
-    options = model.options_of(p)
+    options = options_of(p)
     k = model.pump_constants(p, H, options)
     state = model.PumpState(4e5)
     slow = model.pump_sample(state, inputs_of(p, 0.6), p, k, H, options)
@@ -245,7 +251,7 @@ def test_the_prime_movers_speed_scales_flow_and_speed(pump: Pump) -> None:
 def test_a_load_alone_moves_torque_and_pressure_drop_but_no_speed(pump: Pump) -> None:
     """With a stiff line and no leakage the flow sets the speed, whatever the load."""
     p = pump._replace(load_torque=3e4, motor_constant=250.0)
-    options = model.options_of(p)
+    options = options_of(p)
     k = model.pump_constants(p, H, options)
     state = model.PumpState(4e5)
     loaded = model.pump_sample(state, inputs_of(p, 0.6), p, k, H, options)
@@ -285,7 +291,7 @@ def test_next_to_nothing_of_a_refinement_is_next_to_off(pump: Pump, name: str) -
     values[first] *= 1e-9
     speeds = []
     for p in (loaded, loaded._replace(**values)):
-        options = model.options_of(p)
+        options = options_of(p)
         k = model.pump_constants(p, H, options)
         state = model.pump_rest(p, k, options, inputs_of(p, 0.0))
         for n in range(512):

@@ -2,9 +2,11 @@
 
 import copy
 import pickle
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from swashplate import Drive, ParameterError
@@ -62,6 +64,60 @@ def test_they_are_changed_like_all_others(hoist: Drive) -> None:
     assert pickle.loads(pickle.dumps(drive)) == drive
     assert copy.deepcopy(drive) == drive
     assert drive != hoist
+
+
+def test_what_is_on_is_said_and_not_guessed(hoist: Drive, tmp_path: Path) -> None:
+    """A set can have a refinement's values and leave it off; a file says so."""
+    drive = hoist.replace(cam_ripple=0.02, Z12=0.1, solenoid_hysteresis=0.01)
+    assert drive.parameters.options == {"ripple", "loaded", "hysteresis"}
+    parked = Drive(replace(drive.parameters, options=frozenset({"ripple", "leaky"})))
+    assert parked.parameters.refinements == ("cam_ripple",)
+    assert parked["solenoid_hysteresis"].value == 0.01
+    assert parked.plain.parameters.options == {"leaky"}
+    assert parked != drive
+    assert pickle.loads(pickle.dumps(parked)) == parked
+    for each in (drive, parked):
+        each.to_toml(tmp_path / "set.toml")
+        assert Drive.from_toml(tmp_path / "set.toml") == each
+    assert 'options = ["leaky", "ripple"]' in (tmp_path / "set.toml").read_text("utf-8")
+    without = drive.replace(solenoid_hysteresis=0.0, Z12=0.0)
+    voltage = np.linspace(0.0, 4.0, 300)
+    plain = without.simulate(voltage).shaft_speed
+    loose = Drive(replace(parked.parameters, options=frozenset({"ripple"})))
+    assert np.array_equal(loose.simulate(voltage).shaft_speed, plain)
+
+
+def test_values_that_change_take_their_own_option_along(hoist: Drive) -> None:
+    both = hoist.replace(cam_ripple=0.02, cam_ripple_per_torque=1e-6, load_torque=1e4)
+    assert both.replace(cam_ripple=0.0).parameters.options == {"ripple"}
+    assert both.replace(cam_ripple=0.0, cam_ripple_per_torque=0.0).parameters.options == set()
+    fixed = both.parameters.replace({"Z12": 0.1, "cam_ripple": 0.0}, both.parameters.options)
+    assert fixed.options == {"ripple"}
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"stiction"}, "there is no option 'stiction'; there are leaky, loaded, friction"),
+        ({"friction"}, "friction is on, but spool_friction is 0; give at least 1e-07 N, or"),
+        ({"ripple"}, "ripple is on, but cam_ripple and cam_ripple_per_torque are 0; give at"),
+    ],
+)
+def test_options_without_a_size_are_refused(hoist: Drive, options: set[str], sentence: str) -> None:
+    with pytest.raises(ParameterError, match=sentence):
+        replace(hoist.parameters, options=frozenset(options))
+
+
+def test_the_cards_filter_is_the_recursion_where_a_rate_says_so(
+    axis: Drive, tmp_path: Path
+) -> None:
+    assert axis.parameters.rate == 512.0
+    assert Drive.preset("neutral").parameters.rate is None
+    axis.to_toml(tmp_path / "set.toml")
+    text = (tmp_path / "set.toml").read_text("utf-8")
+    assert "rate = 512.0" in text
+    (tmp_path / "set.toml").write_text(text.replace("rate = 512.0\n", ""), "utf-8")
+    assert Drive.from_toml(tmp_path / "set.toml").parameters.rate is None
 
 
 @pytest.mark.parametrize(

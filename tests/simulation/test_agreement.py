@@ -114,6 +114,35 @@ def test_side_by_side_gives_the_same_bits(drive: Drive) -> None:
     )
 
 
+def test_the_filters_equation_gives_the_same_bits_every_way(hoist: Drive) -> None:
+    """March, stepper, lanes and residuals, at 512 Hz and with sub-steps."""
+    drive = hoist.replace(C=3.0).at_every_rate()
+    for rate, start in ((512.0, "rest"), (100.0, "steady")):
+        voltage = command(rate)[:700]
+        run = drive.simulate(voltage, rate, start=start)
+        samples = stepped(drive, voltage, rate, start=start)
+        for name in SIGNALS:
+            assert np.array_equal(samples[name], getattr(run, name)), name
+    voltage, time = command()[:900], np.arange(900) / 512.0
+    run = drive.simulate(voltage)
+    batch = drive.simulate_many({"Z1": [drive["Z1"].value] * 2}, voltage=voltage, output="current")
+    assert np.array_equal(batch.output[1], run.current)
+    observed = ObservedRecord(
+        record_of(voltage, 512.0, what="voltage"), [Observation("current", time, np.zeros(900))]
+    )
+    found = jacobian(drive.parameters, observed, ["omega_plus", "zeta", "C", "tau"])
+    assert np.array_equal(found.residuals, run.current)
+    for j, name in enumerate(found.names):
+        value = drive.parameters.numbers[name]
+        ends = [
+            drive.replace(**{name: value * (1.0 + h)}).simulate(voltage).current
+            for h in (-2e-6, -1e-6, 1e-6, 2e-6)
+        ]
+        slope = (8.0 * (ends[2] - ends[1]) - (ends[3] - ends[0])) / (12e-6 * value)
+        wrong = np.abs(found.columns[:, j] - slope) > 1e-5 * np.abs(found.columns[:, j]).max()
+        assert wrong.mean() < 0.01, name
+
+
 STICTION = {"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6}
 LOAD = {"load_torque": 3e4, "load_inertia": 5e3, "motor_leakage": 1e-6, "motor_constant": 250.0}
 RIPPLE = {"cam_ripple": 0.01, "cam_ripple_per_torque": 5e-7, "cam_phase": 0.3}
@@ -166,6 +195,15 @@ def test_a_refinement_comes_on_in_some_sets_of_a_batch(hoist: Drive) -> None:
     for i in range(4):
         one = hoist.replace(**{name: values[i] for name, values in changes.items()})
         assert np.array_equal(batch.output[i], one.simulate(voltage).shaft_speed), i
+
+
+def test_a_part_of_a_refinement_at_zero_does_not_switch_it_off_in_a_batch(hoist: Drive) -> None:
+    voltage = command()[:900]
+    drive = hoist.replace(cam_ripple_per_torque=1e-6, load_torque=2e4)
+    batch = drive.simulate_many({"cam_ripple": [0.0, 0.01]}, voltage=voltage)
+    for i, depth in enumerate((0.0, 0.01)):
+        one = drive.replace(cam_ripple=depth).simulate(voltage)
+        assert np.array_equal(batch.output[i], one.shaft_speed), i
 
 
 @pytest.mark.parametrize("case", ["hysteresis, line", "everything"])

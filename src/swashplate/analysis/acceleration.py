@@ -23,6 +23,7 @@ from swashplate.models.pump import (
     swash_angle,
     swash_tangent,
 )
+from swashplate.models.refinements import static_leakage
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import instance_of
 from swashplate.simulation.steady import pressure_limits, settled_state
@@ -63,8 +64,10 @@ def accelerations(
 ) -> None:
     """Speed [rad/s] and acceleration [rad/s²] at stroking pressures [Pa], under one current [A].
 
-    The speed is that of the plate's angle; what Z12 takes from it while it accelerates is left out.
+    The speed is that of the plate's angle less what leaks under a load that stands still; what
+    leaks while it accelerates is left out.
     """
+    leakage = 0.0 if options.leakage is None else static_leakage(p.motor_leakage, p.load_torque)
     force = solenoid_force(current, p)
     for n in range(pressure.size):
         free = spool_balance(force, arm_sine(pressure[n], p), p)
@@ -72,7 +75,7 @@ def accelerations(
         opening = orifice_opening(free, p)
         angle = swash_angle(swash_tangent(pressure[n], p), p, options.steep)
         rising = pressure_rate(pressure[n], opening, p.Z6, p.Z7, p.Z8, p.Z9, options.symmetric)
-        speed[n] = shaft_speed(angle, 0.0, p.Z10, p.Z11)
+        speed[n] = shaft_speed(angle, leakage, p.Z10, p.Z11)
         acceleration[n] = p.Z10 * plate_rate(pressure[n], rising, p, k)
         code[n] = 1 if abs(free) > p.Z14 else 0
         if min(abs(free), p.Z14) > orifice:
@@ -81,6 +84,10 @@ def accelerations(
 
 def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> AccelerationCurve:
     """Acceleration at every speed while a command has been held long enough for its current.
+
+    With refinements it is that of the plate's mean motion: in the middle of what friction and
+    hysteresis leave open, without the lag of a damped plate, the swing of a line or the ripple of a
+    turn.
 
     Parameters
     ----------
@@ -123,10 +130,11 @@ def starting_acceleration(drive: Drive, way: float) -> tuple[float, AcceleratedB
 
 
 def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
-    drive.parameters.refuse_refinements("Acceleration curves")
     instance = instance_of(drive.parameters, False)
     p, options, _ = instance.parts[1]
-    forms = PumpOptions(symmetric=options.symmetric, steep=options.steep)
+    # a line at rest leaks as a stiff one does
+    leaks = options.leakage if options.line is None else options.line
+    forms = PumpOptions(symmetric=options.symmetric, steep=options.steep, leakage=leaks)
     speed, acceleration = np.empty_like(pressure), np.empty_like(pressure)
     code = np.empty(pressure.size, dtype=np.int64)
     accelerations(

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import radians
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from swashplate.cli.arguments import DriveWord
-from swashplate.cli.inputs import drive_file, maneuver_of, parameters_of
+from swashplate.cli.inputs import drive_file, drive_of, maneuver_of
 from swashplate.cli.terminal import note, show, table, working
-from swashplate.errors import InputError
 
 EXAMPLES = """\
 Examples:
   swashplate rig hoist --out virtual-hoist
-  swashplate rig slew --out worn --seed 7 --severity harsh --effect backlash=strong
+  swashplate rig slew --out worn --seed 7 --severity harsh --backlash-deg 0.1
+  swashplate rig hoist --out loaded --set load_torque=30kNm --set motor_leakage=1e-6
   swashplate rig hoist --out short --maneuver step:4 --maneuver sine:6,0.2 --perturb 0.1
   swashplate campaign check virtual-hoist/campaign.toml
 """
 
 Severity = Literal["clean", "realistic", "harsh"]
-Level = Literal["off", "on", "strong"]
 Format = Literal["csv", "mat", "parquet"]
 
 
@@ -37,20 +38,18 @@ def rig(
             help="The instruments: perfect, as in a good campaign, or with everything wrong."
         ),
     ] = "realistic",
-    effects: Annotated[
-        Level, typer.Option(help="All that the plant has and the identified model has not.")
-    ] = "off",
-    effect: Annotated[
+    values: Annotated[
         list[str] | None,
         typer.Option(
-            help="One of them: cam_ripple, spool_stiction, backlash or leakage, =off, =on or "
-            "=strong. May be repeated.",
-            metavar="NAME=LEVEL",
+            "--set",
+            help="Of the drive that is simulated, not of the one that a fit starts from: a "
+            "refinement, for example. As in 'swashplate simulate'.",
+            metavar="NAME=VALUE",
         ),
     ] = None,
-    load: Annotated[
-        float, typer.Option(help="Load as a share of the rated one; effects go with it.")
-    ] = 0.5,
+    backlash_deg: Annotated[
+        float, typer.Option(help="Play between shaft and encoder.", metavar="DEG")
+    ] = 0.0,
     perturb: Annotated[
         float,
         typer.Option(help="Draw all true parameters, held ones too, within this share: 0.1."),
@@ -74,16 +73,17 @@ def rig(
     logs, then look into truth/. Every file says that it is virtual.
     """
     from swashplate.campaign import rig as bench
-    from swashplate.drive import Drive
 
     with working("Simulating"):
-        nominal = Drive(parameters_of(drive))
+        nominal = drive_of(drive)
+        tools = replace(bench.SEVERITIES[severity], backlash=radians(backlash_deg))
         tests = bench.run(
             drive if drive_file(drive) is None else nominal,
             None if not maneuver else [maneuver_of(each, nominal) for each in maneuver],
             seed=seed,
             severity=severity,
-            effects=_effects(effects, effect or [], load),
+            instruments=tools,
+            truth=drive_of(drive, values) if values else None,
             perturb=perturb,
         )
     with working("Writing"):
@@ -101,21 +101,3 @@ def rig(
     show(made)
     note(f"Campaign: {path}")
     note(f"Truth:    {path.parent / 'truth'} (look only after the fit)")
-
-
-def _effects(level: Level, single: list[str], load: float):  # type: ignore[no-untyped-def]
-    from dataclasses import fields
-
-    from swashplate.campaign.rig import Effects
-
-    names = [each.name for each in fields(Effects) if each.name != "load"]
-    chosen: dict[str, str] = dict.fromkeys(names, level)
-    for word in single:
-        name, equals, value = (part.strip() for part in word.partition("="))
-        if name not in names or not equals:
-            raise InputError(
-                f"--effect cannot read '{word}'; write {', '.join(names[:-1])} or {names[-1]}, "
-                "then =off, =on or =strong."
-            )
-        chosen[name] = value
-    return Effects(**chosen, load=load)  # type: ignore[arg-type]

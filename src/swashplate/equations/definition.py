@@ -35,8 +35,8 @@ class Definition:
     """Infinity is allowed and switches the limit off."""
     default: float | None = None
     """What it is where a set does not give it; None: every set must."""
-    switch: bool = False
-    """Whether the model is another one as soon as it is not zero."""
+    switch: str = ""
+    """Option of the model that it belongs to, and that is off where it is zero."""
     least: float | None = None
     """Lowest value that an estimate may take where `lower` itself would switch the term off."""
     symmetry: Mapping[str, float] = field(default_factory=dict, hash=False)

@@ -51,6 +51,8 @@ class Code:
     def fresh(self, stem: str) -> str:
         """A name that is not yet taken."""
         stem = stem.replace(".", "_").replace("[", "_").replace("]", "")
+        if stem[0].isdigit():  # an item of a tuple without names
+            stem = f"value_{stem}"
         name, count = stem, 1
         while name in self.taken:
             count += 1

@@ -144,7 +144,8 @@ class DriveModel:
         if self.forces is not None:
             changes |= self.forces.coefficients(own, self.parameters)
         try:
-            made = self.parameters.replace(changes)
+            # whatever the values, the equations stay those that the fit began with
+            made = self.parameters.replace(changes, self.parameters.options)
         except ParameterError as error:
             raise DomainError(str(error)) from None
         self._last["set"] = (key, made)

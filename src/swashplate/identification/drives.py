@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from swashplate.campaign.experiment import Experiment
@@ -9,7 +11,11 @@ from swashplate.equations.record import SLOWEST, SOURCE_RATE, Record, record_of
 from swashplate.equations.run import Start
 from swashplate.errors import InputError
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.simulation.instance import at_every_rate
 from swashplate.simulation.run import check_voltage, simulate_drive
+
+OTHER_RATE = 0.01
+"""Part by which a rate must differ to be another one."""
 
 
 def voltage_record(experiment: Experiment) -> Record:
@@ -42,6 +48,33 @@ def simulated_current(experiment: Experiment, parameters: ParameterSet) -> Recor
     # refinements begin behind the card
     run = simulate_drive(parameters.plain, record, start)
     return Record(run.fine("current"), record.start, record.rate, record.substeps)
+
+
+def at_rate_of(
+    experiments: Sequence[Experiment], parameters: ParameterSet
+) -> tuple[ParameterSet, tuple[str, ...]]:
+    """A set whose card's filter holds at the rate of the runs, and what was changed for that.
+
+    Returns
+    -------
+    parameters : ParameterSet
+        With the filter's differential equation, if a run is marched at another rate than the one
+        that its recursion belongs to; otherwise as they are.
+    said : tuple of str
+        A sentence, if they were changed.
+    """
+    if parameters.rate is None:
+        return parameters, ()
+    driven = [each for each in experiments if each.input.kind == "voltage"]
+    rates = {each.name: 1.0 / voltage_record(each).step for each in driven}
+    for name, rate in rates.items():
+        if abs(rate / parameters.rate - 1.0) > OTHER_RATE:
+            return at_every_rate(parameters), (
+                f"{name} is marched at {rate:.4g} Hz, but the card's filter of {parameters.name} "
+                f"is a recursion for {parameters.rate:g} Hz: the fit takes the differential "
+                "equation with the same poles, which holds at every rate.",
+            )
+    return parameters, ()
 
 
 def _record(experiment: Experiment, what: str) -> Record:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from swashplate.__about__ import __version__
 from swashplate.campaign.experiment import Experiment
 from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.drives import at_rate_of
 from swashplate.identification.executors import Executor, Serial
 from swashplate.identification.prior_weights import weighed
 from swashplate.identification.problem import Problem
@@ -102,7 +103,8 @@ def fit(
     experiments : sequence of Experiment
         The runs to fit.
     nominal : ParameterSet
-        Where to begin, and what stays fixed. The decay's switch is split, see `smooth`.
+        Where to begin, and what stays fixed. The decay's switch is split, see `smooth`, and the
+        card's filter one that holds at the rate of the runs.
     setup : Setup
         Stages and their free parameters.
     method, loss, tolerance, max_evaluations :
@@ -122,8 +124,9 @@ def fit(
     DomainError
         If the model does not hold at the nominal values.
     """
-    parameters, stages = smooth(nominal), []
-    doubts = refuse_unsound(check_sound(experiments, parameters, setup))
+    doubts = refuse_unsound(check_sound(experiments, smooth(nominal), setup))
+    nominal, changed = at_rate_of(experiments, nominal)
+    parameters, stages, doubts = smooth(nominal), [], (*doubts, *changed)
     for stage in setup.stages:
         problem = stage_problem(stage, parameters, experiments, threads=threads)
         begin: Array | None = None
@@ -225,8 +228,10 @@ def _fingerprint(stage: Stage, problem: Problem, search: Search, *settings: obje
     digest = blake2b(digest_size=16)
     model = problem.model
     assert isinstance(model, DriveModel)
-    numbers = sorted(model.parameters.numbers.items())
-    words = (__version__, stage.model_dump_json(), search.seed, settings, numbers)
+    known = model.parameters
+    forms = known.pressure_root, known.coulomb_sign, known.rate, sorted(known.options)
+    numbers = sorted(known.numbers.items())
+    words = (__version__, stage.model_dump_json(), search.seed, settings, numbers, forms)
     digest.update(repr(words).encode())
     for experiment, weights in zip(problem.experiments, problem.weights, strict=True):
         arrays = [experiment.input.time, experiment.input.values]

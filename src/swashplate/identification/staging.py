@@ -19,7 +19,7 @@ from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
 from swashplate.identification.stage_weights import check_weights, weighted
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
-from swashplate.parameters.definitions import find
+from swashplate.parameters.definitions import SWITCHES, find
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.instance import START_PRESSURE
 
@@ -108,14 +108,15 @@ def stage_problem(
             else simulated_current(each, parameters)
             for each in runs
         }
+    free = _parameters(stage.free, parameters)
     unknowns = (
-        *_parameters(stage.free, parameters),
+        *free,
         *_forces(stage, forces, parameters),
         *_clocks(stage, runs, channels),
         *_own(stage, runs, channels),
     )
     return DriveProblem(
-        DriveModel(parameters, stage.part, currents, forces),
+        DriveModel(_switched_on(parameters, free), stage.part, currents, forces),
         tuple(weighted(each, stage) for each in runs),
         Unknowns(unknowns),
         channels,
@@ -159,6 +160,7 @@ def _parameters(free: Mapping[str, Free], parameters: ParameterSet) -> list[Unkn
                 relative=entry.relative,
                 absolute=entry.bounds,
                 unit=definition.unit,
+                least=definition.least,
                 log=entry.log,
                 prior=None
                 if entry.prior is None
@@ -168,6 +170,13 @@ def _parameters(free: Mapping[str, Free], parameters: ParameterSet) -> list[Unkn
             for group in groups
         ]
     return unknowns
+
+
+def _switched_on(parameters: ParameterSet, free: Sequence[Unknown]) -> ParameterSet:
+    """The set where the unknowns begin, with all that they belong to on."""
+    begin = {column: each.start for each in free for column in each.targets if column in SWITCHES}
+    options = parameters.options | {SWITCHES[column] for column in begin}
+    return parameters.replace(begin, options) if begin else parameters
 
 
 def _nominal(parameters: ParameterSet, column: str) -> float:

@@ -74,7 +74,9 @@ class Unknown:
     @property
     def scale(self) -> float:
         """What one unit of the solver's vector means, for an unknown that is not logarithmic."""
-        return abs(self.start) or 0.25 * (self.high - self.low)
+        reach = self.high - self.low
+        # one that begins at next to nothing, or at 0, is known by its bounds alone
+        return abs(self.start) if abs(self.start) > 1e-6 * reach else 0.25 * reach
 
     def to_vector(self, value: float) -> float:
         """The solver's number for a value."""
@@ -96,6 +98,7 @@ def bounded(
     *,
     relative: tuple[float, float] | None = None,
     absolute: tuple[float, float] | None = None,
+    least: float | None = None,
     **more: object,
 ) -> Unknown:
     """An unknown with bounds that are multiples of its nominal value, or numbers.
@@ -108,6 +111,8 @@ def bounded(
         Where the fit begins.
     relative, absolute : (float, float)
         One of the two: factors on the nominal value, in either order, or bounds as they are.
+    least : float, optional
+        Value that it must not fall below, whatever the bounds: it begins there at the lowest.
     **more :
         Other fields of `Unknown`.
 
@@ -128,6 +133,8 @@ def bounded(
     else:
         assert absolute is not None
         low, high = absolute
+    if least is not None:
+        nominal, low = max(nominal, least), max(low, least)
     return Unknown(name, nominal, low, high, **more)  # type: ignore[arg-type]
 
 

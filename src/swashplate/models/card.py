@@ -14,7 +14,7 @@ it, I*'' + 2ζω I*' + C sign(I*') + ω² I* = ω² I_ss, is solved over each st
 and C mean the same at every rate.
 """
 
-from math import cos, exp, pi, sin, sqrt
+from math import cos, exp, sin, sqrt
 from typing import Annotated, NamedTuple
 
 from swashplate.equations.definition import OFF, Definition, Flag
@@ -314,7 +314,7 @@ def filtered_current(
     Returns
     -------
     float
-        Kruse eq. 3.6. Stable for ωh < 2ζ and ζωh < 1 + ω²h²/4 only, see `filter_margin`. [A]
+        Kruse eq. 3.6. Stable for ωh < 2ζ and ζωh < 1 + ω²h²/4 only (Jury). [A]
     """
     w = p.omega * h
     friction = p.C * h * h * coulomb_sign(now - before, h, literal)
@@ -337,20 +337,6 @@ def current_acceleration(
     """
     friction = p.C * coulomb_sign(rate, 1.0, literal)
     return p.omega * p.omega * (steady - current) - 2.0 * p.zeta * p.omega * rate - friction
-
-
-@equation
-def filter_margin(p: Channel, h: float) -> float:
-    """Margin of the recursion's stability, above 0 where it is stable.
-
-    Notes
-    -----
-    Jury's criterion for z² - 2(1 - ζωh) z + 1 - 2ζωh + ω²h²: ωh < 2ζ and ζωh < 1 + ω²h²/4. The
-    first condition is the stricter one where damping is small: an explicit step adds to a swing
-    what the damping has to take away.
-    """
-    w = p.omega * h
-    return min(2.0 * p.zeta - w, 1.0 + 0.25 * w * w - p.zeta * w)
 
 
 # --- the filter's differential equation ----------------------------------------------------------
@@ -518,15 +504,6 @@ def exact_filter(s: Filter, begins: float, ends: float, k: ChannelConstants) -> 
     left = soft_threshold(rate, k.coulomb)
     filtered = begins + k.stays * off + k.swings * s.before + k.ramp * rise
     return faded(filtered - k.lost * (rate - left)), faded(left)
-
-
-@equation
-def exact_filter_margin(p: Channel, h: float) -> float:
-    """Margin of the exact filter, above 0 where a step is below half a swing. [rad]
-
-    The Coulomb term counts as constant within a step, which a step of more than that is not.
-    """
-    return pi - p.omega * h * sqrt(max(1.0 - p.zeta * p.zeta, 0.0))
 
 
 # --- filter to output ----------------------------------------------------------------------------

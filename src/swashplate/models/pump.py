@@ -19,10 +19,10 @@ option that is off leaves nothing of them.
 from math import asin, atan, inf, pi, sin, sqrt, tan
 from typing import Annotated, NamedTuple
 
-from swashplate.equations.definition import MINUS, OFF, ON, Definition, Flag
+from swashplate.equations.definition import MINUS, OFF, Definition, Flag
 from swashplate.equations.derivatives import declared
 from swashplate.equations.equation import equation
-from swashplate.equations.library import TAN_22_5, arctangent, small_arctangent
+from swashplate.equations.library import arctangent, small_arctangent
 from swashplate.equations.primitives import root
 from swashplate.models.refinements import (
     accelerating_leakage,
@@ -72,7 +72,7 @@ class Pump(NamedTuple):
     Z6: Annotated[float, Definition("piston motion against oil stiffness", "1", lower=0.0,
         source="6.67", stands_for="A_s² B/(k_r V)")]
     Z7: Annotated[float, Definition("leakage around the stroking piston", "1/s", lower=0.0,
-        source="6.64", stands_for="K_L B/V")]
+        source="6.64", stands_for="K_L B/V", switch="leaky")]
     Z8: Annotated[float, Definition("flow gain of the valve", "sqrt(Pa)/(m s)", above=0.0,
         source="6.67", stands_for="C_o B/V",
         symmetry={PRESSURE: 0.5, TRAVEL: -1.0, MOTION: 1.0, TILT: -1.0})]
@@ -83,7 +83,7 @@ class Pump(NamedTuple):
     Z11: Annotated[float, Definition("speed lost to static load", "rad/s", source="6.69",
         stands_for="K_mL C_g")]
     Z12: Annotated[float, Definition("speed lost to accelerating load", "1", source="6.69",
-        stands_for="K_mL K_mf C_i C_q")]
+        stands_for="K_mL K_mf C_i C_q", switch="loaded")]
     Z13_plus: Annotated[float, Definition("stop of the swash plate", "rad", above=0.0, upper=pi / 2,
         source="8.9", symmetry={ANGLE: 1.0}, needs="the swash plate at its stop")]
     Z13_minus: Annotated[float, MINUS]
@@ -112,33 +112,34 @@ class Pump(NamedTuple):
         symmetry=OF_FORCE, needs=DRIVEN)]
     Z22_minus: Annotated[float, MINUS]
     spool_friction: Annotated[float, Definition("friction of spool and solenoid", "N", lower=0.0,
-        stands_for="F_s", default=0.0, switch=True, least=1e-07)] = 0.0
+        stands_for="F_s", default=0.0, switch="friction", least=1e-07)] = 0.0
     spool_presliding: Annotated[float, Definition("travel over which that friction builds up", "m",
         lower=0.0, stands_for="x_s", default=0.0, least=1e-10)] = 0.0
     dither_time: Annotated[float, Definition("time constant with which dither frees the spool", "s",
         above=0.0, can_be_off=True, stands_for="T", default=inf, least=1e-06)] = inf
     solenoid_hysteresis: Annotated[float, Definition("half-width of the solenoids' hysteresis", "A",
-        lower=0.0, stands_for="r", default=0.0, switch=True, least=1e-08)] = 0.0
+        lower=0.0, stands_for="r", default=0.0, switch="hysteresis", least=1e-08)] = 0.0
     load_torque: Annotated[float, Definition("static torque of the load at the shaft", "N m",
         stands_for="C_g, positive against positive speed", default=0.0)] = 0.0
     load_inertia: Annotated[float, Definition("inertia of motor and load at the shaft", "kg m^2",
         lower=0.0, stands_for="C_i, J", default=0.0, least=1e-06)] = 0.0
     motor_leakage: Annotated[float, Definition("speed lost to leakage for a torque", "rad/(s N m)",
-        lower=0.0, stands_for="K_mL", default=0.0, switch=True, least=1e-15)] = 0.0
+        lower=0.0, stands_for="K_mL", default=0.0, switch="leakage", least=1e-15)] = 0.0
     cam_ripple: Annotated[float, Definition("variation of the motor's displacement without load",
-        "1", lower=0.0, upper=1.0, stands_for="ε0", default=0.0, switch=True, least=1e-09)] = 0.0
+        "1", lower=0.0, upper=1.0, stands_for="ε0", default=0.0, switch="ripple",
+        least=1e-09)] = 0.0
     cam_ripple_per_torque: Annotated[float, Definition("growth of that variation with the load",
-        "1/(N m)", lower=0.0, stands_for="ε1", default=0.0, switch=True, least=1e-15)] = 0.0
+        "1/(N m)", lower=0.0, stands_for="ε1", default=0.0, switch="ripple", least=1e-15)] = 0.0
     cam_cycles: Annotated[float, Definition("cycles of the cam ring in a turn", "1", above=0.0,
         stands_for="n", default=5.5, least=1e-06)] = 5.5
     cam_phase: Annotated[float, Definition("phase of the cam ring at the start", "rad",
         stands_for="ψ", default=0.0)] = 0.0
     swash_damping: Annotated[float, Definition("time constant of the swash plate's damping", "s",
-        lower=0.0, stands_for="T", default=0.0, switch=True, least=1e-09)] = 0.0
+        lower=0.0, stands_for="T", default=0.0, switch="damping", least=1e-09)] = 0.0
     line_stiffness: Annotated[float, Definition("stiffness of the line's oil at the shaft",
-        "N m/rad", lower=0.0, stands_for="k", default=0.0, switch=True, least=0.001)] = 0.0
+        "N m/rad", lower=0.0, stands_for="k", default=0.0, switch="line", least=0.001)] = 0.0
     motor_constant: Annotated[float, Definition("motor speed for a flow", "rad/m^3", lower=0.0,
-        stands_for="K_mf", default=0.0, switch=True, least=1e-06)] = 0.0
+        stands_for="K_mf", default=0.0, least=1e-06)] = 0.0
     pump_speed: Annotated[float, Definition("speed of the prime mover, relative to that of Z10",
         "1", above=0.0, default=1.0)] = 1.0
     # fmt: on
@@ -275,34 +276,6 @@ class PumpLimits(NamedTuple):
     """The swash plate is at a stop: the speed limit."""
     relief: bool
     """The relief valve holds the stroking pressure at ±Z15."""
-
-
-def options_of(p: Pump, *, symmetric: bool = False) -> PumpOptions:
-    """Options that the values of a pump ask for.
-
-    Parameters
-    ----------
-    p : Pump
-        Its parameters; what is zero is off.
-    symmetric : bool, optional
-        Whether the root is √((Z9 - sgn(x)δP)/2).
-    """
-
-    def flag(on: bool) -> Flag:
-        return ON if on else OFF
-
-    return PumpOptions(
-        symmetric=flag(symmetric),
-        leaky=flag(p.Z7 != 0.0),
-        loaded=flag(p.Z12 != 0.0),
-        steep=flag(tan(max(p.Z13_plus, p.Z13_minus)) >= TAN_22_5),
-        friction=flag(p.spool_friction != 0.0),
-        hysteresis=flag(p.solenoid_hysteresis != 0.0),
-        ripple=flag(p.cam_ripple != 0.0 or p.cam_ripple_per_torque != 0.0),
-        damping=flag(p.swash_damping != 0.0),
-        leakage=flag(p.motor_leakage != 0.0),
-        line=flag(p.line_stiffness != 0.0),
-    )
 
 
 # --- solenoids and spool -------------------------------------------------------------------------

@@ -71,6 +71,18 @@ COLUMNS: dict[str, str] = {
 DEFAULTS: dict[str, float] = {s: d.default for s, d in REFINEMENTS.items() if d.default is not None}
 """What a refinement is where a set does not give it."""
 
+SWITCHES: dict[str, str] = {each.symbol: each.switch for each in _ALL if each.switch}
+"""Option of the pump (`swashplate.models.pump.PumpOptions`) that a parameter belongs to, by symbol;
+each has one value."""
+
+OPTIONS: tuple[str, ...] = tuple(dict.fromkeys(SWITCHES.values()))
+"""Those options, along the chain."""
+
+
+def options_of(numbers: Mapping[str, float]) -> frozenset[str]:
+    """Options whose parameters are not all zero; what is not among the numbers is off."""
+    return frozenset(each for name, each in SWITCHES.items() if numbers.get(name, 0.0) != 0.0)
+
 
 def find(name: str) -> Definition:
     """Definition of a symbol (``Z16``, ``spool_friction``) or column (``Z16_plus``).

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.errors import InputError, ParameterError
-from swashplate.parameters.definitions import Block, find
+from swashplate.parameters.definitions import Block, find, options_of
 from swashplate.parameters.parameter_set import Pair, Parameter, ParameterSet
 from swashplate.parameters.schema import CardFile, Entry, SetFile
 from swashplate.units import to_si
@@ -56,22 +56,27 @@ def read_set(text: str, origin: str) -> ParameterSet:
     contents = validated(parse_toml(text, origin), SetFile, origin)
     if isinstance(contents.control_card, str):
         card = _load_card(contents.control_card, origin)
-        card_name, entries = card.name, card.control_card
+        card_name, entries, rate = card.name, card.control_card, card.rate
     else:
+        rate = None
         card_name, entries = contents.card or f"{contents.name} card", contents.control_card
     parameters = {
         **_parameters(entries, "control_card", origin),
         **_parameters(contents.pump_motor, "pump_motor", origin),
         **_parameters(contents.refinements, "refinements", origin),
     }
+    model = contents.model
+    values = {symbol: each.values[0] for symbol, each in parameters.items()}
     return ParameterSet(
         contents.name,
         contents.title,
         card_name,
         parameters,
-        contents.model.pressure_root,
-        contents.model.coulomb_sign,
-        contents.model.card_switch,
+        model.pressure_root,
+        model.coulomb_sign,
+        model.card_switch,
+        model.rate or rate,
+        options_of(values) if model.options is None else frozenset(model.options),
     )
 
 
@@ -89,6 +94,10 @@ def dump_set(parameters: ParameterSet) -> str:
     options.add("pressure_root", parameters.pressure_root)
     options.add("coulomb_sign", parameters.coulomb_sign)
     options.add("card_switch", parameters.card_switch)
+    if parameters.rate is not None:
+        options.add("rate", parameters.rate)
+    if parameters.options != options_of(parameters.numbers):
+        options.add("options", sorted(parameters.options))
     text.add("model", options)
     for block in ("control_card", "pump_motor", "refinements"):
         if all(parameter.definition.block != block for parameter in parameters.values()):

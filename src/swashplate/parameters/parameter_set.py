@@ -10,11 +10,13 @@ from swashplate.parameters.definitions import (
     CATALOGUE,
     DEFAULTS,
     REFINEMENTS,
+    SWITCHES,
     Definition,
     find,
+    options_of,
     unknown_parameter,
 )
-from swashplate.parameters.rules import check_bounds, check_rules
+from swashplate.parameters.rules import check_bounds, check_options, check_rules
 
 PressureRoot = Literal["published", "symmetric"]
 CoulombSign = Literal["smooth", "literal"]
@@ -92,6 +94,11 @@ class ParameterSet(Mapping[str, Parameter]):
     pressure_root: PressureRoot = "published"
     coulomb_sign: CoulombSign = "smooth"
     card_switch: CardSwitch = "sampled"
+    rate: float | None = None
+    """Rate that the recursion of the card's filter belongs to, 512 for the source's; None is the
+    filter's differential equation, whose ζ, ω and C mean the same at every rate. [Hz]"""
+    options: frozenset[str] = frozenset()
+    """Terms of the pump that count: of `swashplate.parameters.definitions.OPTIONS`."""
     numbers: Mapping[str, float] = field(init=False, repr=False, compare=False)
     """Every single value by column, e.g. ``Z16_plus``."""
 
@@ -110,6 +117,7 @@ class ParameterSet(Mapping[str, Parameter]):
                         self.name, column, parameter.definition, value, parameter.own_bounds
                     )
         check_rules(self.name, numbers)
+        check_options(self.name, self.options, numbers)
         object.__setattr__(self, "parameters", MappingProxyType(ordered))
         object.__setattr__(self, "numbers", MappingProxyType(numbers))
 
@@ -133,7 +141,7 @@ class ParameterSet(Mapping[str, Parameter]):
         return len(self.parameters)
 
     def __hash__(self) -> int:
-        return hash((self.name, *self.numbers.values()))
+        return hash((self.name, self.options, *self.numbers.values()))
 
     def __reduce__(self) -> tuple[object, ...]:
         # read-only views cannot be pickled, so a copy in another process is built anew
@@ -145,6 +153,8 @@ class ParameterSet(Mapping[str, Parameter]):
             self.pressure_root,
             self.coulomb_sign,
             self.card_switch,
+            self.rate,
+            self.options,
         )
 
     @property
@@ -153,7 +163,7 @@ class ParameterSet(Mapping[str, Parameter]):
         return tuple(
             symbol
             for symbol, definition in REFINEMENTS.items()
-            if definition.switch and self.numbers.get(symbol, 0.0) != 0.0
+            if definition.switch in self.options and self.numbers.get(symbol, 0.0) != 0.0
         )
 
     @property
@@ -161,7 +171,9 @@ class ParameterSet(Mapping[str, Parameter]):
         """The set without refinements, itself if it has none."""
         if REFINEMENTS.keys().isdisjoint(self.parameters):
             return self
-        return replace(self, parameters={symbol: self.parameters[symbol] for symbol in CATALOGUE})
+        parameters = {symbol: self.parameters[symbol] for symbol in CATALOGUE}
+        own = {SWITCHES[symbol] for symbol in CATALOGUE if symbol in SWITCHES}
+        return replace(self, parameters=parameters, options=self.options & own)
 
     def refuse_refinements(self, what: str) -> None:
         """Refuse the set where a computation knows the source's equations alone.
@@ -184,13 +196,18 @@ class ParameterSet(Mapping[str, Parameter]):
                 "(its .plain), or simulate it."
             )
 
-    def replace(self, changes: Mapping[str, Change]) -> "ParameterSet":
+    def replace(
+        self, changes: Mapping[str, Change], options: frozenset[str] | None = None
+    ) -> "ParameterSet":
         """Copy with other values, marked as the user's.
 
         Parameters
         ----------
         changes : mapping
             Symbol (``Z16``, both directions or a pair) or column (``Z16_plus``) to value, SI.
+        options : frozenset of str, optional
+            Terms that count then. By default a refinement whose parameters are changed comes on
+            where one of them is not 0, and goes off where all are.
 
         Raises
         ------
@@ -204,7 +221,11 @@ class ParameterSet(Mapping[str, Parameter]):
             parameters[definition.symbol] = replace(
                 old, value=_changed(name, definition, old, change), source="", status="user"
             )
-        return replace(self, parameters=parameters)
+        if options is None:
+            numbers = {symbol: parameters[symbol].values[0] for symbol in parameters}
+            touched = {SWITCHES[name] for name in changes if name in SWITCHES}
+            options = (self.options - touched) | (options_of(numbers) & touched)
+        return replace(self, parameters=parameters, options=options)
 
     def scale(self, factors: Mapping[str, Change]) -> "ParameterSet":
         """Copy with values multiplied by factors; names as in `replace`."""

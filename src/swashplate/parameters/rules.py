@@ -18,7 +18,14 @@ from swashplate.equations.cache import kernel
 from swashplate.errors import ParameterError
 from swashplate.models.card import Channel, channel_level
 from swashplate.models.pump import Pump, moment_sine, solenoid_force
-from swashplate.parameters.definitions import DEFAULTS, REFINEMENTS, Definition, find
+from swashplate.parameters.definitions import (
+    DEFAULTS,
+    OPTIONS,
+    REFINEMENTS,
+    SWITCHES,
+    Definition,
+    find,
+)
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -60,6 +67,29 @@ def check_rules(owner: str, numbers: Mapping[str, float]) -> None:
     for mask, sentence in broken_rules(columns):
         if mask[0]:
             raise ParameterError(f"{owner}: {sentence(0)}")
+
+
+def check_options(owner: str, options: frozenset[str], numbers: Mapping[str, float]) -> None:
+    """Check that what is on has a size.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown option, or one whose parameters are all 0 where that has no meaning.
+    """
+    for option in sorted(options):
+        if option not in OPTIONS:
+            raise ParameterError(
+                f"{owner}: there is no option '{option}'; there are {', '.join(OPTIONS)}."
+            )
+        own = [find(name) for name, each in SWITCHES.items() if each == option]
+        sized = [each for each in own if each.least is not None]
+        if sized and all(numbers.get(each.symbol, 0.0) == 0.0 for each in sized):
+            raise ParameterError(
+                f"{owner}: {option} is on, but {' and '.join(each.symbol for each in sized)} "
+                f"{'are' if len(sized) > 1 else 'is'} 0; give at least {sized[0].least:g} "
+                f"{sized[0].unit}, or take {option} out of the options."
+            )
 
 
 def check_bounds(

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 
 from swashplate.parameters.parameter_set import CardSwitch, CoulombSign, PressureRoot, Status
 
@@ -29,6 +29,11 @@ class ModelOptions(BaseModel):
     pressure_root: PressureRoot = "published"
     coulomb_sign: CoulombSign = "smooth"
     card_switch: CardSwitch = "sampled"
+    rate: PositiveFloat | None = None
+    """Samples a second that the recursion of the card's filter belongs to; none is the filter's
+    differential equation, for any rate."""
+    options: list[str] | None = None
+    """Terms of the pump that count; where they are not given, those whose parameters are not 0."""
 
 
 class CardFile(BaseModel):
@@ -39,6 +44,8 @@ class CardFile(BaseModel):
     format: Literal[1] = 1
     name: str
     title: str = ""
+    rate: PositiveFloat | None = None
+    """Of the recursion that its filter belongs to."""
     control_card: dict[str, Entry]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from tempfile import TemporaryDirectory
 
 from scipy.optimize import brentq
@@ -14,11 +14,9 @@ from swashplate.drive import Drive
 from swashplate.parameters.rules import FULL_VOLTAGE
 
 SEVERITY: rig.Severity = "realistic"
-EFFECTS = {
-    "hoist": rig.Effects(spool_stiction="on"),
-    "slew": rig.Effects(backlash="on"),
-}
-"""What the source saw of each axis and did not model: overshooting steps, a turret's play."""
+REFINEMENTS = {"hoist": {"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6}}
+BACKLASH = {"slew": 0.002}
+"""What the source saw of each axis and did not model: overshooting steps; a turret's play [rad]."""
 ON_CURRENT = 1.5
 """Factor that the source put on the luff axis's measured current. [1]"""
 BELOW_STOP = 0.98
@@ -43,12 +41,16 @@ class Bench:
         key = axis, "effects" if effects else ""
         if key not in self._kept:
             truth = with_stand_in_card() if axis == "luff" else Drive.preset(axis)
+            tools = rig.SEVERITIES[SEVERITY]
+            if effects:
+                truth = truth.replace(**REFINEMENTS.get(axis, {}))
+                tools = replace(tools, backlash=BACKLASH.get(axis, 0.0))
             made = rig.run(
                 axis,
                 truth=truth,
                 seed=self.seed,
                 severity=SEVERITY,
-                effects=EFFECTS[axis] if effects else None,
+                instruments=tools,
             )
             with TemporaryDirectory() as folder:
                 self._kept[key] = made, Campaign.from_toml(rig.write(made, folder, "parquet"))

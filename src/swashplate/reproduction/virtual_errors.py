@@ -35,7 +35,7 @@ STARTS = 2
 """Fits of each campaign, of which the better one counts."""
 CHANNELS = {"current": "current", "speed": "speed from counts"}
 EFFECT_WORDS = {
-    "hoist": "a spool that overshoots behind steps of current",
+    "hoist": "a spool that sticks and overshoots behind steps",
     "slew": "a turret with play",
 }
 Case = Literal["true drive", "fitted", "fitted, with effects"]

@@ -15,17 +15,16 @@ from swashplate.equations.library import TAN_22_5
 from swashplate.equations.record import Record
 from swashplate.errors import InputError
 from swashplate.models.pump import PumpOptions
-from swashplate.parameters.definitions import columns_of
+from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import broken_rules
 from swashplate.simulation.instance import (
-    OPTION_OF,
     PATHS,
     SIDES,
     card_options,
     model_of,
     pump_options,
-    stability_limit,
+    step_limit,
 )
 
 Array = NDArray[np.float64]
@@ -89,7 +88,7 @@ def simulate_many(
 ) -> Batch:
     """March many sets over one record; see `Drive.simulate_many`."""
     numbers, count = _columns(parameters, changes)
-    failures = _failures(parameters.name, numbers, record.step, by_voltage)
+    failures = _failures(parameters, numbers, record.step, by_voltage)
     observed = _observed(cost.output if cost is not None else output)
     samples = (record.values.size - 1) // record.substeps + 1
     measured, weight = _comparison(cost, samples, record)
@@ -158,19 +157,21 @@ def _columns(
 
 
 def _failures(
-    name: str, numbers: Mapping[str, Array], step: float, by_voltage: bool
+    parameters: ParameterSet, numbers: Mapping[str, Array], step: float, by_voltage: bool
 ) -> dict[int, str]:
     """Sets that cannot be marched at all."""
-    failures: dict[int, str] = {}
+    name, failures = parameters.name, dict[int, str]()
     for mask, sentence in broken_rules(numbers):
         for i in np.flatnonzero(mask):
             failures.setdefault(int(i), f"{name}: {sentence(int(i))}")
     for side in SIDES if by_voltage else ():
-        limit = stability_limit(numbers[f"zeta_{side}"])
+        limit = step_limit(numbers[f"zeta_{side}"], parameters.rate is None)
         for i in np.flatnonzero(~(numbers[f"omega_{side}"] * step < limit)):
             failures.setdefault(
                 int(i),
-                f"{name}: the current filter of the {side} channel is unstable at this step.",
+                f"{name}: the current filter of the {side} channel "
+                f"{'swings too fast for' if parameters.rate is None else 'is unstable at'} this "
+                "step.",
             )
     return failures
 
@@ -225,11 +226,9 @@ def _jobs(
     masks: dict[str, NDArray[np.bool_]] = {
         "steep": np.tan(np.maximum(numbers["Z13_plus"], numbers["Z13_minus"])) >= TAN_22_5
     }
-    for column in changed:
-        option = OPTION_OF.get(column)
-        if option is not None:
-            on = numbers[column] != 0.0
-            masks[option] = masks[option] | on if option in masks else on
+    for option in {SWITCHES[column] for column in changed if column in SWITCHES}:
+        own = [numbers[each] for each in SWITCHES if SWITCHES[each] == option and each in numbers]
+        masks[option] = np.any(own, axis=0)
     names = list(masks)
     kind = sum(
         (masks[name].astype(np.int64) << k for k, name in enumerate(names)),

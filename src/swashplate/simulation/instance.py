@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from cmath import log, sqrt
+from dataclasses import replace
 from functools import lru_cache
 from math import floor, tan
 from typing import Final
@@ -37,18 +39,6 @@ PATHS = _paths()
 START_PRESSURE = "start_pressure"
 """Column of δP at the first sample, where it is an unknown of the experiment."""
 START_PATHS = {START_PRESSURE: ("pump.pressure", "pump.plate_pressure")}
-OPTION_OF = {
-    "Z7": "leaky",
-    "Z12": "loaded",
-    "spool_friction": "friction",
-    "solenoid_hysteresis": "hysteresis",
-    "cam_ripple": "ripple",
-    "cam_ripple_per_torque": "ripple",
-    "swash_damping": "damping",
-    "motor_leakage": "leakage",
-    "line_stiffness": "line",
-}
-"""Option of the pump that a parameter belongs to."""
 
 
 def path_of(column: str) -> str:
@@ -77,40 +67,24 @@ def card_options(parameters: ParameterSet) -> CardOptions:
     return CardOptions(
         literal=True if parameters.coulomb_sign == "literal" else None,
         split=True if parameters.card_switch == "split" else None,
+        exact=True if parameters.rate is None else None,
     )
 
 
-def pump_options(parameters: ParameterSet, also: frozenset[str] = frozenset()) -> PumpOptions:
-    """Forms of the pump; `also` names columns whose options are on whatever their values are."""
-    numbers = parameters.numbers
-    on = {
-        option
-        for name, option in OPTION_OF.items()
-        if numbers.get(name, 0.0) != 0.0 or (name in also and name != "Z7")
-    }
+def pump_options(parameters: ParameterSet) -> PumpOptions:
+    """Forms of the pump."""
+    numbers, on = parameters.numbers, set(parameters.options)
     if tan(max(numbers["Z13_plus"], numbers["Z13_minus"])) >= TAN_22_5:
         on.add("steep")
     if parameters.pressure_root == "symmetric":
         on.add("symmetric")
-    return PumpOptions(**{name: True for name in PumpOptions._fields if name in on})
+    return PumpOptions(**dict.fromkeys(on, True))
 
 
 @lru_cache(maxsize=256)
-def instance_of(
-    parameters: ParameterSet, by_voltage: bool, also: frozenset[str] = frozenset()
-) -> Instance:
-    """The drive behind a voltage, or the pump alone behind a signed current.
-
-    Parameters
-    ----------
-    parameters : ParameterSet
-        The numbers.
-    by_voltage : bool
-        Whether the card is part of it.
-    also : frozenset of str
-        Columns whose options are on whatever their values are: those that are differentiated by.
-    """
-    pump = Part(pump_of(parameters), pump_options(parameters, also))
+def instance_of(parameters: ParameterSet, by_voltage: bool) -> Instance:
+    """The drive behind a voltage, or the pump alone behind a signed current."""
+    pump = Part(pump_of(parameters), pump_options(parameters))
     if by_voltage:
         card = Part(card_of(parameters), card_options(parameters))
         return Instance(drive, (card, pump), parameters.name)
@@ -122,20 +96,31 @@ def model_of(by_voltage: bool) -> Model:
     return drive if by_voltage else pump_drive
 
 
-# --- the card's recursion -------------------------------------------------------------------------
+# --- the card's filter ----------------------------------------------------------------------------
 
 
-def stability_limit(zeta: ArrayLike) -> NDArray[np.float64]:
-    """Largest ωh, itself excluded, at which the card's explicit filter is stable, for each ζ.
+def step_limit(zeta: ArrayLike, exact: bool) -> NDArray[np.float64]:
+    """Largest ωh, itself excluded, that the card's filter bears, for each ζ.
+
+    Parameters
+    ----------
+    zeta : array_like
+        Damping ratios. [1]
+    exact : bool
+        Whether the filter is its differential equation, and not the recursion.
 
     Notes
     -----
-    Jury's criterion for z² - 2(1 - ζωh) z + 1 - 2ζωh + ω²h² is ωh < 2ζ and ζωh < 1 + ω²h²/4. The
-    first condition is the stricter one where damping is small: an explicit step adds to a swing
-    what the damping has to take away. From ζ = 1 on the second gives ωh < 2(ζ - √(ζ² - 1)), here
-    written without cancellation.
+    Recursion: Jury's criterion for z² - 2(1 - ζωh) z + 1 - 2ζωh + ω²h² is ωh < 2ζ and
+    ζωh < 1 + ω²h²/4. The first condition is the stricter one where damping is small: an explicit
+    step adds to a swing what the damping has to take away. From ζ = 1 on the second gives
+    ωh < 2(ζ - √(ζ² - 1)), here written without cancellation. Differential equation: half a swing,
+    ωh √(1 - ζ²) < π, within which its Coulomb term may count as constant.
     """
     damping = np.asarray(zeta, dtype=np.float64)
+    if exact:
+        share = np.sqrt(np.maximum(1.0 - damping * damping, 0.0))
+        return np.divide(np.pi, share, out=np.full_like(damping, np.inf), where=share > 0.0)
     over = np.maximum(damping, 1.0)
     slow = 2.0 / (over + np.sqrt(over - 1.0) * np.sqrt(over + 1.0))
     limit: NDArray[np.float64] = np.minimum(2.0 * damping, slow)
@@ -143,27 +128,68 @@ def stability_limit(zeta: ArrayLike) -> NDArray[np.float64]:
 
 
 def check_filter_stability(parameters: ParameterSet, step: float) -> None:
-    """Refuse a step at which the explicit filter would settle on wrong values without a word.
+    """Refuse a step at which the filter would settle on wrong values without a word.
 
     Raises
     ------
     InputError
-        Unless ωh is below `stability_limit`; the sentence says how many steps a sample would do.
+        Unless ωh is below `step_limit`; the sentence says how many steps a sample would do.
     """
-    owner, numbers = parameters.name, parameters.numbers
+    owner, numbers, exact = parameters.name, parameters.numbers, parameters.rate is None
     for side in SIDES:
         zeta, omega = numbers[f"zeta_{side}"], numbers[f"omega_{side}"]
-        steps = omega * step / float(stability_limit(zeta))
+        steps = omega * step / float(step_limit(zeta, exact))
         if steps < 1.0:
             continue
         if not steps < MOST_SUBSTEPS:
-            much, change = ("little", "raise") if zeta < 1.0 else ("much", "lower")
+            has, change = "has so little damping", "raise zeta"
+            if zeta >= 1.0:
+                has, change = "has so much damping", "lower zeta"
+            if exact:
+                has, change = f"swings so fast with omega = {omega:g} rad/s", "lower omega"
             raise InputError(
-                f"{owner}: the current filter of the {side} channel (zeta = {zeta:g}) has so "
-                f"{much} damping that {MOST_SUBSTEPS} steps a sample would not do; {change} zeta."
+                f"{owner}: the current filter of the {side} channel (zeta = {zeta:g}) {has} that "
+                f"{MOST_SUBSTEPS} steps a sample would not do; {change}."
             )
         raise InputError(
             f"{owner}: the current filter of the {side} channel (zeta = {zeta:g}, omega = "
-            f"{omega:g} rad/s) is unstable at a step of 1/{1.0 / step:g} s; simulate with "
+            f"{omega:g} rad/s) {'swings too fast for' if exact else 'is unstable at'} a step of "
+            f"1/{1.0 / step:g} s; simulate with "
             f"substeps={floor(steps) + 1} or more or at a higher rate, or lower omega."
         )
+
+
+def at_every_rate(parameters: ParameterSet) -> ParameterSet:
+    """The set with the filter's differential equation in place of the recursion for one rate.
+
+    Raises
+    ------
+    InputError
+        If the recursion changes its sign from sample to sample, as no differential equation does.
+
+    Notes
+    -----
+    Both have the same poles, z = e^(sh) at the recursion's rate, and the same band C/ω² in which
+    the Coulomb term holds the current. By that their delays are alike as well: 2ζ/ω of the
+    equation, a sample less by the old ζ and ω of the recursion.
+    """
+    if parameters.rate is None:
+        return parameters
+    changes: dict[str, float] = {}
+    for side in SIDES:
+        zeta, omega, C = (parameters.numbers[f"{name}_{side}"] for name in ("zeta", "omega", "C"))
+        w = omega / parameters.rate
+        middle, half = 1.0 - zeta * w, w * sqrt(complex(zeta * zeta - 1.0))
+        poles = middle + half, middle - half
+        if any(each.imag == 0.0 and each.real <= 0.0 for each in poles):
+            raise InputError(
+                f"{parameters.name}: the recursion of the {side} channel's filter (zeta = "
+                f"{zeta:g}, omega = {omega:g} rad/s at {parameters.rate:g} Hz) swings from sample "
+                "to sample, as no filter of another rate does; lower omega."
+            )
+        first, second = (parameters.rate * log(each) for each in poles)
+        made = float(sqrt(first * second).real)
+        changes[f"omega_{side}"] = made
+        changes[f"zeta_{side}"] = -float((first + second).real) / (2.0 * made)
+        changes[f"C_{side}"] = C * (made / omega) ** 2
+    return replace(parameters.replace(changes, parameters.options), rate=None)

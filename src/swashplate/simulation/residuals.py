@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +18,7 @@ from swashplate.equations.observation import Own as EngineOwn
 from swashplate.equations.rows import BLOCK
 from swashplate.equations.run import Instance
 from swashplate.errors import InputError
-from swashplate.parameters.definitions import columns_of
+from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.instance import (
     SIDES,
@@ -180,7 +182,11 @@ def _instance(
             )
     if by_voltage:
         check_filter_stability(parameters, observed.record.step)
-    instance = instance_of(parameters, by_voltage, frozenset(names))
+    # what is differentiated by counts, at 0 as well
+    asked = frozenset(SWITCHES[name] for name in names if name in SWITCHES)
+    if observed.start != "steady":
+        asked -= {"leaky"}  # at 0 a step has a derivative by Z7 of its own, a settled pressure none
+    instance = instance_of(_switched_on(parameters, asked), by_voltage)
     start: dict[str, float] = {}
     if own.start_pressure is not None:
         started = started_at(instance, observed.records, observed.record.step, observed.start)
@@ -191,3 +197,11 @@ def _instance(
     elif START_PRESSURE in names:
         raise InputError(f"{START_PRESSURE} is a column, so Own needs a value of it.")
     return instance, EngineOwn(start, own.offsets, own.clock_offsets)
+
+
+@lru_cache(maxsize=64)
+def _switched_on(parameters: ParameterSet, asked: frozenset[str]) -> ParameterSet:
+    """The set with some options on, itself where they are."""
+    if asked <= parameters.options:
+        return parameters
+    return replace(parameters, options=parameters.options | asked)

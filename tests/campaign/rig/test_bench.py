@@ -6,7 +6,7 @@ import pytest
 from swashplate import Drive, InputError, maneuvers
 from swashplate.campaign import rig
 from swashplate.campaign.recognition import recognise
-from swashplate.campaign.rig.chance import perturbed
+from swashplate.campaign.rig.bench import perturbed
 
 STEP = maneuvers.step(4.0)
 SINE = maneuvers.sine(4.0, 0.2, length=12.0)
@@ -55,7 +55,7 @@ def test_a_realistic_log_leaves_noise_of_mean_zero_alone() -> None:
             columns["voltage"], time=columns["time"], interpolation="linear"
         )
         current = model.current_positive + model.current_negative
-        truth = run.truth.current_plus + run.truth.current_minus
+        truth = run.truth.current_positive + run.truth.current_negative
         wrong = np.interp(run.truth.time, model.time, current) - truth
         # one code too much or too little is 4.9 mV, at 0.06 A/V 0.3 mA; beside the dead zone it
         # moves the jump of 0.27 A by a part of a sample, which the card's filter flattens
@@ -151,6 +151,30 @@ def test_what_is_simulated_may_be_another_drive() -> None:
     np.testing.assert_allclose(tests.runs[STEP.name].truth.shaft_speed, expected, rtol=1e-12)
 
 
+def test_refinements_are_those_of_the_drive_that_is_simulated() -> None:
+    truth = Drive.preset("hoist").replace(cam_ripple=0.02, load_torque=2e4, motor_leakage=1e-6)
+    tests = rig.run("hoist", [STEP], severity="clean", truth=truth, channels=("shaft_speed",))
+    expected = split(truth).simulate(STEP.sample()).shaft_speed
+    np.testing.assert_array_equal(tests.runs[STEP.name].columns["shaft_speed"], expected)
+    assert tests.nominal == Drive.preset("hoist")
+    drawn = rig.run("hoist", [STEP], truth=truth, perturb=0.1, seed=3).drive
+    assert drawn == split(perturbed(truth, 0.1, 3))
+    assert drawn["cam_ripple"].value != 0.02
+
+
+def test_backlash_is_between_shaft_and_encoder() -> None:
+    loose = replace(rig.SEVERITIES["clean"], backlash=0.01)
+    kinds = ("position", "shaft_speed", "encoder_counts")
+    tests = rig.run("hoist", [SINE], instruments=loose, channels=kinds)
+    run = tests.runs[SINE.name]
+    np.testing.assert_array_equal(run.columns["shaft_speed"], run.truth.shaft_speed)
+    lag = run.truth.shaft_position - run.columns["position"]
+    assert lag.max() == pytest.approx(0.005, rel=1e-9)
+    assert lag.min() == pytest.approx(-0.005, rel=1e-9)
+    counts = run.columns["position"] * tests.counts_per_turn / (2.0 * np.pi)
+    np.testing.assert_allclose(run.columns["counts"], counts, rtol=1e-14)
+
+
 def test_perturbed_values_stay_within_the_spread() -> None:
     hoist = Drive.preset("hoist")
     numbers = hoist.parameters.numbers
@@ -202,7 +226,6 @@ def test_a_drive_of_ones_own_says_whose_tests_it_runs() -> None:
         ({"channels": ("counts",)}, "There is no channel 'counts'; there are signed_current"),
         ({"channels": ()}, "channels must be one or more kinds, each once."),
         ({"validate": ["step 4 V"]}, "There is no run 'step 4 V' to validate"),
-        ({"perturb": 0.1, "truth": Drive.preset("slew")}, "not both"),
         ({"perturb": 0.9}, "perturb must be above 0 and at most 0.5, not 0.9."),
         ({"axis": "boom", "maneuvers": [STEP]}, "The encoder of 'boom' is not known"),
         ({"maneuvers": [20.0 * STEP]}, "±10 V"),

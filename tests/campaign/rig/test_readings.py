@@ -7,13 +7,16 @@ from swashplate import InputError
 from swashplate.campaign.rig import SEVERITIES, Instruments
 from swashplate.campaign.rig.readings import (
     dither_ripple,
+    lost,
+    play,
     put_out,
     read_counts,
     read_current,
     read_transducer,
     read_voltage,
+    rounded,
+    sampled_instants,
 )
-from swashplate.campaign.rig.sampling import lost, rounded, sampled_instants
 
 NONE = Instruments()
 GRID = np.arange(10_241) / 512.0
@@ -224,6 +227,29 @@ def test_a_share_of_rows_is_lost_in_runs(longest: int) -> None:
     assert lengths.min() == 1
     assert lengths.mean() == pytest.approx(0.5 * (1 + longest), rel=0.06)
     assert not lost(1000, 0.0, longest, chance()).any()
+
+
+def test_play_by_hand() -> None:
+    """A gap of 2: 1 is lost at first from its middle, 2 at each reversal."""
+    drives = np.array([0.0, 0.5, 1.0, 2.0, 4.0, 3.0, 2.0, 1.0, -1.0, -1.0, 0.0, 1.5, 3.0])
+    driven = np.array([0.0, 0.0, 0.0, 1.0, 3.0, 3.0, 3.0, 2.0, 0.0, 0.0, 0.0, 0.5, 2.0])
+    np.testing.assert_array_equal(play(drives, 2.0), driven)
+    np.testing.assert_array_equal(play(-drives, 2.0), -driven)
+
+
+def test_the_play_operator_sample_by_sample() -> None:
+    drives = np.cumsum(np.random.default_rng(0).normal(size=3000))
+    behind, expected = drives[0], []
+    for position in drives:
+        behind = max(position - 0.75, min(position + 0.75, behind))
+        expected.append(behind)
+    np.testing.assert_array_equal(play(drives, 1.5), expected)
+
+
+def test_play_of_one_sample_and_of_none() -> None:
+    np.testing.assert_array_equal(play(np.array([3.0]), 1.0), [3.0])
+    drives = np.array([0.0, 1.0, 0.5])
+    np.testing.assert_array_equal(play(drives, 0.0), drives)
 
 
 def test_instruments_as_made_are_perfect_and_clean_are_those() -> None:

@@ -1,4 +1,5 @@
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -99,11 +100,12 @@ def test_a_campaign_reads_what_is_written(
 
 
 def test_the_campaign_file_says_that_it_is_virtual(tmp_path: Path) -> None:
-    tests = rig.run("luff", severity="harsh", effects=rig.Effects(backlash="on"), seed=9)
+    truth = Drive.preset("luff").replace(cam_ripple=0.02)
+    tests = rig.run("luff", severity="harsh", truth=truth, seed=9)
     path = rig.write(tests, tmp_path)
     text = path.read_text("utf-8")
     assert text.startswith("# Virtual tests, simulated by swashplate ")
-    assert "effects beyond the model: backlash on; seed 9" in text
+    assert "# Instruments: harsh; refinements: cam_ripple; seed 9." in text
     file = tomllib.loads(text)
     assert file["virtual"] is True
     axis = file["axes"]["luff"]
@@ -117,14 +119,14 @@ def test_the_campaign_file_says_that_it_is_virtual(tmp_path: Path) -> None:
 
 
 def test_the_truth_lies_apart_and_complete(tmp_path: Path) -> None:
-    effects = rig.Effects(leakage="strong", load=0.8)
-    tests = rig.run("hoist", [STEP], perturb=0.1, effects=effects, seed=12)
+    tools = replace(rig.SEVERITIES["realistic"], backlash=0.01)
+    tests = rig.run("hoist", [STEP], perturb=0.1, instruments=tools, seed=12)
+    assert tests.severity == "custom"
     rig.write(tests, tmp_path)
     truth = tomllib.loads((tmp_path / "truth" / "truth.toml").read_text("utf-8"))
     assert truth["virtual"] is True
     assert truth["seed"] == 12
-    assert rig.Effects(**truth["effects"]) == effects
-    assert rig.Instruments(**truth["instruments"]) == rig.SEVERITIES["realistic"]
+    assert rig.Instruments(**truth["instruments"]) == tools
     assert {"swashplate", "numpy"} <= truth["versions"].keys()
     assert Drive.from_toml(tmp_path / "truth" / truth["drive"]) == tests.drive
     assert tests.drive != Drive.preset("hoist")

@@ -2,8 +2,8 @@
 
 `run` simulates the tests and reads them with `Instruments`, of one of the `SEVERITIES` or of one's
 own; `write` makes of them the files that a campaign leaves: logs, a campaign.toml and, apart, the
-truth. `Effects` adds what the identified model does not have. Everything that is written says that
-it is virtual.
+truth. Refinements that a fit is to find, or to miss, are parameters of the drive that is simulated.
+Everything that is written says that it is virtual.
 
 >>> from swashplate.campaign import rig
 >>> tests = rig.run("hoist", seed=1)
@@ -16,6 +16,4 @@ from swashplate.campaign.rig.bench import run as run
 from swashplate.campaign.rig.instruments import SEVERITIES as SEVERITIES
 from swashplate.campaign.rig.instruments import Instruments as Instruments
 from swashplate.campaign.rig.instruments import Severity as Severity
-from swashplate.campaign.rig.plant import Effects as Effects
-from swashplate.campaign.rig.plant import Truth as Truth
 from swashplate.campaign.rig.writing import write as write

@@ -11,18 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.kinds import CHANNEL_KINDS, ChannelKind
-from swashplate.campaign.rig.chance import perturbed
 from swashplate.campaign.rig.instruments import SEVERITIES, Instruments, Severity
-from swashplate.campaign.rig.logger import logged
-from swashplate.campaign.rig.plant import RATE, Effects, Truth, simulate_plant
-from swashplate.campaign.rig.readings import put_out
+from swashplate.campaign.rig.readings import logged, put_out, stream
 from swashplate.drive import Drive
-from swashplate.errors import InputError
+from swashplate.equations.record import SOURCE_RATE
+from swashplate.errors import InputError, ParameterError
 from swashplate.maneuvers import Maneuver, source_tests
 from swashplate.maneuvers.checks import positive, whole
+from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
 
+TRIES = 100
+"""Draws after which no set of parameters within the rules is expected any more."""
 COUNTS_PER_TURN = {"hoist": 400.0 * 120.0 / 19.0, "luff": 635.0 * 4.0, "slew": 81_000.0 * 7.0}
 """Counts in a turn of the output: 2526.3, 2540 and 567,000 in the source's tables."""
 HELD_BACK = {
@@ -45,7 +46,7 @@ class VirtualRun:
     columns: Mapping[str, Array]
     """What was logged, SI: ``"time"`` [s], ``"voltage"`` [V] and the channels; NaN is an empty
     cell. Arrays of one length; rows that were lost are missing in all of them."""
-    truth: Truth
+    truth: Simulation
     """What really happened."""
 
 
@@ -63,7 +64,6 @@ class VirtualTests:
     instruments: Instruments
     severity: str
     """``"clean"``, ``"realistic"``, ``"harsh"`` or ``"custom"``."""
-    effects: Effects
     seed: int
     channels: tuple[ChannelKind, ...]
     counts_per_turn: float
@@ -83,7 +83,6 @@ def run(
     seed: int = 1,
     severity: Severity = "realistic",
     instruments: Instruments | None = None,
-    effects: Effects | None = None,
     truth: Drive | None = None,
     perturb: float = 0.0,
     axis: str | None = None,
@@ -105,12 +104,11 @@ def run(
         How bad the instruments are, see `SEVERITIES`.
     instruments : Instruments, optional
         One's own instead.
-    effects : Effects, optional
-        What the plant has beyond the model; by default nothing.
     truth : Drive, optional
-        What is simulated instead of `drive`; the decay of its card takes over within a step.
+        What is simulated instead of `drive`, with refinements for example; the decay of its card
+        takes over within a step.
     perturb : float
-        Or: draw what is simulated about `drive`, values within so much of its own, see `perturbed`.
+        Draw what is simulated about that drive, values within so much of its own, see `perturbed`.
         0 leaves them. [1]
     axis : {"hoist", "slew", "luff"}, optional
         Whose tests and encoder they are; by default the one that the drive is called after.
@@ -138,11 +136,9 @@ def run(
     seed = whole("seed", seed)
     if severity not in SEVERITIES:
         raise InputError(f"severity is {severity!r}; it is one of {', '.join(SEVERITIES)}.")
-    if truth is not None and perturb:
-        raise InputError("Give either the truth or how far to perturb the drive, not both.")
     simulated = truth if truth is not None else nominal
     if perturb:
-        simulated = perturbed(nominal, perturb, seed)
+        simulated = perturbed(simulated, perturb, seed)
     # a real card's decay does not wait for the next sample of a log (docs/decisions/0008)
     simulated = Drive(replace(simulated.parameters, card_switch="split"))
     axis = axis or nominal.name
@@ -151,10 +147,9 @@ def run(
     turn = _counts_per_turn(axis, counts_per_turn, kinds)
     held_back = _held_back(validate, axis, tests, default=maneuvers is None)
     tools = SEVERITIES[severity] if instruments is None else instruments
-    plant = effects or Effects()
     runs = {}
     for name, maneuver in tests.items():
-        happened = simulate_plant(simulated, put_out(maneuver.sample(RATE), tools), plant)
+        happened = simulated.simulate(put_out(maneuver.sample(SOURCE_RATE), tools))
         columns = logged(happened, kinds, tools, turn, seed, name)
         role: Literal["fit", "validate"] = "validate" if name in held_back else "fit"
         runs[name] = VirtualRun(name, _stem(axis, name), role, columns, happened)
@@ -167,8 +162,7 @@ def run(
         drive if isinstance(drive, str) else None,
         simulated,
         tools,
-        severity if instruments is None else "custom",
-        plant,
+        severity if tools == SEVERITIES[severity] else "custom",
         seed,
         kinds,
         turn,
@@ -228,3 +222,54 @@ def _held_back(
 def _stem(axis: str, name: str) -> str:
     """Axis and manoeuvre as a file's name: ``hoist_step_+4_V``, ``hoist_ramp_+1_V-s``."""
     return re.sub(r"[^\w.+-]+", "_", f"{axis} {name}".replace("/", "-"))
+
+
+def perturbed(drive: Drive, spread: float, seed: int) -> Drive:
+    """A drive whose every value is multiplied by chance.
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive about which they are drawn.
+    spread : float
+        Largest deviation of a factor's logarithm, above 0 and at most 0.5. Its standard deviation
+        is half of that: 0.1 gives factors of 0.90 to 1.11, most within 5 %. [1]
+    seed : int
+        The same seed gives the same drive.
+
+    Returns
+    -------
+    Drive
+        Zeros, infinite limits and parameters without effect stay as they are.
+
+    Raises
+    ------
+    InputError
+        If the spread is out of range, or no draw keeps the rules of a parameter set.
+    """
+    if not 0.0 < spread <= 0.5:
+        raise InputError(f"perturb must be above 0 and at most 0.5, not {spread:g}.")
+    parameters = drive.parameters
+    columns = [
+        column
+        for parameter in parameters.values()
+        if parameter.status != "inactive"
+        for column in parameter.definition.columns
+        if parameters.numbers[column] != 0.0 and np.isfinite(parameters.numbers[column])
+    ]
+    generator = stream(seed, "parameters")
+    for _ in range(TRIES):
+        logarithms = 0.5 * spread * generator.standard_normal(len(columns))
+        while (far := np.abs(logarithms) > spread).any():
+            logarithms[far] = 0.5 * spread * generator.standard_normal(int(far.sum()))
+        factors = np.exp(logarithms).tolist()
+        try:
+            drawn = drive.scale(**dict(zip(columns, factors, strict=True)))
+        except ParameterError:
+            continue
+        title = f"{parameters.title}; values within ±{100 * spread:g} % by seed {seed}"
+        return drawn.renamed(drive.name, title)
+    raise InputError(
+        f"No draw of {TRIES} within ±{100 * spread:g} % keeps the rules of {drive.name}'s "
+        "parameters; take a smaller spread."
+    )

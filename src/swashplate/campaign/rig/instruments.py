@@ -68,6 +68,8 @@ class Instruments:
     """Counts by which the counter moves at once; 0 is a position without steps. [1]"""
     counter_bits: int = 0
     """Bits of a signed counter that rolls over; 0 is one that is wide enough. [1]"""
+    backlash: float = 0.0
+    """Play between the shaft and the encoder, or another instrument of its position. [rad]"""
     transducer_noise: float = 0.0
     """White noise of every other channel, as a share of its largest value in the run. [1]"""
 

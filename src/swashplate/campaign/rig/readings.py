@@ -1,22 +1,162 @@
-"""What each instrument reads: pure functions of the true signal, the instruments and chance."""
+"""What is logged of a run: when samples are taken, what each instrument reads, what gets lost.
+
+Every reading is a pure function of the true signal, the instruments and chance.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign.kinds import ChannelKind
 from swashplate.campaign.rig.instruments import Instruments
-from swashplate.campaign.rig.sampling import rounded
 from swashplate.errors import InputError
+from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Generator = np.random.Generator
 
+COLUMNS: Mapping[str, str] = {"rectified_current": "current", "encoder_counts": "counts"}
+"""Columns that are not called as the kind of their channel."""
+SIGNALS: Mapping[str, str] = {
+    "signed_current": "current",
+    "current_plus": "current_positive",
+    "current_minus": "current_negative",
+    "position": "shaft_position",
+    "encoder_counts": "shaft_position",
+}
+"""Simulated signals that are not called as the kind of their channel."""
 FULL_SCALE = 10.0
 """Range of the command's converters, either way. [V]"""
 OVERSAMPLING = 32
 """Points from one sample to the next at which a lagging ammeter is followed: 160 a period of a
 100 Hz dither at 512 Hz."""
+FARTHEST = 0.4
+"""Of the way to the next grid point a sample strays at most, so that the stamps increase. [1]"""
+
+
+def stream(seed: int, *names: str) -> Generator:
+    """Random numbers that depend on the seed and on names, on nothing else.
+
+    So a run is the same whatever runs before it, and an instrument that is switched off takes no
+    numbers from the others.
+    """
+    words = [
+        int.from_bytes(blake2b(name.encode(), digest_size=8).digest(), "little") for name in names
+    ]
+    return np.random.default_rng(np.random.SeedSequence([seed, *words]))
+
+
+def logged(
+    truth: Simulation,
+    kinds: tuple[ChannelKind, ...],
+    instruments: Instruments,
+    counts_per_turn: float,
+    seed: int,
+    name: str,
+) -> dict[str, Array]:
+    """What the instruments make of a run; each has its own stream of chance."""
+    grid = truth.time
+    instants, stamps = sampled_instants(grid, instruments, stream(seed, name, "time"))
+    assert truth.voltage is not None
+    at_voltage = interpolated(instants, grid, truth.voltage)
+    columns = {
+        "time": stamps,
+        "voltage": read_voltage(at_voltage, instruments, stream(seed, name, "voltage")),
+    }
+    for kind in kinds:
+        chance = stream(seed, name, kind)
+        if kind == "rectified_current":
+            currents = truth.current_positive, truth.current_negative
+            reading = read_current(grid, *currents, instants, instruments, chance)
+        else:
+            signal: Array = getattr(truth, SIGNALS.get(kind, kind))
+            if kind in ("position", "encoder_counts") and instruments.backlash:
+                signal = play(signal, instruments.backlash)
+            signal = interpolated(instants, grid, signal)
+            if kind == "encoder_counts":
+                reading = read_counts(signal, counts_per_turn, instruments, chance)
+            else:
+                reading = read_transducer(signal, instruments, chance)
+        columns[COLUMNS.get(kind, kind)] = reading
+    for column, values in columns.items():
+        if column != "time" and instruments.empty_cells:
+            chance = stream(seed, name, "empty", column)
+            gaps = lost(values.size, instruments.empty_cells, instruments.longest_gap, chance)
+            columns[column] = np.where(gaps, np.nan, values)
+    gone = lost(
+        grid.size, instruments.lost_rows, instruments.longest_loss, stream(seed, name, "rows")
+    )
+    if gone.all():
+        raise InputError(f"{name}: lost_rows leaves no row; take a smaller share.")
+    return {column: values[~gone] for column, values in columns.items()}
+
+
+def sampled_instants(
+    grid: Array, instruments: Instruments, generator: Generator
+) -> tuple[Array, Array]:
+    """Instants at which samples are taken, and the stamps that are written for them.
+
+    Parameters
+    ----------
+    grid : (n,) array
+        Even instants from the run's beginning to its end. [s]
+
+    Returns
+    -------
+    instants, stamps : (n,) arrays
+        Instants lie within the run. The stamps leave the hidden part of the jitter out and are
+        rounded; without jitter both are the grid. [s]
+    """
+    told = instruments.jitter * generator.standard_normal(grid.size)
+    hidden = instruments.hidden_jitter * generator.standard_normal(grid.size)
+    spacing = grid[1] - grid[0] if grid.size > 1 else 0.0
+    bound = 0.5 * FARTHEST * spacing
+    stamps = np.clip(grid + np.clip(told, -bound, bound), grid[0], grid[-1])
+    instants = np.clip(stamps + np.clip(hidden, -bound, bound), grid[0], grid[-1])
+    if instruments.stamp_resolution:
+        stamps = rounded(stamps, instruments.stamp_resolution)
+    return instants, stamps
+
+
+def rounded(values: Array, step: float) -> Array:
+    """Values rounded to whole steps, as the nearest decimals where the step is one."""
+    per_unit = 1.0 / step
+    if abs(per_unit - round(per_unit)) < 1e-6 * per_unit:
+        # division by a whole number gives the float that the decimal number is read as
+        return np.asarray(np.rint(values * round(per_unit)) / round(per_unit) + 0.0)
+    return np.asarray(np.rint(values / step) * step + 0.0)
+
+
+def lost(size: int, share: float, longest: int, generator: Generator) -> Mask:
+    """Which of `size` rows are lost: in runs of 1 to `longest`, together about a share of all.
+
+    Parameters
+    ----------
+    share : float
+        Expected share of rows that are lost, as long as it is small. [1]
+    """
+    mask = np.zeros(size, dtype=np.bool_)
+    begins = np.flatnonzero(generator.random(size) < share / (0.5 * (1 + longest)))
+    lengths = generator.integers(1, longest, size=begins.size, endpoint=True)
+    for begin, length in zip(begins.tolist(), lengths.tolist(), strict=True):
+        mask[begin : begin + length] = True
+    return mask
+
+
+def interpolated(instants: Array, time: Array, signal: Array) -> Array:
+    """A signal of the grid at other instants, on straight lines; on the grid itself, its samples.
+
+    The drive is marched on the grid, so what lies between is not known better. At an instant that
+    strays by a hundredth of a sample the line is off by 4 % of what it is half way between two.
+    """
+    if instants is time or np.array_equal(instants, time):
+        return signal
+    return np.interp(instants, time, signal)
 
 
 def put_out(voltage: Array, instruments: Instruments) -> Array:
@@ -176,12 +316,31 @@ def read_transducer(signal: Array, instruments: Instruments, generator: Generato
     return np.asarray(signal + instruments.transducer_noise * np.abs(signal).max() * noise)
 
 
-def interpolated(instants: Array, time: Array, signal: Array) -> Array:
-    """A signal of the grid at other instants, on straight lines; on the grid itself, its samples.
+def play(position: Array, width: float) -> Array:
+    """Position behind a gear with backlash: the play operator. [rad]
 
-    The drive is marched on the grid, so what lies between is not known better. At an instant that
-    strays by a hundredth of a sample the line is off by 4 % of what it is half way between two.
+    Parameters
+    ----------
+    position : (n,) array
+        Position of what drives. [rad]
+    width : float
+        Way that it can go without taking the other along. [rad]
+
+    Notes
+    -----
+    yₙ = max(xₙ − b/2, min(xₙ + b/2, yₙ₋₁)), in the middle of the gap at first. Between two
+    reversals of x it is one maximum or minimum, which is how it is computed.
     """
-    if instants is time or np.array_equal(instants, time):
-        return signal
-    return np.interp(instants, time, signal)
+    half, behind = 0.5 * width, float(position[0])
+    driven = np.empty_like(position)
+    driven[0] = behind
+    rising = np.diff(position) >= 0.0
+    turns = np.flatnonzero(rising[1:] != rising[:-1]) + 1
+    for begin, end in zip([0, *turns.tolist()], [*turns.tolist(), rising.size], strict=True):
+        way = position[begin + 1 : end + 1]
+        if end > begin and rising[begin]:
+            driven[begin + 1 : end + 1] = np.maximum(way - half, behind)
+        else:
+            driven[begin + 1 : end + 1] = np.minimum(way + half, behind)
+        behind = float(driven[end])
+    return driven
