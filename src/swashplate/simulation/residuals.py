@@ -55,6 +55,17 @@ class Own(NamedTuple):
 NOTHING_OWN = Own()
 
 
+class Ready(NamedTuple):
+    """A model with numbers, and what of it is asked for, in the engine's words."""
+
+    instance: Instance
+    own: EngineOwn
+    paths: Sequence[str] = ()
+    """Columns of derivatives."""
+    moved: Sequence[bool] | None = None
+    """Whether the record may depend on a column at all."""
+
+
 def residuals(
     parameters: ParameterSet,
     observed: ObservedRecord,
@@ -63,8 +74,8 @@ def residuals(
     block: int = BLOCK,
 ) -> Array:
     """Weighted residuals of all observations, one after the other; see `jacobian.residuals`."""
-    instance, inner = _instance(parameters, observed, own, ())
-    return engine.residuals(instance, observed, inner, block=block)
+    ready = made_ready(parameters, observed, (), own)
+    return engine.residuals(ready.instance, observed, ready.own, block=block)
 
 
 def jacobian(
@@ -95,9 +106,7 @@ def jacobian(
         Samples marched at a time, 2 to 512.
     """
     names = wanted_columns(columns)
-    instance, inner = _instance(parameters, observed, own, names)
-    moved = moved_by(parameters, observed, names)
-    paths = [path_of(name) for name in names]
+    instance, inner, paths, moved = made_ready(parameters, observed, names, own)
     found = engine.jacobian(instance, observed, paths, inner, moved=moved, out=out, block=block)
     return found._replace(names=(*names, *observed.own_columns))
 
@@ -112,9 +121,7 @@ def triangle(
 ) -> Triangle:
     """Triangular factor of [J r]; arguments as in `jacobian`, which is never held."""
     names = wanted_columns(columns)
-    instance, inner = _instance(parameters, observed, own, names)
-    moved = moved_by(parameters, observed, names)
-    paths = [path_of(name) for name in names]
+    instance, inner, paths, moved = made_ready(parameters, observed, names, own)
     found = engine.triangle(instance, observed, paths, inner, moved=moved, block=block)
     return found._replace(names=(*names, *observed.own_columns))
 
@@ -168,10 +175,16 @@ def moved_by(
     return found
 
 
-def _instance(
-    parameters: ParameterSet, observed: ObservedRecord, own: Own, names: Sequence[str]
-) -> tuple[Instance, EngineOwn]:
-    """The model with its numbers, and the experiment's own in its words."""
+def made_ready(
+    parameters: ParameterSet, observed: ObservedRecord, names: Sequence[str], own: Own
+) -> Ready:
+    """The drive's model with its numbers, for some columns.
+
+    Raises
+    ------
+    InputError
+        If a signal cannot be observed, the filter is unstable, or a start has no value.
+    """
     by_voltage = observed.driven_by == "voltage"
     for each in observed.observations:
         if each.signal not in OBSERVABLE:
@@ -190,4 +203,9 @@ def _instance(
             start["pump.plate_pressure"] = pressure
     elif START_PRESSURE in names:
         raise InputError(f"{START_PRESSURE} is a column, so Own needs a value of it.")
-    return instance, EngineOwn(start, own.offsets, own.clock_offsets)
+    return Ready(
+        instance,
+        EngineOwn(start, own.offsets, own.clock_offsets),
+        [path_of(name) for name in names],
+        moved_by(parameters, observed, names),
+    )
