@@ -42,7 +42,8 @@ def value_at(value: Any, path: str) -> Any:
 
 def numbers_of(value: Any) -> list[float]:
     """All floats of a nested named tuple, in the order of `floats_of`."""
-    return [float(each) for each in _reader(type(value))(value)]
+    kind: Any = type(value)
+    return [float(each) for each in _reader(kind)(value)]
 
 
 @cache
