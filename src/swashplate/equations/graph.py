@@ -35,7 +35,7 @@ from swashplate.equations.march import (
     settled_of,
 )
 from swashplate.equations.model import Model, Source, arguments_of
-from swashplate.equations.pieces import PIECE, Piece, piece
+from swashplate.equations.pieces import PIECE, Planned, piece
 from swashplate.equations.program import leaves
 from swashplate.equations.rows import STRIDE
 from swashplate.equations.run import module
@@ -163,8 +163,8 @@ class Graph:
     """The parts' code."""
     signals: tuple[str, ...]
     """External signals that are given as records."""
-    pieces: tuple[Piece, ...]
-    """Compiled: the march, and what the parts' graphs name by number."""
+    pieces: tuple[Planned, ...]
+    """The march, and what the parts' graphs name by number."""
 
 
 @generating
@@ -201,7 +201,7 @@ class _Builder:
             model, signals, options, [place for place, _ in self.observed], ruled=True
         )
         self.parts = self.sampler.used()
-        self.pieces: list[Piece] = [None]
+        self.pieces: list[Planned] = []
         """The march, made last, comes first."""
         self.stored: dict[Stored, int] = {}
         self.row_of: dict[str, int] = {}
@@ -222,7 +222,7 @@ class _Builder:
                 self._row_for(place)
         rows = {each: _place(row, "n - first") for each, row in self.stored.items()}
         text, names = march_piece_source(self.model, self.signals, self.options, rows)
-        self.pieces[0] = self._compiled("march", text, names)
+        march = self._planned("march", text, names)
         return Graph(
             self.graphs,
             self.stored,
@@ -234,18 +234,19 @@ class _Builder:
             [self._locals(part) for part in self.parts],
             self.parts,
             self.signals,
-            tuple(self.pieces),
+            (march, *self.pieces),
         )
 
-    def _compiled(self, name: str, text: str, names: Mapping[str, Any]) -> Piece:
+    def _planned(self, name: str, text: str, names: Mapping[str, Any]) -> Planned:
         """A piece, in a module of its own."""
-        return module(f"{self.model.name}_{name}", text, {"piece": piece, **names})[name]
+        file = f"{self.model.name}_{name}"
+        return Planned(lambda: module(file, text, {"piece": piece, **names})[name])
 
     def _piece(self, name: str, says: str, lines: Sequence[str], names: Mapping[str, Any]) -> int:
         """Number of a new piece."""
         text = function_source(f"{name}({PIECE})", says, lines, "@piece")
-        self.pieces.append(self._compiled(name, text, {**self.sampler.names, **names}))
-        return len(self.pieces) - 1
+        self.pieces.append(self._planned(name, text, {**self.sampler.names, **names}))
+        return len(self.pieces)
 
     def _new_row(self) -> int:
         self.rows += 1

@@ -68,6 +68,8 @@ class Layout:
     """A program without the numbers that depend on parameters, and the memory it needs."""
 
     program: Program
+    pieces: frozenset[int]
+    """Numbers of the pieces that are called."""
     slots: tuple[tuple[int, Slot], ...]
     """Terms with a factor of this kind."""
     rows: int
@@ -153,6 +155,7 @@ class _Planner:
         )
         return Layout(
             program,
+            frozenset(todo[1] for todo in self.todo if todo[0] == CALL),
             tuple((k, term.slot) for k, term in enumerate(terms) if term.slot is not None),
             self.rows,
             {row: value for value, row in self.constant.items()},
@@ -663,7 +666,7 @@ def _march(
     places = instance.places(signals, h)
     plan = observed.plan(own, len(columns) if first_own is None else first_own)
     program = _with_numbers(layout, slopes.constants, places)
-    marched = tuple(np.require(each, np.float64, ["C", "W"]) for each in records.values())
+    marched = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
     met = np.array([np.inf])
     room = room_for(layout.rows, layout.constant, layout.states, len(columns), plan)
     arrays = (
@@ -678,7 +681,7 @@ def _march(
         room.flat,
     )
     size = marched[0].size
-    pieces = addresses(graph.pieces)
+    pieces = addresses(graph.pieces, layout.pieces)
     march_observed(pieces, arrays, size, block, h, tangent, program, plan, sink, room)
     check_domain(instance, states, float(met[0]), observed.driven_by)
 

@@ -7,7 +7,8 @@ states, met, flat) -> None``, and the kernel that calls them, by address, is the
 compiled once, kept on disk, as is each piece for all models that share it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Container, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations.cache import on_disk
 from swashplate.equations.equation import known
+from swashplate.equations.lowering import GENERATING
 from swashplate.equations.syntax import plain
 
 PIECE = "count, first, h, records, before, whole, fraction, params, given, states, met, flat"
@@ -47,6 +49,23 @@ Piece = Any
 """What `piece` returns."""
 
 
+@dataclass
+class Planned:
+    """A piece that is compiled when it is first needed: residuals alone need no derivatives."""
+
+    make: Callable[[], Piece]
+    _made: Piece = None
+
+    @property
+    def made(self) -> Piece:
+        """The piece; one thread at a time compiles."""
+        if self._made is None:
+            with GENERATING:
+                if self._made is None:
+                    self._made = self.make()
+        return self._made
+
+
 def piece(function: Callable[..., None]) -> Piece:
     """Compile a function with the arguments of `PIECE`: strict arithmetic, cached on disk."""
     known[plain(function)] = None
@@ -59,11 +78,12 @@ def piece(function: Callable[..., None]) -> Piece:
     return made
 
 
-def addresses(pieces: tuple[Piece, ...]) -> Any:
+def addresses(pieces: Sequence[Planned], needed: Container[int]) -> Any:
     """What `call` is given of each piece; the pieces themselves must be kept as well."""
+    made = [each.made if k in needed else None for k, each in enumerate(pieces)]
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
-        return pieces
-    return np.array([each.address for each in pieces], dtype=np.int64)
+        return made
+    return np.array([0 if each is None else each.address for each in made], dtype=np.int64)
 
 
 def pointers(records: tuple[NDArray[np.float64], ...]) -> Any:
