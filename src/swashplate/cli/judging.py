@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from swashplate.campaign.experiment import Experiment
     from swashplate.identification.assessment import Assessment, RunQuality
     from swashplate.identification.bootstrap import Bootstrap
-    from swashplate.identification.executors import Executor
+    from swashplate.executors import Executor
     from swashplate.identification.fit import Fit
     from swashplate.identification.fit_file import StageProfile
     from swashplate.identification.fold_results import CrossValidation

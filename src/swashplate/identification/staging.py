@@ -12,7 +12,7 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.errors import InputError, ParameterError
 from swashplate.identification.drive_model import CURRENTS, SIGNALS, DriveModel
 from swashplate.identification.drives import simulated_current
-from swashplate.identification.executors import available_cores
+from swashplate.executors import available_cores
 from swashplate.identification.forces import Forces
 from swashplate.identification.measured_current import measured_current
 from swashplate.identification.problem import Problem, noise_scales
