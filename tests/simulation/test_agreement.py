@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swashplate import Drive, SquaredError, maneuvers
+from swashplate import Drive, Serial, SquaredError, Threads, maneuvers
 from swashplate.equations.observation import Observation, ObservedRecord
 from swashplate.equations.record import record_of
 from swashplate.simulation.residuals import jacobian, residuals
@@ -239,8 +239,8 @@ def test_cost_is_the_weighted_sum_of_squares(hoist: Drive) -> None:
 def test_batch_does_not_depend_on_threads(hoist: Drive) -> None:
     rng = np.random.default_rng(5)
     changes = {"Z8": 1.65e6 * rng.uniform(0.8, 1.2, 70)}
-    one = hoist.simulate_many(changes, voltage=command(), threads=1)
-    four = hoist.simulate_many(changes, voltage=command(), threads=4)
+    one = hoist.simulate_many(changes, voltage=command(), executor=Serial())
+    four = hoist.simulate_many(changes, voltage=command(), executor=Threads(4))
     assert np.array_equal(one.output, four.output)
 
 

@@ -184,7 +184,7 @@ class Lanes:
     march: Callable[..., None]
     rows: Mapping[str, int]
     columns: Mapping[str, str]
-    """Name in the kernels of each parameter, by its path."""
+    """Name in the kernels of each parameter and given, as `march_lanes` takes them."""
     fractions: Mapping[int, str]
     """Name of each tap's fraction."""
     states: tuple[str, ...]
@@ -204,6 +204,7 @@ def lanes_of(
     for part in sampler.parts:
         prefix = f"{part.own.name}." if len(model.parts) > 1 else ""
         columns |= {f"{prefix}{path}": name for name, path in part.parameters.items()}
+        columns |= {f"given {prefix}{path}": node.value for path, node in leaves(part.given)}
         fractions |= {tap.number: part.fraction(tap) for tap in part.taps}
         own = dict(leaves(part.state))
         states += [own[path].value for path in sampler.carried[part.part]]
@@ -239,7 +240,8 @@ def march_lanes(
     Parameters
     ----------
     numbers : mapping of str to (LANES,) array
-        Every parameter by its path; those that a type has a default for may be left out.
+        Every parameter by its path, and every given, ``"given "`` before it; parameters that a type
+        has a default for may be left out.
     records : mapping of str to (n,) array
         External signals, zero before.
     h : float

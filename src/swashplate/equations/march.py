@@ -143,6 +143,17 @@ class PartCode:
         if self.own.sample is not None:
             self.known["signals"] = self._call(self.code, self.own.sample)
         self.following = self._call(self.code, self.own.step)
+        self._check_type(self.own.step, self.following, self.own.state)
+
+    def _check_type(self, equation: Equation, made: Value, kind: type[Any]) -> None:
+        """Refuse what an equation returns unless it is of a type, and all of it numbers."""
+        cls = made.cls if isinstance(made, Tuple) else None
+        numbers = tuple(path for path, node in leaves(made) if node.kind in ("float", "int"))
+        if cls is not kind or numbers != floats_of(kind):
+            raise InputError(
+                f"Model {self.own.name}: {plain(equation).__name__} must return a {kind.__name__} "
+                "of numbers on every way."
+            )
 
     def _names(self, kind: Any, letter: str) -> Value:
         hints = get_type_hints(kind)
@@ -232,7 +243,11 @@ class PartCode:
         if self.own.domain is None:
             return None
         made = self._call(self.code, self.own.domain)
-        assert isinstance(made, Node)
+        if not isinstance(made, Node):
+            raise InputError(
+                f"Model {self.own.name}: {plain(self.own.domain).__name__} must return one number, "
+                "the margin."
+            )
         return made
 
     @cached_property

@@ -16,7 +16,7 @@ from swashplate.equations.equation import inlined, interpreted
 from swashplate.equations.fields import floats_of, made, numbers_of, value_at
 from swashplate.equations.lowering import generating
 from swashplate.equations.march import Stored, march_source, observe_source, taps_of
-from swashplate.equations.model import Link, Model, Place, arguments_of, place
+from swashplate.equations.model import Link, Model, Place, arguments_of, place, plain
 from swashplate.equations.windows import Window
 from swashplate.errors import DomainError, InputError
 
@@ -93,8 +93,11 @@ class Instance:
         """Where every tap reads at a step of `h`."""
         found: list[Place] = []
         for each in taps_of(self.model, signals):
-            p, delay = self.parts[each.part].p, each.tap.delay
-            found.append(place(each.tap, float(value_at(p, delay)) if delay else 0.0, h))
+            name, p = each.tap.delay, self.parts[each.part].p
+            delay = float(value_at(p, name)) if name else 0.0
+            if not 0.0 <= delay < math.inf:
+                raise InputError(f"{self.name}: {name} is {delay:g} s, but a delay is at least 0.")
+            found.append(place(each.tap, delay, h))
         return Places(
             np.array([each.whole for each in found], dtype=np.int64),
             np.array([each.fraction for each in found]),
@@ -125,12 +128,19 @@ class Instance:
         Raises
         ------
         InputError
-            If a signal is missing, or the model cannot start settled.
+            If a signal is missing or unknown, or the model cannot start settled.
+        DomainError
+            If constants or the state cannot be computed for these numbers.
         """
         key = (tuple(first.items()), h, start)
         if chosen is None and key in self._starts:
             return self._starts[key]
         check_start(start)
+        for name in first:
+            if name not in self.model.external:
+                raise InputError(
+                    f"{self.name} has no input '{name}'; it has {', '.join(self.model.external)}."
+                )
         before = {name: value if start == "steady" else 0.0 for name, value in first.items()}
         states: list[Any] = []
         found: list[Mapping[str, Any]] = []
@@ -138,7 +148,7 @@ class Instance:
             known: dict[str, Any] = {"p": own.p, "options": own.options, "given": own.given}
             known["h"] = h
             if part.constants is not None:
-                known["k"] = called(part.constants, known)
+                known["k"] = self._called(part.constants, known)
             for name in part.input_types:
                 known[name] = self._input(i, name, first, before, states, found)
             if part.inputs is not None:
@@ -163,7 +173,13 @@ class Instance:
     def _state(self, part: Model, known: Mapping[str, Any], start: Start) -> Any:
         equation = part.rest if start == "rest" else part.settled
         if equation is not None:
-            return called(equation, known)
+            found = self._called(equation, known)
+            if not isinstance(found, part.state):
+                raise InputError(
+                    f"{self.name}: {plain(equation).__name__} must return a "
+                    f"{part.state.__name__}, not {found!r}."
+                )
+            return found
         if start == "steady" and floats_of(part.state):
             raise InputError(
                 f"{self.name}: {part.name} has no equation for its steady state ('settled'), so "
@@ -172,6 +188,15 @@ class Instance:
         defaults = part.state._field_defaults
         empty = [path for path in floats_of(part.state) if path.split(".")[0] not in defaults]
         return made(part.state, dict.fromkeys(empty, 0.0))
+
+    def _called(self, equation: Callable[..., Any], known: Mapping[str, Any]) -> Any:
+        try:
+            return called(equation, known)
+        except (ValueError, ZeroDivisionError, OverflowError) as error:
+            raise DomainError(
+                f"{self.name}: {plain(equation).__name__} cannot be computed for these numbers "
+                f"({error})."
+            ) from None
 
     def _input(
         self,
@@ -338,5 +363,11 @@ def check_domain(instance: Instance, states: Array, worst: float, cause: str) ->
 
 def outside(model: Model, worst: float, cause: str) -> str:
     """What has happened where the margin is not above 0."""
-    said = next((part.outside for part in model.parts if part.domain is not None), model.outside)
-    return said(worst, cause) if callable(said) else f"{said} under this {cause}."
+    parts = [part for part in model.parts if part.domain is not None]
+    said = [
+        each.outside(worst, cause)
+        if callable(each.outside)
+        else f"{each.outside} under this {cause}."
+        for each in parts or [model]
+    ]
+    return " Or: ".join(said)
