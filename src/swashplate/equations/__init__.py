@@ -8,7 +8,7 @@ from swashplate.equations.derivatives import declared, derive
 from swashplate.equations.derived import Derived
 from swashplate.equations.equation import closure, closure_hash, equation, inlined, source
 from swashplate.equations.library import soft_threshold
-from swashplate.equations.primitives import interpolate, root
+from swashplate.equations.primitives import interpolate, repeated, root
 
 __all__ = [
     "Derived",
@@ -21,6 +21,7 @@ __all__ = [
     "inlined",
     "interpolate",
     "kernel",
+    "repeated",
     "root",
     "soft_threshold",
     "source",

@@ -37,7 +37,7 @@ from swashplate.equations.program import (
     paths,
     shapes_of,
 )
-from swashplate.equations.rules import of_root, of_rule, of_table
+from swashplate.equations.rules import of_repeated, of_root, of_rule, of_table
 from swashplate.equations.syntax import parsed
 from swashplate.equations.writing import Call, Cond, Define, Names, Region, Result, written
 
@@ -172,11 +172,10 @@ def _derived(
     if outputs is None:
         outputs = tuple(range(len(result_paths(program))))
     if isinstance(program, Primitive):
-        return (
-            of_root(program, inputs, _derived)
-            if program.kind == "root"
-            else of_table(program, inputs)
-        )
+        if program.kind == "interpolate":
+            return of_table(program, inputs)
+        rule = of_root if program.kind == "root" else of_repeated
+        return rule(program, inputs, _derived)
     key = program, inputs, outputs
     if key not in _made:
         if program.rule is not None:
@@ -297,8 +296,8 @@ class _Derivation:
         derived = _derived(callee, by) if by or _decided(callee) else None
         if derived is None or not (derived.entries or _decided(callee)):
             function = self.names.of(callee.function, _called(callee))
-            residual = self.names.residual(callee)
-            first = () if residual is None else (residual,)
+            inner = self.names.inner(callee)
+            first = () if inner is None else (inner,)
             region.add(Call(function, first, call.arguments, call.result, []))
             return
         self.callees[derived.name] = derived

@@ -242,8 +242,8 @@ class Code:
                 targets = ", ".join(node.value for _, node in leaves(item.result))
                 arguments = [self._argument(each) for each in item.arguments]
                 called = self.name_of(item.callee.function)
-                if isinstance(item.callee, Primitive) and item.callee.residual is not None:
-                    arguments.insert(0, self.name_of(item.callee.residual.function))
+                if isinstance(item.callee, Primitive) and item.callee.inner is not None:
+                    arguments.insert(0, self.name_of(item.callee.inner.function))
                 yield f"{targets} = {called}({', '.join(arguments)})"
 
     def _argument(self, value: Value) -> str:
