@@ -75,6 +75,8 @@ class Component:
 
     kernel: str
     groups: list[Group]
+    signals: bool = False
+    """Whether the kernel fills in the derivatives of signals as well."""
 
 
 @dataclass
@@ -362,7 +364,9 @@ class _Builder:
                     stored = stored._replace(kind="state")
                 self._store(stored, part.source(source))
         for signal in self._signals(part):
-            if signal in graph.aliases and (part.part, signal) not in self.values:
+            # what sub-steps lead to is not computed again
+            known = signal in graph.aliases or part.code.repeats
+            if known and (part.part, signal) not in self.values:
                 stored = Stored(part.part, "signals", signal)
                 if stored not in self.stored:
                     self._store(stored, f"signal {part.part} {signal}")
@@ -406,7 +410,9 @@ class _Builder:
             for each, node in results.items()
             if each.startswith("signals.") and each.removeprefix("signals.") not in graph.aliases
         }
-        if signals:
+        # derivatives are carried through sub-steps once, for states and signals
+        together = part.code.repeats
+        if signals and not together:
             graph.signal_kernel = f"fill_{own}_signals"
             self._fill(graph, part, graph.signal_kernel, signals)
         states = list(partials)
@@ -414,6 +420,9 @@ class _Builder:
             out: {f"state.{by.path}" for by in each if by.kind == "state"} & {*states}
             for out, each in partials.items()
         }
+        if together:
+            every = {each: results[each] for each in states}
+            self._fill(graph, part, f"fill_{own}", every | signals)
         at_sample = {
             by.path
             for out, by in graph.entries
@@ -421,9 +430,10 @@ class _Builder:
         } | {place.path for place, _ in self.observed if place.kind == "state"}
         at_sample |= {s.signal for s in self.sampler.sources if s.part == part.part}
         graph.aliases = {s: path for s, path in graph.aliases.items() if path not in at_sample}
-        for c, outs in enumerate(_weakly_connected(states, flows)):
+        for c, outs in enumerate([states] if together else _weakly_connected(states, flows)):
             name = f"{own}_{c}" if len(outs) < len(states) else own
-            self._fill(graph, part, f"fill_{name}", {each: results[each] for each in outs})
+            if not together:
+                self._fill(graph, part, f"fill_{name}", {each: results[each] for each in outs})
             groups = []
             for g, members in enumerate(_strongly_connected(outs, flows)):
                 bare = tuple(each.removeprefix("state.") for each in members)
@@ -442,7 +452,7 @@ class _Builder:
                 group = Group(f"recur_{name}_{g}", bare, after, stored)
                 groups.append(group)
                 self.texts[group.kernel] = self._recurrence(graph, group)
-            graph.components.append(Component(f"fill_{name}", groups))
+            graph.components.append(Component(f"fill_{name}", groups, together))
         constants = self._constants(part)
         if constants is not None:
             graph.constants = [

@@ -110,7 +110,7 @@ class _Planner:
             by_result = _by_result(part)
             for component in part.components:
                 groups = [self._group(part, group, by_result) for group in component.groups]
-                self.active.append(any(groups))
+                self.active.append(any(groups) or (component.signals and bool(self.columns)))
             if part.signal_kernel:
                 self.active.append(bool(self.columns))
             self._signals(part, by_result)

@@ -6,10 +6,13 @@ results keep their last bit, and nothing else: what no wanted result needs is le
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from hashlib import blake2b
 from typing import Any
 
 from swashplate.equations import expressions as ex
+from swashplate.equations.equation import equation_of_text
 from swashplate.equations.expressions import Node
 from swashplate.equations.lowering import lower
 from swashplate.equations.program import (
@@ -30,6 +33,7 @@ from swashplate.equations.program import (
     shapes_of,
 )
 from swashplate.equations.syntax import plain
+from swashplate.equations.terms import repeated_moving
 
 
 class Code:
@@ -48,9 +52,16 @@ class Code:
         self.names: dict[str, Any] = {}
         self._called: dict[int, str] = {}
 
+    @property
+    def repeats(self) -> bool:
+        """Whether there are sub-steps in it."""
+        calls = [each.callee for each in self.items if isinstance(each, Invoke)]
+        return any(isinstance(each, Primitive) and each.kind == "repeated" for each in calls)
+
     def fresh(self, stem: str) -> str:
         """A name that is not yet taken."""
         stem = stem.replace(".", "_").replace("[", "_").replace("]", "")
+        stem = f"value_{stem}" if stem[0].isdigit() else stem
         name, count = stem, 1
         while name in self.taken:
             count += 1
@@ -166,6 +177,8 @@ class Code:
                     new = ex.name(name, new.kind)
                 env[old.value] = new
             return
+        if isinstance(callee, Primitive) and callee.kind == "repeated":
+            callee, arguments = flattened(callee, arguments, self.ruled)
         named = []
         for _, old in leaves(item.result):
             name = self.fresh(old.value)
@@ -241,10 +254,24 @@ class Code:
             else:
                 targets = ", ".join(node.value for _, node in leaves(item.result))
                 arguments = [self._argument(each) for each in item.arguments]
+                if isinstance(item.callee, Primitive) and item.callee.kind == "repeated":
+                    if not self.ruled:
+                        yield from self._loop(item.callee, targets, arguments)
+                        continue
                 called = self.name_of(item.callee.function)
                 if isinstance(item.callee, Primitive) and item.callee.inner is not None:
                     arguments.insert(0, self.name_of(item.callee.inner.function))
                 yield f"{targets} = {called}({', '.join(arguments)})"
+
+    def _loop(self, loop: Primitive, targets: str, arguments: Sequence[str]) -> Iterator[str]:
+        """A loop written out: what `repeated` does, without passing a function."""
+        count, state, *rest = arguments
+        assert loop.inner is not None and isinstance(loop.result, Tuple)
+        called, number = self.name_of(loop.inner.function), self.fresh("number")
+        given = f"{self.name_of(loop.result.cls)}({targets}), float({number})"
+        yield f"{targets} = {state}"
+        yield f"for {number} in range(int({count})):"
+        yield f"    {targets} = {called}({', '.join([given, *rest])})"
 
     def _argument(self, value: Value) -> str:
         if isinstance(value, Node):
@@ -256,6 +283,45 @@ class Code:
             return repr(value.value)
         assert isinstance(value, Open)
         return value.text
+
+
+def flattened(
+    loop: Primitive, arguments: tuple[Value, ...], ruled: bool
+) -> tuple[Primitive, tuple[Value, ...]]:
+    """A loop whose step is straight code of the scalars that it reads, and its arguments."""
+    step = loop.inner
+    assert step is not None
+    code, env = Code(ruled=ruled), dict[str, Node]()
+    formals, actuals = list[str](), list[Value]()
+    (state, _), (number, _), *rest = step.arguments
+    code.taken = {state, number, *vars(math)}
+    for name, value in rest:
+        for path, node in leaves(value):
+            env[node.value] = ex.name(code.fresh(f"{name}_{path}" if path else name), node.kind)
+    result = code._named(code._body(step.body, env, code.items), "value", code.items)
+    ends = [node for _, node in leaves(result)]
+    read = code.reads(ends)
+    for (_, value), given in zip(rest, arguments[2:], strict=True):
+        for (_, node), actual in zip(leaves(value), leaves(given), strict=True):
+            if env[node.value].value in read:
+                formals.append(env[node.value].value)
+                actuals.append(actual[1])
+    assert isinstance(result, Tuple)
+    kind = code.name_of(result.cls)
+    typed = ", ".join(f"{each}: float" for each in (number, *formals))
+    body = [*code.lines(ends), f"return {kind}({', '.join(text(each) for each in ends)})"]
+    lines = "\n".join(f"    {line}" for line in body)
+    lines = f"({state}: {kind}, {typed}) -> {kind}:\n{lines}\n"
+    name = f"{step.source.name}_{blake2b(lines.encode(), digest_size=4).hexdigest()}"
+    made = equation_of_text(f"def {name}{lines}", name, code.names)
+    inner = lower(made, shapes_of(made, {}, {}))
+    shown = [(n, ex.name(n)) for n in formals]
+    flat = (*loop.arguments[:2], *shown)
+    moving = repeated_moving(inner)
+    return Primitive(loop.kind, loop.function, inner, flat, moving, loop.result), (
+        *arguments[:2],
+        *actuals,
+    )
 
 
 def text(node: Node) -> str:
