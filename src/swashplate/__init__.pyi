@@ -9,8 +9,8 @@ from .errors import FileError as FileError
 from .errors import InputError as InputError
 from .errors import ParameterError as ParameterError
 from .errors import SwashplateError as SwashplateError
-from .full_order.drive import FullOrderDrive as FullOrderDrive
-from .full_order.physical_set import PhysicalSet as PhysicalSet
+from .full_order import FullOrderDrive as FullOrderDrive
+from .full_order import PhysicalSet as PhysicalSet
 from .linear import FrequencyResponse as FrequencyResponse
 from .linear import LinearDrive as LinearDrive
 from .linear import OperatingPoint as OperatingPoint

@@ -55,8 +55,7 @@ class Code:
     @property
     def repeats(self) -> bool:
         """Whether there are sub-steps in it."""
-        calls = [each.callee for each in self.items if isinstance(each, Invoke)]
-        return any(isinstance(each, Primitive) and each.kind == "repeated" for each in calls)
+        return any(isinstance(each, Invoke) and _is_loop(each.callee) for each in self.items)
 
     def fresh(self, stem: str) -> str:
         """A name that is not yet taken."""
@@ -177,7 +176,8 @@ class Code:
                     new = ex.name(name, new.kind)
                 env[old.value] = new
             return
-        if isinstance(callee, Primitive) and callee.kind == "repeated":
+        if _is_loop(callee):
+            assert isinstance(callee, Primitive)
             callee, arguments = flattened(callee, arguments, self.ruled)
         named = []
         for _, old in leaves(item.result):
@@ -254,21 +254,23 @@ class Code:
             else:
                 targets = ", ".join(node.value for _, node in leaves(item.result))
                 arguments = [self._argument(each) for each in item.arguments]
-                if isinstance(item.callee, Primitive) and item.callee.kind == "repeated":
-                    if not self.ruled:
-                        yield from self._loop(item.callee, targets, arguments)
-                        continue
+                if _is_loop(item.callee) and not self.ruled:
+                    yield from self._loop(item, targets, arguments)
+                    continue
                 called = self.name_of(item.callee.function)
                 if isinstance(item.callee, Primitive) and item.callee.inner is not None:
                     arguments.insert(0, self.name_of(item.callee.inner.function))
                 yield f"{targets} = {called}({', '.join(arguments)})"
 
-    def _loop(self, loop: Primitive, targets: str, arguments: Sequence[str]) -> Iterator[str]:
+    def _loop(self, item: Invoke, targets: str, arguments: Sequence[str]) -> Iterator[str]:
         """A loop written out: what `repeated` does, without passing a function."""
         count, state, *rest = arguments
-        assert loop.inner is not None and isinstance(loop.result, Tuple)
-        called, number = self.name_of(loop.inner.function), self.fresh("number")
-        given = f"{self.name_of(loop.result.cls)}({targets}), float({number})"
+        number = f"{targets.partition(',')[0]}_number"
+        assert isinstance(item.callee, Primitive)
+        assert item.callee.inner is not None
+        assert isinstance(item.callee.result, Tuple)
+        called = self.name_of(item.callee.inner.function)
+        given = f"{self.name_of(item.callee.result.cls)}({targets}), float({number})"
         yield f"{targets} = {state}"
         yield f"for {number} in range(int({count})):"
         yield f"    {targets} = {called}({', '.join([given, *rest])})"
@@ -283,6 +285,10 @@ class Code:
             return repr(value.value)
         assert isinstance(value, Open)
         return value.text
+
+
+def _is_loop(callee: Program | Primitive) -> bool:
+    return isinstance(callee, Primitive) and callee.kind == "repeated"
 
 
 def flattened(

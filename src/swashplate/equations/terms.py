@@ -559,9 +559,7 @@ class Terms:
         number = "count" if "count" not in names else "count_"
         formal = tuple(
             (n, argument(shape(v), n))
-            for n, v in zip(
-                [number, names[0], *names[2:]], [count, state, *rest], strict=True
-            )
+            for n, v in zip([number, names[0], *names[2:]], [count, state, *rest], strict=True)
         )
         moving = repeated_moving(program)
         return self.invoke(
@@ -601,7 +599,9 @@ def repeated_moving(step: Program) -> tuple[tuple[str, ...], ...]:
     """Of each number of a state what it may follow once a step has been repeated, in order."""
     state, number = (name for name, _ in step.arguments[:2])
     own = paths(state, step.arguments[0][1])
-    reach = [{own.index(p) for p in moving if p in own} | {i} for i, moving in enumerate(step.moving)]
+    reach = [
+        {own.index(p) for p in moving if p in own} | {i} for i, moving in enumerate(step.moving)
+    ]
     for _ in own:
         reach = [set[int]().union(each, *(reach[k] for k in each)) for each in reach]
     order = [p for n, v in step.arguments if n != number for p in paths(n, v)]
