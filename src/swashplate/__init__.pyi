@@ -13,8 +13,8 @@ from .executors import Dask as Dask
 from .executors import Processes as Processes
 from .executors import Serial as Serial
 from .executors import Threads as Threads
-from .full_order.drive import FullOrderDrive as FullOrderDrive
-from .full_order.physical_set import PhysicalSet as PhysicalSet
+from .full_order import FullOrderDrive as FullOrderDrive
+from .full_order import PhysicalSet as PhysicalSet
 from .linear import FrequencyResponse as FrequencyResponse
 from .linear import LinearDrive as LinearDrive
 from .linear import OperatingPoint as OperatingPoint

@@ -11,7 +11,7 @@ from swashplate.equations.equation import closure, closure_hash, equation, inlin
 from swashplate.equations.jacobian import state_paths
 from swashplate.equations.library import soft_threshold
 from swashplate.equations.model import Model, Tap, join
-from swashplate.equations.primitives import interpolate, root
+from swashplate.equations.primitives import interpolate, repeated, root
 from swashplate.equations.use import Run, instance_of, parameter_paths, sensitivities, simulate
 from swashplate.equations.windows import Window
 
@@ -34,6 +34,7 @@ __all__ = [
     "join",
     "kernel",
     "parameter_paths",
+    "repeated",
     "root",
     "sensitivities",
     "simulate",

@@ -80,6 +80,8 @@ class Component:
 
     piece: int
     groups: list[Group]
+    signals: bool = False
+    """Whether the piece fills in the derivatives of signals as well."""
 
 
 @dataclass
@@ -394,7 +396,9 @@ class _Builder:
                     stored = stored._replace(kind="state")
                 self._store(stored, part.source(source))
         for signal in self._signals(part):
-            if signal in graph.aliases and (part.part, signal) not in self.values:
+            # what sub-steps lead to is not computed again
+            known = signal in graph.aliases or part.code.repeats
+            if known and (part.part, signal) not in self.values:
                 stored = Stored(part.part, "signals", signal)
                 if stored not in self.stored:
                     self._store(stored, f"signal {part.part} {signal}")
@@ -433,13 +437,18 @@ class _Builder:
             for each, node in results.items()
             if each.startswith("signals.") and each.removeprefix("signals.") not in graph.aliases
         }
-        if signals:
+        # derivatives are carried through sub-steps once, for states and signals
+        together = part.code.repeats
+        if signals and not together:
             graph.signal_piece = self._fill(graph, part, f"{own}_signals", signals)
         states = list(partials)
         flows = {
             out: {f"state.{by.path}" for by in each if by.kind == "state"} & {*states}
             for out, each in partials.items()
         }
+        if together:
+            every = {each: results[each] for each in states}
+            filled = self._fill(graph, part, own, every | signals)
         at_sample = {
             by.path
             for out, by in graph.entries
@@ -447,9 +456,10 @@ class _Builder:
         } | {place.path for place, _ in self.observed if place.kind == "state"}
         at_sample |= {s.signal for s in self.sampler.sources if s.part == part.part}
         graph.aliases = {s: path for s, path in graph.aliases.items() if path not in at_sample}
-        for c, outs in enumerate(_weakly_connected(states, flows)):
+        for c, outs in enumerate([states] if together else _weakly_connected(states, flows)):
             name = f"{own}_{c}" if len(outs) < len(states) else own
-            piece_of = self._fill(graph, part, name, {each: results[each] for each in outs})
+            if not together:
+                filled = self._fill(graph, part, name, {each: results[each] for each in outs})
             groups = []
             for members in _strongly_connected(outs, flows):
                 bare = tuple(each.removeprefix("state.") for each in members)
@@ -466,7 +476,7 @@ class _Builder:
                     for path, behind in zip(bare, after, strict=True)
                 )
                 groups.append(Group(bare, after, stored))
-            graph.components.append(Component(piece_of, groups))
+            graph.components.append(Component(filled, groups, together))
         constants = self._constants(part)
         if constants is not None:
             graph.constants = [

@@ -127,7 +127,7 @@ class _Planner:
             for component in part.components:
                 at = len(self.todo)
                 some = [self._group(part, group, by_result) for group in component.groups]
-                if any(some) and component.piece >= 0:
+                if (any(some) or component.signals) and component.piece >= 0:
                     self.todo.insert(at, (CALL, component.piece, 0, 0))
             if part.signal_piece >= 0:
                 self.todo.append((CALL, part.signal_piece, 0, 0))
