@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import namedtuple
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from types import FunctionType
+from types import CellType, FunctionType
 from typing import Any, get_type_hints
 
 from swashplate.equations.equation import closure, equation, equation_of_text, is_function
@@ -148,7 +148,13 @@ def _rebuilt(function: Any, old: Equation, made: dict[Any, Any], names: Mapping[
         for name, each in f.__globals__.items():
             if name in f.__code__.co_names and is_function(each) and _reaches(each, old):
                 space[name] = _rebuilt(each, old, made, names)
-        copy = FunctionType(f.__code__, space, f.__name__, f.__defaults__, f.__closure__)
+        cells = tuple(
+            CellType(_rebuilt(cell.cell_contents, old, made, names))
+            if is_function(cell.cell_contents) and _reaches(cell.cell_contents, old)
+            else cell
+            for cell in f.__closure__ or ()
+        )
+        copy = FunctionType(f.__code__, space, f.__name__, f.__defaults__, cells or None)
         copy.__kwdefaults__, copy.__module__ = f.__kwdefaults__, f.__module__
         copy.__annotations__ = {
             key: names.get(each.__name__, each) if is_named_tuple(each) else each
