@@ -327,8 +327,8 @@ def simulate_many(
             model, instance.options, numbers, records, 1.0 / rate, output, nothing, nothing, True
         )
         good = np.isfinite(block.end) & (block.worst > 0.0)
-        rows = np.where(good[:, None], block.outputs.T, np.nan)
-        found[begin : begin + LANES] = rows[: min(LANES, count - begin)]
+        block.outputs[~good] = np.nan
+        found[begin : begin + LANES] = block.outputs[: count - begin]
     return found
 
 

@@ -122,7 +122,7 @@ def simulate_many(
         if costs is not None:
             costs[chosen[good]] = found.cost[:size][good]
         if outputs is not None:
-            outputs[chosen[good]] = found.outputs[:: record.substeps, :size].T[good]
+            outputs[chosen[good]] = found.outputs[:size, :: record.substeps][good]
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         # each job writes its own sets' places, so the result does not depend on who is first
