@@ -1,6 +1,6 @@
 """A model of one's own, marched, differentiated and batched like the package's drives."""
 
-from math import exp
+from math import cos, exp, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +9,8 @@ import pytest
 from swashplate import InputError
 from swashplate.equations import equation
 from swashplate.equations.model import Model, Tap, join
-from swashplate.equations.use import sensitivities, simulate, simulate_many
+from swashplate.equations.use import sensitivities, simulate
+from swashplate.simulation.batch import simulate_many
 
 
 class Valve(NamedTuple):
@@ -115,10 +116,33 @@ def test_where_the_state_begins_has_a_derivative() -> None:
 def test_many_sets_are_each_alone_to_the_last_bit() -> None:
     gains = np.linspace(0.1, 0.9, 19)
     free = Model("lagged", Valve, Rod, lagged)
-    rows = simulate_many(free, P, {"gain": gains}, {"command": COMMAND}, RATE, output="position")
+    rows = simulate_many(free, P, {"gain": gains}, {"command": COMMAND}, RATE, output="position").output
     for gain, row in zip(gains, rows, strict=True):
         alone = simulate(free, P._replace(gain=float(gain)), {"command": COMMAND}, RATE)
         assert (alone["position"] == row).all()
+
+
+def test_a_library_and_decisions_leave_the_bits_of_many_sets_alone() -> None:
+    model = Model("wobbling", Valve, Rod, wobbling)
+    changes = {"gain": np.linspace(0.1, 0.9, 21), "lag": np.linspace(0.04, 0.08, 21)}
+    changes["overlap"] = np.linspace(-0.2, 0.2, 21)
+    rows = simulate_many(model, P, changes, {"command": COMMAND}, RATE, output="position").output
+    for i, row in enumerate(rows):
+        p = P._replace(**{name: float(values[i]) for name, values in changes.items()})
+        alone = simulate(model, p, {"command": COMMAND}, RATE)["position"]
+        assert (alone == row).all()
+
+
+@equation
+def wobbling(state: Rod, command: float, p: Valve, h: float) -> Rod:
+    left = exp(-h / p.lag) if p.lag > 0.05 else exp(-h / 0.05)
+    far = abs(command) > p.overlap and (state.position > 0.1 or state.opening < 0.2)
+    swing = 0.0
+    if far:
+        swing = sin(state.position) / (1.0 + cos(state.opening) ** 2)
+    target = command + swing if far else p.overlap
+    opening = left * state.opening + (1.0 - left) * target
+    return Rod(opening, state.position + h * p.gain * opening**3 / (p.overlap + 0.5))
 
 
 @equation

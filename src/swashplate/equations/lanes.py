@@ -1,46 +1,178 @@
 """Many sets of one model side by side: LANES of them in the innermost loop of one march.
 
-The compiler turns the loop over lanes into vector instructions, because the equations stand in it
-as straight code. Arithmetic is as strict as in the plain march, so that each set's numbers are the
-same to the last bit, whatever its neighbours are.
+The compiler turns a loop over lanes into vector instructions if there is nothing in it but
+arithmetic on rows of neighbouring numbers. Hence
+
+- a decision is not a branch: both ways are computed, and `choose` takes one;
+- what does not change over the march is computed once, ahead of it: the compiler moves it out of a
+  plain march by itself, but not out of this one;
+- what a lane sees of a record at a place of its own is fetched number by number, a sample ahead of
+  its use: a row that was just written piecemeal cannot be read at once;
+- a call of a library has a loop over lanes of its own, between those that are vectors.
+
+The operations of the equations and their order are those of the plain march, so that each set's
+numbers are the same to the last bit, whatever its neighbours are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import reduce
+from itertools import groupby, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import config, types
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.fields import floats_of
+from swashplate.equations.expressions import Node
 from swashplate.equations.lowering import generating
 from swashplate.equations.march import (
-    PartCode,
     Sampler,
     function_source,
     indented,
     output_of,
     rest_of,
-    taps_of,
 )
 from swashplate.equations.model import Model
-from swashplate.equations.program import leaves
+from swashplate.equations.program import Choice, Item, Let, leaves
 from swashplate.equations.run import module
-from swashplate.equations.scalars import text
+from swashplate.equations.scalars import Code, text
+from swashplate.equations.triangle import aligned
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 LANES = 16
 """Sets marched side by side: two vectors of eight where the processor has them, else four of 4."""
 
 
+# --- straight code --------------------------------------------------------------------------------
+
+
+def _choose(test: bool, one: Any, two: Any) -> Any:
+    return one if test else two
+
+
+def _selected(typing: Any, test: Any, one: Any, two: Any) -> Any:
+    kind = types.boolean if one == two == types.boolean else types.float64
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return builder.select(*values)
+
+    return kind(types.boolean, kind, kind), generate
+
+
+choose: Any = _choose if config.DISABLE_JIT else intrinsic(_selected)  # type: ignore[attr-defined]
+"""One of two numbers, both of which have been computed.
+
+From ``a if test else b`` the compiler makes a choice between two addresses, and gathers.
+"""
+
+VECTOR = {*ex.CHEAP, "choose", "/", "sqrt", "**"}
+"""Operations that processors have for many numbers at once."""
+
+
+def is_vector(node: Node) -> bool:
+    """Whether a processor can compute an expression for many lanes at once."""
+    return node.op in VECTOR and all(map(is_vector, node.args))
+
+
+def is_flat(item: Item) -> bool:
+    """Whether all of an item can be computed for many lanes at once, whatever its tests say."""
+    if isinstance(item, Choice):
+        merged = [node for each in item.merged for node in each[1:]]
+        return all(map(is_flat, (*item.then, *item.other))) and all(map(is_vector, merged))
+    return isinstance(item, Let) and is_vector(item.node)
+
+
+class Statement(NamedTuple):
+    """Lines that give some names their values."""
+
+    names: tuple[str, ...]
+    lines: list[str]
+    reads: frozenset[str]
+    vector: bool
+    """Whether a processor can do it for many lanes at once."""
+
+
+class Straight:
+    """Code of a sample without branches, and what can be computed ahead of the march.
+
+    Parameters
+    ----------
+    still : iterable of str
+        Names of numbers that do not change over the march.
+    fresh : callable
+        Gives a name that is not taken.
+    """
+
+    def __init__(self, still: Iterable[str], fresh: Callable[[str], str]) -> None:
+        self.still, self.fresh = {"h", *still}, fresh
+        self.ahead: list[Statement] = []
+        self.statements: list[Statement] = []
+        self._moved: dict[Node, Node] = {}
+
+    def add(self, code: Code, items: Iterable[Item]) -> None:
+        """Append items of some code."""
+        for item in items:
+            if isinstance(item, Let):
+                self.let(item.name, item.node)
+            elif isinstance(item, Choice) and is_flat(item):
+                self.add(code, (*item.then, *item.other))
+                for name, one, two in item.merged:
+                    self.let(name, ex.make("if", item.test, one, two))
+            else:
+                made = item.merged if isinstance(item, Choice) else leaves(item.result)
+                names = [each[0] if isinstance(item, Choice) else each[1].value for each in made]
+                alone = Code()
+                alone.items = [item]
+                reads = frozenset(alone.reads(map(ex.name, names)))
+                self._append(Statement(tuple(names), code.written([item]), reads, False))
+
+    def let(self, name: str, node: Node) -> None:
+        """Append a name and what it stands for."""
+        made = node if node.reads <= self.still else self.node(node)
+        self._append(Statement((name,), [f"{name} = {text(made)}"], made.reads, is_vector(made)))
+
+    def _append(self, statement: Statement) -> None:
+        if statement.reads <= self.still:
+            self.still.update(statement.names)
+            self.ahead.append(statement)
+        else:
+            self.statements.append(statement)
+
+    def node(self, node: Node) -> Node:
+        """An expression without branches, and without what can be computed ahead of the march."""
+        if node.op in ex.LEAVES:
+            return node
+        if node.reads and node.reads <= self.still:
+            if node not in self._moved:
+                name = self.fresh("still")
+                self.let(name, node)
+                self._moved[node] = ex.name(name, node.kind)
+            return self._moved[node]
+        args = [self.node(each) for each in node.args]
+        if node.op == "if" and node.kind != "int":
+            return ex.make("choose", *args, kind=node.kind)
+        if node.op == "and":
+            return reduce(lambda a, b: ex.make("choose", a, b, ex.number(False), kind="bool"), args)
+        if node.op == "or":
+            return reduce(lambda a, b: ex.make("choose", a, ex.number(True), b, kind="bool"), args)
+        return ex.make(node.op, *args, value=node.value)
+
+
+# --- the kernels' text ----------------------------------------------------------------------------
+
+
 class Rows:
-    """Numbers of the rows of a block of lanes, given out on demand."""
+    """Rows of a block of lanes, given out on demand.
+
+    A block is one flat array: row r of lane l is ``flat[r * LANES + l]``. With everything in one
+    array at known distances the compiler need not prove at run time that rows do not overlap.
+    """
 
     def __init__(self) -> None:
         self.number: dict[str, int] = {}
@@ -49,131 +181,149 @@ class Rows:
         """Text of a lane's number in the row of a name."""
         return f"flat[{self.number.setdefault(name, len(self.number))} * LANES + lane]"
 
+    def loads(self, names: Iterable[str]) -> list[str]:
+        """Lines that take numbers out of their rows."""
+        return [f"{name} = {self.text(name)}" for name in sorted(names)]
+
+    def saves(self, names: Iterable[str]) -> list[str]:
+        """Lines that put numbers into their rows."""
+        return [f"{self.text(name)} = {name}" for name in sorted(names)]
+
+    def loops(self, statements: Iterable[Statement], shared: set[str]) -> list[str]:
+        """Loops over lanes, cut where a library is called; `shared` is the same for all lanes."""
+        cut = [list(each) for _, each in groupby(statements, lambda each: each.vector)]
+        lines: list[str] = []
+        for k, each in enumerate(cut):
+            made = {name for statement in each for name in statement.names}
+            read = {name for statement in each for name in statement.reads}
+            later = {name for after in cut[k + 1 :] for s in after for name in s.reads}
+            body = [line for statement in each for line in statement.lines]
+            loads, saves = self.loads(read - made - shared), self.saves(made & later)
+            lines += over_lanes([*loads, *body, *saves])
+        return lines
+
+
+def over_lanes(lines: Sequence[str]) -> list[str]:
+    """A loop over lanes."""
+    return ["for lane in range(LANES):", *indented(lines)] if lines else []
+
 
 def lanes_source(
     model: Model, signals: Sequence[str], options: Sequence[Any], output: str
 ) -> tuple[str, dict[str, Any], dict[str, int], Sampler]:
     """Text of the march of LANES sets over one record, its names, and the rows of its block.
 
-    A block is one flat array: row r of lane l is ``flat[r * LANES + l]``. With everything in one
-    array at known distances the compiler need not prove at run time that rows do not overlap, and
-    vectorises. Two kernels:
+    Two kernels:
 
-    - ``prepare(h, flat)`` computes constants and states at rest of every lane;
-    - ``march(records, before, whole, h, flat, measured, weight, outputs)`` marches, and returns
-      nothing: costs and the worst margins are rows of the block.
+    - ``prepare(h, flat)`` computes what does not change, and states at rest, of every lane;
+    - ``march(records, whole, h, flat, measured, weight, outputs)`` marches: costs and the worst
+      margins are rows of the block, and ``outputs``, unless empty, are a row for each lane.
     """
     place, is_rate = output_of(model, output)
-    sampler = Sampler(model, signals, options, [place])
-    rows = Rows()
+    sampler, rows = Sampler(model, signals, options, [place]), Rows()
     parts = sampler.used()
+    known = {node.value for part in parts for _, node in (*leaves(part.p), *leaves(part.given))}
+    known |= {part.fraction(tap) for part in parts for tap in part.taps}
+    constants = {name for part in parts for name in sampler.constants(part)}
+    straight = Straight(known | constants, parts[0].code.fresh)
 
-    def loads(names: Iterable[str]) -> list[str]:
-        return [f"{name} = {rows.text(name)}" for name in names]
-
-    def saves(names: Iterable[str]) -> list[str]:
-        return [f"{rows.text(name)} = {name}" for name in names]
-
-    def outside(part: PartCode, read: set[str]) -> list[str]:
-        every = [*leaves(part.p), *leaves(part.given)]
-        return [node.value for _, node in every if node.value in read]
-
-    def states(part: PartCode) -> list[str]:
-        names = dict(leaves(part.state))
-        return [names[path].value for path in sampler.carried[part.part]]
-
-    prepare: list[str] = []
+    # what rows become at the end of a sample
+    following: dict[str, Node] = {}
+    shown = ex.name("value")
     for part in parts:
-        constants = sampler.constants(part)
-        made = [ex.name(name) for name in constants]
-        rest = rest_of(part)
-        at_rest = [dict(leaves(rest.value))[path] for path in sampler.carried[part.part]]
-        read = part.prologue.reads([*made, *at_rest]) | rest.code.reads(at_rest)
-        needed = [ex.name(each) for each in read]
-        lines = [
-            *loads(outside(part, read | part.prologue.reads(needed))),
-            *part.prologue.lines([*made, *needed]),
-            *saves(constants),
-            *rest.code.lines(at_rest),
-        ]
-        for name, node in zip(states(part), at_rest, strict=True):
-            lines.append(f"{rows.text(name)} = {text(node)}")
-        prepare += ["for lane in range(LANES):", *indented(lines or ["pass"])]
-
-    inner: list[str] = []
-    taps = [(part, tap) for part in parts for tap in part.taps]
-    if taps:
-        shift, fetch = [], []
-        for part, tap in taps:
-            samples = part.tap_samples(tap)
-            for newer, older in reversed(list(pairwise(samples))):
-                shift.append(f"{rows.text(older)} = {rows.text(newer)}")
-            row = sampler.signals.index(tap.tap.signal)
-            fetch.append(
-                f"{rows.text(samples[0])} = sample_at(records[{row}], n - whole[{tap.number}, "
-                f"lane], before[{row}])"
-            )
-        inner += ["for lane in range(LANES):", *indented(shift)]
-        # apart, because a loop that reads at computed places is not vectorised
-        inner += ["for lane in range(LANES):", *indented(fetch)]
-    for part in parts:
-        read = sampler.read(part)
-        known = [*outside(part, read), *sampler.constants(part), *states(part)]
-        known += [name for tap in part.taps for name in part.tap_samples(tap) if name in read]
-        known += [part.fraction(tap) for tap in part.taps if part.fraction(tap) in read]
-        known += [part.source(s) for s in sampler.sources if part.source(s) in read]
-        lines = loads(dict.fromkeys(known))
-        for signal in sampler.signals:
-            if f"x_{signal}" in read:
-                inner.append(f"x_{signal} = records[{sampler.signals.index(signal)}][n]")
-        lines += sampler.body(part)
-        lines += saves(part.source(s) for s in sampler.sources if s.part == part.part)
+        straight.add(part.code, part.code.kept(sampler.ends[part.part]))
+        for source, node in sampler.sources.items():
+            if source.part == part.part:
+                straight.let(part.source(source), node)
         if part.margin is not None:
-            worst = rows.text("worst")
-            lines.append(f"{worst} = min({worst}, {text(part.margin)})")
+            worst = following.get("worst", ex.name("worst"))
+            following["worst"] = ex.make("min", worst, part.margin)
         if place.part == part.part:
-            shown = sampler.stored(part, [place], "n")
-            value = shown[-1].removeprefix("out[0, n] = ")
-            lines += [*shown[:-1], f"value = {value}"]
-            if is_rate:
-                total, rate = rows.text("integral"), rows.text("rate")
-                lines += [
-                    f"total = {total} + half * ({rate} + value)",
-                    f"{rate} = value",
-                    f"{total} = total",
-                    "value = total",
-                ]
-            cost = rows.text("cost")
-            lines += [
-                "error = value - target",
-                f"{rows.text('observed')} = value",
-                f"{cost} = {cost} + counts * error * error",
-            ]
-        lines += sampler.step(part)
-        lines += saves(states(part))
-        inner += ["for lane in range(LANES):", *indented(lines)]
-    # read here, where no store between can have changed them
-    inner[:0] = ["target = measured[n]", "counts = weight[n]"]
+            code, node = sampler.observed(part, place)
+            straight.add(code, code.kept([node]))
+            straight.let("value", node)
+        state, step = dict(leaves(part.state)), dict(leaves(part.following))
+        following |= {state[path].value: step[path] for path in sampler.carried[part.part]}
     if is_rate:
-        inner.insert(0, "half = 0.5 * h if n > 0 else 0.0")
-    inner += [
-        "if outputs.shape[0] > 0:",
-        "    for lane in range(LANES):",
-        f"        outputs[n, lane] = {rows.text('observed')}",
-    ]
+        trapezium = ex.make("*", ex.name("half"), ex.make("+", ex.name("rate"), shown))
+        following["rate"] = shown
+        straight.let("integral", ex.make("+", ex.name("total"), trapezium))
+        following["total"] = shown = ex.name("integral")
+    straight.let("error", ex.make("-", shown, ex.name("target")))
+    square = ex.make("*", ex.make("*", ex.name("counts"), ex.name("error")), ex.name("error"))
+    following |= {"cost": ex.make("+", ex.name("cost"), square), "shown": shown}
+
+    first, fetched = [], []
+    for part in parts:
+        for tap in part.taps:
+            samples, record = part.tap_samples(tap), sampler.signals.index(tap.tap.signal)
+            names = [f"{part.fraction(tap)}_coming", *samples]
+            for lines, name, n in ((first, names[1], "0"), (fetched, names[0], "coming")):
+                index = f"{n} - whole[{tap.number}, lane]"
+                lines.append(f"{rows.text(name)} = sample_at(records[{record}], {index}, 0.0)")
+            following |= {older: ex.name(newer) for newer, older in pairwise(names)}
+    for name, node in following.items():
+        made = straight.node(node)
+        line = f"{rows.text(name)} = {text(made)}"
+        straight.statements.append(Statement((), [line], made.reads, True))
+
+    read = {name for each in straight.statements for name in each.reads}
+    shared = {"target": "measured[n]", "counts": "weight[n]"}
+    shared["half"] = "0.5 * h if n > 0 else 0.0"
+    shared |= {f"x_{name}": f"records[{k}][n]" for k, name in enumerate(sampler.signals)}
+    inner = [f"{name} = {value}" for name, value in shared.items() if name in read]
+    if fetched:
+        inner += ["coming = min(n + 1, last)", *over_lanes(fetched)]
+    inner += rows.loops(straight.statements, {"h", *shared})
+    kept = over_lanes([f"outputs[lane, n] = {rows.text('shown')}"])
+    inner += ["if outputs.size > 0:", *indented(kept)]
+
+    ahead = [line for each in straight.ahead for line in each.lines]
+    ahead += rows.saves(read & straight.still - known - {"h"})
+    used = {name for each in straight.ahead for name in each.reads}
+    for part in parts:
+        rest = rest_of(part)
+        names, nodes = dict(leaves(part.state)), dict(leaves(rest.value))
+        at_rest = {names[path].value: nodes[path] for path in sampler.carried[part.part]}
+        ahead += rest.code.lines(at_rest.values())
+        ahead += [f"{rows.text(name)} = {text(node)}" for name, node in at_rest.items()]
+        reads = {*sampler.constants(part), *rest.code.reads(at_rest.values())}
+        needed = [ex.name(name) for name in reads]
+        ahead[:0] = part.prologue.lines(needed)
+        used |= part.prologue.reads(needed)
     texts = [
         function_source(
             "prepare(h, flat)",
-            f"Constants and states at rest of LANES sets of {model.name}.",
-            prepare,
+            f"What does not change, and states at rest, of LANES sets of {model.name}.",
+            over_lanes([*rows.loads(used & known), *ahead]),
         ),
         function_source(
-            "march(records, before, whole, h, flat, measured, weight, outputs)",
+            "march(records, whole, h, flat, measured, weight, outputs)",
             f"March LANES sets of {model.name} over one record.",
-            ["for n in range(records[0].size):", *indented(inner)],
+            [
+                "last = measured.size - 1",
+                *over_lanes(first),
+                "for n in range(measured.size):",
+                *indented(inner),
+            ],
         ),
     ]
-    return "\n\n".join(texts), {**sampler.names, "LANES": LANES}, rows.number, sampler
+    names = {**sampler.names, "LANES": LANES, "choose": choose}
+    return "\n\n".join(texts), names, rows.number, sampler
+
+
+# --- marching -------------------------------------------------------------------------------------
+
+
+class Delayed(NamedTuple):
+    """How one of the model's taps looks at its signal."""
+
+    number: int
+    delay: str | None
+    """Path of the parameter."""
+    ahead: float
+    fraction: int | None
+    """Row of the fraction of a sample, if anything reads it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,12 +333,11 @@ class Lanes:
     prepare: Callable[..., None]
     march: Callable[..., None]
     rows: Mapping[str, int]
-    columns: Mapping[str, str]
-    """Name in the kernels of each parameter and given, as `march_lanes` takes them."""
-    fractions: Mapping[int, str]
-    """Name of each tap's fraction."""
-    states: tuple[str, ...]
-    """Names of the states."""
+    columns: Mapping[str, tuple[int, float | None]]
+    """Row and default of each parameter and given that is read, as `march_lanes` takes them."""
+    taps: Sequence[Delayed]
+    ends: Sequence[int]
+    """Rows of states and cost."""
 
 
 @generating
@@ -198,17 +347,23 @@ def lanes_of(
     """The compiled lanes of a model for one output."""
     source, names, rows, sampler = lanes_source(model, signals, options, output)
     made = module(f"{model.name}_lanes", source, names)
-    columns: dict[str, str] = {}
-    fractions: dict[int, str] = {}
-    states: list[str] = []
-    for part in sampler.parts:
+    columns: dict[str, tuple[int, float | None]] = {}
+    taps, ends = [], [rows["cost"]]
+    for part in sampler.used():
         prefix = f"{part.own.name}." if len(model.parts) > 1 else ""
-        columns |= {f"{prefix}{path}": name for name, path in part.parameters.items()}
-        columns |= {f"given {prefix}{path}": node.value for path, node in leaves(part.given)}
-        fractions |= {tap.number: part.fraction(tap) for tap in part.taps}
-        own = dict(leaves(part.state))
-        states += [own[path].value for path in sampler.carried[part.part]]
-    return Lanes(made["prepare"], made["march"], rows, columns, fractions, tuple(states))
+        defaults, states = part.own.parameters._field_defaults, dict(leaves(part.state))
+        for name, path in part.parameters.items():
+            if name in rows:
+                columns[f"{prefix}{path}"] = rows[name], defaults.get(path)
+        for path, node in leaves(part.given):
+            if node.value in rows:
+                columns[f"given {prefix}{path}"] = rows[node.value], None
+        for each in part.taps:
+            delay = f"{prefix}{each.tap.delay}" if each.tap.delay else None
+            fraction = rows.get(part.fraction(each))
+            taps.append(Delayed(each.number, delay, each.tap.ahead, fraction))
+        ends += [rows[states[path].value] for path in sampler.carried[part.part]]
+    return Lanes(made["prepare"], made["march"], rows, columns, taps, ends)
 
 
 class Marched(NamedTuple):
@@ -221,7 +376,7 @@ class Marched(NamedTuple):
     end: Array
     """(LANES,) a sum that is finite where all numbers are."""
     outputs: Array
-    """(n, LANES) the output, or (0, LANES)."""
+    """(LANES, n) the output, or (LANES, 0)."""
 
 
 def march_lanes(
@@ -253,42 +408,26 @@ def march_lanes(
     keep : bool
         Whether the output is kept.
     """
-    signals = tuple(records)
-    lanes = lanes_of(model, signals, options, output)
-    block = np.zeros((len(lanes.rows), LANES))
-    if "worst" in lanes.rows:
-        block[lanes.rows["worst"]] = np.inf
-    for path, name in lanes.columns.items():
-        if name in lanes.rows:
-            block[lanes.rows[name]] = numbers[path] if path in numbers else default_of(model, path)
-    taps = taps_of(model, signals)
-    whole = np.zeros((max(len(taps), 1), LANES), dtype=np.int64)
-    for each in taps:
-        prefix = f"{model.parts[each.part].name}." if len(model.parts) > 1 else ""
-        delay = numbers[f"{prefix}{each.tap.delay}"] / h if each.tap.delay else np.zeros(LANES)
-        end = np.maximum(delay, each.tap.ahead) - each.tap.ahead
-        whole[each.number] = np.floor(end).astype(np.int64)
-        if lanes.fractions[each.number] in lanes.rows:
-            block[lanes.rows[lanes.fractions[each.number]]] = end - whole[each.number]
-    size = next(iter(records.values())).size
-    outputs = np.empty((size if keep else 0, LANES))
-    flat = block.reshape(-1)
+    lanes = lanes_of(model, tuple(records), options, output)
+    block = aligned(len(lanes.rows), LANES)
+    for path, (row, default) in lanes.columns.items():
+        block[row] = numbers[path] if default is None else numbers.get(path, default)
+    highest = max((tap.number for tap in lanes.taps), default=0)
+    whole = np.zeros((highest + 1, LANES), dtype=np.int64)
+    for tap in lanes.taps:
+        delay = numbers[tap.delay] / h if tap.delay is not None else np.zeros(LANES)
+        end = np.maximum(delay, tap.ahead) - tap.ahead
+        whole[tap.number] = np.floor(end)
+        if tap.fraction is not None:
+            block[tap.fraction] = end - whole[tap.number]
+    worst = block[lanes.rows["worst"]] if "worst" in lanes.rows else np.empty(LANES)
+    worst[:] = np.inf
+    size = measured.size
+    # rows an odd number of cache lines apart, so that they do not share places in a cache
+    outputs = np.empty((LANES, (size | 15) + 9 if keep else 0))
     values = tuple(np.require(each, np.float64, ["C", "W"]) for each in records.values())
-    lanes.prepare(h, flat)
-    lanes.march(values, (0.0,) * len(values), whole, h, flat, measured, weight, outputs)
-    worst = block[lanes.rows["worst"]] if "worst" in lanes.rows else np.full(LANES, np.inf)
-    ends = [block[lanes.rows[name]] for name in (*lanes.states, "cost") if name in lanes.rows]
-    return Marched(block[lanes.rows["cost"]], worst, np.sum(ends, axis=0), outputs)
-
-
-def default_of(model: Model, path: str) -> float:
-    """What a parameter is where nobody gives it."""
-    first, _, rest = path.partition(".")
-    for part in model.parts:
-        if len(model.parts) == 1 or part.name == first:
-            name = path if len(model.parts) == 1 else rest
-            if name in part.parameters._field_defaults:
-                return float(part.parameters._field_defaults[name])
-            if name in floats_of(part.parameters):
-                break
-    raise KeyError(path)
+    with np.errstate(all="ignore"):  # of ways that are not taken there is nothing to say
+        lanes.prepare(h, block.reshape(-1))
+        lanes.march(values, whole, h, block.reshape(-1), measured, weight, outputs)
+    end = block[lanes.ends].sum(axis=0)
+    return Marched(block[lanes.rows["cost"]], worst, end, outputs[:, :size])

@@ -42,7 +42,7 @@ _OWN = """
 n m j c lane first last worst h half value error total count span used progress values lines
 whole fraction params given constants states out flags records before measured weight outputs flat
 table kept tangent columns program plan sink room block met machine volts current speed voltage
-target counts
+target counts coming cost rate integral shown
 """
 RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
 """Names that the kernels use themselves."""
@@ -486,23 +486,25 @@ class Sampler:
                     lines.append(f"flags[{flag}, {at}] = {packed}")
                 flag += 1
                 continue
-            if each.kind == "link" and self.model.links[each.path].after == part.part:
-                code = Code()
-                code.taken = part.code.taken
-                link = self.model.links[each.path]
-                sources: dict[str, Value] = {
-                    s.signal: ex.name(part.source(s)) for s in link.sources
-                }
-                assert link.equation is not None
-                made = code.called(link.equation, sources)
-                assert isinstance(made, Node)
+            if each.part == part.part:
+                code, made = self.observed(part, each)
                 target = into(row) if into else f"out[{row}, {at}]"
                 lines += [*code.lines([made]), f"{target} = {text(made)}"]
-            elif each.kind != "link" and each.part == part.part:
-                target = into(row) if into else f"out[{row}, {at}]"
-                lines.append(f"{target} = {text(part.node(each))}")
             row += 1
         return lines
+
+    def observed(self, part: PartCode, stored: Stored) -> tuple[Code, Node]:
+        """A number that is kept, and the code that makes it of what is known at its part's end."""
+        code = Code()
+        code.taken = part.code.taken
+        if stored.kind != "link":
+            return code, part.node(stored)
+        link = self.model.links[stored.path]
+        sources: dict[str, Value] = {s.signal: ex.name(part.source(s)) for s in link.sources}
+        assert link.equation is not None
+        made = code.called(link.equation, sources)
+        assert isinstance(made, Node)
+        return code, made
 
     def margin(self, part: PartCode) -> list[str]:
         """Lines that keep the worst margin."""

@@ -199,11 +199,18 @@ class Code:
 
     def lines(self, wanted: Iterable[Node]) -> list[str]:
         """Text of the items that some results need."""
+        return self.written(self.kept(wanted))
+
+    def kept(self, wanted: Iterable[Node]) -> list[Item]:
+        """Items that some results need."""
         needed: set[str] = set()
         for node in wanted:
             needed |= node.reads
-        kept = self._live(self.items, needed)
-        return list(self._lines(kept))
+        return self._live(self.items, needed)
+
+    def written(self, items: Iterable[Item]) -> list[str]:
+        """Text of items."""
+        return list(self._lines(items))
 
     def reads(self, wanted: Iterable[Node]) -> set[str]:
         """Names from outside that some results need, decisions included."""
@@ -239,7 +246,7 @@ class Code:
                     kept.append(item)
         return kept[::-1]
 
-    def _lines(self, items: Sequence[Item]) -> Iterator[str]:
+    def _lines(self, items: Iterable[Item]) -> Iterator[str]:
         for item in items:
             if isinstance(item, Let):
                 yield f"{item.name} = {text(item.node)}"

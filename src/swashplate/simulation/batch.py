@@ -157,7 +157,7 @@ def _march(shared: _Sets, blocks: Sequence[_Block]) -> list[_Marched]:
         bad = ~(np.isfinite(end) & (worst > 0.0))
         values: Array | None = np.where(bad, np.inf, found.cost[:size])
         if shared.keep:
-            values = found.outputs[:: record.substeps, :size].T
+            values = found.outputs[:size, :: record.substeps]
             values[bad] = np.nan
             if shared.to is not None:
                 table |= {str(number): row for number, row in zip(sets, values, strict=True)}
