@@ -19,7 +19,9 @@ Examples
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -291,6 +293,7 @@ def simulate_many(
     *,
     output: str,
     options: Any = None,
+    threads: int | None = None,
 ) -> Array:
     """(m, n) a signal of many parameter sets over one record, from rest.
 
@@ -302,6 +305,8 @@ def simulate_many(
         Values of parameters, by path; the others are those of `p`.
     output : str
         The signal.
+    threads : int, optional
+        Blocks of sets at once, one a core by default. The numbers do not depend on it.
     """
     instance = instance_of(model, p, options=options)
     records = records_of(instance, inputs, rate)
@@ -317,7 +322,8 @@ def simulate_many(
     size = next(iter(records.values())).size
     nothing = np.zeros(size)
     found = np.empty((count, size))
-    for begin in range(0, count, LANES):
+
+    def march(begin: int) -> None:
         chosen = np.resize(np.arange(begin, min(begin + LANES, count)), LANES)
         numbers = {
             path: values[path][chosen] if path in values else np.full(LANES, number)
@@ -329,6 +335,9 @@ def simulate_many(
         good = np.isfinite(block.end) & (block.worst > 0.0)
         block.outputs[~good] = np.nan
         found[begin : begin + LANES] = block.outputs[: count - begin]
+
+    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+        list(pool.map(march, range(0, count, LANES)))
     return found
 
 
