@@ -1,30 +1,18 @@
 """Many sets of one model side by side: LANES of them in the innermost loop of one march.
 
-The compiler turns a loop over lanes into vector instructions if there is nothing in it but
-arithmetic on rows of neighbouring numbers. Hence
-
-- a decision is not a branch: both ways are computed, and `choose` takes one;
-- what does not change over the march is computed once, ahead of it: the compiler moves it out of a
-  plain march by itself, but not out of this one;
-- what a lane sees of a record at a place of its own is fetched number by number, a sample ahead of
-  its use: a row that was just written piecemeal cannot be read at once;
-- a call of a library has a loop over lanes of its own, between those that are vectors.
-
-The operations of the equations and their order are those of the plain march, so that each set's
-numbers are the same to the last bit, whatever its neighbours are.
+The equations stand in that loop as straight code (`straight`), which the compiler turns into vector
+instructions. Arithmetic is as strict as in the plain march, so that each set's numbers are the same
+to the last bit, whatever its neighbours are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
-from itertools import groupby, pairwise
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import config, types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from swashplate.equations import expressions as ex
@@ -38,133 +26,16 @@ from swashplate.equations.march import (
     rest_of,
 )
 from swashplate.equations.model import Model
-from swashplate.equations.program import Choice, Item, Let, leaves
+from swashplate.equations.program import leaves
 from swashplate.equations.run import module
-from swashplate.equations.scalars import Code, text
+from swashplate.equations.scalars import text
+from swashplate.equations.straight import CALLED, Statement, Straight
 from swashplate.equations.triangle import aligned
 
 Array = NDArray[np.float64]
 
 LANES = 16
 """Sets marched side by side: two vectors of eight where the processor has them, else four of 4."""
-
-
-# --- straight code --------------------------------------------------------------------------------
-
-
-def _choose(test: bool, one: Any, two: Any) -> Any:
-    return one if test else two
-
-
-def _selected(typing: Any, test: Any, one: Any, two: Any) -> Any:
-    kind = types.boolean if one == two == types.boolean else types.float64
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return builder.select(*values)
-
-    return kind(types.boolean, kind, kind), generate
-
-
-choose: Any = _choose if config.DISABLE_JIT else intrinsic(_selected)  # type: ignore[attr-defined]
-"""One of two numbers, both of which have been computed.
-
-From ``a if test else b`` the compiler makes a choice between two addresses, and gathers.
-"""
-
-VECTOR = {*ex.CHEAP, "choose", "/", "sqrt", "**"}
-"""Operations that processors have for many numbers at once."""
-
-
-def is_vector(node: Node) -> bool:
-    """Whether a processor can compute an expression for many lanes at once."""
-    return node.op in VECTOR and all(map(is_vector, node.args))
-
-
-def is_flat(item: Item) -> bool:
-    """Whether all of an item can be computed for many lanes at once, whatever its tests say."""
-    if isinstance(item, Choice):
-        merged = [node for each in item.merged for node in each[1:]]
-        return all(map(is_flat, (*item.then, *item.other))) and all(map(is_vector, merged))
-    return isinstance(item, Let) and is_vector(item.node)
-
-
-class Statement(NamedTuple):
-    """Lines that give some names their values."""
-
-    names: tuple[str, ...]
-    lines: list[str]
-    reads: frozenset[str]
-    vector: bool
-    """Whether a processor can do it for many lanes at once."""
-
-
-class Straight:
-    """Code of a sample without branches, and what can be computed ahead of the march.
-
-    Parameters
-    ----------
-    still : iterable of str
-        Names of numbers that do not change over the march.
-    fresh : callable
-        Gives a name that is not taken.
-    """
-
-    def __init__(self, still: Iterable[str], fresh: Callable[[str], str]) -> None:
-        self.still, self.fresh = {"h", *still}, fresh
-        self.ahead: list[Statement] = []
-        self.statements: list[Statement] = []
-        self._moved: dict[Node, Node] = {}
-
-    def add(self, code: Code, items: Iterable[Item]) -> None:
-        """Append items of some code."""
-        for item in items:
-            if isinstance(item, Let):
-                self.let(item.name, item.node)
-            elif isinstance(item, Choice) and is_flat(item):
-                self.add(code, (*item.then, *item.other))
-                for name, one, two in item.merged:
-                    self.let(name, ex.make("if", item.test, one, two))
-            else:
-                made = item.merged if isinstance(item, Choice) else leaves(item.result)
-                names = [each[0] if isinstance(item, Choice) else each[1].value for each in made]
-                alone = Code()
-                alone.items = [item]
-                reads = frozenset(alone.reads(map(ex.name, names)))
-                self._append(Statement(tuple(names), code.written([item]), reads, False))
-
-    def let(self, name: str, node: Node) -> None:
-        """Append a name and what it stands for."""
-        made = node if node.reads <= self.still else self.node(node)
-        self._append(Statement((name,), [f"{name} = {text(made)}"], made.reads, is_vector(made)))
-
-    def _append(self, statement: Statement) -> None:
-        if statement.reads <= self.still:
-            self.still.update(statement.names)
-            self.ahead.append(statement)
-        else:
-            self.statements.append(statement)
-
-    def node(self, node: Node) -> Node:
-        """An expression without branches, and without what can be computed ahead of the march."""
-        if node.op in ex.LEAVES:
-            return node
-        if node.reads and node.reads <= self.still:
-            if node not in self._moved:
-                name = self.fresh("still")
-                self.let(name, node)
-                self._moved[node] = ex.name(name, node.kind)
-            return self._moved[node]
-        args = [self.node(each) for each in node.args]
-        if node.op == "if" and node.kind != "int":
-            return ex.make("choose", *args, kind=node.kind)
-        if node.op == "and":
-            return reduce(lambda a, b: ex.make("choose", a, b, ex.number(False), kind="bool"), args)
-        if node.op == "or":
-            return reduce(lambda a, b: ex.make("choose", a, ex.number(True), b, kind="bool"), args)
-        return ex.make(node.op, *args, value=node.value)
-
-
-# --- the kernels' text ----------------------------------------------------------------------------
 
 
 class Rows:
@@ -189,15 +60,14 @@ class Rows:
         """Lines that put numbers into their rows."""
         return [f"{self.text(name)} = {name}" for name in sorted(names)]
 
-    def loops(self, statements: Iterable[Statement], shared: set[str]) -> list[str]:
-        """Loops over lanes, cut where a library is called; `shared` is the same for all lanes."""
-        cut = [list(each) for _, each in groupby(statements, lambda each: each.vector)]
+    def loops(self, loops: Sequence[Sequence[Statement]], shared: set[str]) -> list[str]:
+        """Text of loops over lanes; the names in `shared` are the same for all lanes."""
         lines: list[str] = []
-        for k, each in enumerate(cut):
-            made = {name for statement in each for name in statement.names}
-            read = {name for statement in each for name in statement.reads}
-            later = {name for after in cut[k + 1 :] for s in after for name in s.reads}
-            body = [line for statement in each for line in statement.lines]
+        for k, loop in enumerate(loops):
+            made = {name for each in loop for name in each.names}
+            read = {name for each in loop for name in each.reads}
+            later = {name for after in loops[k + 1 :] for each in after for name in each.reads}
+            body = [line for each in loop for line in each.lines]
             loads, saves = self.loads(read - made - shared), self.saves(made & later)
             lines += over_lanes([*loads, *body, *saves])
         return lines
@@ -231,6 +101,7 @@ def lanes_source(
     following: dict[str, Node] = {}
     shown = ex.name("value")
     for part in parts:
+        straight.cut()
         straight.add(part.code, part.code.kept(sampler.ends[part.part]))
         for source, node in sampler.sources.items():
             if source.part == part.part:
@@ -253,49 +124,37 @@ def lanes_source(
     square = ex.make("*", ex.make("*", ex.name("counts"), ex.name("error")), ex.name("error"))
     following |= {"cost": ex.make("+", ex.name("cost"), square), "shown": shown}
 
-    first, fetched = [], []
+    # what a lane sees of a record at a place of its own is fetched a sample ahead of its use: a row
+    # that was just written number by number cannot be read as a whole at once
+    first: list[str] = []
+    fetched: list[str] = []
     for part in parts:
         for tap in part.taps:
             samples, record = part.tap_samples(tap), sampler.signals.index(tap.tap.signal)
-            names = [f"{part.fraction(tap)}_coming", *samples]
-            for lines, name, n in ((first, names[1], "0"), (fetched, names[0], "coming")):
+            queue = [f"{part.fraction(tap)}_coming", *samples]
+            for lines, name, n in ((first, queue[1], "0"), (fetched, queue[0], "coming")):
                 index = f"{n} - whole[{tap.number}, lane]"
                 lines.append(f"{rows.text(name)} = sample_at(records[{record}], {index}, 0.0)")
-            following |= {older: ex.name(newer) for newer, older in pairwise(names)}
+            following |= {older: ex.name(newer) for newer, older in pairwise(queue)}
     for name, node in following.items():
-        made = straight.node(node)
-        line = f"{rows.text(name)} = {text(made)}"
-        straight.statements.append(Statement((), [line], made.reads, True))
+        straight.become(rows.text(name), node)
 
-    read = {name for each in straight.statements for name in each.reads}
+    read = {name for loop in straight.loops for each in loop for name in each.reads}
     shared = {"target": "measured[n]", "counts": "weight[n]"}
     shared["half"] = "0.5 * h if n > 0 else 0.0"
     shared |= {f"x_{name}": f"records[{k}][n]" for k, name in enumerate(sampler.signals)}
     inner = [f"{name} = {value}" for name, value in shared.items() if name in read]
     if fetched:
         inner += ["coming = min(n + 1, last)", *over_lanes(fetched)]
-    inner += rows.loops(straight.statements, {"h", *shared})
+    inner += rows.loops(straight.loops, {"h", *shared})
     kept = over_lanes([f"outputs[lane, n] = {rows.text('shown')}"])
     inner += ["if outputs.size > 0:", *indented(kept)]
 
-    ahead = [line for each in straight.ahead for line in each.lines]
-    ahead += rows.saves(read & straight.still - known - {"h"})
-    used = {name for each in straight.ahead for name in each.reads}
-    for part in parts:
-        rest = rest_of(part)
-        names, nodes = dict(leaves(part.state)), dict(leaves(rest.value))
-        at_rest = {names[path].value: nodes[path] for path in sampler.carried[part.part]}
-        ahead += rest.code.lines(at_rest.values())
-        ahead += [f"{rows.text(name)} = {text(node)}" for name, node in at_rest.items()]
-        reads = {*sampler.constants(part), *rest.code.reads(at_rest.values())}
-        needed = [ex.name(name) for name in reads]
-        ahead[:0] = part.prologue.lines(needed)
-        used |= part.prologue.reads(needed)
     texts = [
         function_source(
             "prepare(h, flat)",
             f"What does not change, and states at rest, of LANES sets of {model.name}.",
-            over_lanes([*rows.loads(used & known), *ahead]),
+            over_lanes(prepared(sampler, straight, rows, known, read)),
         ),
         function_source(
             "march(records, whole, h, flat, measured, weight, outputs)",
@@ -308,8 +167,28 @@ def lanes_source(
             ],
         ),
     ]
-    names = {**sampler.names, "LANES": LANES, "choose": choose}
-    return "\n\n".join(texts), names, rows.number, sampler
+    called = {**sampler.names, **CALLED, "LANES": LANES}
+    return "\n\n".join(texts), called, rows.number, sampler
+
+
+def prepared(
+    sampler: Sampler, straight: Straight, rows: Rows, known: set[str], read: set[str]
+) -> list[str]:
+    """Lines of a lane ahead of the march, from what is known to what is read in it."""
+    lines = [line for each in straight.ahead for line in each.lines]
+    lines += rows.saves(read & straight.still - known - {"h"})
+    used = {name for each in straight.ahead for name in each.reads}
+    for part in sampler.used():
+        rest = rest_of(part)
+        state, nodes = dict(leaves(part.state)), dict(leaves(rest.value))
+        at_rest = {state[path].value: nodes[path] for path in sampler.carried[part.part]}
+        lines += rest.code.lines(at_rest.values())
+        lines += [f"{rows.text(name)} = {text(node)}" for name, node in at_rest.items()]
+        reads = {*sampler.constants(part), *rest.code.reads(at_rest.values())}
+        needed = [ex.name(name) for name in reads]
+        lines[:0] = part.prologue.lines(needed)
+        used |= part.prologue.reads(needed)
+    return [*rows.loads(used & known), *lines]
 
 
 # --- marching -------------------------------------------------------------------------------------
