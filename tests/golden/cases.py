@@ -319,7 +319,9 @@ def many(axis: str, variant: str, inputs: Inputs) -> Outputs:
         measured = drive.simulate(**by_voltage).shaft_speed
         weight = inputs["weight"][: measured.size]
         cost = SquaredError(np.where(weight > 0.0, measured, np.nan), weight)
-        found[f"{name}, cost"] = drive.simulate_many(sets, cost=cost, executor=Serial(), **by_voltage).cost
+        found[f"{name}, cost"] = drive.simulate_many(
+            sets, cost=cost, executor=Serial(), **by_voltage
+        ).cost
     sets = MANY["pump"](axis)
     current = inputs[f"current of {axis}"][:1500]
     batch = drive.simulate_many(sets, current=current, executor=Serial())

@@ -85,7 +85,9 @@ def discretised(
     def state(weights: tuple[float, ...]) -> str:
         """Text of the state at the beginning of a sub-step, moved by weighted slopes."""
         moves = [
-            f" + sub_step * slope_{j + 1}" if weight == 1.0 else f" + sub_step * {weight!r} * slope_{j + 1}"
+            f" + sub_step * slope_{j + 1}"
+            if weight == 1.0
+            else f" + sub_step * {weight!r} * slope_{j + 1}"
             for j, weight in enumerate(weights)
             if weight != 0.0
         ]
@@ -122,8 +124,8 @@ def _state_of(equation: Equation) -> type[Any]:
     """Type of the state that an equation takes and returns."""
     name, arguments = plain(equation).__name__, arguments_of(equation)
     hints = get_type_hints(plain(equation))
-    kind = hints.get("return")
-    if not is_named_tuple(kind) or hints.get("state") is not kind:
+    kind: type[Any] | None = hints.get("return")
+    if kind is None or not is_named_tuple(kind) or hints.get("state") is not kind:
         raise InputError(
             f"{name} must take the state and return its type, as in 'def {name}(state: State, ...) "
             "-> State'."
@@ -137,11 +139,12 @@ def _state_of(equation: Equation) -> type[Any]:
     for each in arguments:
         if each == "sub_step" or each.startswith("slope_"):
             raise InputError(f"{name}: the name '{each}' is taken; call the argument otherwise.")
-    assert kind is not None
     return kind
 
 
-def _built(kind: type[Any], names: dict[str, Any], number: Callable[[str], str], path: str = "") -> str:
+def _built(
+    kind: type[Any], names: dict[str, Any], number: Callable[[str], str], path: str = ""
+) -> str:
     """Text of a nested named tuple, its numbers written by their paths."""
     hints = get_type_hints(kind)
     word = f"{kind.__name__}_at{path.replace('.', '_')}"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, get_type_hints
 
+import numpy as np
+
 
 def is_named_tuple(kind: object) -> bool:
     """Whether a type is a named tuple's."""
@@ -29,6 +31,11 @@ def _paths(kind: type[Any], prefix: str) -> Iterator[str]:
             yield from _paths(inner, f"{prefix}{name}.")
         elif inner is float:
             yield f"{prefix}{name}"
+
+
+def is_real(value: object) -> bool:
+    """Whether something is a real number, finite or not."""
+    return isinstance(value, int | float | np.integer | np.floating)
 
 
 def value_at(value: Any, path: str) -> Any:

@@ -351,7 +351,9 @@ def outside(model: Model, worst: float, cause: str) -> str:
     """What has happened where the margin is not above 0."""
     parts = [part for part in model.parts if part.domain is not None]
     said = [
-        each.outside(worst, cause) if callable(each.outside) else f"{each.outside} under this {cause}."
+        each.outside(worst, cause)
+        if callable(each.outside)
+        else f"{each.outside} under this {cause}."
         for each in parts or [model]
     ]
     return " Or: ".join(said)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
 from swashplate.equations import Model, instance_of, parameter_paths, state_paths
-from swashplate.equations.fields import floats_of, made, numbers_of
+from swashplate.equations.fields import made, numbers_of
 from swashplate.equations.jacobian import jacobian, residuals, started_by, triangle
 from swashplate.equations.march import output_of
 from swashplate.equations.observation import Observation, ObservedRecord
@@ -302,7 +302,9 @@ class OwnModel(EquationModel):
             elif name.startswith("start."):
                 begin |= dict.fromkeys(self._started(name), value)
             elif not name.startswith((OFFSET, CLOCK)):
-                raise InputError(f"{model.name} has no parameter '{name}'; it has {', '.join(paths)}.")
+                raise InputError(
+                    f"{model.name} has no parameter '{name}'; it has {', '.join(paths)}."
+                )
         unknown = [path for path in begin if path not in states]
         if unknown:
             raise InputError(
@@ -312,7 +314,8 @@ class OwnModel(EquationModel):
             p = made(model.parameters, numbers)
         except KeyError as error:
             raise InputError(
-                f"{model.name} has no value of {error.args[0]}: let it be unknown, fix it, or give p."
+                f"{model.name} has no value of {error.args[0]}: let it be an unknown, fix it, or "
+                "give p."
             ) from None
         given = self.given
         if isinstance(given, Mapping):

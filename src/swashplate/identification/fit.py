@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from swashplate.__about__ import __version__
 from swashplate.campaign.experiment import Experiment
-from swashplate.identification.drive_model import DriveModel
 from swashplate.executors import Executor, Serial
+from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.prior_weights import weighed
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Setup, Stage

@@ -44,9 +44,6 @@ Indices = NDArray[np.intp]
 
 OVERPOWERED = "Z5·F/√Z4 reaches 1 under this input: the solenoid overpowers the feedback spring."
 OVERFLOW = (
-    "the numbers grow beyond all bounds under this input: a parameter is far too large or too small."
-)
-OVERFLOWING_DRIVE = (
     "the numbers grow beyond all bounds under this input: a parameter is far larger or smaller "
     "than any real drive's; compare the set with a packaged one."
 )
@@ -213,7 +210,9 @@ def _run(
                 target = outputs if costs is None else costs
                 assert target is not None
                 target[sets] = values
-    files = tuple(shared.to / f"{each[0].sets[0]:08d}.parquet" for each in items) if shared.to else ()
+    files = (
+        tuple(shared.to / f"{each[0].sets[0]:08d}.parquet" for each in items) if shared.to else ()
+    )
     return Batch(costs, outputs, dict(sorted(failures.items())), files)
 
 
@@ -249,7 +248,9 @@ def _make_folder(folder: Path) -> None:
     except OSError as error:
         raise FileError(f"{folder} cannot be made: {error.strerror or error}.") from None
     if there is not None:
-        raise FileError(f"{folder} holds {there.name} already; name an empty folder for the outputs.")
+        raise FileError(
+            f"{folder} holds {there.name} already; name an empty folder for the outputs."
+        )
 
 
 # --- models of one's own --------------------------------------------------------------------------
@@ -341,8 +342,9 @@ def simulate_many(
     )
 
     def why(worst: float) -> str:
-        sentence = OVERFLOW if worst > 0.0 else outside(model, worst, "input")
-        return f"{model.name}: {sentence}"
+        if worst > 0.0:
+            return f"{model.name}: the numbers grow beyond all bounds under this input."
+        return f"{model.name}: {outside(model, worst, 'input')}"
 
     blocks = [_Block(good[k : k + LANES], instance.options) for k in range(0, good.size, LANES)]
     return _run(shared, blocks, count, failures, why, executor)
@@ -401,7 +403,7 @@ def simulate_drives(
     ]
 
     def why(worst: float) -> str:
-        return f"{parameters.name}: {OVERFLOWING_DRIVE if worst > 0.0 else OVERPOWERED}"
+        return f"{parameters.name}: {OVERFLOW if worst > 0.0 else OVERPOWERED}"
 
     return _run(shared, blocks, count, failures, why, executor)
 
