@@ -90,6 +90,7 @@ def arx(u: np.ndarray, p: np.ndarray, order: int = 10) -> np.ndarray:
     return run[size:]
 
 
+# %% The run
 def main(data: str, *options: str) -> None:
     """Fit, run freely over the test, compare."""
     tests = Campaign.from_toml(CAMPAIGN, logs=data)

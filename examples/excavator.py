@@ -3,8 +3,7 @@
     .venv/bin/python examples/excavator.py DATA [--figure excavator.png]
 
 DATA is a folder with the trials of github.com/mitchallain/BeagleBone-excavator, tests/data. The
-packaged drive "neutral" and a valve of one's own equations are fitted to the other trials of a
-cylinder and predict this one. docs/own-models.md tells the story and keeps the table.
+models are the drive "neutral" and a valve of one's own equations; see docs/own-models.md.
 """
 
 import argparse
@@ -119,6 +118,7 @@ def errors(tests: Campaign, left_out: Experiment) -> Iterator[np.ndarray]:
         yield since_anchor(position, simulated - position.values)
 
 
+# %% The run
 def main() -> None:
     """Print each trial's score; draw what the valve makes of the last trial if asked to."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

@@ -116,7 +116,9 @@ def test_where_the_state_begins_has_a_derivative() -> None:
 def test_many_sets_are_each_alone_to_the_last_bit() -> None:
     gains = np.linspace(0.1, 0.9, 19)
     free = Model("lagged", Valve, Rod, lagged)
-    rows = simulate_many(free, P, {"gain": gains}, {"command": COMMAND}, RATE, output="position").output
+    rows = simulate_many(
+        free, P, {"gain": gains}, {"command": COMMAND}, RATE, output="position"
+    ).output
     for gain, row in zip(gains, rows, strict=True):
         alone = simulate(free, P._replace(gain=float(gain)), {"command": COMMAND}, RATE)
         assert (alone["position"] == row).all()

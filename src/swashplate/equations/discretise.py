@@ -124,8 +124,8 @@ def _state_of(equation: Equation) -> type[Any]:
     """Type of the state that an equation takes and returns."""
     name, arguments = plain(equation).__name__, arguments_of(equation)
     hints = get_type_hints(plain(equation))
-    kind = hints.get("return")
-    if not is_named_tuple(kind) or hints.get("state") is not kind:
+    kind: type[Any] | None = hints.get("return")
+    if kind is None or not is_named_tuple(kind) or hints.get("state") is not kind:
         raise InputError(
             f"{name} must take the state and return its type, as in 'def {name}(state: State, ...) "
             "-> State'."
@@ -139,7 +139,6 @@ def _state_of(equation: Equation) -> type[Any]:
     for each in arguments:
         if each == "sub_step" or each.startswith("slope_"):
             raise InputError(f"{name}: the name '{each}' is taken; call the argument otherwise.")
-    assert kind is not None
     return kind
 
 

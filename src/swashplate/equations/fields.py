@@ -7,6 +7,8 @@ from functools import cache
 from operator import attrgetter
 from typing import Any, get_type_hints
 
+import numpy as np
+
 
 def is_named_tuple(kind: object) -> bool:
     """Whether a type is a named tuple's."""
@@ -31,6 +33,11 @@ def _paths(kind: type[Any], prefix: str) -> Iterator[str]:
             yield from _paths(inner, f"{prefix}{name}.")
         elif inner is float:
             yield f"{prefix}{name}"
+
+
+def is_real(value: object) -> bool:
+    """Whether something is a real number, finite or not."""
+    return isinstance(value, int | float | np.integer | np.floating)
 
 
 def value_at(value: Any, path: str) -> Any:

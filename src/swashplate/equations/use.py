@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.fields import floats_of, made, numbers_of, value_at
+from swashplate.equations.fields import floats_of, is_real, made, numbers_of, value_at
 from swashplate.equations.jacobian import jacobian, state_paths
 from swashplate.equations.march import Stored, output_of
 from swashplate.equations.model import Model
@@ -108,7 +108,7 @@ def instance_of(
                 )
             for path in () if kind is None or what == "options" else floats_of(kind):
                 value = value_at(number, path)
-                if not isinstance(value, int | float | np.number) or np.iscomplexobj(value):
+                if not is_real(value):
                     raise InputError(
                         f"Model {part.name}: {path} is {value!r}, but must be a real number."
                     )
@@ -130,7 +130,7 @@ def records_of(
         For a missing signal, another length, or a sample that is no finite number.
     """
     model = instance.model
-    if not isinstance(rate, int | float | np.number) or not 0.0 < rate < np.inf:
+    if not is_real(rate) or not 0.0 < rate < np.inf:
         raise InputError(f"The rate is {rate!r} Hz, but must be a number above 0.")
     found: dict[str, Array] = {}
     for name, values in inputs.items():
@@ -167,7 +167,7 @@ def started(
             raise InputError(
                 f"{instance.name} has no state '{path}' to start from; it has {', '.join(known)}."
             )
-        if not isinstance(begin[path], int | float | np.number) or not np.isfinite(begin[path]):
+        if not is_real(begin[path]) or not np.isfinite(begin[path]):
             raise InputError(f"{path} begins at {begin[path]!r}, but must be a finite number.")
     states = list(found.states)
     for i, part in enumerate(instance.model.parts):

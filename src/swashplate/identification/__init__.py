@@ -1,4 +1,4 @@
-"""Identification: a model's unknowns found from a campaign, and what is known of them afterwards."""
+"""Identification: unknowns of a model found from a campaign, and how well they are known."""
 
 import lazy_loader
 

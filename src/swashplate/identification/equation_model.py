@@ -314,7 +314,8 @@ class OwnModel(EquationModel):
             p = made(model.parameters, numbers)
         except KeyError as error:
             raise InputError(
-                f"{model.name} has no value of {error.args[0]}: let it be unknown, fix it, or give p."
+                f"{model.name} has no value of {error.args[0]}: let it be an unknown, fix it, or "
+                "give p."
             ) from None
         given = self.given
         if isinstance(given, Mapping):

@@ -42,8 +42,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 OVERPOWERED = "Z5·F/√Z4 reaches 1 under this input: the solenoid overpowers the feedback spring."
-OVERFLOW = "the numbers grow beyond all bounds under this input: a parameter is far too large or too small."
-OVERFLOWING_DRIVE = (
+OVERFLOW = (
     "the numbers grow beyond all bounds under this input: a parameter is far larger or smaller "
     "than any real drive's; compare the set with a packaged one."
 )
@@ -342,8 +341,9 @@ def simulate_many(
     )
 
     def why(worst: float) -> str:
-        sentence = OVERFLOW if worst > 0.0 else outside(model, worst, "input")
-        return f"{model.name}: {sentence}"
+        if worst > 0.0:
+            return f"{model.name}: the numbers grow beyond all bounds under this input."
+        return f"{model.name}: {outside(model, worst, 'input')}"
 
     blocks = [_Block(good[k : k + LANES], instance.options) for k in range(0, good.size, LANES)]
     return _run(shared, blocks, count, failures, why, executor)
@@ -402,7 +402,7 @@ def simulate_drives(
     ]
 
     def why(worst: float) -> str:
-        return f"{parameters.name}: {OVERFLOWING_DRIVE if worst > 0.0 else OVERPOWERED}"
+        return f"{parameters.name}: {OVERFLOW if worst > 0.0 else OVERPOWERED}"
 
     return _run(shared, blocks, count, failures, why, executor)
 
