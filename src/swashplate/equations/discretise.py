@@ -123,8 +123,8 @@ def discretised(
 def _state_of(equation: Equation) -> type[Any]:
     """Type of the state that an equation takes and returns."""
     name, arguments = plain(equation).__name__, arguments_of(equation)
-    hints = get_type_hints(plain(equation))
-    kind: type[Any] | None = hints.get("return")
+    hints: dict[str, type[Any]] = get_type_hints(plain(equation))
+    kind = hints.get("return")
     if kind is None or not is_named_tuple(kind) or hints.get("state") is not kind:
         raise InputError(
             f"{name} must take the state and return its type, as in 'def {name}(state: State, ...) "
