@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
@@ -104,6 +104,19 @@ class Instance:
             np.array([each.slope for each in found]),
         )
 
+    def check_inputs(self, signals: Collection[str]) -> None:
+        """Refuse external signals that the model does not know, and the lack of those it needs."""
+        known = self.model.external
+        for signal in signals:
+            if signal not in known:
+                raise InputError(f"{self.name} has no input '{signal}'; it has {', '.join(known)}.")
+        for i, part in enumerate(self.model.parts):
+            for name in part.input_types:
+                signal = part.tap(name).signal
+                outside = self.model.link_of(i, name) is None and name not in part.defaults
+                if outside and signal not in signals:
+                    raise InputError(f"{self.name}: {part.name} needs the signal '{signal}'.")
+
     def start(
         self,
         first: Mapping[str, float],
@@ -136,11 +149,7 @@ class Instance:
         if chosen is None and key in self._starts:
             return self._starts[key]
         check_start(start)
-        for name in first:
-            if name not in self.model.external:
-                raise InputError(
-                    f"{self.name} has no input '{name}'; it has {', '.join(self.model.external)}."
-                )
+        self.check_inputs(first)
         before = {name: value if start == "steady" else 0.0 for name, value in first.items()}
         states: list[Any] = []
         found: list[Mapping[str, Any]] = []
@@ -214,10 +223,8 @@ class Instance:
         tap = own.tap(name)
         if tap.signal in first:
             value = before[tap.signal] if own.looked_at(name) else first[tap.signal]
-        elif name in own.defaults:
-            value = float(value_at(self.parts[part].p, own.defaults[name]))
         else:
-            raise InputError(f"{self.name}: {own.name} needs the signal '{tap.signal}'.")
+            value = float(value_at(self.parts[part].p, own.defaults[name]))
         return Window((value,) * tap.width, 0.0) if tap.width else value
 
 

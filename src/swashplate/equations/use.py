@@ -127,9 +127,8 @@ def records_of(
     Raises
     ------
     InputError
-        For a missing signal, another length, or a sample that is no finite number.
+        For a missing or unknown signal, another length, or a sample that is no finite number.
     """
-    model = instance.model
     if not is_real(rate) or not 0.0 < rate < np.inf:
         raise InputError(f"The rate is {rate!r} Hz, but must be a number above 0.")
     found: dict[str, Array] = {}
@@ -146,8 +145,9 @@ def records_of(
     if len(set(sizes.values())) > 1:
         listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
         raise InputError(f"All inputs need the same number of samples: {listed}.")
+    instance.check_inputs(found)
     if not found:
-        raise InputError(f"{model.name} needs a record of {', '.join(model.external)}.")
+        raise InputError(f"{instance.name} needs a record of {', '.join(instance.model.external)}.")
     return found
 
 

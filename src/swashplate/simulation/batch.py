@@ -304,6 +304,8 @@ def simulate_many(
         if path not in paths:
             raise InputError(f"{model.name} has no parameter '{path}'; it has {', '.join(paths)}.")
     observed = cost.output if cost is not None else output
+    if not observed:
+        raise InputError(f"{model.name}: say which output of the sets is wanted, or give a cost.")
     output_of(model, observed)
     held = dict(zip(paths, instance.params, strict=True))
     givens = [
@@ -337,7 +339,7 @@ def simulate_many(
         observed,
         *_comparison(cost, size, record),
         cost is None,
-        None if to is None or cost is not None else Path(to),
+        _folder(to, cost),
     )
 
     def why(worst: float) -> str:
@@ -394,7 +396,7 @@ def simulate_drives(
         observed,
         *_comparison(cost, record.time.size, record),
         cost is None,
-        None if to is None or cost is not None else Path(to),
+        _folder(to, cost),
     )
     blocks = [
         _Block(sets, (card, chosen))
@@ -445,6 +447,15 @@ def _failures(
                 "step.",
             )
     return failures
+
+
+def _folder(to: str | Path | None, cost: SquaredError | None) -> Path | None:
+    """Where outputs go."""
+    if to is not None and cost is not None:
+        raise InputError(
+            "Outputs are written to files, costs are not: leave out one of to and cost."
+        )
+    return None if to is None else Path(to)
 
 
 def _comparison(cost: SquaredError | None, samples: int, record: Record) -> tuple[Array, Array]:
