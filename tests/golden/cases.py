@@ -236,7 +236,7 @@ def signals_of(run: Any, names: tuple[str, ...] = SIGNALS) -> Outputs:
     """Signals of a simulation, and those that only a refined one has."""
     found: Outputs = {name: np.array(getattr(run, name)) for name in names}
     found["time"] = np.array(run.time)
-    for name in ("motor_torque", "motor_pressure_drop") if run.refined else ():
+    for name in ("motor_torque", "motor_pressure_drop") if getattr(run, "refined", False) else ():
         values = getattr(run, name, None)
         if values is not None:
             found[name] = np.array(values)
@@ -634,7 +634,7 @@ def full_order(axis: str, variant: str, inputs: Inputs) -> Outputs:
         run = drive.simulate(inputs["from 4 V"][:600], start="steady")
     else:
         run = drive.simulate(inputs["full voltage"])
-    return {**signals_of(run, FULL_SIGNALS), "events": np.array([float(run.events)])}
+    return signals_of(run, FULL_SIGNALS)
 
 
 def full_order_current(axis: str, inputs: Inputs) -> Outputs:
