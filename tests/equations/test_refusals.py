@@ -41,8 +41,8 @@ def defined(text: str, file: str = "/somewhere/friction.py") -> Any:
     """The function that a text defines, as if it stood in a file."""
     linecache.cache[file] = (len(text), None, text.splitlines(True), file)
     space = {
-        "math": math, "np": np, "Two": Two, "WORDS": WORDS, "fine": fine, "added": added, "equation": equation,
-        "interpolate": interpolate, "repeated": repeated, "root": root,
+        "math": math, "np": np, "Two": Two, "WORDS": WORDS, "fine": fine, "added": added,
+        "equation": equation, "interpolate": interpolate, "repeated": repeated, "root": root,
     }  # fmt: skip
     exec(compile(text, file, "exec"), space)
     return space["f"]

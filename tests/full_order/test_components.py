@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from swashplate import PhysicalSet
 from swashplate.equations import derive
 from swashplate.equations.equation import interpreted
-from swashplate.models import full_order
-from swashplate.models.full_order import Machine, Motion
+from swashplate.models import full_order, machine
+from swashplate.models.full_order import Motion, PlantOptions
+from swashplate.models.machine import ATMOSPHERE
 
 pytestmark = pytest.mark.interpreted
 
@@ -22,11 +23,11 @@ def real(low: float, high: float) -> st.SearchStrategy[float]:
 
 
 def plainly(name: str) -> Callable[..., Any]:
-    """An equation of the model in plain Python."""
-    return interpreted(getattr(full_order, name))
+    """An equation of the machine in plain Python."""
+    return interpreted(getattr(machine, name))
 
 
-HOIST = Machine(**PhysicalSet.preset("hoist").numbers)
+HOIST = PhysicalSet.preset("hoist").machine
 D1, MASS, INERTIA, DAMPING, X0 = 0.008, 0.04, 1.1e-6, 8.7, 2e-5
 D4, J_SW, M_ST, B_ST, K_R, A_S, PUMPING = 0.08, 5e-3, 0.4, 180.0, 7.6e4, 2.8e-3, 1e-6
 MACHINE = HOIST._replace(
@@ -75,8 +76,6 @@ def test_spool_conserves_energy(state: tuple[float, ...], arm_rate: float) -> No
     assert rate == pytest.approx(brought, rel=1e-5, abs=1e-6)
     moment = plainly("feedback_moment")(x, sine, MACHINE)
     assert moment == pytest.approx(resisting, rel=1e-12, abs=1e-15)
-    parts = plainly("spool_energy")(x, v, sine, MACHINE)
-    assert sum(parts) == pytest.approx(energy(0.0), rel=1e-9, abs=1e-12)
 
 
 @given(SWASH)
@@ -123,7 +122,29 @@ def test_flow_and_pressure_by_hand() -> None:
     oil = MACHINE._replace(
         piston_area=2e-3, piston_leakage=1e-11, oil_volume=2e-4, bulk_modulus=1e9
     )
-    assert plainly("oil_pressure_rate")(1e6, 1e-4, 0.02, oil) == pytest.approx(2.5e8)
+    assert plainly("oil_pressure_rate")(1e6, 1e-4, 0.02, oil, None) == pytest.approx(2.5e8)
+
+
+def test_air_makes_the_oil_soft_by_hand() -> None:
+    # 1 % of air at 1.01325 MPa is 0.1 % of the oil's volume; 1/B_e = (1/1 GPa + 0.001/1.01325 MPa)
+    # over 1.001: 1.987e-9/Pa
+    oil = MACHINE._replace(bulk_modulus=1e9, air_fraction=0.01)
+    mixture = plainly("mixture_modulus")
+    compressed = (1e-9 + 1e-3 / (10.0 * ATMOSPHERE)) / 1.001
+    assert mixture(10.0 * ATMOSPHERE, oil) == pytest.approx(1.0 / compressed, rel=1e-14)
+    assert mixture(1e12, oil) == pytest.approx(1e9, rel=1e-6)
+    assert mixture(ATMOSPHERE, oil._replace(air_fraction=1.0)) == pytest.approx(
+        2.0 * ATMOSPHERE, rel=1e-3
+    )
+    # the mean of both ends of the cylinder, the same for both signs
+    modulus = plainly("oil_modulus")
+    valve = oil._replace(supply_pressure=8e6)
+    ends = [mixture(4e6 + half + ATMOSPHERE, valve) for half in (1e6, -1e6)]
+    assert modulus(2e6, valve, True) == pytest.approx(sum(ends) / 2.0, rel=1e-14)
+    assert modulus(-2e6, valve, True) == modulus(2e6, valve, True)
+    assert modulus(2e6, valve, None) == 1e9
+    # ends cannot fall below the reservoir
+    assert modulus(9e6, valve, True) > mixture(ATMOSPHERE, valve) / 2.0
 
 
 def test_motor_pressure_drop_by_hand() -> None:
@@ -137,12 +158,13 @@ def test_motor_pressure_drop_by_hand() -> None:
     assert plainly("pump_flow")(0.25, motor) == pytest.approx(0.0125)
 
 
-@given(SPOOL, SWASH, st.sampled_from([None, True]))
+@given(SPOOL, SWASH, st.sampled_from([None, True]), st.sampled_from([None, True]))
 def test_slopes_of_the_rates(
     derivative: Callable[..., float],
     spool: tuple[float, ...],
     swash: tuple[float, ...],
     root: bool | None,
+    air: bool | None,
 ) -> None:
     """Generated derivatives by the states against differences, away from the orifices' edges."""
     x, v, force, _ = spool
@@ -150,16 +172,17 @@ def test_slopes_of_the_rates(
     edges = (MACHINE.orifice_opening_plus, -MACHINE.orifice_opening_minus, 0.0)
     if min(abs(x - edge) for edge in (*edges, MACHINE.spool_stroke, -MACHINE.spool_stroke)) < 2e-6:
         return
-    slopes = derive(full_order.free_rates, by="state", options={"symmetric": root})
+    options, oil = PlantOptions(root, air), MACHINE._replace(air_fraction=0.01)
+    slopes = derive(full_order.free_rates, by="state", options={"options": options})
     state = Motion(x, v, pressure, angle, rate)
-    values = slopes.python(state, force, MACHINE, root)
-    rates = plainly("free_rates")
-    assert values[:3] == rates(state, force, MACHINE, root)
+    values = slopes.python(state, force, oil, options)
+    rates = interpreted(full_order.free_rates)
+    assert values[:3] == rates(state, force, oil, options)
     steps = (1e-6, 1e-3, 1e3, 1e-4, 1e-3)
     for place, (row, column) in enumerate(slopes.entries):
 
         def one(*state: float, row: int = row) -> float:
-            return float(rates(Motion(*state), force, MACHINE, root)[row])
+            return float(rates(Motion(*state), force, oil, options)[row])
 
         expected = derivative(one, state, column, steps[column])
         noise = 1e-10 * (abs(values[row]) + 1e3) / steps[column]

@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swashplate import Drive, FullOrderDrive, InputError, ParameterError, PhysicalSet, maneuvers
-from swashplate.full_order import comparison, reduction
-from swashplate.full_order.completion import from_lumped
+from swashplate.full_order import comparison, from_lumped
 
 AXES = ("hoist", "slew", "luff")
 SCALED = ("Z1", "Z3", "Z4", "Z5", "Z6", "Z8", "Z9", "Z10", "Z13", "Z14", "Z15", "Z16", "Z18")
@@ -242,8 +241,8 @@ def test_without_motion_there_is_nothing_to_tell() -> None:
     assert not found.difference.moves
     assert found.lag is None
     begun: list[str] = []
-    table = reduction.validity(full, begin=begun.append)
-    assert begun == [title for title, _ in reduction.TABLE_MANEUVERS]
+    table = comparison.validity(full, begin=begun.append)
+    assert begun == [title for title, _ in comparison.TABLE_MANEUVERS]
     assert table["largest_percent"].null_count() == table.height
     assert table["within_1_percent"].null_count() == table.height
     assert table["top_speed"].max() < 1e-6

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 from swashplate import Drive, FileError, ParameterError
-from swashplate.full_order.completion import from_lumped
-from swashplate.full_order.physical_set import PhysicalSet
-from swashplate.full_order.quantities import QUANTITIES
+from swashplate.full_order import PhysicalSet, from_lumped
+from swashplate.full_order.physical_set import QUANTITIES
 
 AXES = ("hoist", "slew", "luff")
 
@@ -41,6 +40,7 @@ def test_everything_in_a_preset_is_marked_assumed(name: str) -> None:
     physical = PhysicalSet.preset(name)
     assert list(physical) == list(QUANTITIES)
     assert {entry.status for entry in physical.values()} == {"assumed"}
+    assert physical.numbers["air_fraction"] == 0.0  # not in the file
 
 
 def test_hoist_by_hand() -> None:
@@ -172,8 +172,13 @@ def test_files(tmp_path: Path) -> None:
         ("spool_mass =", "spool_mas =", "own.toml: A physical set has no quantity 'spool_mas'"),
         ('unit = "kg"', 'unit = "Pa"', "own.toml: .* is given in 'Pa', which does not measure"),
         ("oil_volume = {value = 0.0002", "oil_volume = {value = -1.0", "but must be above 0"),
-        ('status = "assumed"}', 'status = "assumed", bounds = [0, 1]}', "has bounds, but nothing"),
+        (
+            'status = "assumed"}',
+            'status = "assumed", bounds = [0, 1]}',
+            "spool_arm has bounds; leave them out",
+        ),
         ("piston_mass =", "spool_frequency =", "chosen only where a set is completed"),
+        ("air_fraction = {value = 0.0", "air_fraction = {value = 1.5", "at least 0 and below 1"),
     ):
         assert old in text
         own.write_text(text.replace(old, new, 1), "utf-8")

@@ -636,7 +636,7 @@ def full_order(axis: str, variant: str, inputs: Inputs) -> Outputs:
         run = drive.simulate(inputs["from 4 V"][:600], start="steady")
     else:
         run = drive.simulate(inputs["full voltage"])
-    return {**signals_of(run, FULL_SIGNALS), "events": np.array([float(run.events)])}
+    return signals_of(run, FULL_SIGNALS)
 
 
 def full_order_current(axis: str, inputs: Inputs) -> Outputs:

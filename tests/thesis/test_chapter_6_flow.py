@@ -11,8 +11,8 @@ import sympy as sp
 from swashplate import Drive, PhysicalSet, maneuvers
 from swashplate.equations.equation import interpreted
 from swashplate.equations.fields import made
-from swashplate.models import full_order, pump
-from swashplate.models.full_order import Machine
+from swashplate.models import machine, pump
+from swashplate.models.machine import Machine
 from swashplate.models.pump import Pump
 
 A_A, A_S, rho, C_d, k = sp.symbols("A_A A_S rho C_d k", positive=True)
@@ -20,12 +20,12 @@ supply, tank, port_a, port_b = sp.symbols("supply tank port_a port_b", real=True
 speed_wide, speed_narrow = sp.symbols("speed_wide speed_narrow", positive=True)
 P, Delta, x = sp.symbols("P Delta_P x", real=True)
 
-oil_pressure_rate = interpreted(full_order.oil_pressure_rate)
+oil_pressure_rate = interpreted(machine.oil_pressure_rate)
 orifice_opening = interpreted(pump.orifice_opening)
-piston_speed = interpreted(full_order.piston_speed)
+piston_speed = interpreted(machine.piston_speed)
 flow_head = interpreted(pump.flow_head)
-valve_flow = interpreted(full_order.valve_flow)
-valve_opening = interpreted(full_order.valve_opening)
+valve_flow = interpreted(machine.valve_flow)
+valve_opening = interpreted(machine.valve_opening)
 
 MACHINE = Machine(**PhysicalSet.preset("hoist").numbers)
 UNLIMITED = MACHINE._replace(spool_stroke=inf, orifice_opening_plus=inf, orifice_opening_minus=inf)
@@ -145,7 +145,7 @@ def test_eq_6_32_to_6_35_stroker_pressure(points: Callable) -> None:
             bulk_modulus=bulk,
         )
         speed = piston_speed(float(np.tan(alpha)), alpha_rate, p)
-        found = oil_pressure_rate(pressure, flow, speed, p)
+        found = oil_pressure_rate(pressure, flow, speed, p, None)
         assert found == pytest.approx(expected(*at), rel=1e-9)
 
 

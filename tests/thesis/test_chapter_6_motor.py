@@ -9,19 +9,19 @@ import sympy as sp
 
 from swashplate import Drive
 from swashplate.equations.equation import interpreted
-from swashplate.full_order.physical_set import PhysicalSet
-from swashplate.models import full_order, pump, refinements
-from swashplate.models.full_order import Machine
+from swashplate.full_order import PhysicalSet
+from swashplate.models import machine, pump, refinements
+from swashplate.models.machine import Machine
 
 K, K_L, C_i, C_g, C_q, tau = sp.symbols("K_mf K_mL C_i C_g C_q tau", positive=True)
 Q, high, low = sp.symbols("Q P_hi P_lo", positive=True)
 angle, rate, rise = sp.symbols("alpha alpha_d delta_P_d", real=True)
 
 load_leakage = interpreted(refinements.load_leakage)
-motor_drop = interpreted(full_order.motor_drop)
+motor_drop = interpreted(machine.motor_drop)
 motor_pressure_drop = interpreted(refinements.motor_pressure_drop)
-motor_torque = interpreted(full_order.motor_torque)
-pump_flow = interpreted(full_order.pump_flow)
+motor_torque = interpreted(machine.motor_torque)
+pump_flow = interpreted(machine.pump_flow)
 shaft_speed = interpreted(pump.shaft_speed)
 
 MACHINE = Machine(**PhysicalSet.preset("hoist").numbers)

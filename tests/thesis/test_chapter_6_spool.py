@@ -9,9 +9,9 @@ import sympy as sp
 from swashplate import Drive
 from swashplate.equations.equation import interpreted
 from swashplate.equations.fields import made
-from swashplate.full_order.physical_set import PhysicalSet
-from swashplate.models import full_order, pump
-from swashplate.models.full_order import Machine
+from swashplate.full_order import PhysicalSet
+from swashplate.models import machine, pump
+from swashplate.models.machine import Machine
 from swashplate.models.pump import Pump
 
 d1, d3, J_fa, m_sp, k_f = sp.symbols("d1 d3 J_fa m_sp k_f", positive=True)
@@ -21,11 +21,11 @@ b, bd, bdd = sp.symbols("beta beta_d beta_dd", real=True)
 Z4, Z5 = sp.symbols("Z4 Z5", positive=True)
 
 arm_sine = interpreted(pump.arm_sine)
-feedback_moment = interpreted(full_order.feedback_moment)
-feedback_sine = interpreted(full_order.feedback_sine)
-spool_acceleration = interpreted(full_order.spool_acceleration)
+feedback_moment = interpreted(machine.feedback_moment)
+feedback_sine = interpreted(machine.feedback_sine)
+spool_acceleration = interpreted(machine.spool_acceleration)
 spool_balance = interpreted(pump.spool_balance)
-spool_energy = interpreted(full_order.spool_energy)
+spool_inertia = interpreted(machine.spool_inertia)
 
 PUMP = made(Pump, Drive.preset("hoist").parameters.numbers)
 MACHINE = Machine(**PhysicalSet.preset("hoist").numbers)
@@ -96,12 +96,16 @@ def test_eq_6_11_and_6_12_spool_speed(gap: Callable) -> None:
 
 
 def test_eq_6_13_kinetic_energy(points: Callable) -> None:
-    """Both arms turn with the same inertia; the package counts the one that the spool turns."""
+    """Both arms turn with the same inertia; the package counts the one that the spool turns.
+
+    Its inertia stands against the lever D/d1: T = (d1/D) I x'²/2.
+    """
     expected = sp.lambdify((x, xd, d1, m_sp, J_fa), in_spool_position(KINETIC.subs(ad, 0)))
     for at in points((-3e-3, 3e-3), (-0.5, 0.5), (5e-3, 1e-2), (0.01, 0.1), (1e-7, 1e-5)):
         position, speed, arm, mass, inertia = at
         p = spool_of(arm, mass, inertia, 0.2, 0.0)
-        found = spool_energy(position, speed, 0.1, p)[0]
+        lever = (arm * arm + position * position) / arm
+        found = 0.5 * spool_inertia(position, p) / lever * speed * speed
         assert found == pytest.approx(expected(*at), rel=1e-12)
 
 

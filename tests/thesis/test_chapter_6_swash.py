@@ -8,11 +8,12 @@ import sympy as sp
 
 from swashplate import PhysicalSet
 from swashplate.equations.equation import interpreted
-from swashplate.models import full_order
-from swashplate.models.full_order import Machine
+from swashplate.models import machine
+from swashplate.models.machine import Machine
 
-swash_acceleration = interpreted(full_order.swash_acceleration)
-swash_energy = interpreted(full_order.swash_energy)
+swash_acceleration = interpreted(machine.swash_acceleration)
+plate_inertia = interpreted(machine.plate_inertia)
+plate_moment = interpreted(machine.plate_moment)
 
 MACHINE = Machine(**PhysicalSet.preset("hoist").numbers)
 
@@ -161,13 +162,18 @@ def test_eq_6_51_is_what_the_package_integrates(points: Callable) -> None:
 
 
 def test_energies_of_the_plate(points: Callable) -> None:
+    """T = I α'²/2, and the spring's moment is the derivative of k (d4 tan α)²/2."""
     speed = in_time(d4 * sp.tan(q))
-    energies = (J * qd**2 / 2 + m * speed**2 / 2, k * (d4 * sp.tan(q)) ** 2 / 2)
-    expected = sp.lambdify((q, qd, d4, J, m, k), energies)
+    kinetic = J * qd**2 / 2 + m * speed**2 / 2
+    moment = -sp.diff(k * (d4 * sp.tan(q)) ** 2 / 2, q)
+    expected = sp.lambdify((q, qd, d4, J, m, k), (kinetic, moment))
     for at in points((-0.3, 0.3), (-0.5, 0.5), (0.05, 0.1), (1e-3, 1e-2), (0.1, 0.5), (5e4, 1e5)):
         angle, rate, arm, plate, piston, spring = at
         p = MACHINE._replace(
             swash_arm=arm, swash_inertia=plate, piston_mass=piston, return_spring_rate=spring
         )
-        found = swash_energy(tan(angle), rate, p)
+        found = (
+            0.5 * plate_inertia(tan(angle), p) * rate * rate,
+            plate_moment(0.0, tan(angle), 0.0, p),
+        )
         assert found == pytest.approx(expected(*at), rel=1e-12)

@@ -5,7 +5,7 @@ import pytest
 
 from swashplate import Drive, maneuvers
 from swashplate.campaign.kinds import CHANNEL_KINDS
-from swashplate.full_order.drive import FullOrderDrive
+from swashplate.full_order import FullOrderDrive
 
 
 def test_figure_9_1_speed_and_acceleration_limits_grow_by_half(hoist: Drive) -> None:

@@ -358,8 +358,6 @@ def dump_set(physical: PhysicalSet) -> str:
     text.add("title", physical.title)
     entries = table()
     for name, each in physical.items():
-        if each.status == "inactive":  # left out, as its default has it
-            continue
         entry = inline_table()
         pair = isinstance(each.value, Pair)
         entry.append("value", list(each.values) if pair else each.value)

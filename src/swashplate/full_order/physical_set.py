@@ -106,7 +106,7 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         for name in self.entries:
             quantity_of(name)
         entries = {
-            name: PhysicalValue(each, each.definition.default, status="inactive")
+            name: PhysicalValue(each, each.definition.default, status="assumed")
             for name, each in QUANTITIES.items()
             if each.definition.default is not None
         } | dict(self.entries)

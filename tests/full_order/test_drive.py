@@ -1,4 +1,4 @@
-"""The full-order drive: paths against each other, stops, balances, modes, loads."""
+"""The drive with five states: march against referee, stops, balances, modes, loads."""
 
 from pathlib import Path
 
@@ -7,11 +7,8 @@ import polars as pl
 import pytest
 
 from swashplate import DomainError, InputError, maneuvers
-from swashplate.full_order.drive import FullOrderDrive
-from swashplate.full_order.result import SIGNALS, FullOrderSimulation
-
-STOP = 1e-6
-"""What a stop may be passed by. [rad]"""
+from swashplate.full_order import FullOrderDrive, FullOrderSimulation
+from swashplate.full_order.result import SIGNALS
 
 
 @pytest.fixture(scope="module")
@@ -30,27 +27,42 @@ def marched(hoist: FullOrderDrive, step: np.ndarray) -> FullOrderSimulation:
     return hoist.simulate(step)
 
 
-@pytest.mark.traced
-@pytest.mark.parametrize("method", ["radau", "lsoda"])
-def test_march_agrees_with_stiff_solver(
-    hoist: FullOrderDrive, step: np.ndarray, marched: FullOrderSimulation, method: str
-) -> None:
-    run = hoist.simulate(step, method=method)
-    # 1e-6 of the top speed 3.42 rad/s: the march resolves the 920 Hz of the trapped oil with six
-    # steps a turn, of which 5e-7 rad are left in the swash angle
-    assert np.abs(run.shaft_speed - marched.shaft_speed).max() < 2e-5
-    assert np.abs(run.spool_position - marched.spool_position).max() < 2e-8
-    assert np.abs(run.shaft_position - marched.shaft_position).max() < 1e-5
-    assert run.events == marched.events
+@pytest.mark.parametrize("name", ["hoist", "slew", "luff"])
+def test_march_agrees_with_the_referee(name: str, step: np.ndarray) -> None:
+    """At its usual sub-steps, over a stop: 5e-5 rad/s is 0.003 deg/s of a hoist's 196."""
+    full = FullOrderDrive.preset(name)
+    solved, marched = full.simulate(step, method="radau", tolerance=1e-8), full.simulate(step)
+    assert np.abs(solved.shaft_speed - marched.shaft_speed).max() < 5.5e-5
+    assert np.abs(solved.spool_position - marched.spool_position).max() < 1e-7
+    assert np.abs(solved.shaft_position - marched.shaft_position).max() < 5e-5
+    assert np.mean(solved.plate_hold != marched.plate_hold) <= 2.0 / step.size
+    assert solved.plate_hold.max() == (0 if name == "luff" else 1)  # luff has not got there
+
+
+@pytest.mark.parametrize("kind", ["free", "stops", "relief", "stroke", "air"])
+def test_march_converges_to_the_referee(hoist: FullOrderDrive, kind: str) -> None:
+    """With order two where nothing is hit, and no less than one with limits that come and go."""
+    full = {
+        "relief": hoist.replace(load_torque=3e3, motor_leakage=1e-6, relief_pressure=3e5),
+        "stroke": hoist.replace(spool_stroke=1e-4),
+        "air": hoist.replace(air_fraction=0.01, piston_leakage=1e-12),
+    }.get(kind, hoist)
+    volts = 4.0 if kind in ("free", "air") else 9.0
+    command = maneuvers.step(volts, start=0.1, stop=1.6, length=2.0).sample(512.0)
+    run = full.drive.simulate(command)
+    exact = full.follow(run, method="radau", tolerance=1e-9).shaft_speed
+    found = [full.follow(run, substeps=n).shaft_speed for n in (16, 32, 64, 128)]
+    errors = np.array([np.abs(each - exact).max() for each in found])
+    assert errors[-1] < 1e-6
+    order = -np.polyfit(np.log([16, 32, 64, 128]), np.log(errors), 1)[0]
+    assert order > (1.8 if kind in ("free", "air") else 1.0)
 
 
 def test_stop_is_not_passed_and_nothing_chatters(
     hoist: FullOrderDrive, marched: FullOrderSimulation
 ) -> None:
     n = hoist.physical.numbers
-    assert marched.swash_angle.max() <= n["swash_stop_plus"] + STOP
-    # relief valve and stop: each takes hold once and lets go once
-    assert marched.events == 4
+    assert marched.swash_angle.max() == n["swash_stop_plus"]
     at_stop = marched.plate_hold == 1
     assert np.count_nonzero(np.diff(at_stop.astype(int))) == 2
     assert np.all(marched.swash_rate[at_stop] == 0.0)
@@ -66,50 +78,66 @@ def test_every_axis_at_both_stops(name: str, frequency: float) -> None:
     full = FullOrderDrive.preset(name)
     run = full.simulate(maneuvers.sine(10.0, frequency, settle=None, length=8.0).sample(512.0))
     n = full.physical.numbers
-    assert run.swash_angle.max() <= n["swash_stop_plus"] + STOP
-    assert run.swash_angle.min() >= -n["swash_stop_minus"] - STOP
-    cycles = 7.0 * frequency
-    assert run.events <= 8 * np.ceil(cycles)  # relief and stop, on and off, at two stops a turn
-    # the march resolves the oil's own mode with six steps a turn: its energy errs by about 1e-7
-    assert run.balances().worst < 1e-6
-    assert np.isfinite(run.rows).all()
+    assert run.swash_angle.max() <= n["swash_stop_plus"]
+    assert run.swash_angle.min() >= -n["swash_stop_minus"]
+    # each stop is taken hold of and let go once a turn
+    assert np.count_nonzero(np.diff(run.plate_hold)) <= 4 * np.ceil(7.0 * frequency)
+    assert np.isfinite(run.states).all()
 
 
-@pytest.mark.traced
-def test_balances_close(
-    hoist: FullOrderDrive, step: np.ndarray, marched: FullOrderSimulation
-) -> None:
-    assert marched.balances().worst < 1e-6
-    tight = hoist.simulate(step, method="radau", tolerance=1e-8)
-    assert tight.balances().worst < 1e-7
-    found = marched.balances()
-    # the pump turned the empty drum to 3.42 rad/s: C_i Ω²/2
-    assert found.load.turnover == pytest.approx(0.5 * 150.0 * marched.shaft_speed.max() ** 2)
-    assert marched.losses[-1, 1] > 0.0
+def test_oil_and_energy_are_kept(hoist: FullOrderDrive) -> None:
+    """What came through the valve is swept, compressed or leaked; what the pump sent moved the
+    load. By quadrature of fine samples, so that the equations of the parts are seen together."""
+    loaded = hoist.replace(load_torque=3e3, piston_leakage=1e-12)
+    command = maneuvers.step(4.0, start=0.1, stop=0.6, length=1.0).sample(8192.0)
+    run, m = loaded.simulate(command, 8192.0), loaded.physical.machine
+    pressure = run.stroker_pressure + run.case.k.rest_pressure
 
+    def passed(rate: np.ndarray) -> float:
+        return float(np.trapezoid(rate, run.time))
 
-@pytest.mark.traced
-def test_balances_with_everything_on(hoist: FullOrderDrive, step: np.ndarray) -> None:
-    loaded = hoist.replace(
-        load_torque=3e3, motor_leakage=1e-6, piston_leakage=1e-12, relief_pressure=3e5
+    came = passed(run.valve_flow - m.piston_leakage * pressure)
+    swept = m.piston_area * m.swash_arm * np.ptp(np.tan(run.swash_angle[[0, -1]]))
+    squeezed = m.oil_volume / m.bulk_modulus * (pressure[-1] - pressure[0])
+    turnover = passed(np.abs(run.valve_flow))
+    assert came == pytest.approx(
+        np.sign(run.swash_angle[-1]) * swept + squeezed, abs=1e-4 * turnover
     )
+    sent = passed(run.motor_pressure_drop * run.pump_flow)
+    ideal = m.motor_constant * run.pump_flow  # the motor's speed but for its leakage
+    stored = 0.5 * m.load_inertia * (ideal[-1] ** 2 - ideal[0] ** 2)
+    assert sent == pytest.approx(stored + m.load_torque * passed(ideal), rel=1e-4)
+
+
+@pytest.mark.traced
+def test_relief_valve_opens_before_the_stop(hoist: FullOrderDrive, step: np.ndarray) -> None:
+    loaded = hoist.replace(load_torque=3e3, relief_pressure=3e5)
     for run in (loaded.simulate(step), loaded.simulate(step, method="radau")):
-        found = run.balances()
-        assert found.worst < 1e-6
         assert run.relief_hold.max() == 1
-        assert run.plate_hold.max() == 0  # the relief valve opens before the stop
-        assert run.account("leakage_volume")[-1] > 0.0
-        assert run.account("relief_volume").max() > 0.0
+        assert run.plate_hold.max() == 0
 
 
 @pytest.mark.traced
 def test_spool_at_its_stroke(hoist: FullOrderDrive, step: np.ndarray) -> None:
-    short = hoist.replace(spool_stroke=1e-4)
-    run = short.simulate(step)
+    run = hoist.replace(spool_stroke=1e-4).simulate(step)
     assert np.abs(run.spool_position).max() <= 1e-4
     assert {-1, 0, 1} == set(run.spool_hold.tolist())
-    assert run.balances().worst < 1e-6
-    assert run.losses[-1, 0] > 0.0
+    assert np.all(run.spool_velocity[run.spool_hold != 0] == 0.0)
+
+
+@pytest.mark.traced
+def test_air_makes_the_drive_slower(hoist: FullOrderDrive) -> None:
+    """Free air softens the oil: nothing at 1e-9 of it, and off it costs no bit."""
+    command = maneuvers.step(4.0, start=0.1, stop=0.6, length=1.0).sample(512.0)
+    plain = hoist.simulate(command).shaft_speed
+    assert np.array_equal(hoist.replace(air_fraction=0.0).simulate(command).shaft_speed, plain)
+    hint = hoist.replace(air_fraction=1e-9).simulate(command).shaft_speed
+    assert 0.0 < np.abs(hint - plain).max() < 1e-6 * plain.max()
+    soft = hoist.replace(air_fraction=0.05)
+    assert np.abs(soft.simulate(command).shaft_speed - plain).max() > 1e-4 * plain.max()
+    assert soft.physical.to_lumped()["Z6"] < hoist.physical.to_lumped()["Z6"]
+    # trapped oil that is softer swings slower
+    assert abs(soft.modes().swash) < abs(hoist.modes().swash)
 
 
 def test_modes_stand_where_the_source_says(hoist: FullOrderDrive) -> None:
@@ -125,29 +153,6 @@ def test_modes_stand_where_the_source_says(hoist: FullOrderDrive) -> None:
     assert -1.0 / modes.slow.real == pytest.approx(0.1214, rel=0.03)
     assert len(hoist.eigenvalues()) == 5
     assert np.all(hoist.eigenvalues().real < 0.0)
-
-
-@pytest.mark.traced
-def test_modes_against_differences_of_the_rates(hoist: FullOrderDrive) -> None:
-    """The Jacobian that solvers and modes use, against differences through the whole model."""
-    from swashplate.full_order.march import N_STATES, jacobian_at, rates_at
-    from swashplate.simulation.instance import pump_of
-
-    loaded = hoist.replace(load_torque=3e3, piston_leakage=1e-12)
-    machine, pump = loaded.machine, pump_of(hoist.drive.parameters)
-    current, free = np.array([0.5, 0.5]), (0, 0, 0)
-    row = np.zeros(16)
-    row[:5] = 6e-5, 0.01, 2e5, 0.12, 0.08
-    jacobian = jacobian_at(0.0, row, current, True, 1.0, free, machine, pump)
-    for k, h in enumerate((1e-6, 1e-4, 1e3, 1e-4, 1e-4)):
-        ahead, behind = row.copy(), row.copy()
-        ahead[k] += h
-        behind[k] -= h
-        rates = [
-            rates_at(0.0, each, current, True, 1.0, free, machine, pump) for each in (ahead, behind)
-        ]
-        expected = (rates[0] - rates[1])[:N_STATES] / (2.0 * h)
-        assert jacobian[:N_STATES, k] == pytest.approx(expected, rel=1e-5, abs=1e-4)
 
 
 @pytest.mark.traced
@@ -183,7 +188,7 @@ def test_rest_is_rest_until_the_valve_opens() -> None:
     slew = FullOrderDrive.preset("slew")  # no plussing
     run = slew.simulate(np.zeros(512))
     assert np.all(run.shaft_speed == 0.0)
-    assert run.events == 0
+    assert not run.relief_hold.any()
 
 
 def test_symmetric_root_is_taken_from_the_drive(hoist: FullOrderDrive, step: np.ndarray) -> None:
@@ -222,16 +227,11 @@ def test_table(marched: FullOrderSimulation, tmp_path: Path) -> None:
     assert table.columns == ["time", *SIGNALS, "spool_hold", "relief_hold", "plate_hold"]
     assert table["swash_angle"].to_numpy() == pytest.approx(marched.swash_angle)
     assert not marched.shaft_speed.flags.writeable
-    # at its stop the plate stands still, and all that passes the orifice leaves by the relief valve
-    held = marched.plate_hold == 1
-    fine = marched.account("relief_volume")[held]
-    flow = table["valve_flow"].to_numpy()[held]
-    assert fine[-1] - fine[0] == pytest.approx(np.trapezoid(flow, dx=1.0 / 512.0), rel=1e-3)
     assert "2049 samples, march" in repr(marched)
 
 
 def test_wrong_options_are_sentences(hoist: FullOrderDrive, step: np.ndarray) -> None:
-    with pytest.raises(InputError, match="method is 'euler'; it is 'march', 'radau' or 'lsoda'"):
+    with pytest.raises(InputError, match="method is 'euler'; it is 'march' or 'radau'"):
         hoist.simulate(step, method="euler")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="tolerance is 0, but must be above 0"):
         hoist.simulate(step, method="radau", tolerance=0.0)
@@ -239,8 +239,10 @@ def test_wrong_options_are_sentences(hoist: FullOrderDrive, step: np.ndarray) ->
         hoist.simulate_current([0.1, 0.1], start="warm")  # type: ignore[arg-type]
     with pytest.raises(DomainError, match="more than 20000; use method='radau'"):
         hoist.scaled(1e-9).simulate(step)
-    with pytest.raises(InputError, match="substeps is 3, but .* needs at least 5 to be stable"):
-        hoist.simulate(step, substeps=3)
+    with pytest.raises(InputError, match="substeps is 5, but .* needs at least 6 to be stable"):
+        hoist.simulate(step, substeps=5)
+    with pytest.raises(InputError, match="no parameter 'spool_weight'; it has those of the card, "):
+        hoist.sensitivities(step, parameters=["spool_weight"])
     with pytest.raises(InputError, match="The current is nan"):
         hoist.modes(float("nan"))
     with pytest.raises(InputError, match="not finite"):
@@ -252,15 +254,13 @@ def test_limits_that_come_and_go_within_a_step(hoist: FullOrderDrive) -> None:
     rough = hoist.replace(spool_damping=130.0, spool_stroke=2e-4, oil_volume=1.4e-4)
     noise = np.random.default_rng(3).normal(size=513)
     current = np.repeat([0.9, -0.9, 0.5], 171) + 0.1 * noise
-    exact = rough.simulate_current(current, substeps=100)
     solved = rough.simulate_current(current, method="radau")
-    top = np.abs(exact.shaft_speed).max()
-    assert exact.events > 10
-    assert np.abs(solved.shaft_speed - exact.shaft_speed).max() < 1e-5 * top
+    top = np.abs(solved.shaft_speed).max()
+    for substeps, allowed in ((None, 2e-3), (100, 1e-4)):
+        marched = rough.simulate_current(current, substeps=substeps)
+        assert np.count_nonzero(np.diff(marched.spool_hold)) > 4
+        assert np.abs(solved.shaft_speed - marched.shaft_speed).max() < allowed * top
     assert np.abs(solved.spool_position).max() <= 2e-4 * (1.0 + 1e-6)
-    # the default resolution, six steps a turn of the fastest mode
-    marched = rough.simulate_current(current)
-    assert np.abs(marched.shaft_speed - exact.shaft_speed).max() < 1e-4 * top
 
 
 @pytest.mark.traced
@@ -268,7 +268,7 @@ def test_a_pulse_of_one_sample_is_seen(hoist: FullOrderDrive) -> None:
     current = np.zeros(400)
     current[201] = 0.8
     calm = hoist.simulate_current(np.zeros(400)).shaft_speed
-    for method in ("march", "radau", "lsoda"):
+    for method in ("march", "radau"):
         run = hoist.simulate_current(current, method=method)
         assert np.abs(run.shaft_speed - calm).max() > 0.01
 
@@ -287,8 +287,7 @@ def test_a_stop_that_is_left_slowly_is_left() -> None:
     luff = FullOrderDrive.preset("luff")
     command = maneuvers.sine(6.5, 0.3, settle=None, length=6.0).sample(512.0)
     run, march = luff.simulate(command, method="radau"), luff.simulate(command)
-    assert run.events == march.events == 2
-    assert np.abs(run.shaft_speed - march.shaft_speed).max() < 2e-6
-    assert (
-        np.abs(run.spool_position).max() < luff.machine.p.spool_stroke + 1e-9
-    )  # the solver's tolerance
+    assert np.abs(run.shaft_speed - march.shaft_speed).max() < 5e-6
+    stroke = luff.plant.machine.spool_stroke
+    assert np.abs(march.spool_position).max() == stroke
+    assert np.abs(run.spool_position).max() < stroke + 1e-9  # the solver's tolerance
