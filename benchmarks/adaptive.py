@@ -14,6 +14,7 @@ from swashplate.models.pump import (
     pressure_rate,
     shaft_speed,
     solenoid_force,
+    solenoids_of,
     spool_balance,
     swash_angle,
     swash_tangent,
@@ -32,7 +33,7 @@ def slope(t: float, state: Array, current: Array, h: float, pump: Pump, k: PumpC
     n = min(int(at), current.size - 2)
     i = current[n] + (at - n) * (current[n + 1] - current[n])
     p = min(max(state[0], k.lower), k.upper)
-    free = spool_balance(solenoid_force(i, pump), arm_sine(p, pump), pump)
+    free = spool_balance(solenoid_force(i, solenoids_of(pump)), arm_sine(p, pump), pump)
     opening = orifice_opening(free, pump)
     Z6 = plate_motion(p, pump, k)
     rate = pressure_rate(p, opening, Z6, pump.Z7, pump.Z8, pump.Z9, None)

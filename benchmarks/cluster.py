@@ -16,7 +16,7 @@ from distributed import LocalCluster
 
 from swashplate import Campaign
 from swashplate.campaign import rig
-from swashplate.identification.executors import Dask, Serial
+from swashplate.executors import Dask, Serial
 from swashplate.identification.setup import load_setup
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.starts import StartResult, sobol_starts, solve_from

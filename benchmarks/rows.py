@@ -11,7 +11,7 @@ from reference import Reference
 from table import Row, duration, times
 from timing import Timing, cores_used, in_turns, one_core
 
-from swashplate import Drive, SquaredError, maneuvers
+from swashplate import Drive, Serial, SquaredError, maneuvers
 from swashplate.equations.march import Stored
 from swashplate.equations.observation import Observation, ObservedRecord
 from swashplate.equations.record import record_of
@@ -151,7 +151,7 @@ def batch_rows(m: Marches) -> Iterator[Row]:
         values = changes(numbers, symbols)
         run = partial(m.drive.simulate_many, values, cost=cost, **record)
         with one_core():
-            timing = in_turns(m.c_pump, partial(run, threads=1), 7, base_calls=25)
+            timing = in_turns(m.c_pump, partial(run, executor=Serial()), 7, base_calls=25)
         each = Timing(timing.seconds / SETS, timing.base, timing.ratio * SETS)
         yield _against_c(f"{what}, each of {SETS:,} sets, one core", each, 10.0)
         timing = in_turns(m.c_pump, run, 15, base_calls=25)

@@ -14,7 +14,7 @@ from statistics import median
 
 from swashplate import Campaign
 from swashplate.campaign import rig
-from swashplate.identification.executors import Processes
+from swashplate.executors import Processes
 from swashplate.identification.fit import fit, smooth
 from swashplate.identification.setup import load_setup
 from swashplate.identification.staging import stage_problem

@@ -11,9 +11,9 @@ from table import Row, duration, size
 
 from swashplate import Campaign, maneuvers
 from swashplate.campaign import rig
+from swashplate.executors import Processes
 from swashplate.full_order.drive import FullOrderDrive
 from swashplate.identification.assessment import assess
-from swashplate.identification.executors import Processes
 from swashplate.identification.fit import fit
 from swashplate.identification.refits import bootstraps_of
 from swashplate.identification.setup import load_setup

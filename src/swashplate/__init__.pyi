@@ -9,8 +9,12 @@ from .errors import FileError as FileError
 from .errors import InputError as InputError
 from .errors import ParameterError as ParameterError
 from .errors import SwashplateError as SwashplateError
-from .full_order.drive import FullOrderDrive as FullOrderDrive
-from .full_order.physical_set import PhysicalSet as PhysicalSet
+from .executors import Dask as Dask
+from .executors import Processes as Processes
+from .executors import Serial as Serial
+from .executors import Threads as Threads
+from .full_order import FullOrderDrive as FullOrderDrive
+from .full_order import PhysicalSet as PhysicalSet
 from .linear import FrequencyResponse as FrequencyResponse
 from .linear import LinearDrive as LinearDrive
 from .linear import OperatingPoint as OperatingPoint
@@ -19,6 +23,7 @@ from .parameters.parameter_set import Parameter as Parameter
 from .parameters.parameter_set import ParameterSet as ParameterSet
 from .simulation.batch import Batch as Batch
 from .simulation.batch import SquaredError as SquaredError
+from .simulation.batch import simulate_many as simulate_many
 from .simulation.result import Limit as Limit
 from .simulation.result import Simulation as Simulation
 from .simulation.sensitivities import Sensitivities as Sensitivities

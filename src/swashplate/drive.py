@@ -16,7 +16,7 @@ from swashplate.errors import InputError
 from swashplate.parameters.files import dump_set, load_preset, load_set
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.batch import Batch, SquaredError, simulate_many
+from swashplate.simulation.batch import Batch, SquaredError, simulate_drives
 from swashplate.simulation.instance import at_every_rate
 from swashplate.simulation.result import Simulation
 from swashplate.simulation.run import (
@@ -34,6 +34,7 @@ from swashplate.simulation.steady import steady_states
 from swashplate.simulation.stepper import Stepper
 
 if TYPE_CHECKING:
+    from swashplate.executors import Executor
     from swashplate.linear import (
         Coulomb,
         FrequencyResponse,
@@ -298,7 +299,8 @@ class Drive:
         interpolation: Interpolation | None = None,
         cost: SquaredError | None = None,
         output: str = "shaft_speed",
-        threads: int | None = None,
+        to: str | Path | None = None,
+        executor: Executor | None = None,
     ) -> Batch:
         """Simulate many parameter sets over one record, from rest, on all cores.
 
@@ -315,8 +317,13 @@ class Drive:
         output : str
             Without `cost`: the signal to return, ``"shaft_speed"``, ``"shaft_position"`` or
             ``"current"``.
-        threads : int, optional
-            By default one a core. The numbers do not depend on it.
+        to, executor :
+            As in `swashplate.simulate_many`.
+
+        Raises
+        ------
+        InputError, FileError
+            As in `swashplate.simulate_many`.
         """
         if (voltage is None) == (current is None):
             raise InputError("A batch needs either a voltage or a current.")
@@ -325,14 +332,15 @@ class Drive:
             record = _voltage_record(voltage, rate, None, interpolation, False, None)
         else:
             record = record_of(current, rate, what="current", interpolation=interpolation)
-        return simulate_many(
+        return simulate_drives(
             self.parameters,
             changes,
             record,
             by_voltage=current is None,
             cost=cost,
             output=output,
-            threads=threads,
+            to=to,
+            executor=executor,
         )
 
     def stepper(

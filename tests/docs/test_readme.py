@@ -41,7 +41,7 @@ def test_calls_of_the_table_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         for code in re.findall(r"`([^`]*\(.*?\).*?)`", call):
             exec(code, names)
             ran += 1
-    assert ran == 8
+    assert ran == 9
 
 
 def test_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

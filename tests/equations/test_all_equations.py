@@ -24,7 +24,7 @@ from swashplate.equations import derive
 from swashplate.equations.equation import interpreted, is_function
 from swashplate.equations.syntax import plain
 from swashplate.equations.windows import Window
-from swashplate.models import card, full_order, pump
+from swashplate.models import card, full_order, machine, pump
 
 POINTS, FEWER = 100, 30
 SLOW = 25
@@ -88,7 +88,8 @@ RANGES = {
     "speed": (-3.0, 3.0), "flow_speed": (-3.0, 3.0), "load_torque": (-3e4, 3e4),
     "velocity": (-0.3, 0.3), "flow": (-1e-4, 1e-4), "piston_speed": (-0.1, 0.1),
     "motor_pressure": (-2e7, 2e7), "force": (-35.0, 35.0), "pressure": (-6e5, 6e5),
-    "plate": (-6e5, 6e5), "plate_pressure": (-6e5, 6e5),
+    "plate": (-6e5, 6e5), "plate_pressure": (-6e5, 6e5), "number": (0.0, 5.0),
+    "moment": (-100.0, 100.0), "resistance": (0.0, 5.0), "inertia": (0.005, 0.01),
 }  # fmt: skip
 """Physical ranges of what is no parameter, by its name."""
 OWN_RANGES: dict[str, dict[str, tuple[float, float]]] = {
@@ -98,6 +99,9 @@ OWN_RANGES: dict[str, dict[str, tuple[float, float]]] = {
     "card.taken_over": {"previous": (0.0, 0.1), "target": (0.6, 0.8)},
     "card.current_acceleration": {"rate": (-0.05, 0.05)},
     "library.arctangent": {"tangent": (-4.0, 4.0)},
+    "machine.mixture_modulus": {"pressure": (2e5, 1e7)},
+    "full_order.stopped": {"position": (-1.0, 1.0), "lower": (-0.5, -0.2), "upper": (0.2, 0.5)},
+    "library.clipped": {"lower": (-0.5, -0.2), "upper": (0.2, 0.5)},
     "pump.swash_angle": {"tangent": (-0.5, 0.5)},
 }
 
@@ -149,10 +153,17 @@ class Draw:
         near = [middle + self.uniform(-0.5, 0.5) for _ in range(2)]
         return Window((near[0], middle, near[1]), self.uniform(0.02, 0.98))
 
-    def machine(self) -> full_order.Machine:
+    def machine(self) -> machine.Machine:
         numbers = PhysicalSet.preset("hoist").numbers
-        usual = {"orifice_opening_plus": 1e-3, "orifice_opening_minus": 1e-3}
-        return full_order.Machine(
+        usual = {
+            "orifice_opening_plus": 1e-3,
+            "orifice_opening_minus": 1e-3,
+            "piston_leakage": 3e-11,
+            "motor_leakage": 1e-6,
+            "load_torque": 2e3,
+            "air_fraction": 0.01,
+        }
+        return machine.Machine(
             **{
                 name: (v if isfinite(v) and v != 0.0 else usual.get(name, 1e-3))
                 * self.uniform(0.9, 1.1)
@@ -164,7 +175,8 @@ class Draw:
         """One argument after the other, each consistent with those that it follows from."""
         options = {name: self.flags(kind) for name, kind in hints.items() if name == "options"}
         known: dict[str, Any] = {"h": H, **options}
-        known["p"] = self.parameters(hints.get("p", pump.Pump))
+        own = full_order.Plant if self.name.startswith("full_order.") else pump.Pump
+        known["p"] = self.parameters(hints.get("p", own))
         for name in (*[n for n in ("k", "state", "inputs", "signals") if n in hints], *hints):
             if name not in known:
                 known[name] = self.argument(name, hints[name], known)
@@ -175,8 +187,13 @@ class Draw:
             return card.Card(self.channel(), self.channel(), 0.014)
         if kind is card.Channel:
             return self.channel()
-        if kind is full_order.Machine:
+        if kind is machine.Machine:
             return self.machine()
+        if kind is pump.Solenoids:
+            return pump.Solenoids(*(self.parameter(name) for name in kind._fields))
+        if kind is full_order.Plant:
+            solenoids = self.parameters(pump.Solenoids)
+            return full_order.Plant(self.machine(), solenoids)
         return pump.Pump(*(self.parameter(name) for name in pump.Pump._fields))
 
     def argument(self, name: str, kind: Any, known: dict[str, Any]) -> Any:
@@ -216,11 +233,29 @@ class Draw:
             return self.pump_state(known)
         if kind is pump.PumpSignals:
             return self.pump_signals(known)
+        if kind in (machine.Machine, pump.Solenoids, full_order.Plant):
+            return self.parameters(kind)
         if kind is full_order.Motion:
             return kind(
                 *(self.number(n) for n in ("position", "velocity", "pressure", "angle")),
                 self.number("swash_rate"),
             )
+        if kind is full_order.PlantConstants:
+            return interpreted(full_order.plant_constants)(p, H, full_order.Substeps(12.0))
+        if kind is full_order.PlantState:
+            motion = self.argument("state", full_order.Motion, known)
+            return kind(motion, self.number("current"), 1.0)
+        if kind is full_order.PlantInputs:
+            return kind(self.number("current"))
+        if kind is full_order.PlantSignals:
+            motion = self.argument("state", full_order.Motion, known)
+            k = self.argument("k", full_order.PlantConstants, known)
+            options = full_order.PlantOptions()
+            return interpreted(full_order.plant_signals)(motion, 0.4, p, k, options)
+        if kind is full_order.Substeps:
+            return kind(2.0)
+        if kind is full_order.Span:
+            return kind(self.uniform(1e-5, 1e-4), self.number("current"), self.uniform(-0.01, 0.01))
         if not getattr(kind, "_fields", None) and hasattr(kind, "_fields"):
             return kind()
         raise AssertionError(f"{self.name}: say how a {kind} is drawn")
@@ -368,6 +403,8 @@ def compared(function: Any, arguments: dict[str, Any], implicit: set[str]) -> bo
         if value is None or value is True or name == "options":
             options[name] = value
             continue
+        if name == "given":  # nobody differentiates by how a run is integrated
+            continue
         for path, number in leaves(value, name):
             floats[path] = number
             if path.endswith(".s.0"):
@@ -450,6 +487,6 @@ def test_partials_are_those_of_differences(name: str) -> None:
 
 def test_no_equation_is_missed() -> None:
     """Those that the models name, and the library's, are among what was found."""
-    for package in ("card", "pump", "refinements", "full_order", "library", "windows"):
+    for package in ("card", "pump", "refinements", "machine", "full_order", "library", "windows"):
         assert any(name.startswith(f"{package}.") for name in EQUATIONS), package
     assert len(EQUATIONS) > 100

@@ -9,7 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swashplate.equations import declared, derive, equation, interpolate, root, soft_threshold
+from swashplate.equations import (
+    declared,
+    derive,
+    equation,
+    interpolate,
+    repeated,
+    root,
+    soft_threshold,
+)
 from swashplate.equations.program import leaves
 from swashplate.errors import EquationError
 
@@ -493,6 +501,60 @@ def test_soft_threshold(derivative: Callable[..., float]) -> None:
     assert soft_threshold(-0.9, 0.7) == pytest.approx(-0.2)
     for x in (-2.0, -0.5, 0.5, 2.0):
         check(stuck, derivative, ("x", "w"), x=x, w=0.7)
+
+
+class Swing(NamedTuple):
+    angle: float
+    rate: float
+
+
+@equation
+def swung(state: Swing, number: float, s: Spring, h: float) -> Swing:
+    rate = state.rate - h * (s.stiffness * sin(state.angle) + s.rest * number)
+    return Swing(state.angle + h * rate, min(rate, 0.9))
+
+
+@equation
+def after(count: float, state: Swing, s: Spring, h: float) -> float:
+    """What follows behind the steps, from a state that follows an argument."""
+    end = repeated(swung, count, Swing(2.0 * state.angle, state.rate), s, h)
+    return end.angle * end.rate + s.rest
+
+
+def test_repeated_is_a_loop(derivative: Callable[..., float]) -> None:
+    state, spring = Swing(0.3, 0.2), Spring(1.5, 0.1)
+    expected = Swing(0.6, 0.2)
+    for number in range(5):
+        expected = swung(expected, float(number), spring, 0.1)
+    assert after(5.0, state, spring, 0.1) == expected.angle * expected.rate + 0.1
+    assert after(0.0, state, spring, 0.1) == 0.6 * 0.2 + 0.1
+    check(after, derivative, ("state", "s", "h"), count=5.0, state=state, s=spring, h=0.1)
+
+
+def test_derivatives_of_no_repetition_are_those_of_the_state() -> None:
+    derived = derive(after, ("state", "s"))
+    values = dict(
+        zip(derived.inputs, derived.python(0.0, Swing(0.3, 0.2), Spring(1.5, 0.1), 0.1)[1:])
+    )
+    assert values == {"state.angle": 0.4, "state.rate": 0.6, "s.stiffness": 0.0, "s.rest": 1.0}
+
+
+def test_what_a_repeated_step_follows_is_structure() -> None:
+    """The rate does not depend on what only the angle follows before it has been taken over."""
+    derived = derive(swung, ("state", "s", "h"))
+    assert derived.outputs == ("angle", "rate")
+    many = derive(many_times, ("state", "drag"))
+    assert many.entries == ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2))
+
+
+@equation
+def coasting(state: Swing, number: float, drag: float) -> Swing:
+    return Swing(state.angle + state.rate, state.rate * drag)
+
+
+@equation
+def many_times(state: Swing, drag: float) -> Swing:
+    return repeated(coasting, 3.0, state, drag)
 
 
 # --- conventions ----------------------------------------------------------------------------------

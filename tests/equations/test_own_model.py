@@ -1,15 +1,20 @@
-"""A model of one's own, marched, differentiated and batched like the package's drives."""
+"""A model of one's own, marched and differentiated like the package's drives."""
 
-from math import exp
-from typing import NamedTuple
+import pickle
+from math import cos, exp, log, sin
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
-from swashplate import InputError
-from swashplate.equations import equation
-from swashplate.equations.model import Model, Tap, join
-from swashplate.equations.use import sensitivities, simulate, simulate_many
+from swashplate import DomainError, InputError
+from swashplate.equations import Model, Tap, equation, instance_of, join, sensitivities, simulate
+from swashplate.equations.jacobian import residuals
+from swashplate.equations.observation import Observation, ObservedRecord
+from swashplate.equations.record import Record
+from swashplate.errors import EquationError
+from swashplate.models.drive import pump_drive
+from swashplate.simulation.batch import simulate_many
 
 
 class Valve(NamedTuple):
@@ -112,13 +117,27 @@ def test_where_the_state_begins_has_a_derivative() -> None:
     assert found[:, 0] == pytest.approx(np.ones(COMMAND.size))
 
 
-def test_many_sets_are_each_alone_to_the_last_bit() -> None:
-    gains = np.linspace(0.1, 0.9, 19)
-    free = Model("lagged", Valve, Rod, lagged)
-    rows = simulate_many(free, P, {"gain": gains}, {"command": COMMAND}, RATE, output="position")
-    for gain, row in zip(gains, rows, strict=True):
-        alone = simulate(free, P._replace(gain=float(gain)), {"command": COMMAND}, RATE)
-        assert (alone["position"] == row).all()
+def test_a_library_and_decisions_leave_the_bits_of_many_sets_alone() -> None:
+    model = Model("wobbling", Valve, Rod, wobbling)
+    changes = {"gain": np.linspace(0.1, 0.9, 21), "lag": np.linspace(0.04, 0.08, 21)}
+    changes["overlap"] = np.linspace(-0.2, 0.2, 21)
+    rows = simulate_many(model, P, changes, {"command": COMMAND}, RATE, output="position").output
+    for i, row in enumerate(rows):
+        p = P._replace(**{name: float(values[i]) for name, values in changes.items()})
+        alone = simulate(model, p, {"command": COMMAND}, RATE)["position"]
+        assert (alone == row).all()
+
+
+@equation
+def wobbling(state: Rod, command: float, p: Valve, h: float) -> Rod:
+    left = exp(-h / p.lag) if p.lag > 0.05 else exp(-h / 0.05)
+    far = abs(command) > p.overlap and (state.position > 0.1 or state.opening < 0.2)
+    swing = 0.0
+    if far:
+        swing = sin(state.position) / (1.0 + cos(state.opening) ** 2)
+    target = command + swing if far else p.overlap
+    opening = left * state.opening + (1.0 - left) * target
+    return Rod(opening, state.position + h * p.gain * opening**3 / (p.overlap + 0.5))
 
 
 @equation
@@ -156,3 +175,207 @@ def test_bad_inputs_are_named() -> None:
             parameters=["lead"],
             given=STROKE,
         )
+
+
+# --- what is refused ------------------------------------------------------------------------------
+
+
+class Fill(NamedTuple):
+    level: float
+
+
+class Outlet(NamedTuple):
+    width: float
+
+
+class Odd(NamedTuple):
+    level: complex
+
+
+@equation
+def filled(state: Fill, flow: float) -> Fill:
+    return Fill(state.level + flow)
+
+
+@equation
+def nothing(state: Fill, flow: float) -> Fill:
+    return None
+
+
+@equation
+def number(state: Fill, flow: float) -> Fill:
+    return state.level + flow
+
+
+@equation
+def row(state: Fill, flow: float) -> Fill:
+    return (state.level, flow)
+
+
+@equation
+def stranger(state: Fill, flow: float, p: Outlet) -> Fill:
+    return p
+
+
+@equation
+def hollow(state: Fill, flow: float) -> Fill:
+    return Fill(None)
+
+
+@equation
+def truth(state: Fill, flow: float) -> Fill:
+    return Fill(flow > 0.0)
+
+
+@equation
+def growing(state: Fill, flow: float) -> Fill:
+    return Fill(1e300 * (state.level + flow))
+
+
+@equation
+def shares(p: Outlet, h: float) -> Outlet:
+    return Outlet(log(p.width - 1.0))
+
+
+@equation
+def drained(state: Fill, flow: float, k: Outlet) -> Fill:
+    return Fill(state.level + k.width * flow)
+
+
+@equation
+def full(p: Outlet) -> Fill:
+    return Fill(1.0 / (p.width - 1.0))
+
+
+@equation
+def no_state(p: Outlet) -> Outlet:
+    return p
+
+
+@equation
+def room(state: Fill) -> float:
+    return 3.0 - state.level
+
+
+@equation
+def two_margins(state: Fill) -> Fill:
+    return state
+
+
+@equation
+def bare(state: Fill) -> float:
+    return state.level
+
+
+WIDE = Outlet(1.0)
+
+
+def run(step: Any = filled, p: Any = WIDE, flow: Any = None, rate: Any = 1.0, **more: Any):
+    """A tank that one unit a second flows into."""
+    begin = {"begin": more.pop("begin")} if "begin" in more else {}
+    tank = Model("tank", more.pop("parameters", Outlet), more.pop("state", Fill), step, **more)
+    return simulate(tank, p, {"flow": np.ones(5) if flow is None else flow}, rate, **begin)
+
+
+NO_STATE = "must return a Fill of numbers on every way"
+REFUSED = {
+    "nothing": ({"step": nothing}, f"Model tank: nothing {NO_STATE}"),
+    "number": ({"step": number}, f"number {NO_STATE}"),
+    "row": ({"step": row}, f"row {NO_STATE}"),
+    "stranger": ({"step": stranger}, f"stranger {NO_STATE}"),
+    "hollow": ({"step": hollow}, f"hollow {NO_STATE}"),
+    "truth": ({"step": truth}, f"truth {NO_STATE}"),
+    "no step": ({"step": None}, "step must be an equation, not None"),
+    "text": ({"step": "filled"}, "step must be an equation, not 'filled'"),
+    "complex state": ({"state": Odd}, "Odd.level is of type complex, but must be a float"),
+    "signals": ({"sample": bare}, "bare must return a named tuple, and say so"),
+    "margins": ({"domain": two_margins}, "two_margins must return one number, the margin"),
+    "rest": ({"rest": no_state}, "no_state must return a Fill, not Outlet"),
+    "p text": ({"p": Outlet("wide")}, "width is 'wide', but must be a real number"),
+    "p complex": ({"p": Outlet(1j)}, "width is 1j, but must be a real number"),
+    "p none": ({"p": Outlet(None)}, "width is None"),
+    "p list": ({"p": Outlet([1.0])}, r"width is \[1.0\]"),
+    "flow complex": ({"flow": np.ones(5) * 1j}, "flow must be one column of real numbers"),
+    "flow text": ({"flow": ["a"]}, "flow must be one column of real numbers"),
+    "flow none": ({"flow": [None]}, "flow must be one column of real numbers"),
+    "rate": ({"rate": "fast"}, "The rate is 'fast' Hz, but must be a number above 0"),
+    "begin": ({"begin": {"level": np.nan}}, "level begins at nan, but must be a finite number"),
+    "no such state": ({"begin": {"depth": 1.0}}, "no state 'depth' to start from; it has level"),
+    "hold": ({"taps": {"flow": Tap("flow", hold="cubic")}}, "held as 'cubic'; there are linear"),
+    "delay": (
+        {"taps": {"flow": Tap("flow", "width")}, "p": Outlet(-0.1)},
+        "tank: width is -0.1 s, but a delay is at least 0",
+    ),
+    "no delay": ({"taps": {"flow": Tap("flow", "width")}, "p": Outlet(np.nan)}, "width is nan s"),
+}
+
+
+@pytest.mark.parametrize(("options", "sentence"), REFUSED.values(), ids=REFUSED)
+def test_a_model_that_cannot_be_marched_is_refused(options: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        run(**options)
+
+
+@pytest.mark.parametrize("value", ['"high"', "1j", "[flow]"])
+def test_text_complex_numbers_and_lists_are_refused_in_the_equation(tmp_path, value: str) -> None:
+    path = tmp_path / "own.py"
+    path.write_text(f"def step(state: float, flow: float) -> float:\n    return {value}\n", "utf-8")
+    names: dict[str, Any] = {"__name__": "own"}
+    exec(compile(path.read_text("utf-8"), str(path), "exec"), names)
+    with pytest.raises(EquationError, match=r"own\.py, line 2: .* in step"):
+        equation(names["step"])
+
+
+OUTSIDE = {
+    "text": ({"domain": room, "outside": "the tank runs over"}, "tank: the tank runs over under "),
+    "function": (
+        {
+            "domain": room,
+            "outside": lambda margin, cause: f"{-margin:g} m too high by the {cause}.",
+        },
+        r"tank: 1 m too high by the input\.$",
+    ),
+    "constants": ({"step": drained, "constants": shares}, "tank: shares cannot be computed"),
+    "rest": ({"rest": full}, r"full cannot be computed for these numbers \(.*zero\)"),
+    "overflow": ({"step": growing}, "tank's level is inf at the end of the record"),
+}
+
+
+@pytest.mark.parametrize(("options", "sentence"), OUTSIDE.values(), ids=OUTSIDE)
+def test_leaving_the_domain_ends_in_its_sentence(options: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(DomainError, match=sentence):
+        run(**options)
+
+
+def test_of_two_models_in_series_both_say_what_may_have_happened() -> None:
+    tank = {"parameters": Outlet, "state": Fill, "step": filled, "domain": room}
+    first = Model("first", **tank, outside="the first runs over")
+    second = Model("second", **tank, outside="the second does")
+    both = join("both", first, second)
+    p = both.parameters(Outlet(1.0), Outlet(1.0))
+    with pytest.raises(DomainError, match=r"the first runs over .* Or: the second does"):
+        simulate(both, p, {"flow": np.ones(5)}, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("signal", "driver", "others", "sentence"),
+    [
+        ("depth", "flow", {}, "tank has no signal 'depth'; it has level"),
+        ("level", "rain", {}, "tank has no input 'rain'; it has flow"),
+        ("level", "flow", {"rain": np.ones(5)}, "tank has no input 'rain'; it has flow"),
+    ],
+)
+def test_an_unknown_signal_or_driver_cannot_be_observed(signal, driver, others, sentence) -> None:
+    record = Record(np.ones(5), 0.0, 1.0, 1)
+    observed = ObservedRecord(
+        record, [Observation(signal, np.arange(5.0), np.ones(5))], driver, "rest", others
+    )
+    tank = instance_of(Model("tank", Outlet, Fill, filled), WIDE)
+    with pytest.raises(InputError, match=sentence):
+        residuals(tank, observed)
+
+
+def test_a_model_goes_to_other_processes_by_its_name() -> None:
+    assert pickle.loads(pickle.dumps(pump_drive)) is pump_drive
+    with pytest.raises(InputError, match="tank cannot be sent .* stand by a name in a module"):
+        pickle.dumps(Model("tank", Outlet, Fill, filled))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numba import config
 
-from swashplate.equations import derive, equation, interpolate, root
+from swashplate.equations import derive, equation, interpolate, repeated, root
 from swashplate.errors import EquationError, SwashplateError
 
 pytestmark = pytest.mark.interpreted
@@ -32,12 +32,17 @@ def fine(x: float) -> float:
     return x
 
 
+@equation
+def added(t: Two, number: float) -> float:
+    return t.a + number
+
+
 def defined(text: str, file: str = "/somewhere/friction.py") -> Any:
     """The function that a text defines, as if it stood in a file."""
     linecache.cache[file] = (len(text), None, text.splitlines(True), file)
     space = {
-        "math": math, "np": np, "Two": Two, "WORDS": WORDS, "fine": fine, "equation": equation,
-        "interpolate": interpolate, "root": root,
+        "math": math, "np": np, "Two": Two, "WORDS": WORDS, "fine": fine, "added": added, "equation": equation,
+        "interpolate": interpolate, "repeated": repeated, "root": root,
     }  # fmt: skip
     exec(compile(text, file, "exec"), space)
     return space["f"]
@@ -157,6 +162,10 @@ DERIVED = {
     "y = root(x, 0.0, 1.0)": ("root of something else", "name of an @equation"),
     "y = root(fine, 0.0)": ("root with other arguments", "root(residual, low, high"),
     "y = root(fine, 0.0, 1.0, x)": ("root of fine with other arguments", "low, high"),
+    "y = repeated(x, 3.0, t)": ("repeated of something else", "name of an @equation"),
+    "y = repeated(fine, 3.0)": ("repeated with other arguments", "repeated(step, count, state"),
+    "y = repeated(fine, 3.0, t)": ("repeated of fine with other arguments", "the rest"),
+    "y = repeated(added, 3.0, t)": ("added, which does not return a state", "same named tuple"),
     "y = interpolate(x, t, (1.0,))": ("interpolate with something else", "one length"),
     "if x > 1.0: return x, y": ("results of different structure", "same tuple"),
 }  # fmt: skip

@@ -9,15 +9,15 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Source
-from swashplate.identification.model import Differentiable, Linearised
-from swashplate.identification.problem import Problem
-from swashplate.identification.solving import solve
-from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate import Campaign, Channel, Experiment
+from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.equations import simulate
+from swashplate.identification import Linearised, Problem, Unknown, Unknowns, solve
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "excavator"
 PAGE = (ROOT / "docs" / "own-models.md").read_text("utf-8")
+RATE = 50.0
 logs = pytest.mark.skipif(
     not DATA.exists(), reason="the excavator's logs are not beside this checkout"
 )
@@ -28,44 +28,50 @@ def excavator(load_example: Callable[[str], ModuleType]) -> ModuleType:
     return load_example("excavator")
 
 
-def rod(excavator: ModuleType, command: float, slope: float = 0.0, seconds: float = 2.0) -> float:
-    steps = round(seconds / excavator.STEP)
-    return float(
-        excavator.rod_position(
-            np.full(steps, command), 1e-6, (1.2, 1.0), 0.25, (0.02, 0.03), slope, 0.1, 0.08
-        )[-1]
+def rod(
+    excavator: ModuleType, command: float, slope: float = 0.0, stops: tuple[float, ...] = ()
+) -> np.ndarray:
+    """Position under a constant command without lag or delay, from 0.1 m."""
+    p = excavator.Valve(0.0, 1e-6, 1.2, 1.0, 0.25, 0.02, 0.03, slope)
+    run = simulate(
+        excavator.valve,
+        p,
+        {"command": np.full(201, command)},
+        RATE,
+        given=excavator.Stroke(0.08, *stops),
+        begin={"position": 0.1},
     )
+    return run["position"]
 
 
 def test_within_the_overlap_the_rod_stays(excavator: ModuleType) -> None:
-    assert rod(excavator, 1.2) == rod(excavator, -1.0) == 0.1
+    for command in (1.2, -1.0):
+        assert (rod(excavator, command) == 0.1).all()
 
 
 def test_beyond_it_the_flow_saturates(excavator: ModuleType) -> None:
     # by hand: 2 s at 20 mm/s (1 - exp(-0.5/0.25)), and back at 30 mm/s (1 - exp(-0.7/0.25))
-    assert rod(excavator, 1.7) == pytest.approx(0.1 + 0.04 * (1.0 - np.exp(-2.0)), rel=1e-9)
-    assert rod(excavator, -1.7) == pytest.approx(0.1 - 0.06 * (1.0 - np.exp(-2.8)), rel=1e-9)
+    for command, moved in (
+        (1.7, 0.04 * (1.0 - np.exp(-2.0))),
+        (-1.7, -0.06 * (1.0 - np.exp(-2.8))),
+    ):
+        position = rod(excavator, command)
+        assert position[200] - position[100] == pytest.approx(moved, rel=1e-9)
 
 
 def test_a_load_slows_what_extends_and_helps_it_back(excavator: ModuleType) -> None:
-    # 20 mm beyond the middle, half of 40 mm: speeds change by half of the slope, to first order
-    out, back = rod(excavator, 9.0, 0.2, 0.02) - 0.1, rod(excavator, -9.0, 0.2, 0.02) - 0.1
-    assert out == pytest.approx(0.02 * 0.02 * 0.9, rel=1e-6)
-    assert back == pytest.approx(-0.02 * 0.03 * 1.1, rel=1e-6)
+    for command, speed in ((9.0, 0.02), (-9.0, -0.03)):
+        position = rod(excavator, command, 0.2)
+        # counted from the middle of 80 mm, in half strokes of 40 mm
+        load = 0.2 * (position[9] - 0.08) / 0.04
+        factor = 1.0 - load if command > 0.0 else 1.0 + load
+        assert RATE * (position[10] - position[9]) == pytest.approx(speed * factor, rel=1e-6)
 
 
-def test_the_mean_of_a_held_command(excavator: ModuleType) -> None:
-    command = InputSignal(
-        "voltage",
-        "V",
-        np.array([0.0, 1.0, 3.0]),
-        np.array([2.0, -1.0, 4.0]),
-        "previous",
-        Source(Path("none.csv"), "u"),
-    )
-    edges = np.array([-1.0, 0.0, 0.5, 1.5, 3.0, 4.0])
-    # before the log nothing is commanded; from 0.5 to 1.5 s half a second of 2 and half of -1
-    assert excavator.mean_command(command, edges) == pytest.approx([0.0, 2.0, 0.5, -1.0, 4.0])
+def test_the_end_stops_hold_the_rod(excavator: ModuleType) -> None:
+    out, back = (rod(excavator, command, stops=(0.05, 0.13)) for command in (9.0, -9.0))
+    assert out[-1] == out.max() == 0.13
+    assert back[-1] == back.min() == 0.05
 
 
 def position(time: list[float], values: list[float], weight: list[float]) -> Channel:
@@ -73,17 +79,11 @@ def position(time: list[float], values: list[float], weight: list[float]) -> Cha
     return Channel("position", "position", "m", *arrays, Source(Path("none.csv"), "x"))
 
 
-def test_each_window_is_anchored_by_its_first_sample_that_counts(excavator: ModuleType) -> None:
+def test_each_window_is_anchored_by_its_first_sample(excavator: ModuleType) -> None:
     time = [0.5, 1.0, 5.4, 5.5, 7.6, 19.0, 19.1]
-    channel = position(time, time, [1, 1, 1, 1, 1, 0, 1])
+    channel = position(time, time, [1] * 7)
     moved = excavator.since_anchor(channel, channel.values)
-    assert moved == pytest.approx([0.0, 0.5, 4.9, 0.0, 2.1, -0.1, 0.0])
-    # nothing counts in the second window, or nowhere
-    channel = position(time, time, [0, 1, 0, 0, 0, 0, 0])
-    moved = excavator.since_anchor(channel, channel.values)
-    assert moved == pytest.approx([-0.5, 0.0, 4.4, 0.0, 2.1, 0.0, 0.1])
-    ignored = excavator.since_anchor(position(time, time, [0] * 7), np.array(time))
-    assert ignored == pytest.approx([0.0, 0.5, 4.9, 0.0, 2.1, 0.0, 0.1])
+    assert moved == pytest.approx([0.0, 0.5, 4.9, 0.0, 2.1, 0.0, 0.1])
 
 
 class Ramp:
@@ -109,14 +109,13 @@ def test_a_position_that_slips_between_windows_does_not_spoil_the_speed(
     channel = position(time, 0.7 * time + 2.0 * np.floor(time / 5.0), np.ones(time.size))
     command = InputSignal("other", "1", time, time, "linear", channel.source)
     parts = ("run", "axis", "run", "fit", "rest", None, command, {"position": channel})
-    made = excavator.anchored_model(model)
-    assert isinstance(made, Differentiable) == isinstance(model, Differentiable)
     problem = Problem(
-        made,
-        (excavator.anchored(Experiment(*parts)),),
+        model,
+        (Experiment(*parts),),
         Unknowns((Unknown("speed", 1.0, 0.1, 5.0),)),
         ("position",),
         {"position": 1.0},
+        compare=excavator.since_anchor,
     )
     found = problem.unknowns.values(solve(problem).vector)
     assert found["speed"] == pytest.approx(0.7, abs=1e-9)
@@ -124,7 +123,7 @@ def test_a_position_that_slips_between_windows_does_not_spoil_the_speed(
 
 @logs
 def test_traps_of_the_data(excavator: ModuleType) -> None:
-    tests = excavator.load(DATA)
+    tests = Campaign.from_toml(excavator.CAMPAIGN, logs=DATA)
     assert len(tests) == 12
     for each in tests:
         # mm and cm come out alike, and each command begins at neutral
@@ -139,11 +138,16 @@ def table() -> list[list[str]]:
 
 @logs
 @pytest.mark.slow
-def test_the_table_of_the_page(
-    excavator: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_the_table_and_the_figure_of_the_page(
+    excavator: ModuleType,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(sys, "argv", ["excavator.py", str(DATA)])
+    figure = tmp_path / "excavator.png"
+    monkeypatch.setattr(sys, "argv", ["excavator.py", str(DATA), "--figure", str(figure)])
     excavator.main()
+    assert figure.stat().st_size > 20_000
     printed = capsys.readouterr().out
     rows = re.findall(r"^\| (boom|stick|bucket) \|(.*)\|$", printed, re.MULTILINE)
     assert len(rows) == len(table()) == 12
@@ -158,10 +162,3 @@ def test_the_table_of_the_page(
         wins += lost == ""
     assert f"The valve is the better one in {wins} of 12." in printed
     assert wins == 10
-
-
-@logs
-def test_the_figure(excavator: ModuleType, tmp_path: Path) -> None:
-    figure = tmp_path / "excavator.png"
-    excavator.draw(excavator.load(DATA), "manual_ol_1010_2055", figure)
-    assert figure.stat().st_size > 20_000

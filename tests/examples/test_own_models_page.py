@@ -14,7 +14,8 @@ def test_the_python_runs_and_prints_what_the_page_says(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (block,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    exec(compile(block, "own-models.md", "exec"), {})
+    Path("tank.py").write_text(block, "utf-8")  # an equation is read from its file
+    exec(compile(block, "tank.py", "exec"), {"__name__": "tank"})
     printed = capsys.readouterr().out.strip()
     assert f"It prints `{printed}`" in PAGE
     assert printed == "7.00 K/kW, 12.0 s"  # what the page's log was made with

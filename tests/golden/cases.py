@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from store import Class, Output
 
-from swashplate import Drive, FullOrderDrive, SquaredError
+from swashplate import Drive, FullOrderDrive, Serial, SquaredError
 
 Array = NDArray[np.float64]
 Inputs = Mapping[str, Array]
@@ -236,7 +236,7 @@ def signals_of(run: Any, names: tuple[str, ...] = SIGNALS) -> Outputs:
     """Signals of a simulation, and those that only a refined one has."""
     found: Outputs = {name: np.array(getattr(run, name)) for name in names}
     found["time"] = np.array(run.time)
-    for name in ("motor_torque", "motor_pressure_drop") if run.refined else ():
+    for name in ("motor_torque", "motor_pressure_drop") if getattr(run, "refined", False) else ():
         values = getattr(run, name, None)
         if values is not None:
             found[name] = np.array(values)
@@ -312,22 +312,24 @@ def many(axis: str, variant: str, inputs: Inputs) -> Outputs:
         sets = changes(axis)
         by_voltage = {"voltage": inputs["slow voltage"], "rate": 200.0}
         for output in ("shaft_speed", "shaft_position", "current"):
-            batch = drive.simulate_many(sets, output=output, threads=1, **by_voltage)
+            batch = drive.simulate_many(sets, output=output, executor=Serial(), **by_voltage)
             assert batch.output is not None
             found[f"{name}, {output}"] = batch.output.T
         found[f"{name}, failures"] = tuple(f"{k}: {why}" for k, why in batch.failures.items())
         measured = drive.simulate(**by_voltage).shaft_speed
         weight = inputs["weight"][: measured.size]
         cost = SquaredError(np.where(weight > 0.0, measured, np.nan), weight)
-        found[f"{name}, cost"] = drive.simulate_many(sets, cost=cost, threads=1, **by_voltage).cost
+        found[f"{name}, cost"] = drive.simulate_many(
+            sets, cost=cost, executor=Serial(), **by_voltage
+        ).cost
     sets = MANY["pump"](axis)
     current = inputs[f"current of {axis}"][:1500]
-    batch = drive.simulate_many(sets, current=current, threads=1)
+    batch = drive.simulate_many(sets, current=current, executor=Serial())
     assert batch.output is not None
     found["by current"] = batch.output.T
     cost = SquaredError(np.cumsum(current) / 512.0, output="shaft_position")
     found["by current, cost"] = drive.simulate_many(
-        sets, current=current, cost=cost, interpolation="previous", threads=1
+        sets, current=current, cost=cost, interpolation="previous", executor=Serial()
     ).cost
     return found
 

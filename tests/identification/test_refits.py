@@ -7,8 +7,8 @@ import pytest
 
 from swashplate import Experiment
 from swashplate.errors import InputError
+from swashplate.executors import Serial
 from swashplate.identification.assessment import Assessment
-from swashplate.identification.executors import Serial
 from swashplate.identification.fit import StageFit
 from swashplate.identification.problem import Problem
 from swashplate.identification.refits import bootstraps_of, profiles_of

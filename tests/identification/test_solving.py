@@ -9,7 +9,7 @@ import pytest
 from swashplate import Channel, DomainError, Experiment, FileError, InputError, maneuvers
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.identification.executors import Processes, Serial
+from swashplate.executors import Processes, Serial
 from swashplate.identification.model import Linearised
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import Free, Stage

@@ -1,9 +1,15 @@
 """Many sets at once: what is refused, and what a bad set does to its neighbours."""
 
+import re
+
 import numpy as np
 import pytest
+from numba import config, njit
 
 from swashplate import Drive, InputError, ParameterError, SquaredError
+from swashplate.equations.lanes import lanes_of
+from swashplate.models.drive import pump_drive
+from swashplate.models.pump import PumpOptions
 
 
 @pytest.mark.traced
@@ -100,3 +106,14 @@ def test_samples_without_weight_may_be_missing(hoist: Drive) -> None:
 def test_unknown_parameter(hoist: Drive) -> None:
     with pytest.raises(ParameterError, match="did you mean Z16"):
         hoist.simulate_many({"Z_16": [1.0]}, voltage=[0.0])
+
+
+@pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
+def test_the_sets_are_marched_as_vectors() -> None:
+    lanes = lanes_of(pump_drive, ("current",), (None, PumpOptions()), "shaft_speed")
+    march = njit(error_model="numpy")(lanes.march.py_func)  # not from the cache, which has no text
+    row, table = "float64[::1]", "float64[:, ::1]"
+    march.compile(f"(UniTuple({row}, 1), int64[:, ::1], float64, {row}, {row}, {row}, {table})")
+    (text,) = march.inspect_llvm().values()
+    assert re.search(r"<\d+ x double> @llvm\.sqrt", text)
+    assert not re.search(r"gather|call double @llvm\.sqrt", text)

@@ -240,9 +240,6 @@ def slopes(drive: Drive, name: str, signals: tuple[str, ...], command: Array) ->
 CASES = {
     "everything": {**ALL, "cam_cycles": 5.4},
     "everything but the line": {k: v for k, v in ALL.items() if k != "line_stiffness"},
-    "stiction": {**STICTION},
-    "hysteresis": {"solenoid_hysteresis": 0.005},
-    "cam ring": {"cam_ripple": 0.01, "cam_ripple_per_torque": 5e-7, "load_torque": 3e4},
     "damping, physical root": {"swash_damping": 0.02, "Z7": 0.3},
 }
 

@@ -1,6 +1,6 @@
 """Residuals against plain simulations, the Jacobian against differences, the triangle against both.
 
-The readable sensitivities, and extrapolated differences of the residuals, are the references.
+Extrapolated differences of the residuals are the reference.
 """
 
 import tracemalloc
@@ -103,22 +103,6 @@ def close(found: np.ndarray, expected: np.ndarray, tolerance: float = 1e-11) -> 
     scale = np.abs(expected).max(axis=0)
     error = np.abs(found - expected).max(axis=0)
     assert (error <= tolerance * scale).all(), (error / np.where(scale > 0.0, scale, 1.0)).max()
-
-
-@pytest.mark.traced
-@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES.keys())
-def test_derivatives_are_those_of_the_readable_form(scene) -> None:
-    command, changes, start = scene
-    drive = drive_of(changes)
-    observed = observed_at_samples(command, start)
-    found = jacobian(drive.parameters, observed, ALL_COLUMNS)
-    by = drive.sensitivities(command, start=start)
-    assert found.names == by.names
-    for signal in ("current", "current_positive", "current_negative", "shaft_speed"):
-        close(found.columns[observed.rows_of(OBSERVABLE.index(signal))], getattr(by, signal))
-    sums = found.columns[observed.rows_of(OBSERVABLE.index("current_sum"))]
-    close(sums, by.current_positive + by.current_negative)
-    close(found.columns[observed.rows_of(OBSERVABLE.index("shaft_position"))], by.shaft_position)
 
 
 def test_limits_act_in_the_scenes() -> None:
@@ -385,7 +369,9 @@ def test_experiments_combine(hoist: Drive) -> None:
 def test_a_triangle_needs_no_memory_for_the_jacobian(hoist: Drive) -> None:
     command = np.tile(SWING, 60)
     observed = observed_at_samples(command, signals=["shaft_speed"])
-    residuals(hoist.parameters, observed)  # whatever is made once
+    short = observed_at_samples(SWING, signals=["shaft_speed"])
+    residuals(hoist.parameters, observed)  # where the observations look is kept with them
+    triangle(hoist.parameters, short, PUMP_COLUMNS)  # whatever else is made once
     tracemalloc.start()
     triangle(hoist.parameters, observed, PUMP_COLUMNS)
     _, peak = tracemalloc.get_traced_memory()

@@ -19,6 +19,7 @@ from swashplate.models.pump import (
     pressure_rate,
     shaft_speed,
     solenoid_force,
+    solenoids_of,
     spool_balance,
     swash_angle,
     swash_tangent,
@@ -68,7 +69,7 @@ def accelerations(
     leaks while it accelerates is left out.
     """
     leakage = 0.0 if options.leakage is None else static_leakage(p.motor_leakage, p.load_torque)
-    force = solenoid_force(current, p)
+    force = solenoid_force(current, solenoids_of(p))
     for n in range(pressure.size):
         free = spool_balance(force, arm_sine(pressure[n], p), p)
         orifice = p.Z16_plus if free > 0.0 else p.Z16_minus

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from swashplate.analysis.outcomes import Outcome, outcome_matrix
 from swashplate.analysis.trial import Trial
 from swashplate.drive import Drive
 from swashplate.equations.lanes import LANES
+from swashplate.executors import Serial, available_cores
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def batch_outcomes(
 
     def block(first: int, size: int) -> tuple[Array, dict[int, str]]:
         part = {name: values[first : first + size] for name, values in columns.items()}
-        run = drive.simulate_many(part, voltage=trial.voltage, rate=trial.rate, threads=1)
+        run = drive.simulate_many(part, voltage=trial.voltage, rate=trial.rate, executor=Serial())
         assert run.output is not None
         ran = np.ones(len(run.output), dtype=bool)
         ran[list(run.failures)] = False
@@ -85,7 +85,7 @@ def batch_outcomes(
 
     # whole blocks of what the batch marches side by side
     size = max(SAMPLES_AT_ONCE // trial.voltage.size // LANES * LANES, LANES)
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(threads or available_cores()) as pool:
         done = list(pool.map(partial(block, size=size), range(0, count, size)))
     return BatchOutcomes(
         tuple(outcomes),

@@ -40,8 +40,15 @@ class Campaign:
     experiments: tuple[Experiment, ...]
 
     @classmethod
-    def from_toml(cls, path: str | Path) -> Campaign:
-        """Read a campaign file and the logs beside it.
+    def from_toml(cls, path: str | Path, *, logs: str | Path | None = None) -> Campaign:
+        """Read a campaign file and its logs.
+
+        Parameters
+        ----------
+        path : path
+            The campaign file.
+        logs : path, optional
+            Folder of the logs; by default that of the campaign file.
 
         Raises
         ------
@@ -53,7 +60,7 @@ class Campaign:
             If a column is missing, a unit wrong or a name taken twice.
         """
         file = read_campaign_file(path)
-        experiments = tuple(read_experiments(path, file))
+        experiments = tuple(read_experiments(path, file, logs))
         title = file.title or Path(path).resolve().parent.name
         return cls(Path(path), title, file.virtual, file.axes, experiments)
 

@@ -45,24 +45,28 @@ class _Place:
     log: Log
 
 
-def read_experiments(path: str | Path, file: schema.CampaignFile) -> Iterator[Experiment]:
+def read_experiments(
+    path: str | Path, file: schema.CampaignFile, logs: str | Path | None = None
+) -> Iterator[Experiment]:
     """The experiments of a campaign file, run after run; each log is read once.
 
     Parameters
     ----------
     path : path
-        The campaign file; its logs lie beside it.
+        The campaign file.
     file : schema.CampaignFile
         Its content.
+    logs : path, optional
+        Folder of its logs; by default they lie beside it.
 
     Raises
     ------
     FileError, InputError, ParameterError
         For the first thing that is wrong; the sentence names file, column and row.
     """
-    names = _run_names(path, file)
+    names, folder = _run_names(path, file), Path(path).parent if logs is None else Path(logs)
     for number, (name, run) in enumerate(zip(names, file.runs, strict=True)):
-        log = open_log(Path(path).parent / run.file, options=file.format)
+        log = open_log(folder / run.file, options=file.format)
         place = _Place(Path(path), run, log)
         axes = _axes_of(place, number, file)
         columns = Columns(log, [column for axis in axes.values() for column in named(axis)])

@@ -121,7 +121,7 @@ def fit(
     far. The exit code is 1 if the result is not usable.
     """
     from swashplate.campaign.campaign import Campaign
-    from swashplate.identification.executors import Dask, Processes
+    from swashplate.executors import Dask, Processes
     from swashplate.identification.fit import fit as fitted
     from swashplate.identification.fit import refined
     from swashplate.identification.solving import longest_left
@@ -198,7 +198,7 @@ def fit(
 def _search(
     starts: int, seed: int, executor: object, out: Path, resume: bool, shown: Shown
 ) -> Search:
-    from swashplate.identification.executors import Dask, Processes
+    from swashplate.executors import Dask, Processes
     from swashplate.identification.fit import Search
     from swashplate.identification.starts import time_left
 

@@ -37,9 +37,9 @@ from swashplate.tables import FIGURE, TABLE
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swashplate.full_order.drive import FullOrderDrive
+    from swashplate.full_order import FullOrderDrive
 
-Method = Literal["march", "radau", "lsoda"]
+Method = Literal["march", "radau"]
 
 EXAMPLES = """\
 Examples:
@@ -81,7 +81,7 @@ def full_order(
     ] = None,
     method: Annotated[
         Method,
-        typer.Option(help="How the five states are integrated: march, or a solver to check it by."),
+        typer.Option(help="How the five states are integrated: march, or radau to check it by."),
     ] = "march",
     out: Annotated[
         Path | None,
@@ -122,8 +122,8 @@ def full_order(
         )
     given = physical_values(physical or ())
     with working("Completing the physical values"):
-        from swashplate.full_order.drive import FullOrderDrive
-        from swashplate.full_order.files import nearest_set
+        from swashplate.full_order import FullOrderDrive
+        from swashplate.full_order.completion import nearest_set
 
         chosen = drive_of(drive, values or (), factors or ())
         axis = nearest_set(chosen.name) if like is None else like
@@ -150,7 +150,7 @@ def _say_table(
     out: Path | None,
 ) -> None:
     from swashplate.equations.record import least_substeps
-    from swashplate.full_order.reduction import TABLE_MANEUVERS, validity
+    from swashplate.full_order.comparison import TABLE_MANEUVERS, validity
 
     least_substeps(rate)  # a rate out of range is refused before anything is sampled
     with progress(len(TABLE_MANEUVERS)) as begin:
@@ -179,7 +179,7 @@ def _say_run(
     out: Path | None,
     plot: Path | None,
 ) -> None:
-    from swashplate.full_order.comparison import compare
+    from swashplate.full_order import compare
 
     with working("Simulating"):
         name, run = simulated(full.drive, command, options)

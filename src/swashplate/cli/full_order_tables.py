@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     import polars
     from rich.table import Table
 
-    from swashplate.full_order.comparison import Comparison
-    from swashplate.full_order.drive import FullOrderDrive
+    from swashplate.full_order import Comparison, FullOrderDrive
     from swashplate.parameters.parameter_set import Change
 
 UNITS = {
@@ -46,9 +45,7 @@ def physical_values(words: Sequence[str]) -> dict[str, Change]:
 
 
 def _physical_value(word: str) -> tuple[str, Change]:
-    from swashplate.full_order.files import si_value
-    from swashplate.full_order.physical_set import quantity_of
-    from swashplate.full_order.quantities import CHOICES
+    from swashplate.full_order.completion import chosen_quantity, si_value
 
     name, _, given = (part.strip() for part in word.partition("="))
     read = numbers_and_unit(given)
@@ -56,7 +53,7 @@ def _physical_value(word: str) -> tuple[str, Change]:
         raise InputError(
             f"--physical cannot read '{word}'; write it as oil_volume=1e-4 or oil_volume=100cm^3."
         )
-    quantity = CHOICES[name] if name in CHOICES else quantity_of(name)
+    quantity = chosen_quantity(name)
     numbers, unit = read
     if unit:
         numbers = [si_value(quantity, number, unit) for number in numbers]
@@ -65,12 +62,11 @@ def _physical_value(word: str) -> tuple[str, Change]:
 
 def chosen_table(axis: str, given: Mapping[str, Change]) -> Table:
     """What the physical set was completed from: assumed values and given ones."""
-    from swashplate.full_order.completion import chosen_over
-    from swashplate.full_order.files import load_choices
+    from swashplate.full_order.completion import chosen_over, load_choices
 
     made = table("What the drive's parameters do not say", "Physical value", ">", "", "")
     for name, entry in chosen_over(load_choices(axis), given).items():
-        unit, factor = UNITS.get(entry.quantity.unit, (entry.quantity.unit, 1.0))
+        unit, factor = UNITS.get(entry.unit, (entry.unit, 1.0))
         numbers = "/".join(f"{factor * value:.5g}" for value in entry.values)
         made.add_row(name, numbers, unit, "given" if entry.status == "user" else "assumed")
     return made
@@ -78,8 +74,7 @@ def chosen_table(axis: str, given: Mapping[str, Change]) -> Table:
 
 def assumed_said(axis: str, given: Mapping[str, Change]) -> str:
     """How much of the physical set is assumed."""
-    from swashplate.full_order.completion import chosen_over
-    from swashplate.full_order.files import load_choices
+    from swashplate.full_order.completion import chosen_over, load_choices
 
     entries = chosen_over(load_choices(axis), given)
     assumed = sum(entry.status != "user" for entry in entries.values())
@@ -127,11 +122,8 @@ def run_table(found: Comparison) -> Table:
         for band in reversed(BANDS):
             made.add_row(f"within {100.0 * band:g} %", "", _yes(differ.relative <= band))
     made.add_section()
-    drop, balances = 1e-6 * found.full.motor_pressure_drop, found.full.balances()
-    energy = max(balances.spool.worst, balances.swash.worst, balances.load.worst)
+    drop = 1e-6 * found.full.motor_pressure_drop
     made.add_row("motor pressure drop, MPa", f"{drop.min():z.3f}", f"to {drop.max():z.3f}")
-    made.add_row("worst energy balance, of the turnover", f"{energy:.0e}", "")
-    made.add_row("oil's volume balance, of the turnover", f"{balances.oil.worst:.0e}", "")
     return made
 
 

@@ -13,9 +13,9 @@ from swashplate.errors import InputError
 if TYPE_CHECKING:
     from swashplate.campaign.campaign import Campaign
     from swashplate.campaign.experiment import Experiment
+    from swashplate.executors import Executor
     from swashplate.identification.assessment import Assessment, RunQuality
     from swashplate.identification.bootstrap import Bootstrap
-    from swashplate.identification.executors import Executor
     from swashplate.identification.fit import Fit
     from swashplate.identification.fit_file import StageProfile
     from swashplate.identification.fold_results import CrossValidation

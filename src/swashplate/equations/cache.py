@@ -128,11 +128,26 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     known[plain(function)] = None
     compiled: Any = njit(nogil=True, error_model="numpy")(function)
     if not config.DISABLE_JIT:  # type: ignore[attr-defined]
-        try:
-            compiled._cache = _KernelCache(function)
-        except RuntimeError:  # no folder to cache in can be written
-            warn(UNCACHED, RuntimeWarning, stacklevel=2)
+        on_disk(compiled, function)
     return compiled  # type: ignore[no-any-return]
+
+
+def subroutine(function: Callable[P, R]) -> Callable[P, R]:
+    """A `kernel` that only kernels call: without the code that takes arguments from Python."""
+    known[plain(function)] = None
+    inner: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    compiled: Any = njit(nogil=True, error_model="numpy", **inner)(function)
+    if not config.DISABLE_JIT:  # type: ignore[attr-defined]
+        on_disk(compiled, function)
+    return compiled  # type: ignore[no-any-return]
+
+
+def on_disk(compiled: Any, function: Callable[..., Any]) -> None:
+    """Let a compiled function keep its machine code."""
+    try:
+        compiled._cache = _KernelCache(function)
+    except RuntimeError:  # no folder to cache in can be written
+        warn(UNCACHED, RuntimeWarning, stacklevel=3)
 
 
 # --- generated modules ----------------------------------------------------------------------------

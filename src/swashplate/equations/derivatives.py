@@ -37,7 +37,7 @@ from swashplate.equations.program import (
     paths,
     shapes_of,
 )
-from swashplate.equations.rules import of_root, of_rule, of_table
+from swashplate.equations.rules import of_repeated, of_root, of_rule, of_table
 from swashplate.equations.syntax import parsed
 from swashplate.equations.writing import Call, Cond, Define, Names, Region, Result, written
 
@@ -163,34 +163,50 @@ def _wanted(program: Program, outputs: tuple[str, ...] | None) -> tuple[int, ...
     return tuple(out)
 
 
-_made: dict[tuple[Any, tuple[str, ...], tuple[int, ...]], Derived] = {}
+_made: dict[tuple[Any, tuple[str, ...], tuple[int, ...], bool], Derived] = {}
 
 
 def _derived(
-    program: Program | Primitive, inputs: tuple[str, ...], outputs: tuple[int, ...] | None = None
+    program: Program | Primitive,
+    inputs: tuple[str, ...],
+    outputs: tuple[int, ...] | None = None,
+    chained: bool = False,
 ) -> Derived:
     if outputs is None:
         outputs = tuple(range(len(result_paths(program))))
     if isinstance(program, Primitive):
-        return (
-            of_root(program, inputs, _derived)
-            if program.kind == "root"
-            else of_table(program, inputs)
-        )
-    key = program, inputs, outputs
+        if program.kind == "interpolate":
+            return of_table(program, inputs)
+        if program.kind == "root":
+            return of_root(program, inputs, _derived)
+        return of_repeated(program, inputs, lambda step, by: _derived(step, by, chained=True))
+    key = program, inputs, outputs, chained
     if key not in _made:
         if program.rule is not None:
             _made[key] = of_rule(program, inputs, outputs)
         else:
-            _made[key] = _Derivation(program, inputs, outputs).derived()
+            _made[key] = _Derivation(program, inputs, outputs, chained).derived()
     return _made[key]
 
 
 class _Derivation:
-    """One function's forward sweep and adjoints."""
+    """One function's forward sweep and adjoints.
 
-    def __init__(self, program: Program, inputs: tuple[str, ...], outputs: tuple[int, ...]) -> None:
+    With `chained` a result that others follow is swept once: their adjoints end at it, and go on
+    with its derivatives. That is shorter where the results are links of one chain.
+    """
+
+    def __init__(
+        self,
+        program: Program,
+        inputs: tuple[str, ...],
+        outputs: tuple[int, ...],
+        chained: bool = False,
+    ) -> None:
         self.program, self.inputs, self.outputs = program, inputs, outputs
+        self.chained = chained
+        self.links: dict[str, dict[str, Node]] = {}
+        """Results that are names, with their derivatives."""
         self.texts = {path: _text_of(program, path) for path in inputs}
         self.active = set(self.texts.values())
         self.meaning: dict[str, Node] = {}
@@ -297,8 +313,8 @@ class _Derivation:
         derived = _derived(callee, by) if by or _decided(callee) else None
         if derived is None or not (derived.entries or _decided(callee)):
             function = self.names.of(callee.function, _called(callee))
-            residual = self.names.residual(callee)
-            first = () if residual is None else (residual,)
+            inner = self.names.inner(callee)
+            first = () if inner is None else (inner,)
             region.add(Call(function, first, call.arguments, call.result, []))
             return
         self.callees[derived.name] = derived
@@ -323,18 +339,26 @@ class _Derivation:
     def finish(self, end: Value, region: Region, tape: list[Any]) -> None:
         nodes = [n for _, n in leaves(end)]
         known = result_paths(self.program)
-        slopes: list[dict[str, Node]] = []
         for node in nodes:
             self.divide(node)
-        for o in self.outputs:
+        found: dict[int, dict[str, Node]] = {}
+        self.links = {}
+        defined = [each.name for each in tape if isinstance(each, Let)] if self.chained else []
+        place = {name: k for k, name in enumerate(defined)}
+        # links first: a name that is defined earlier may be met on the way from a later one
+        for o in sorted(self.outputs, key=lambda o: place.get(nodes[o].value, len(place))):
             bars: dict[str, Node] = {}
             label = "" if len(self.outputs) == 1 else known[o].replace(".", "_") + "_"
             self.push(nodes[o], ONE, (), bars)
             self.sweep(tape, bars, region, label)
-            slopes.append(bars)
+            found[o] = bars
             for text in self.texts.values():
                 if text in bars:
                     self.suggest(bars[text], f"d_{label}{word(text)}")
+            if nodes[o].op == "name" and nodes[o].value in place:
+                # by names, so that what is multiplied with them is written once
+                self.links[nodes[o].value] = bars
+        slopes = [found[o] for o in self.outputs]
         result = Result([])
         region.add(result)
         self.results.append((result, [nodes[o] for o in self.outputs], slopes))
@@ -345,6 +369,10 @@ class _Derivation:
             if isinstance(each, Let):
                 weight = bars.pop(each.name, ZERO)
                 self.suggest(weight, f"d_{label}{each.name}")
+                if each.name in self.links and weight is not ZERO:
+                    for text, slope in self.links[each.name].items():
+                        bars[text] = ex.plus(bars.get(text, ZERO), times(weight, slope))
+                    continue
                 self.push(each.node, weight, (), bars)
             elif isinstance(each[0], Invoke):
                 for name, moved in each[1].items():

@@ -84,8 +84,6 @@ class Derived:
 
 def result_paths(program: Program | Primitive) -> tuple[str, ...]:
     """Dotted paths of a result's scalars; one without a name is "value"."""
-    if isinstance(program, Primitive):
-        return ("value",)
     return tuple(p or "value" for p, _ in leaves(program.result))
 
 

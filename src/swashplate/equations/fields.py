@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from operator import attrgetter
 from typing import Any, get_type_hints
+
+import numpy as np
 
 
 def is_named_tuple(kind: object) -> bool:
@@ -31,6 +35,11 @@ def _paths(kind: type[Any], prefix: str) -> Iterator[str]:
             yield f"{prefix}{name}"
 
 
+def is_real(value: object) -> bool:
+    """Whether something is a real number, finite or not."""
+    return isinstance(value, int | float | np.integer | np.floating)
+
+
 def value_at(value: Any, path: str) -> Any:
     """What lies at a dotted path of a nested named tuple."""
     for name in path.split(".") if path else ():
@@ -40,7 +49,16 @@ def value_at(value: Any, path: str) -> Any:
 
 def numbers_of(value: Any) -> list[float]:
     """All floats of a nested named tuple, in the order of `floats_of`."""
-    return [float(value_at(value, path)) for path in floats_of(type(value))]
+    kind: Any = type(value)
+    return [float(each) for each in _reader(kind)(value)]
+
+
+@cache
+def _reader(kind: Any) -> Callable[[Any], tuple[Any, ...]]:
+    paths = floats_of(kind)
+    if len(paths) < 2:
+        return lambda value: tuple(value_at(value, path) for path in paths)
+    return attrgetter(*paths)
 
 
 def made(kind: type[Any], numbers: Mapping[str, float]) -> Any:

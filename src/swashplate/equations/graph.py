@@ -1,4 +1,4 @@
-"""Which derivative flows into which: the structure behind a model's Jacobian, and its kernels.
+"""Which derivative flows into which: the structure behind a model's Jacobian, and its pieces.
 
 A column of the Jacobian is the derivative of every state by one parameter, over all samples. It
 follows the linear recurrence ds[n+1] = A[n] ds[n] + b[n]. The partial derivatives A and b are known
@@ -10,6 +10,7 @@ each other (`recur` kernels: strongly connected components), each behind those t
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import TopologicalSorter
@@ -20,6 +21,7 @@ from swashplate.equations.derivatives import derive
 from swashplate.equations.derived import Derived
 from swashplate.equations.equation import equation_of_text
 from swashplate.equations.expressions import Node
+from swashplate.equations.lowering import generating
 from swashplate.equations.march import (
     PartCode,
     Sampler,
@@ -27,16 +29,20 @@ from swashplate.equations.march import (
     Stored,
     function_source,
     indented,
-    march_source,
+    march_piece_source,
     output_of,
     rest_of,
     settled_of,
 )
 from swashplate.equations.model import Model, Source, arguments_of
+from swashplate.equations.pieces import PIECE, Planned, piece
 from swashplate.equations.program import leaves
-from swashplate.equations.rows import ABREAST, STRIDE, carry, combine, deliver, finish
+from swashplate.equations.rows import STRIDE
+from swashplate.equations.run import module
 from swashplate.equations.scalars import Code, text
 from swashplate.errors import InputError
+
+WORD = re.compile(r"\b[A-Za-z_]\w*")
 
 
 class Entry(NamedTuple):
@@ -61,7 +67,6 @@ class By(NamedTuple):
 class Group:
     """States of a part that wait for each other, in one recurrence."""
 
-    kernel: str
     states: tuple[str, ...]
     after: tuple[bool, ...]
     """Whether a state's row holds the derivative behind the sample, as its signal needs it."""
@@ -71,10 +76,12 @@ class Group:
 
 @dataclass
 class Component:
-    """States of a part that share no derivative with its others: one fill kernel."""
+    """States of a part that share no derivative with its others: one piece fills them in."""
 
-    kernel: str
+    piece: int
     groups: list[Group]
+    signals: bool = False
+    """Whether the piece fills in the derivatives of signals as well."""
 
 
 @dataclass
@@ -85,8 +92,10 @@ class PartGraph:
     entries: dict[tuple[str, By], Entry] = field(default_factory=dict)
     """By result (``state.x``, ``signals.y``) and what it is derived by."""
     components: list[Component] = field(default_factory=list)
-    signal_kernel: str = ""
-    value_kernel: str = ""
+    signal_piece: int = -1
+    """Piece that fills in the derivatives of signals, -1 for none."""
+    value_piece: int = -1
+    """Piece that computes signals which the march does not leave, -1 for none."""
     aliases: dict[str, str] = field(default_factory=dict)
     """Signals that are a state behind the sample, as far as derivatives go."""
     constants: list[tuple[str, str]] = field(default_factory=list)
@@ -139,8 +148,8 @@ class Graph:
     """A model's whole structure."""
 
     parts: list[PartGraph]
-    stored: list[Stored]
-    """Numbers that the march leaves in the first rows of the block."""
+    stored: dict[Stored, int]
+    """Rows of the numbers that the march leaves in the block."""
     rows: int
     """Rows of numbers and partial derivatives together."""
     links: dict[str, dict[str, float]]
@@ -156,25 +165,28 @@ class Graph:
     """The parts' code."""
     signals: tuple[str, ...]
     """External signals that are given as records."""
+    pieces: tuple[Planned, ...]
+    """The march, and what the parts' graphs name by number."""
 
 
-def graph_source(
-    model: Model, signals: Sequence[str], options: Sequence[Any], observed: Sequence[str]
-) -> tuple[str, dict[str, Any], Graph]:
-    """Kernels of the Jacobian, what their names mean, and the structure.
+@generating
+def graph_of(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], observed: tuple[str, ...]
+) -> Graph:
+    """A model's structure, and the pieces of its march.
 
     Parameters
     ----------
     model : Model
         What is marched.
-    signals : sequence of str
+    signals : tuple of str
         External signals given as records.
-    options : sequence
+    options : tuple
         Options of each part.
-    observed : sequence of str
+    observed : tuple of str
         Signals whose derivatives are wanted.
     """
-    return _Builder(model, tuple(signals), tuple(options), tuple(observed)).build()
+    return _Builder(model, signals, options, observed).build()
 
 
 class _Builder:
@@ -191,30 +203,29 @@ class _Builder:
             model, signals, options, [place for place, _ in self.observed], ruled=True
         )
         self.parts = self.sampler.used()
-        self.texts: dict[str, str] = {}
-        self.names: dict[str, Any] = {}
-        self.stored: list[Stored] = []
+        self.pieces: list[Planned] = []
+        """The march, made last, comes first."""
+        self.stored: dict[Stored, int] = {}
         self.row_of: dict[str, int] = {}
         """Row of each number by its name in the code."""
         self.rows = 0
         self.graphs: list[PartGraph] = []
         self.values: dict[tuple[int, str], int] = {}
 
-    def build(self) -> tuple[str, dict[str, Any], Graph]:
+    def build(self) -> Graph:
         flows = [self._flows(part) for part in self.parts]
-        for graph, part in zip(self.graphs, self.parts, strict=True):
+        # part by part, so that the pieces of the first ones are the same whatever follows
+        for graph, part, partials in zip(self.graphs, self.parts, flows, strict=True):
             self._keep(graph, part)
+            self._values(graph, part)
+            self._part(graph, part, partials)
         for place, _ in self.observed:
             if place.kind == "link":
-                self.stored.append(place)
-        self.rows = len(self.stored)
-        for graph, part in zip(self.graphs, self.parts, strict=True):
-            self._values(graph, part)
-        for graph, part, partials in zip(self.graphs, self.parts, flows, strict=True):
-            self._part(graph, part, partials)
-        march, names = march_source(self.model, self.signals, self.options, self.stored)
-        self.names |= {"combine": combine, "carry": carry, "deliver": deliver, "finish": finish}
-        whole = Graph(
+                self._row_for(place)
+        rows = {each: _place(row, "n - first") for each, row in self.stored.items()}
+        text, names = march_piece_source(self.model, self.signals, self.options, rows)
+        march = self._planned("march", text, names)
+        return Graph(
             self.graphs,
             self.stored,
             self.rows,
@@ -225,12 +236,29 @@ class _Builder:
             [self._locals(part) for part in self.parts],
             self.parts,
             self.signals,
+            (march, *self.pieces),
         )
-        return (
-            "\n\n".join([march, *self.texts.values(), self._driver()]),
-            {**self.names, **names, **self.sampler.names},
-            whole,
-        )
+
+    def _planned(self, name: str, text: str, names: Mapping[str, Any]) -> Planned:
+        """A piece, in a module of its own."""
+        file = f"{self.model.name}_{name}"
+        return Planned(lambda: module(file, text, {"piece": piece, **names})[name])
+
+    def _piece(self, name: str, says: str, lines: Sequence[str], names: Mapping[str, Any]) -> int:
+        """Number of a new piece."""
+        text = function_source(f"{name}({PIECE})", says, lines, "@piece")
+        self.pieces.append(self._planned(name, text, {**self.sampler.names, **names}))
+        return len(self.pieces)
+
+    def _new_row(self) -> int:
+        self.rows += 1
+        return self.rows - 1
+
+    def _row_for(self, stored: Stored) -> int:
+        """Row in which the march leaves a number."""
+        if stored not in self.stored:
+            self.stored[stored] = self._new_row()
+        return self.stored[stored]
 
     # -- scalar functions ----------------------------------------------------------------------
 
@@ -296,8 +324,14 @@ class _Builder:
     def _arguments(self, part: PartCode, read: Iterable[str]) -> tuple[list[str], list[str]]:
         """Lines ahead of a loop over known samples, and those at the head of its body."""
         names = set(read)
+        lines = self.sampler.ahead([part])
+        made = [line for line in lines if "= params[" not in line and "= given[" not in line]
+        wanted = names | {name for line in made for name in WORD.findall(line)}
         ahead = [
-            line for line in self.sampler.ahead([part]) if line.split(" = ")[0] not in self.row_of
+            line
+            for line in lines
+            if (line in made or line.split(" = ")[0] in wanted)
+            and line.split(" = ")[0] not in self.row_of
         ]
         ahead += [
             f"{part.fraction(tap)} = fraction[{tap.number}]"
@@ -305,7 +339,7 @@ class _Builder:
             if part.fraction(tap) in names
         ]
         rows = [
-            f"{name} = flat[{self.row_of[name] * STRIDE} + m]"
+            f"{name} = {_place(self.row_of[name], 'm')}"
             for name in sorted(names)
             if name in self.row_of
         ]
@@ -362,20 +396,18 @@ class _Builder:
                     stored = stored._replace(kind="state")
                 self._store(stored, part.source(source))
         for signal in self._signals(part):
-            if signal in graph.aliases and (part.part, signal) not in self.values:
+            # what sub-steps lead to is not computed again
+            known = signal in graph.aliases or part.code.repeats
+            if known and (part.part, signal) not in self.values:
                 stored = Stored(part.part, "signals", signal)
                 if stored not in self.stored:
                     self._store(stored, f"signal {part.part} {signal}")
 
     def _store(self, stored: Stored, name: str) -> None:
-        if stored in self.stored:
-            self.row_of[name] = self.stored.index(stored)
-            return
-        self.row_of[name] = len(self.stored)
-        self.stored.append(stored)
+        self.row_of[name] = self._row_for(stored)
 
     def _values(self, graph: PartGraph, part: PartCode) -> None:
-        """Kernel that computes signals which the march does not leave, at known states."""
+        """Piece that computes signals which the march does not leave, at known states."""
         late = []
         for place, _ in self.observed:
             asked = place.part == part.part and place.kind == "signals"
@@ -387,14 +419,13 @@ class _Builder:
         ahead, rows = self._arguments(part, part.code.reads(nodes))
         inner = [*rows, *part.code.lines(nodes)]
         for signal, node in zip(late, nodes, strict=True):
-            self.values[part.part, signal] = self.rows
-            inner.append(f"flat[{self.rows * STRIDE} + m] = {text(node)}")
-            self.rows += 1
-        graph.value_kernel = f"values_{part.own.name}"
-        self.texts[graph.value_kernel] = function_source(
-            f"{graph.value_kernel}(count, params, given, fraction, h, flat)",
+            self.values[part.part, signal] = self._new_row()
+            inner.append(f"{_place(self.values[part.part, signal], 'm')} = {text(node)}")
+        graph.value_piece = self._piece(
+            f"values_{part.own.name}",
             f"Signals of {part.own.name} at known states.",
             [*ahead, "for m in range(count):", *indented(inner)],
+            {},
         )
 
     def _part(
@@ -406,14 +437,18 @@ class _Builder:
             for each, node in results.items()
             if each.startswith("signals.") and each.removeprefix("signals.") not in graph.aliases
         }
-        if signals:
-            graph.signal_kernel = f"fill_{own}_signals"
-            self._fill(graph, part, graph.signal_kernel, signals)
+        # derivatives are carried through sub-steps once, for states and signals
+        together = part.code.repeats
+        if signals and not together:
+            graph.signal_piece = self._fill(graph, part, f"{own}_signals", signals)
         states = list(partials)
         flows = {
             out: {f"state.{by.path}" for by in each if by.kind == "state"} & {*states}
             for out, each in partials.items()
         }
+        if together:
+            every = {each: results[each] for each in states}
+            filled = self._fill(graph, part, own, every | signals)
         at_sample = {
             by.path
             for out, by in graph.entries
@@ -421,11 +456,12 @@ class _Builder:
         } | {place.path for place, _ in self.observed if place.kind == "state"}
         at_sample |= {s.signal for s in self.sampler.sources if s.part == part.part}
         graph.aliases = {s: path for s, path in graph.aliases.items() if path not in at_sample}
-        for c, outs in enumerate(_weakly_connected(states, flows)):
+        for c, outs in enumerate([states] if together else _weakly_connected(states, flows)):
             name = f"{own}_{c}" if len(outs) < len(states) else own
-            self._fill(graph, part, f"fill_{name}", {each: results[each] for each in outs})
+            if not together:
+                filled = self._fill(graph, part, name, {each: results[each] for each in outs})
             groups = []
-            for g, members in enumerate(_strongly_connected(outs, flows)):
+            for members in _strongly_connected(outs, flows):
                 bare = tuple(each.removeprefix("state.") for each in members)
                 elsewhere = {
                     path
@@ -439,10 +475,8 @@ class _Builder:
                     path in at_sample or path in elsewhere or behind
                     for path, behind in zip(bare, after, strict=True)
                 )
-                group = Group(f"recur_{name}_{g}", bare, after, stored)
-                groups.append(group)
-                self.texts[group.kernel] = self._recurrence(graph, group)
-            graph.components.append(Component(f"fill_{name}", groups))
+                groups.append(Group(bare, after, stored))
+            graph.components.append(Component(filled, groups, together))
         constants = self._constants(part)
         if constants is not None:
             graph.constants = [
@@ -532,155 +566,41 @@ class _Builder:
             }
         return found
 
-    # -- kernels -------------------------------------------------------------------------------
+    # -- pieces --------------------------------------------------------------------------------
 
     def _fill(
-        self, graph: PartGraph, part: PartCode, kernel: str, results: Mapping[str, Node]
-    ) -> None:
-        """Kernel that writes partial derivatives at known states into rows of the block."""
-        derived = self._derived(part, f"{kernel.removeprefix('fill_')}_part", results)
-        inner, ahead = ["pass"], list[str]()
-        if derived is not None:
-            known, order, literal = self._by(part), list(results), literals(derived)
-            self.names.update(derived.names)
-            targets, stores = ["_"] * len(derived.outputs), []
-            for k, (out, inp) in enumerate(derived.entries):
-                key = (order[out], known[derived.inputs[inp]])
-                if k in literal:
-                    graph.entries[key] = Entry(-1, literal[k])
-                    targets.append("_")
-                    continue
-                graph.entries[key] = Entry(self.rows)
-                targets.append(f"e{k}")
-                stores.append(f"flat[{self.rows * STRIDE} + m] = e{k}")
-                self.rows += 1
-            arguments = argument_names(derived)
-            ahead, rows = self._arguments(part, arguments)
-            if stores:
-                called = f"{derived.name}({', '.join(arguments)})"
-                inner = [*rows, f"{', '.join(targets)} = {called}", *stores]
-            for name, each in derived.texts.items():
-                self.texts.setdefault(f"derived {name}", f"@inlined\n{each}")
-        self.texts[kernel] = function_source(
-            f"{kernel}(count, params, given, fraction, h, flat)",
+        self, graph: PartGraph, part: PartCode, name: str, results: Mapping[str, Node]
+    ) -> int:
+        """Piece that writes partial derivatives at known states into rows of the block."""
+        derived = self._derived(part, f"{name}_part", results)
+        if derived is None:
+            return -1
+        known, order, literal = self._by(part), list(results), literals(derived)
+        arguments, body, returns = straight(derived)
+        stores = []
+        for k, (out, inp) in enumerate(derived.entries):
+            key = (order[out], known[derived.inputs[inp]])
+            if k in literal:
+                graph.entries[key] = Entry(-1, literal[k])
+                continue
+            row = self._new_row()
+            graph.entries[key] = Entry(row)
+            stores.append(f"{_place(row, 'm')} = {returns[len(derived.outputs) + k]}")
+        if not stores:
+            return -1
+        ahead, rows = self._arguments(part, arguments)
+        called = {each.name: each.compiled for each in derived.callees}
+        return self._piece(
+            f"fill_{name}",
             "Partial derivatives at known states.",
-            [*ahead, "for m in range(count):", *indented(inner)],
+            [*ahead, "for m in range(count):", *indented([*rows, *body, *stores])],
+            {**called, **derived.names},
         )
 
-    def _recurrence(self, graph: PartGraph, group: Group) -> str:
-        """Kernel that runs the recurrences of a group's columns, ABREAST at a time."""
-        k = len(group.states)
-        carried = [
-            _shift_of(graph, group, i) for i in range(k)
-        ]  # index of the member that a state simply takes over, -1 otherwise
-        lines = [f"for c in range(0, columns.shape[1], {ABREAST}):"]
-        body: list[str] = []
-        for i in range(k):
-            for j in range(ABREAST):
-                body.append(f"y{i}{j} = tangent[columns[{3 * i + 2}, c + {j}]]")
-                if carried[i] < 0 or _has_direct(graph, group, group.states[i]):
-                    body.append(f"g{i}{j} = table[columns[{3 * i}, c + {j}]]")
-                if group.stored[i]:
-                    body.append(f"d{i}{j} = table[columns[{3 * i + 1}, c + {j}]]")
-        inner: list[str] = []
-        factor: dict[tuple[int, int], str] = {}
-        for i in range(k):
-            for l in range(k):
-                entry = graph.entries.get(
-                    (f"state.{group.states[i]}", By("state", group.states[l]))
-                )
-                if entry is None:
-                    continue
-                if entry.row >= 0:
-                    factor[i, l] = f"a{i}{l}"
-                    inner.append(f"a{i}{l} = flat[{entry.row * STRIDE} + m]")
-                else:
-                    factor[i, l] = "" if entry.value == 1.0 else repr(entry.value)
-        for j in range(ABREAST):
-            new = []
-            for i in range(k):
-                terms = [
-                    f"{factor[i, l]} * y{l}{j}" if factor[i, l] else f"y{l}{j}"
-                    for l in range(k)
-                    if (i, l) in factor
-                ]
-                if carried[i] < 0 or _has_direct(graph, group, group.states[i]):
-                    terms.append(f"g{i}{j}[m]")
-                # what has long been known first: the chain then waits for one product alone
-                own = [t for t in terms if t.endswith(f"y{i}{j}")]
-                rest = [t for t in terms if t not in own]
-                total = " + ".join(rest) if rest else "0.0"
-                new.append(f"{own[0]} + ({total})" if own and rest else (own or [total])[0])
-            inner += [f"n{i}{j} = {new[i]}" for i in range(k)]
-            inner += [
-                f"d{i}{j}[m] = {'n' if group.after[i] else 'y'}{i}{j}"
-                for i in range(k)
-                if group.stored[i]
-            ]
-            inner += [f"y{i}{j} = n{i}{j}" for i in range(k)]
-        body += ["for m in range(count):", *indented(inner)]
-        for i in range(k):
-            for j in range(ABREAST):
-                body.append(f"tangent[columns[{3 * i + 2}, c + {j}]] = y{i}{j}")
-        lines += indented(body)
-        return function_source(
-            f"{group.kernel}(count, columns, flat, table, tangent)",
-            f"Derivatives of {', '.join(group.states)}.",
-            lines,
-        )
 
-    def _driver(self) -> str:
-        """Kernel that marches a record block by block, with the wanted derivatives."""
-        stored = len(self.stored)
-        known = "count, params, given, fraction, h, flat"
-        lines = [
-            "worst, used, count = inf, int(plan.first[0]), 0",
-            "progress = plan.first.copy()",
-            "flat, table = room.flat, room.table",
-            "for first in range(0, records[0].size, block):",
-        ]
-        inner = [
-            "carry(room, count)",
-            "count = min(block, records[0].size - first)",
-            "met = march(records, before, whole, fraction, params, given, h, states, "
-            f"(first, first + count), table[:{stored}], room.flags)",
-            "worst = min(worst, met)",
-        ]
-        inner += [f"{graph.value_kernel}({known})" for graph in self.graphs if graph.value_kernel]
-        fills: list[str] = []
-        component = group = stage = 0
-        for graph in self.graphs:
-            for each in graph.components:
-                block = [f"{each.kernel}({known})"]
-                for recurrence in each.groups:
-                    block += [
-                        f"combine(table, program.terms[{stage}], count, table, 0)",
-                        f"{recurrence.kernel}(count, program.columns[{group}], flat, table, "
-                        "tangent)",
-                    ]
-                    group, stage = group + 1, stage + 1
-                fills += [f"if program.active[{component}]:", *indented(block)]
-                component += 1
-            if graph.signal_kernel:
-                fills += [
-                    f"if program.active[{component}]:",
-                    f"    {graph.signal_kernel}({known})",
-                ]
-                component += 1
-            fills.append(f"combine(table, program.terms[{stage}], count, table, 0)")
-            stage += 1
-        inner += ["if program.derived > 0:", *indented(fills)]
-        inner.append(
-            "used = deliver(program, plan, sink, room, progress, used, "
-            "(first, count, records[0].size), h)"
-        )
-        lines += [*indented(inner), "finish(sink, room, used)", "return worst"]
-        return function_source(
-            "march_observed(records, before, whole, fraction, params, given, h, block, states, "
-            "tangent, program, plan, sink, room)",
-            f"March {self.model.name}, and compare it with what was observed.",
-            lines,
-        )
+def _place(row: int, at: str) -> str:
+    """Text of a number in a row of the block."""
+    return f"flat[{row * STRIDE} + {at}]"
 
 
 def scalar_function(
@@ -699,11 +619,37 @@ def scalar_function(
     return equation_of_text("\n".join([head, *indented(body), ""]), name, dict(names))
 
 
-def argument_names(derived: Derived) -> list[str]:
-    """Names of a derived function's arguments."""
+def straight(derived: Derived) -> tuple[list[str], list[str], list[str]]:
+    """Names of a derived function's arguments, lines of its body, and texts of what it returns."""
     tree = ast.parse(derived.source).body[0]
     assert isinstance(tree, ast.FunctionDef)
-    return [each.arg for each in tree.args.args]
+    *body, last = tree.body[1:]
+    assert isinstance(last, ast.Return)
+    assert not any(isinstance(each, ast.Return) for node in body for each in ast.walk(node))
+    lines = [*begun(body), *(line for node in body for line in ast.unparse(node).splitlines())]
+    value = last.value
+    elements = value.elts if isinstance(value, ast.Tuple) else [value]
+    return [each.arg for each in tree.args.args], lines, [ast.unparse(e) for e in elements if e]
+
+
+def begun(body: Sequence[ast.stmt]) -> list[str]:
+    """Lines that give a number to names which only one branch of an `if` makes.
+
+    In a loop such a name would carry its value from one sample to the next, as far as a compiler
+    can know, and the loop would not become vector instructions.
+    """
+    first: dict[str, str] = {}
+    for node in body:
+        if not isinstance(node, ast.If):
+            continue
+        for each in ast.walk(node):
+            if isinstance(each, ast.Assign) and isinstance(each.targets[0], ast.Name):
+                truth = isinstance(each.value, ast.Compare | ast.BoolOp)
+                first.setdefault(each.targets[0].id, "False" if truth else "0.0")
+            elif isinstance(each, ast.Assign) and isinstance(each.targets[0], ast.Tuple):
+                names = [e.id for e in each.targets[0].elts if isinstance(e, ast.Name)]
+                first |= {name: "0.0" for name in names if name not in first}
+    return [f"{name} = {value}" for name, value in first.items()]
 
 
 def literals(derived: Derived) -> dict[int, float]:
@@ -770,21 +716,3 @@ def _strongly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) ->
     for each in states:
         order.add(group[each], *({group[i] for i in flows[each] if i in group} - {group[each]}))
     return [list(members) for members in order.static_order()]
-
-
-def _has_direct(graph: PartGraph, group: Group, state: str) -> bool:
-    """Whether anything but the states of its group moves a state."""
-    return any(
-        out == f"state.{state}" and not (by.kind == "state" and by.path in group.states)
-        for out, by in graph.entries
-    )
-
-
-def _shift_of(graph: PartGraph, group: Group, index: int) -> int:
-    """Member that a state simply takes over, -1 where it does more."""
-    state = f"state.{group.states[index]}"
-    by = [each for out, each in graph.entries if out == state]
-    if len(by) != 1 or graph.entries[state, by[0]] != Entry(-1, 1.0):
-        return -1
-    known = by[0].kind == "state" and by[0].path in group.states
-    return group.states.index(by[0].path) if known else -1

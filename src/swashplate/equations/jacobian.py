@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -10,21 +10,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.fields import floats_of, value_at
-from swashplate.equations.graph import By, Entry, Graph, Group, PartGraph, graph_source
+from swashplate.equations.graph import By, Entry, Graph, Group, PartGraph, graph_of
 from swashplate.equations.lowering import generating
 from swashplate.equations.model import Model, Source
 from swashplate.equations.observation import ObservedRecord, Own
+from swashplate.equations.pieces import addresses, pointers
 from swashplate.equations.program import leaves
 from swashplate.equations.rows import (
     ABREAST,
     BLOCK,
+    CALL,
+    CARRIED,
+    COMBINE,
+    RECUR,
+    STRIDE,
     Indices,
     Program,
     Sink,
     Terms,
+    march_observed,
     room_for,
 )
-from swashplate.equations.run import Instance, Places, Start, check_domain, module
+from swashplate.equations.run import Instance, Places, Start, check_domain
 from swashplate.equations.triangle import ROWS, aligned, upright
 from swashplate.errors import InputError
 
@@ -61,11 +68,15 @@ class Layout:
     """A program without the numbers that depend on parameters, and the memory it needs."""
 
     program: Program
-    slots: tuple[tuple[tuple[int, Slot], ...], ...]
-    """For each list of terms, and last for the observed ones: terms with a factor of this kind."""
+    pieces: frozenset[int]
+    """Numbers of the pieces that are called."""
+    slots: tuple[tuple[int, Slot], ...]
+    """Terms with a factor of this kind."""
     rows: int
-    zeros: int
-    ones: int
+    constant: Mapping[int, float]
+    """Rows that hold just one value."""
+    states: int
+    """Most states of a recurrence."""
     tangents: int
     """Numbers in the vector of tangents."""
     places: Mapping[tuple[int, str, int], int]
@@ -95,41 +106,74 @@ def layout_of(
 class _Planner:
     def __init__(self, graph: Graph, model: Model, columns: tuple[str, ...]) -> None:
         self.graph, self.model, self.columns = graph, model, columns
-        self.zeros, self.ones, self.idle = graph.rows, graph.rows + 1, graph.rows + 2
-        self.rows = graph.rows + 3
+        self.rows = graph.rows
+        self.constant: dict[float, int] = {}
+        self.idle = self._row()
         self.tangents = 1  # the first belongs to idle columns
         self.places: dict[tuple[int, str, int], int] = {}
         self.references: dict[tuple[str, int, str], dict[int, Reference]] = {}
-        self.stages: list[list[tuple[int, list[Term]]]] = []
-        self.columns_of: list[Indices] = []
-        self.active: list[bool] = []
+        self.made: list[tuple[int, list[Term]]] = []
+        """Rows that are sums of terms."""
+        self.todo: list[tuple[int, int, int, int]] = []
+        self.columns_of: list[Indices] = [np.zeros(0, dtype=np.int64)]
+        self.states = 1
         self.linked = set(graph.sources)
 
     def layout(self, observed: tuple[int, ...]) -> Layout:
-        for part in self.graph.parts:
+        pieces = [0, *(part.value_piece for part in self.graph.parts)]
+        self.todo += [(CALL, each, 0, 0) for each in pieces if each >= 0]
+        for part in self.graph.parts if self.columns else ():
             by_result = _by_result(part)
             for component in part.components:
-                groups = [self._group(part, group, by_result) for group in component.groups]
-                self.active.append(any(groups))
-            if part.signal_kernel:
-                self.active.append(bool(self.columns))
+                at = len(self.todo)
+                some = [self._group(part, group, by_result) for group in component.groups]
+                if (any(some) or component.signals) and component.piece >= 0:
+                    self.todo.insert(at, (CALL, component.piece, 0, 0))
+            if part.signal_piece >= 0:
+                self.todo.append((CALL, part.signal_piece, 0, 0))
             self._signals(part, by_result)
-        width = len(self.columns) + 2
-        seen: list[tuple[int, list[Term]]] = []
+        seen, width = len(self.made), len(self.columns) + 2
         for r, number in enumerate(observed):
-            seen += [(r * width + c, self._observed(number, c)) for c in range(len(self.columns))]
-        made = [_terms(stage) for stage in [*self.stages, seen]]
+            for c in range(len(self.columns)):
+                self.made.append((r * width + c, self._observed(number, c)))
+        terms = [term for _, made in self.made for term in made]
         program = Program(
             len(self.columns),
-            np.array(self.active, dtype=np.bool_),
-            tuple(terms for terms, _ in made[:-1]),
-            tuple(self.columns_of),
-            made[-1][0],
+            np.array(self.todo, dtype=np.int64),
+            Terms(
+                np.array([target for target, _ in self.made], dtype=np.int64) * STRIDE
+                + np.where(np.arange(len(self.made)) < seen, 0, CARRIED),
+                np.cumsum([0, *(len(made) for _, made in self.made)]).astype(np.int64),
+                np.array([term.a for term in terms], dtype=np.int64) * STRIDE,
+                np.array([term.b for term in terms], dtype=np.int64) * STRIDE,
+                np.array([term.scale for term in terms], dtype=np.float64),
+            ),
+            seen,
+            np.concatenate(self.columns_of),
             np.array([self._value_row(number) for number in observed], dtype=np.int64),
             np.array([self.graph.observed[number][1] for number in observed], dtype=np.bool_),
         )
-        slots = tuple(slots for _, slots in made)
-        return Layout(program, slots, self.rows, self.zeros, self.ones, self.tangents, self.places)
+        return Layout(
+            program,
+            frozenset(todo[1] for todo in self.todo if todo[0] == CALL),
+            tuple((k, term.slot) for k, term in enumerate(terms) if term.slot is not None),
+            self.rows,
+            {row: value for value, row in self.constant.items()},
+            self.states,
+            self.tangents,
+            self.places,
+        )
+
+    def _constant(self, value: float) -> int:
+        """Row that holds just this value."""
+        if value not in self.constant:
+            self.constant[value] = self._row()
+        return self.constant[value]
+
+    def _combine(self, since: int) -> None:
+        """Have the rows made that are new since then."""
+        if len(self.made) > since:
+            self.todo.append((COMBINE, since, len(self.made), 0))
 
     def _row(self) -> int:
         self.rows += 1
@@ -145,7 +189,8 @@ class _Planner:
         prefix, column = self._prefix(part.part), self.columns[c]
         name = column.removeprefix(prefix) if column.startswith(prefix) else ""
         for by, entry in entries.items():
-            row, scale = (entry.row, 1.0) if entry.row >= 0 else (self.ones, entry.value)
+            constant = entry.row < 0
+            row, scale = (self._constant(1.0), entry.value) if constant else (entry.row, 1.0)
             if by.kind == "p":
                 if by.path == name:
                     yield Term(row, -1, scale)
@@ -170,9 +215,7 @@ class _Planner:
         else:
             yield Term(entry.row, found.row, found.scale)
 
-    def _made(
-        self, stage: list[tuple[int, list[Term]]], terms: list[Term], whole: bool = False
-    ) -> Reference | None:
+    def _made(self, terms: list[Term], whole: bool = False) -> Reference | None:
         """Row that holds a sum of terms: one that is there already, or a new one.
 
         With `whole` the row needs no factor any more.
@@ -184,15 +227,14 @@ class _Planner:
         if alone and (not whole or only.scale == 1.0):
             return Reference(only.a, only.scale)
         row = self._row()
-        stage.append((row, terms))
+        self.made.append((row, terms))
         return Reference(row, 1.0)
 
     def _group(
         self, part: PartGraph, group: Group, by_result: Mapping[str, Mapping[By, Entry]]
     ) -> bool:
         """Columns of a recurrence, and rows that they need."""
-        stage: list[tuple[int, list[Term]]] = []
-        self.stages.append(stage)
+        since = len(self.made)
         found: list[list[tuple[int, int, int]]] = []
         prefix = self._prefix(part.part)
         for c, column in enumerate(self.columns):
@@ -210,28 +252,45 @@ class _Planner:
             each = []
             for i, path in enumerate(group.states):
                 result = self._row() if group.stored[i] else self.idle
-                made = self._made(stage, terms[i], whole=True)
+                made = self._made(terms[i], whole=True)
                 place = self.tangents
                 self.tangents += 1
                 self.places[part.part, path, c] = place
-                each.append((made.row if made else self.zeros, result, place))
+                each.append((made.row if made else self._constant(0.0), result, place))
                 if group.stored[i]:
                     rows = self.references.setdefault(("state", part.part, path), {})
                     rows[c] = Reference(result, 1.0)
             found.append(each)
-        some = bool(found)
-        found += [[(self.zeros, self.idle, 0)] * len(group.states)] * (-len(found) % ABREAST)
-        columns = np.zeros((3 * len(group.states), len(found)), dtype=np.int64)
-        for c, each in enumerate(found):
-            for i, numbers in enumerate(each):
-                columns[3 * i : 3 * i + 3, c] = numbers
-        self.columns_of.append(columns)
-        return some
+        if not found:
+            return False
+        k = len(group.states)
+        found += [[(self._constant(0.0), self.idle, 0)] * k] * (-len(found) % ABREAST)
+        states = group.states
+        numbers = [
+            self._factor(by_result, path, other) * STRIDE for path in states for other in states
+        ]
+        for i, after in enumerate(group.after):
+            numbers += [each[i][0] * STRIDE for each in found]
+            numbers += [each[i][1] * STRIDE for each in found]
+            numbers += [each[i][2] for each in found]
+            numbers += [int(after) for _ in found]
+        begin = sum(each.size for each in self.columns_of)
+        self.columns_of.append(np.array(numbers, dtype=np.int64))
+        self.states = max(self.states, k)
+        self._combine(since)
+        self.todo.append((RECUR, k, begin, begin + len(numbers)))
+        return True
+
+    def _factor(self, by_result: Mapping[str, Mapping[By, Entry]], path: str, other: str) -> int:
+        """Row of the derivative of a state behind the sample by another one at it."""
+        entry = by_result.get(f"state.{path}", {}).get(By("state", other))
+        if entry is None:
+            return self._constant(0.0)
+        return entry.row if entry.row >= 0 else self._constant(entry.value)
 
     def _signals(self, part: PartGraph, by_result: Mapping[str, Mapping[By, Entry]]) -> None:
         """Derivatives of the signals of a part that others need."""
-        stage: list[tuple[int, list[Term]]] = []
-        self.stages.append(stage)
+        since = len(self.made)
         for signal, path in part.aliases.items():
             rows = self.references.get(("state", part.part, path), {})
             self.references["signal", part.part, signal] = rows
@@ -246,9 +305,10 @@ class _Planner:
                 continue
             found = self.references.setdefault(node, {})
             for c in range(len(self.columns)):
-                made = self._made(stage, list(self._terms(part, entries, c)))
+                made = self._made(list(self._terms(part, entries, c)))
                 if made is not None:
                     found[c] = made
+        self._combine(since)
 
     def _observed(self, number: int, c: int) -> list[Term]:
         """What an observed signal's derivative by a column is."""
@@ -272,7 +332,7 @@ class _Planner:
     def _value_row(self, number: int) -> int:
         place, _ = self.graph.observed[number]
         if place in self.graph.stored:
-            return self.graph.stored.index(place)
+            return self.graph.stored[place]
         return self.graph.values[place.part, place.path]
 
 
@@ -283,30 +343,7 @@ def _by_result(part: PartGraph) -> dict[str, dict[By, Entry]]:
     return found
 
 
-def _terms(
-    stage: Sequence[tuple[int, list[Term]]],
-) -> tuple[Terms, tuple[tuple[int, Slot], ...]]:
-    flat = [term for _, terms in stage for term in terms]
-    made = Terms(
-        np.array([target for target, _ in stage], dtype=np.int64),
-        np.cumsum([0, *(len(terms) for _, terms in stage)]).astype(np.int64),
-        np.array([term.a for term in flat], dtype=np.int64),
-        np.array([term.b for term in flat], dtype=np.int64),
-        np.array([term.scale for term in flat], dtype=np.float64),
-    )
-    return made, tuple((k, term.slot) for k, term in enumerate(flat) if term.slot is not None)
-
-
 # --- numbers --------------------------------------------------------------------------------------
-
-
-@generating
-def graph_of(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], observed: tuple[str, ...]
-) -> tuple[Graph, Callable[..., float]]:
-    """A model's structure, and its compiled march with derivatives."""
-    text, names, graph = graph_source(model, signals, options, observed)
-    return graph, module(f"{model.name}_jacobian", text, names)["march_observed"]
 
 
 Slopes = dict[str, float]
@@ -539,7 +576,8 @@ def jacobian(
         out = np.empty(shape)
     elif out.shape != shape or out.dtype != np.float64 or not out.flags.carray:
         raise InputError(f"out must be a plain array of floats of shape {shape}.")
-    out[np.setdiff1d(np.arange(count), places)] = 0.0
+    if places.size < count:
+        out[:count][~np.isin(np.arange(count), places)] = 0.0
     sink = _all_rows(out, count, places, observed)
     _march(instance, observed, own, tuple(columns[int(c)] for c in places), sink, block, count)
     return Jacobian((*columns, *observed.own_columns), out, sink.squares)
@@ -602,7 +640,7 @@ def _march(
         raise InputError(f"block is {block}, but must be 2 to {BLOCK} samples.")
     records, h = observed.records, observed.record.step
     signals, seen = tuple(records), tuple(dict.fromkeys(o.signal for o in observed.observations))
-    graph, kernel = graph_of(instance.model, signals, instance.options, seen)
+    graph = graph_of(instance.model, signals, instance.options, seen)
     layout = layout_of(
         graph,
         instance.model,
@@ -620,7 +658,6 @@ def _march(
         if path not in paths:
             raise InputError(f"There is no state '{path}' to start from; {', '.join(paths)}.")
         states[paths.index(path)] = value
-    before = tuple(started.before[name] for name in signals)
     if observed.start == "rest":
         slopes = rest_slopes(graph, instance, h)
     else:
@@ -629,43 +666,36 @@ def _march(
     places = instance.places(signals, h)
     plan = observed.plan(own, len(columns) if first_own is None else first_own)
     program = _with_numbers(layout, slopes.constants, places)
-    worst = kernel(
-        tuple(records.values()),
-        before,
+    marched = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
+    met = np.array([np.inf])
+    room = room_for(layout.rows, layout.constant, layout.states, len(columns), plan)
+    arrays = (
+        pointers(marched),
+        np.array([started.before[name] for name in signals]),
         places.whole,
         places.fraction,
         instance.params,
         instance.given,
-        h,
-        block,
         states,
-        tangent,
-        program,
-        plan,
-        sink,
-        room_for(layout.rows, layout.zeros, layout.ones, len(columns), plan),
+        met,
+        room.flat,
     )
-    check_domain(instance, states, worst, observed.driven_by)
+    size = marched[0].size
+    pieces = addresses(graph.pieces, layout.pieces)
+    march_observed(pieces, arrays, size, block, h, tangent, program, plan, sink, room)
+    check_domain(instance, states, float(met[0]), observed.driven_by)
 
 
 def _with_numbers(layout: Layout, constants: Mapping[Slot, float], places: Places) -> Program:
     """The program with the factors that depend on parameters."""
     program = layout.program
-
-    def scaled(terms: Terms, slots: Sequence[tuple[int, Slot]]) -> Terms:
-        if not slots:
-            return terms
-        scale = terms.scale.copy()
-        for at, slot in slots:
-            tap = slot.kind == "tap"
-            scale[at] *= places.slope[int(slot.first)] if tap else constants[slot]
-        return terms._replace(scale=scale)
-
-    made = [
-        scaled(terms, slots)
-        for terms, slots in zip((*program.terms, program.seen), layout.slots, strict=True)
-    ]
-    return program._replace(terms=tuple(made[:-1]), seen=made[-1])
+    if not layout.slots:
+        return program
+    scale = program.terms.scale.copy()
+    for at, slot in layout.slots:
+        tap = slot.kind == "tap"
+        scale[at] *= places.slope[int(slot.first)] if tap else constants[slot]
+    return program._replace(terms=program.terms._replace(scale=scale))
 
 
 def state_paths(model: Model) -> list[str]:

@@ -1,8 +1,8 @@
 """Many sets of one model side by side: LANES of them in the innermost loop of one march.
 
-The compiler turns the loop over lanes into vector instructions, because the equations stand in it
-as straight code. Arithmetic is as strict as in the plain march, so that each set's numbers are the
-same to the last bit, whatever its neighbours are.
+The equations stand in that loop as straight code (`straight`), which the compiler turns into vector
+instructions. Arithmetic is as strict as in the plain march, so that each set's numbers are the same
+to the last bit, whatever its neighbours are.
 """
 
 from __future__ import annotations
@@ -16,31 +16,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.fields import floats_of
+from swashplate.equations.expressions import Node
 from swashplate.equations.lowering import generating
 from swashplate.equations.march import (
-    PartCode,
     Sampler,
     function_source,
     indented,
     output_of,
     rest_of,
-    taps_of,
 )
 from swashplate.equations.model import Model
 from swashplate.equations.program import leaves
 from swashplate.equations.run import module
 from swashplate.equations.scalars import text
+from swashplate.equations.straight import CALLED, Statement, Straight
+from swashplate.equations.triangle import aligned
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 LANES = 16
 """Sets marched side by side: two vectors of eight where the processor has them, else four of 4."""
 
 
 class Rows:
-    """Numbers of the rows of a block of lanes, given out on demand."""
+    """Rows of a block of lanes, given out on demand.
+
+    A block is one flat array: row r of lane l is ``flat[r * LANES + l]``. With everything in one
+    array at known distances the compiler need not prove at run time that rows do not overlap.
+    """
 
     def __init__(self) -> None:
         self.number: dict[str, int] = {}
@@ -49,131 +52,157 @@ class Rows:
         """Text of a lane's number in the row of a name."""
         return f"flat[{self.number.setdefault(name, len(self.number))} * LANES + lane]"
 
+    def loads(self, names: Iterable[str]) -> list[str]:
+        """Lines that take numbers out of their rows."""
+        return [f"{name} = {self.text(name)}" for name in sorted(names)]
+
+    def saves(self, names: Iterable[str]) -> list[str]:
+        """Lines that put numbers into their rows."""
+        return [f"{self.text(name)} = {name}" for name in sorted(names)]
+
+    def loops(self, loops: Sequence[Sequence[Statement]], shared: set[str]) -> list[str]:
+        """Text of loops over lanes; the names in `shared` are the same for all lanes."""
+        lines: list[str] = []
+        for k, loop in enumerate(loops):
+            made = {name for each in loop for name in each.names}
+            read = {name for each in loop for name in each.reads}
+            later = {name for after in loops[k + 1 :] for each in after for name in each.reads}
+            body = [line for each in loop for line in each.lines]
+            loads, saves = self.loads(read - made - shared), self.saves(made & later)
+            lines += over_lanes([*loads, *body, *saves])
+        return lines
+
+
+def over_lanes(lines: Sequence[str]) -> list[str]:
+    """A loop over lanes."""
+    return ["for lane in range(LANES):", *indented(lines)] if lines else []
+
 
 def lanes_source(
     model: Model, signals: Sequence[str], options: Sequence[Any], output: str
 ) -> tuple[str, dict[str, Any], dict[str, int], Sampler]:
     """Text of the march of LANES sets over one record, its names, and the rows of its block.
 
-    A block is one flat array: row r of lane l is ``flat[r * LANES + l]``. With everything in one
-    array at known distances the compiler need not prove at run time that rows do not overlap, and
-    vectorises. Two kernels:
+    Two kernels:
 
-    - ``prepare(h, flat)`` computes constants and states at rest of every lane;
-    - ``march(records, before, whole, h, flat, measured, weight, outputs)`` marches, and returns
-      nothing: costs and the worst margins are rows of the block.
+    - ``prepare(h, flat)`` computes what does not change, and states at rest, of every lane;
+    - ``march(records, whole, h, flat, measured, weight, outputs)`` marches: costs and the worst
+      margins are rows of the block, and ``outputs``, unless empty, are a row for each lane.
     """
     place, is_rate = output_of(model, output)
-    sampler = Sampler(model, signals, options, [place])
-    rows = Rows()
+    sampler, rows = Sampler(model, signals, options, [place]), Rows()
     parts = sampler.used()
+    known = {node.value for part in parts for _, node in (*leaves(part.p), *leaves(part.given))}
+    known |= {part.fraction(tap) for part in parts for tap in part.taps}
+    constants = {name for part in parts for name in sampler.constants(part)}
+    straight = Straight(known | constants, parts[0].code.fresh)
 
-    def loads(names: Iterable[str]) -> list[str]:
-        return [f"{name} = {rows.text(name)}" for name in names]
-
-    def saves(names: Iterable[str]) -> list[str]:
-        return [f"{rows.text(name)} = {name}" for name in names]
-
-    def outside(part: PartCode, read: set[str]) -> list[str]:
-        every = [*leaves(part.p), *leaves(part.given)]
-        return [node.value for _, node in every if node.value in read]
-
-    def states(part: PartCode) -> list[str]:
-        names = dict(leaves(part.state))
-        return [names[path].value for path in sampler.carried[part.part]]
-
-    prepare: list[str] = []
+    # what rows become at the end of a sample
+    following: dict[str, Node] = {}
+    shown = ex.name("value")
     for part in parts:
-        constants = sampler.constants(part)
-        made = [ex.name(name) for name in constants]
-        rest = rest_of(part)
-        at_rest = [dict(leaves(rest.value))[path] for path in sampler.carried[part.part]]
-        read = part.prologue.reads([*made, *at_rest]) | rest.code.reads(at_rest)
-        needed = [ex.name(each) for each in read]
-        lines = [
-            *loads(outside(part, read | part.prologue.reads(needed))),
-            *part.prologue.lines([*made, *needed]),
-            *saves(constants),
-            *rest.code.lines(at_rest),
-        ]
-        for name, node in zip(states(part), at_rest, strict=True):
-            lines.append(f"{rows.text(name)} = {text(node)}")
-        prepare += ["for lane in range(LANES):", *indented(lines or ["pass"])]
-
-    inner: list[str] = []
-    taps = [(part, tap) for part in parts for tap in part.taps]
-    if taps:
-        shift, fetch = [], []
-        for part, tap in taps:
-            samples = part.tap_samples(tap)
-            for newer, older in reversed(list(pairwise(samples))):
-                shift.append(f"{rows.text(older)} = {rows.text(newer)}")
-            row = sampler.signals.index(tap.tap.signal)
-            fetch.append(
-                f"{rows.text(samples[0])} = sample_at(records[{row}], n - whole[{tap.number}, "
-                f"lane], before[{row}])"
-            )
-        inner += ["for lane in range(LANES):", *indented(shift)]
-        # apart, because a loop that reads at computed places is not vectorised
-        inner += ["for lane in range(LANES):", *indented(fetch)]
-    for part in parts:
-        read = sampler.read(part)
-        known = [*outside(part, read), *sampler.constants(part), *states(part)]
-        known += [name for tap in part.taps for name in part.tap_samples(tap) if name in read]
-        known += [part.fraction(tap) for tap in part.taps if part.fraction(tap) in read]
-        known += [part.source(s) for s in sampler.sources if part.source(s) in read]
-        lines = loads(dict.fromkeys(known))
-        for signal in sampler.signals:
-            if f"x_{signal}" in read:
-                inner.append(f"x_{signal} = records[{sampler.signals.index(signal)}][n]")
-        lines += sampler.body(part)
-        lines += saves(part.source(s) for s in sampler.sources if s.part == part.part)
+        straight.cut()
+        straight.add(part.code, part.code.kept(sampler.ends[part.part]))
+        for source, node in sampler.sources.items():
+            if source.part == part.part:
+                straight.let(part.source(source), node)
         if part.margin is not None:
-            worst = rows.text("worst")
-            lines.append(f"{worst} = min({worst}, {text(part.margin)})")
+            worst = following.get("worst", ex.name("worst"))
+            following["worst"] = ex.make("min", worst, part.margin)
         if place.part == part.part:
-            shown = sampler.stored(part, [place], "n")
-            value = shown[-1].removeprefix("out[0, n] = ")
-            lines += [*shown[:-1], f"value = {value}"]
-            if is_rate:
-                total, rate = rows.text("integral"), rows.text("rate")
-                lines += [
-                    f"total = {total} + half * ({rate} + value)",
-                    f"{rate} = value",
-                    f"{total} = total",
-                    "value = total",
-                ]
-            cost = rows.text("cost")
-            lines += [
-                "error = value - target",
-                f"{rows.text('observed')} = value",
-                f"{cost} = {cost} + counts * error * error",
-            ]
-        lines += sampler.step(part)
-        lines += saves(states(part))
-        inner += ["for lane in range(LANES):", *indented(lines)]
-    # read here, where no store between can have changed them
-    inner[:0] = ["target = measured[n]", "counts = weight[n]"]
+            code, node = sampler.observed(part, place)
+            straight.add(code, code.kept([node]))
+            straight.let("value", node)
+        state, step = dict(leaves(part.state)), dict(leaves(part.following))
+        following |= {state[path].value: step[path] for path in sampler.carried[part.part]}
     if is_rate:
-        inner.insert(0, "half = 0.5 * h if n > 0 else 0.0")
-    inner += [
-        "if outputs.shape[0] > 0:",
-        "    for lane in range(LANES):",
-        f"        outputs[n, lane] = {rows.text('observed')}",
-    ]
+        trapezium = ex.make("*", ex.name("half"), ex.make("+", ex.name("rate"), shown))
+        following["rate"] = shown
+        straight.let("integral", ex.make("+", ex.name("total"), trapezium))
+        following["total"] = shown = ex.name("integral")
+    straight.let("error", ex.make("-", shown, ex.name("target")))
+    square = ex.make("*", ex.make("*", ex.name("counts"), ex.name("error")), ex.name("error"))
+    following |= {"cost": ex.make("+", ex.name("cost"), square), "shown": shown}
+
+    # what a lane sees of a record at a place of its own is fetched a sample ahead of its use: a row
+    # that was just written number by number cannot be read as a whole at once
+    first: list[str] = []
+    fetched: list[str] = []
+    for part in parts:
+        for tap in part.taps:
+            samples, record = part.tap_samples(tap), sampler.signals.index(tap.tap.signal)
+            queue = [f"{part.fraction(tap)}_coming", *samples]
+            for lines, name, n in ((first, queue[1], "0"), (fetched, queue[0], "coming")):
+                index = f"{n} - whole[{tap.number}, lane]"
+                lines.append(f"{rows.text(name)} = sample_at(records[{record}], {index}, 0.0)")
+            following |= {older: ex.name(newer) for newer, older in pairwise(queue)}
+    for name, node in following.items():
+        straight.become(rows.text(name), node)
+
+    read = {name for loop in straight.loops for each in loop for name in each.reads}
+    shared = {"target": "measured[n]", "counts": "weight[n]"}
+    shared["half"] = "0.5 * h if n > 0 else 0.0"
+    shared |= {f"x_{name}": f"records[{k}][n]" for k, name in enumerate(sampler.signals)}
+    inner = [f"{name} = {value}" for name, value in shared.items() if name in read]
+    if fetched:
+        inner += ["coming = min(n + 1, last)", *over_lanes(fetched)]
+    inner += rows.loops(straight.loops, {"h", *shared})
+    kept = over_lanes([f"outputs[lane, n] = {rows.text('shown')}"])
+    inner += ["if outputs.size > 0:", *indented(kept)]
+
     texts = [
         function_source(
             "prepare(h, flat)",
-            f"Constants and states at rest of LANES sets of {model.name}.",
-            prepare,
+            f"What does not change, and states at rest, of LANES sets of {model.name}.",
+            over_lanes(prepared(sampler, straight, rows, known, read)),
         ),
         function_source(
-            "march(records, before, whole, h, flat, measured, weight, outputs)",
+            "march(records, whole, h, flat, measured, weight, outputs)",
             f"March LANES sets of {model.name} over one record.",
-            ["for n in range(records[0].size):", *indented(inner)],
+            [
+                "last = measured.size - 1",
+                *over_lanes(first),
+                "for n in range(measured.size):",
+                *indented(inner),
+            ],
         ),
     ]
-    return "\n\n".join(texts), {**sampler.names, "LANES": LANES}, rows.number, sampler
+    called = {**sampler.names, **CALLED, "LANES": LANES}
+    return "\n\n".join(texts), called, rows.number, sampler
+
+
+def prepared(
+    sampler: Sampler, straight: Straight, rows: Rows, known: set[str], read: set[str]
+) -> list[str]:
+    """Lines of a lane ahead of the march, from what is known to what is read in it."""
+    lines = [line for each in straight.ahead for line in each.lines]
+    lines += rows.saves(read & straight.still - known - {"h"})
+    used = {name for each in straight.ahead for name in each.reads}
+    for part in sampler.used():
+        rest = rest_of(part)
+        state, nodes = dict(leaves(part.state)), dict(leaves(rest.value))
+        at_rest = {state[path].value: nodes[path] for path in sampler.carried[part.part]}
+        lines += rest.code.lines(at_rest.values())
+        lines += [f"{rows.text(name)} = {text(node)}" for name, node in at_rest.items()]
+        reads = {*sampler.constants(part), *rest.code.reads(at_rest.values())}
+        needed = [ex.name(name) for name in reads]
+        lines[:0] = part.prologue.lines(needed)
+        used |= part.prologue.reads(needed)
+    return [*rows.loads(used & known), *lines]
+
+
+# --- marching -------------------------------------------------------------------------------------
+
+
+class Delayed(NamedTuple):
+    """How one of the model's taps looks at its signal."""
+
+    number: int
+    delay: str | None
+    """Path of the parameter."""
+    ahead: float
+    fraction: int | None
+    """Row of the fraction of a sample, if anything reads it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,12 +212,11 @@ class Lanes:
     prepare: Callable[..., None]
     march: Callable[..., None]
     rows: Mapping[str, int]
-    columns: Mapping[str, str]
-    """Name in the kernels of each parameter, by its path."""
-    fractions: Mapping[int, str]
-    """Name of each tap's fraction."""
-    states: tuple[str, ...]
-    """Names of the states."""
+    columns: Mapping[str, tuple[int, float | None]]
+    """Row and default of each parameter and given that is read, as `march_lanes` takes them."""
+    taps: Sequence[Delayed]
+    ends: Sequence[int]
+    """Rows of states and cost."""
 
 
 @generating
@@ -198,16 +226,23 @@ def lanes_of(
     """The compiled lanes of a model for one output."""
     source, names, rows, sampler = lanes_source(model, signals, options, output)
     made = module(f"{model.name}_lanes", source, names)
-    columns: dict[str, str] = {}
-    fractions: dict[int, str] = {}
-    states: list[str] = []
-    for part in sampler.parts:
+    columns: dict[str, tuple[int, float | None]] = {}
+    taps, ends = [], [rows["cost"]]
+    for part in sampler.used():
         prefix = f"{part.own.name}." if len(model.parts) > 1 else ""
-        columns |= {f"{prefix}{path}": name for name, path in part.parameters.items()}
-        fractions |= {tap.number: part.fraction(tap) for tap in part.taps}
-        own = dict(leaves(part.state))
-        states += [own[path].value for path in sampler.carried[part.part]]
-    return Lanes(made["prepare"], made["march"], rows, columns, fractions, tuple(states))
+        defaults, states = part.own.parameters._field_defaults, dict(leaves(part.state))
+        for name, path in part.parameters.items():
+            if name in rows:
+                columns[f"{prefix}{path}"] = rows[name], defaults.get(path)
+        for path, node in leaves(part.given):
+            if node.value in rows:
+                columns[f"given {prefix}{path}"] = rows[node.value], None
+        for each in part.taps:
+            delay = f"{prefix}{each.tap.delay}" if each.tap.delay else None
+            fraction = rows.get(part.fraction(each))
+            taps.append(Delayed(each.number, delay, each.tap.ahead, fraction))
+        ends += [rows[states[path].value] for path in sampler.carried[part.part]]
+    return Lanes(made["prepare"], made["march"], rows, columns, taps, ends)
 
 
 class Marched(NamedTuple):
@@ -220,7 +255,7 @@ class Marched(NamedTuple):
     end: Array
     """(LANES,) a sum that is finite where all numbers are."""
     outputs: Array
-    """(n, LANES) the output, or (0, LANES)."""
+    """(LANES, n) the output, or (LANES, 0)."""
 
 
 def march_lanes(
@@ -239,7 +274,8 @@ def march_lanes(
     Parameters
     ----------
     numbers : mapping of str to (LANES,) array
-        Every parameter by its path; those that a type has a default for may be left out.
+        Every parameter by its path, and every given, ``"given "`` before it; parameters that a type
+        has a default for may be left out.
     records : mapping of str to (n,) array
         External signals, zero before.
     h : float
@@ -251,42 +287,26 @@ def march_lanes(
     keep : bool
         Whether the output is kept.
     """
-    signals = tuple(records)
-    lanes = lanes_of(model, signals, options, output)
-    block = np.zeros((len(lanes.rows), LANES))
-    if "worst" in lanes.rows:
-        block[lanes.rows["worst"]] = np.inf
-    for path, name in lanes.columns.items():
-        if name in lanes.rows:
-            block[lanes.rows[name]] = numbers[path] if path in numbers else default_of(model, path)
-    taps = taps_of(model, signals)
-    whole = np.zeros((max(len(taps), 1), LANES), dtype=np.int64)
-    for each in taps:
-        prefix = f"{model.parts[each.part].name}." if len(model.parts) > 1 else ""
-        delay = numbers[f"{prefix}{each.tap.delay}"] / h if each.tap.delay else np.zeros(LANES)
-        end = np.maximum(delay, each.tap.ahead) - each.tap.ahead
-        whole[each.number] = np.floor(end).astype(np.int64)
-        if lanes.fractions[each.number] in lanes.rows:
-            block[lanes.rows[lanes.fractions[each.number]]] = end - whole[each.number]
-    size = next(iter(records.values())).size
-    outputs = np.empty((size if keep else 0, LANES))
-    flat = block.reshape(-1)
+    lanes = lanes_of(model, tuple(records), options, output)
+    block = aligned(len(lanes.rows), LANES)
+    for path, (row, default) in lanes.columns.items():
+        block[row] = numbers[path] if default is None else numbers.get(path, default)
+    highest = max((tap.number for tap in lanes.taps), default=0)
+    whole = np.zeros((highest + 1, LANES), dtype=np.int64)
+    for tap in lanes.taps:
+        delay = numbers[tap.delay] / h if tap.delay is not None else np.zeros(LANES)
+        end = np.maximum(delay, tap.ahead) - tap.ahead
+        whole[tap.number] = np.floor(end)
+        if tap.fraction is not None:
+            block[tap.fraction] = end - whole[tap.number]
+    worst = block[lanes.rows["worst"]] if "worst" in lanes.rows else np.empty(LANES)
+    worst[:] = np.inf
+    size = measured.size
+    # rows an odd number of cache lines apart, so that they do not share places in a cache
+    outputs = np.empty((LANES, (size | 15) + 9 if keep else 0))
     values = tuple(np.require(each, np.float64, ["C", "W"]) for each in records.values())
-    lanes.prepare(h, flat)
-    lanes.march(values, (0.0,) * len(values), whole, h, flat, measured, weight, outputs)
-    worst = block[lanes.rows["worst"]] if "worst" in lanes.rows else np.full(LANES, np.inf)
-    ends = [block[lanes.rows[name]] for name in (*lanes.states, "cost") if name in lanes.rows]
-    return Marched(block[lanes.rows["cost"]], worst, np.sum(ends, axis=0), outputs)
-
-
-def default_of(model: Model, path: str) -> float:
-    """What a parameter is where nobody gives it."""
-    first, _, rest = path.partition(".")
-    for part in model.parts:
-        if len(model.parts) == 1 or part.name == first:
-            name = path if len(model.parts) == 1 else rest
-            if name in part.parameters._field_defaults:
-                return float(part.parameters._field_defaults[name])
-            if name in floats_of(part.parameters):
-                break
-    raise KeyError(path)
+    with np.errstate(all="ignore"):  # of ways that are not taken there is nothing to say
+        lanes.prepare(h, block.reshape(-1))
+        lanes.march(values, whole, h, block.reshape(-1), measured, weight, outputs)
+    end = block[lanes.ends].sum(axis=0)
+    return Marched(block[lanes.rows["cost"]], worst, end, outputs[:, :size])

@@ -30,6 +30,24 @@ def _faded(value: float) -> float:
 
 
 @equation
+def clipped(value: float, lower: float, upper: float) -> float:
+    """A value within bounds; beyond one it is that bound, and at it the bound counts."""
+    return min(max(value, lower), upper)
+
+
+@declared(clipped)
+def _clipped(value: float, lower: float, upper: float) -> tuple[float, float, float]:
+    # once for all that follows, in place of a decision on each way back
+    above = value >= upper
+    below = not above and value <= lower
+    return (
+        0.0 if above or below else 1.0,
+        1.0 if below else 0.0,
+        1.0 if above else 0.0,
+    )
+
+
+@equation
 def soft_threshold(value: float, width: float) -> float:
     """What of a value lies beyond a symmetric dead zone, sign(v) max(abs(v) - w, 0).
 

@@ -4,6 +4,7 @@ Every march is generated as readable source in which the model's equations stand
 over scalars (`scalars`). `PartCode` has one sample of a part, and the functions below wrap it as
 
 - `march_source`: the plain march over whole records,
+- `march_piece_source`: the march over a block of them, for the Jacobian,
 - `observe_source`: signals at states that are known already,
 - `advance_source`: one sample, for steppers and for kernels that close loops.
 
@@ -15,7 +16,7 @@ Arithmetic is strict and in the order of the equations, so that all of them give
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple, get_type_hints
 
@@ -24,6 +25,7 @@ from swashplate.equations.equation import inlined
 from swashplate.equations.expressions import Node
 from swashplate.equations.fields import floats_of
 from swashplate.equations.model import Equation, Link, Model, Source, Tap, arguments_of, plain
+from swashplate.equations.pieces import PIECE
 from swashplate.equations.program import Flag, Tuple, Value, leaves, rebuilt
 from swashplate.equations.scalars import Code, text
 from swashplate.equations.windows import Window, linear, mean_over_sample, previous
@@ -37,10 +39,10 @@ HOLDS: dict[str, Equation] = {
 
 
 _OWN = """
-n m j c lane first last worst h half value error total count span met used progress values lines
+n m j c lane first last worst h half value error total count span used progress values lines
 whole fraction params given constants states out flags records before measured weight outputs flat
-table kept tangent columns program plan sink room block machine volts current speed voltage
-target counts
+table kept tangent columns program plan sink room block met machine volts current speed voltage
+target counts coming cost rate integral shown
 """
 RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
 """Names that the kernels use themselves."""
@@ -141,6 +143,17 @@ class PartCode:
         if self.own.sample is not None:
             self.known["signals"] = self._call(self.code, self.own.sample)
         self.following = self._call(self.code, self.own.step)
+        self._check_type(self.own.step, self.following, self.own.state)
+
+    def _check_type(self, equation: Equation, made: Value, kind: type[Any]) -> None:
+        """Refuse what an equation returns unless it is of a type, and all of it numbers."""
+        cls = made.cls if isinstance(made, Tuple) else None
+        numbers = tuple(path for path, node in leaves(made) if node.kind in ("float", "int"))
+        if cls is not kind or numbers != floats_of(kind):
+            raise InputError(
+                f"Model {self.own.name}: {plain(equation).__name__} must return a {kind.__name__} "
+                "of numbers on every way."
+            )
 
     def _names(self, kind: Any, letter: str) -> Value:
         hints = get_type_hints(kind)
@@ -230,7 +243,11 @@ class PartCode:
         if self.own.domain is None:
             return None
         made = self._call(self.code, self.own.domain)
-        assert isinstance(made, Node)
+        if not isinstance(made, Node):
+            raise InputError(
+                f"Model {self.own.name}: {plain(self.own.domain).__name__} must return one number, "
+                "the margin."
+            )
         return made
 
     @cached_property
@@ -448,8 +465,17 @@ class Sampler:
                 lines.append(f"{part.source(source)} = {text(node)}")
         return lines
 
-    def stored(self, part: PartCode, stored: Sequence[Stored], at: str) -> list[str]:
-        """Lines that write what is kept of a part into ``out`` and ``flags``."""
+    def stored(
+        self,
+        part: PartCode,
+        stored: Sequence[Stored],
+        at: str,
+        into: Callable[[int], str] | None = None,
+    ) -> list[str]:
+        """Lines that write what is kept of a part into ``out`` and ``flags``, or elsewhere.
+
+        `into` says where a number goes, by its place in `stored`, instead of ``out[place, at]``.
+        """
         lines, row, flag = [], 0, 0
         for each in stored:
             if each.kind == "limits":
@@ -460,21 +486,25 @@ class Sampler:
                     lines.append(f"flags[{flag}, {at}] = {packed}")
                 flag += 1
                 continue
-            if each.kind == "link" and self.model.links[each.path].after == part.part:
-                code = Code()
-                code.taken = part.code.taken
-                link = self.model.links[each.path]
-                sources: dict[str, Value] = {
-                    s.signal: ex.name(part.source(s)) for s in link.sources
-                }
-                assert link.equation is not None
-                made = code.called(link.equation, sources)
-                assert isinstance(made, Node)
-                lines += [*code.lines([made]), f"out[{row}, {at}] = {text(made)}"]
-            elif each.kind != "link" and each.part == part.part:
-                lines.append(f"out[{row}, {at}] = {text(part.node(each))}")
+            if each.part == part.part:
+                code, made = self.observed(part, each)
+                target = into(row) if into else f"out[{row}, {at}]"
+                lines += [*code.lines([made]), f"{target} = {text(made)}"]
             row += 1
         return lines
+
+    def observed(self, part: PartCode, stored: Stored) -> tuple[Code, Node]:
+        """A number that is kept, and the code that makes it of what is known at its part's end."""
+        code = Code()
+        code.taken = part.code.taken
+        if stored.kind != "link":
+            return code, part.node(stored)
+        link = self.model.links[stored.path]
+        sources: dict[str, Value] = {s.signal: ex.name(part.source(s)) for s in link.sources}
+        assert link.equation is not None
+        made = code.called(link.equation, sources)
+        assert isinstance(made, Node)
+        return code, made
 
     def margin(self, part: PartCode) -> list[str]:
         """Lines that keep the worst margin."""
@@ -528,25 +558,53 @@ def march_source(
     the order of `stored`, advances ``states`` in place, and returns the worst margin met.
     """
     sampler = Sampler(model, signals, options, stored)
+    lines = ["first, last = span", *_marching(sampler, stored), "return worst"]
+    head = "march(records, before, whole, fraction, params, given, h, states, span, out, flags)"
+    return function_source(head, f"March {model.name} over its inputs.", lines), sampler.names
+
+
+def march_piece_source(
+    model: Model, signals: Sequence[str], options: Sequence[Any], rows: Mapping[Stored, str]
+) -> tuple[str, dict[str, Any]]:
+    """Text of the march over a block of samples as a `piece`, and what its names mean.
+
+    Parameters
+    ----------
+    rows : mapping of Stored to str
+        What is kept, and where it goes at sample ``n - first`` of the block.
+    """
+    stored = tuple(rows)
+    sampler = Sampler(model, signals, options, stored)
+    lines = [
+        "last = first + count",
+        *_marching(sampler, stored, lambda row: rows[stored[row]]),
+        "met[0] = min(met[0], worst)",
+    ]
+    says = f"March {model.name} over a block of its inputs."
+    return function_source(f"march({PIECE})", says, lines, "@piece"), sampler.names
+
+
+def _marching(
+    sampler: Sampler, stored: Sequence[Stored], into: Callable[[int], str] | None = None
+) -> list[str]:
+    """Lines that march samples ``first`` to ``last`` - 1 and find the worst margin."""
     parts = sampler.used()
     lines = [*sampler.places(), *sampler.ahead()]
     for part in parts:
         lines += sampler.load(part)
-    lines += ["first, last = span", "worst = inf", "for n in range(first, last):"]
+    lines += ["worst = inf", "for n in range(first, last):"]
     inner: list[str] = []
     for part in parts:
         inner += sampler.fetched(part)
         inner += sampler.body(part)
-        inner += sampler.stored(part, stored, "n - first")
+        inner += sampler.stored(part, stored, "n - first", into)
         inner += sampler.margin(part)
     for part in parts:
         inner += sampler.step(part)
     lines += indented(inner)
     for part in parts:
         lines += sampler.save(part)
-    lines.append("return worst")
-    head = "march(records, before, whole, fraction, params, given, h, states, span, out, flags)"
-    return function_source(head, f"March {model.name} over its inputs.", lines), sampler.names
+    return lines
 
 
 def advance_source(
@@ -597,7 +655,7 @@ def advance_source(
             if f"x_{signal}" in read:
                 lines.append(f"x_{signal} = values[{k}]")
         lines += sampler.body(part)
-        lines += [line.replace(", 0] =", "] =") for line in sampler.stored(part, stored, "0")]
+        lines += sampler.stored(part, stored, "0", lambda row: f"out[{row}]")
     lines.append("worst = inf")
     for part in parts:
         lines += [*sampler.margin(part), *sampler.step(part), *sampler.save(part)]

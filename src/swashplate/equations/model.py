@@ -23,10 +23,13 @@ Equations name the arguments that they need; the names mean
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, NamedTuple, get_type_hints
+from importlib import import_module
+from types import FunctionType
+from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 
 from swashplate.equations.fields import floats_of, is_named_tuple
 from swashplate.equations.windows import Window
@@ -139,6 +142,18 @@ class Model:
     def __hash__(self) -> int:
         return id(self)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """By its name in a module, from which another process imports it and its equations."""
+        # the main module last: that of another process may be another one
+        for name in sorted(sys.modules, key=lambda name: name == "__main__"):
+            for word, thing in list(getattr(sys.modules[name], "__dict__", {}).items()):
+                if thing is self:
+                    return _imported, (name, word)
+        raise InputError(
+            f"The model {self.name} cannot be sent to another process: let it stand by a name in a "
+            "module that can be imported."
+        )
+
     @cached_property
     def input_types(self) -> dict[str, type[Any]]:
         """Inputs of a single model with their types, float or Window."""
@@ -158,7 +173,12 @@ class Model:
         if self.sample is None:
             return None
         made = get_type_hints(plain(self.sample)).get("return")
-        return made if is_named_tuple(made) else None
+        if not is_named_tuple(made):
+            raise InputError(
+                f"Model {self.name}: {plain(self.sample).__name__} must return a named tuple, and "
+                "say so, as in '-> Signals'."
+            )
+        return made
 
     @cached_property
     def signal_names(self) -> tuple[str, ...]:
@@ -168,13 +188,6 @@ class Model:
         return (*own, *states)
 
     @cached_property
-    def limit_names(self) -> tuple[str, ...]:
-        """Names of the limits, bit by bit."""
-        if self.limits is None:
-            return ()
-        return tuple(get_type_hints(plain(self.limits))["return"]._fields)
-
-    @property
     def external(self) -> tuple[str, ...]:
         """Signals that come from outside, in the order in which the parts ask for them."""
         found: dict[str, None] = {}
@@ -195,17 +208,6 @@ class Model:
                 return Link(signal, (Source(j, signal),))
         return None
 
-    @cached_property
-    def used_links(self) -> tuple[Link, ...]:
-        """Links that some part's input takes, each once."""
-        found: dict[str, Link] = {}
-        for i, part in enumerate(self.parts):
-            for name in part.input_types:
-                link = self.link_of(i, name)
-                if link is not None:
-                    found[link.name] = link
-        return tuple(found.values())
-
     def tap(self, name: str) -> Tap:
         """How an input is looked at."""
         return self.taps.get(name, Tap(name))
@@ -220,12 +222,21 @@ class Model:
         return tuple(each for each in all_of_them if each is not None)
 
     def _check(self) -> None:
+        if not str(self.name).isidentifier():
+            raise InputError(f"A model is called by one word, as 'valve', not {self.name!r}.")
         for type_ in (self.parameters, self.state, self.inputs, self.options, self.given):
             if type_ is not None and not is_named_tuple(type_):
                 raise InputError(
                     f"Model {self.name}: {type_!r} must be a named tuple, as in "
                     "'class State(NamedTuple): position: float'."
                 )
+        for type_ in (self.parameters, self.state, self.given):
+            if type_ is not None:
+                self._check_floats(type_)
+        for word in ("step", "sample", "constants", "rest", "settled", "limits", "domain"):
+            made = getattr(self, word)
+            if not isinstance(plain(made), FunctionType) and not (made is None and word != "step"):
+                raise InputError(f"Model {self.name}: {word} must be an equation, not {made!r}.")
         known = set(self.input_types)
         for equation in self._equations:
             for name in arguments_of(equation):
@@ -237,6 +248,11 @@ class Model:
         for name, tap in self.taps.items():
             if name not in known:
                 raise InputError(f"Model {self.name}: there is a tap on '{name}', but no input.")
+            if tap.hold not in get_args(Hold):
+                raise InputError(
+                    f"Model {self.name}: '{name}' is held as '{tap.hold}'; there are "
+                    f"{', '.join(get_args(Hold))}."
+                )
             if tap.delay and tap.delay not in floats_of(self.parameters):
                 raise InputError(
                     f"Model {self.name}: the delay of '{name}' is '{tap.delay}', but the "
@@ -248,6 +264,24 @@ class Model:
                     f"Model {self.name}: free_start names '{name}', but the state has "
                     f"{', '.join(floats_of(self.state))}."
                 )
+
+    def _check_floats(self, type_: type[Any]) -> None:
+        """Refuse fields that are no numbers."""
+        for name, hint in get_type_hints(type_).items():
+            if is_named_tuple(hint):
+                self._check_floats(hint)
+            elif hint is not float:
+                raise InputError(
+                    f"Model {self.name}: {type_.__name__}.{name} is of type "
+                    f"{getattr(hint, '__name__', hint)}, but must be a float or a named tuple of "
+                    "floats."
+                )
+
+
+def _imported(module: str, name: str) -> Model:
+    """A model by its name in a module."""
+    found: Model = getattr(import_module(module), name)
+    return found
 
 
 def join(

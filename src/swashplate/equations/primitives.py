@@ -1,10 +1,15 @@
-"""What equations need beyond arithmetic: tables and roots."""
+"""What equations need beyond arithmetic: tables, roots and loops."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.equations.equation import inlined
-from swashplate.equations.terms import INTERPOLATE, ROOT
+from swashplate.equations.terms import INTERPOLATE, REPEATED, ROOT
+
+S = TypeVar("S")
 
 STEPS = 128
 """Most steps of the search for a root; some 10 are usual."""
@@ -115,5 +120,38 @@ def interpolate(x: float, knots: tuple[float, ...], values: tuple[float, ...]) -
     return value
 
 
+@inlined
+def repeated(step: Callable[..., S], count: float, state: S, *arguments: Any) -> S:
+    """State after a step has been done several times.
+
+    Parameters
+    ----------
+    step : equation
+        Of the state, the number of the repetition, from 0.0, and the arguments; returns the next
+        state.
+    count : float
+        How often, 0 or more.
+    state : named tuple of floats
+        Where it begins.
+    *arguments
+        What else the step depends on.
+
+    Notes
+    -----
+    For sub-steps of a march: how many there are is known only when it runs, and the code does not
+    grow with them. The derivatives are those of the loop, carried along with the state.
+    """
+    for number in range(int(count)):
+        state = step(state, float(number), *arguments)
+    return state
+
+
+@inlined
+def blank(size: int) -> NDArray[np.float64]:
+    """Derivatives that are carried along, all zero."""
+    return np.zeros(size)
+
+
 ROOT.append(root)
 INTERPOLATE.append(interpolate)
+REPEATED.append(repeated)

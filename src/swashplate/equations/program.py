@@ -152,20 +152,24 @@ class Primitive:
     Attributes
     ----------
     kind : str
-        "root" or "interpolate".
+        "root", "interpolate" or "repeated".
     function : object
         What is called.
-    residual : Program, optional
-        Of a root; its own function is then the first argument of the call.
+    inner : Program, optional
+        Residual of a root, or what is repeated; its function is then the first argument of the
+        call.
     moving : tuple of tuple of str
         Of each scalar of the result the paths of the arguments that it follows.
+    result : Value
+        Structure of the result.
     """
 
     kind: str
     function: Any
-    residual: "Program | None"
+    inner: "Program | None"
     arguments: tuple[tuple[str, Value], ...]
     moving: tuple[tuple[str, ...], ...] = ()
+    result: Value = ex.ONE
 
 
 @dataclass(eq=False)

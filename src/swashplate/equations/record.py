@@ -95,7 +95,7 @@ def record_of(
                 "or 'linear' (a straight line between them)."
             )
         stamps = _checked_stamps(time, data.size, what)
-        return _stamped(data, stamps, rate, interpolation, substeps)
+        return gridded(data, stamps, rate, interpolation, substeps)
     _check_length(data.size * substeps, f"{data.size} samples at {rate:g} Hz")
     return Record(_refined(data, interpolation, substeps), 0.0, float(rate), substeps)
 
@@ -171,10 +171,27 @@ def _check_length(steps: float, what: str) -> None:
         )
 
 
-def _stamped(
-    data: Array, stamps: Array, rate: float, interpolation: Interpolation, substeps: int
+def even_rate(stamps: Array) -> float | None:
+    """Rate of stamps that lie evenly, within 2 % of a step; None if they do not. [Hz]"""
+    if stamps.size < 2:
+        return None
+    rate = float((stamps.size - 1) / (stamps[-1] - stamps[0]))
+    even = stamps[0] + np.arange(stamps.size) / rate
+    if np.abs(stamps - even).max() >= 0.02 / rate:
+        return None
+    return float(round(rate)) if abs(rate - round(rate)) < 1e-6 * rate else rate
+
+
+def gridded(
+    data: Array, stamps: Array, rate: float, interpolation: Interpolation, substeps: int = 1
 ) -> Record:
-    """A record with stamps, on a grid that starts at the first one."""
+    """Samples with stamps, on a grid that starts at the first one.
+
+    Raises
+    ------
+    InputError
+        If the grid has more points than anyone means.
+    """
     start = float(stamps[0])
     span = float(stamps[-1]) - start
     _check_length(span * rate * substeps, f"stamps from {start:g} s to {stamps[-1]:g} s")

@@ -3,12 +3,14 @@
 What is here knows no model: it works on rows of a block of samples that a plan names by number.
 """
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.cache import kernel
+from swashplate.equations.cache import kernel, subroutine
+from swashplate.equations.pieces import call
 from swashplate.equations.triangle import EIGHTH, absorb, aligned, aligned_room
 
 Array = NDArray[np.float64]
@@ -26,7 +28,7 @@ ABREAST = 4
 
 
 class Terms(NamedTuple):
-    """Rows that are sums of products of other rows."""
+    """Rows that are sums of products of other rows, each known by its first place in the block."""
 
     target: Indices
     """(t,) rows to be made."""
@@ -41,23 +43,30 @@ class Terms(NamedTuple):
 
 
 class Program(NamedTuple):
-    """What is to be derived in every block."""
+    """What is done in every block, in order."""
 
     derived: int
     """Columns."""
-    active: NDArray[np.bool_]
-    """Which of the fill kernels anything needs."""
-    terms: tuple[Terms, ...]
-    """Rows to make ahead of each recurrence, and behind each part."""
-    columns: tuple[Indices, ...]
-    """For each recurrence (3 k, 4 j): rows of the inputs, rows of the results, places of the
-    tangents, of each of its k states."""
-    seen: Terms
-    """Rows of the observations' derivatives."""
+    todo: Indices
+    """(w, 4) in each row one of
+
+    - CALL, number of a piece: call it;
+    - COMBINE, first and end of the terms' targets: make rows of the block;
+    - RECUR, number k of states, first place and end in `columns`: run a recurrence.
+    """
+    terms: Terms
+    """Of all rows that are made, those of the observations behind the others."""
+    seen: int
+    """First target that is a row of the observations."""
+    columns: Indices
+    """For each recurrence what `follow_each_other` takes: its `places`, then its `columns`."""
     value: Indices
     """(r,) row of each observation's signal."""
     integral: NDArray[np.bool_]
     """(r,) whether an observation is its signal's integral."""
+
+
+CALL, COMBINE, RECUR = 0, 1, 2
 
 
 class Plan(NamedTuple):
@@ -109,14 +118,12 @@ class Room(NamedTuple):
     """The block."""
     table: Array
     """(rows, STRIDE) the same."""
-    flags: NDArray[np.uint8]
-    """(0, 0): the march keeps no limits here."""
     seen: Array
     """(r, d + 2, STRIDE) of each observation its derivatives, the signal, and an idle row."""
     flat_seen: Array
-    """(r (d + 2), STRIDE) the same."""
-    filled: Indices
-    """Numbers of these rows, filled up for `follow`."""
+    """The same."""
+    columns: Indices
+    """(r, 4, j) these rows of each observation, for `follow`."""
     passed: Array
     """(r, q, d + 2) outputs of the low passes at the next sample."""
     integrals: Array
@@ -125,46 +132,59 @@ class Room(NamedTuple):
     """(STRIDE,) room for a row that is needed for a moment."""
     products: Array
     """Room for `absorb`."""
+    waiting: Array
+    """(2, k, ABREAST) room for `follow_each_other`."""
+    progress: Indices
+    """(r,) first stamp of each observation that is not yet dealt with."""
 
 
-def room_for(rows: int, zeros: int, ones: int, derived: int, plan: Plan) -> Room:
-    """Memory for a march with so many rows, columns and observations.
+def room_for(
+    rows: int, constant: Mapping[int, float], states: int, derived: int, plan: Plan
+) -> Room:
+    """Memory for a march with so many rows, states in a recurrence, columns and observations.
 
-    `zeros` and `ones` are the numbers of two rows that hold just these.
+    `constant` are numbers of rows that hold just one value.
     """
     flat = aligned_room(rows * STRIDE)
     table = flat.reshape(rows, STRIDE)
-    table[zeros], table[ones] = 0.0, 1.0
+    for row, value in constant.items():
+        table[row] = value
     observations, low_passes = plan.kept.shape
     idle = (derived + 1,) * (-(derived + 1) % ABREAST)
     seen = aligned(observations, derived + 2, STRIDE)
+    own = np.array([*range(derived + 1), *idle], dtype=np.int64)
+    columns = np.zeros((observations, 4, own.size), dtype=np.int64)
+    for r in range(observations):
+        columns[r, :2] = (r * (derived + 2) + own) * STRIDE + CARRIED
+        columns[r, 2] = own
     return Room(
         flat,
         table,
-        np.zeros((0, 0), dtype=np.uint8),
         seen,
-        seen.reshape(-1, STRIDE),
-        np.array([*range(derived + 1), *idle], dtype=np.int64),
+        seen.reshape(-1),
+        columns,
         np.zeros((observations, low_passes, derived + 2)),
         np.zeros((observations, derived + 1, 3)),
         np.empty(STRIDE),
         aligned(EIGHTH),
+        np.empty((2, states, ABREAST)),
+        plan.first[:-1].copy(),
     )
 
 
-@kernel
-def combine(table: Array, terms: Terms, count: int, into: Array, start: int) -> None:
-    """Make rows of `into`, from place `start` on, from rows of `table`."""
-    for t in range(terms.target.size):
-        row = into[terms.target[t], start : start + count]
+@subroutine
+def combine(flat: Array, terms: Terms, first: int, end: int, count: int, into: Array) -> None:
+    """Make rows of `into` from rows of `flat`."""
+    for t in range(first, end):
+        row = into[terms.target[t] :]
         if terms.first[t] == terms.first[t + 1]:
             for m in range(count):
                 row[m] = 0.0
         for s in range(terms.first[t], terms.first[t + 1]):
-            a, scale = table[terms.a[s], :count], terms.scale[s]
+            a, scale = flat[terms.a[s] :], terms.scale[s]
             fresh = s == terms.first[t]
             if terms.b[s] >= 0:
-                b = table[terms.b[s], :count]
+                b = flat[terms.b[s] :]
                 if fresh:
                     for m in range(count):
                         row[m] = scale * (a[m] * b[m])
@@ -179,38 +199,113 @@ def combine(table: Array, terms: Terms, count: int, into: Array, start: int) -> 
                     row[m] += scale * a[m]
 
 
-@kernel
-def follow(
-    factor: Array, rows: Array, chosen: Indices, start: int, count: int, state: Array
-) -> None:
-    """Replace g by y with y[n+1] = factor[n] y[n] + g[n], in each chosen row.
+@subroutine
+def follow(a: Array, columns: Indices, flat: Array, count: int, tangent: Array) -> None:
+    """Run y[n+1] = a[n] y[n] + g[n], several columns side by side.
 
     Parameters
     ----------
-    factor : (m,) array
+    a : (m,) array
         What a step leaves of y.
-    rows : (r, m) array
-        Inputs g, replaced by y, which begins with the state.
-    chosen : (4 j,) array
-        Numbers of the rows to march.
-    start, count : int
-        First place of a row's samples, and how many there are.
-    state : (r,) array
-        y at the first sample, a number for each row; replaced by that behind the last one.
+    columns : (4, j) array
+        Places of the inputs g and of the results in `flat`, which may be the same, of y in
+        `tangent`, and whether the result at n is y[n+1], not y[n].
+    tangent : array
+        y at the first sample, replaced by that behind the last one.
     """
-    for first in range(0, chosen.size, ABREAST):
-        c0, c1, c2, c3 = chosen[first], chosen[first + 1], chosen[first + 2], chosen[first + 3]
-        r0, r1, r2, r3 = rows[c0], rows[c1], rows[c2], rows[c3]
-        y0, y1, y2, y3 = state[c0], state[c1], state[c2], state[c3]
-        for n in range(start, start + count):
-            a = factor[n - start]
-            g0, g1, g2, g3 = r0[n], r1[n], r2[n], r3[n]
-            r0[n], r1[n], r2[n], r3[n] = y0, y1, y2, y3
-            y0, y1, y2, y3 = a * y0 + g0, a * y1 + g1, a * y2 + g2, a * y3 + g3
-        state[c0], state[c1], state[c2], state[c3] = y0, y1, y2, y3
+    behind = columns[3, 0] != 0
+    for c in range(0, columns.shape[1], ABREAST):
+        p0, p1, p2, p3 = columns[2, c], columns[2, c + 1], columns[2, c + 2], columns[2, c + 3]
+        g0, g1 = flat[columns[0, c] :], flat[columns[0, c + 1] :]
+        g2, g3 = flat[columns[0, c + 2] :], flat[columns[0, c + 3] :]
+        d0, d1 = flat[columns[1, c] :], flat[columns[1, c + 1] :]
+        d2, d3 = flat[columns[1, c + 2] :], flat[columns[1, c + 3] :]
+        y0, y1, y2, y3 = tangent[p0], tangent[p1], tangent[p2], tangent[p3]
+        for m in range(count):
+            n0, n1 = a[m] * y0 + g0[m], a[m] * y1 + g1[m]
+            n2, n3 = a[m] * y2 + g2[m], a[m] * y3 + g3[m]
+            d0[m], d1[m] = n0 if behind else y0, n1 if behind else y1
+            d2[m], d3[m] = n2 if behind else y2, n3 if behind else y3
+            y0, y1, y2, y3 = n0, n1, n2, n3
+        tangent[p0], tangent[p1], tangent[p2], tangent[p3] = y0, y1, y2, y3
 
 
-@kernel
+@subroutine
+def follow_pair(places: Indices, columns: Indices, flat: Array, count: int, tangent: Array) -> None:
+    """`follow_each_other` for two states, which most filters have."""
+    a00, a01 = flat[places[0] :], flat[places[1] :]
+    a10, a11 = flat[places[2] :], flat[places[3] :]
+    behind, other_behind = columns[3, 0] != 0, columns[7, 0] != 0
+    for c in range(0, columns.shape[1], 2):
+        p0, p1, q0, q1 = columns[2, c], columns[2, c + 1], columns[6, c], columns[6, c + 1]
+        g0, g1 = flat[columns[0, c] :], flat[columns[0, c + 1] :]
+        f0, f1 = flat[columns[4, c] :], flat[columns[4, c + 1] :]
+        d0, d1 = flat[columns[1, c] :], flat[columns[1, c + 1] :]
+        e0, e1 = flat[columns[5, c] :], flat[columns[5, c + 1] :]
+        y0, y1, z0, z1 = tangent[p0], tangent[p1], tangent[q0], tangent[q1]
+        for m in range(count):
+            # what has long been known first: the chain then waits for one product alone
+            n0, n1 = a00[m] * y0 + (a01[m] * z0 + g0[m]), a00[m] * y1 + (a01[m] * z1 + g1[m])
+            o0, o1 = a11[m] * z0 + (a10[m] * y0 + f0[m]), a11[m] * z1 + (a10[m] * y1 + f1[m])
+            d0[m], d1[m] = n0 if behind else y0, n1 if behind else y1
+            e0[m], e1[m] = o0 if other_behind else z0, o1 if other_behind else z1
+            y0, y1, z0, z1 = n0, n1, o0, o1
+        tangent[p0], tangent[p1], tangent[q0], tangent[q1] = y0, y1, z0, z1
+
+
+@subroutine
+def follow_each_other(
+    k: int, places: Indices, columns: Indices, flat: Array, count: int, tangent: Array, y: Array
+) -> None:
+    """Run y[n+1] = A[n] y[n] + g[n] of k states, several columns side by side.
+
+    Parameters
+    ----------
+    places : (k²,) array
+        Places of A in `flat`, state by state.
+    columns : (4 k, j) array
+        Of each state what `follow` takes.
+    y : (2, k, ABREAST) array
+        Room for the states and for those behind the sample.
+    """
+    for c in range(0, columns.shape[1], ABREAST):
+        for i in range(k):
+            for j in range(ABREAST):
+                y[0, i, j] = tangent[columns[4 * i + 2, c + j]]
+        for m in range(count):
+            for i in range(k):
+                for j in range(ABREAST):
+                    y[1, i, j] = flat[columns[4 * i, c + j] + m]
+                for l in range(k):
+                    a = flat[places[i * k + l] + m]
+                    for j in range(ABREAST):
+                        y[1, i, j] += a * y[0, l, j]
+            for i in range(k):
+                behind = columns[4 * i + 3, 0]
+                for j in range(ABREAST):
+                    flat[columns[4 * i + 1, c + j] + m] = y[behind, i, j]
+            for i in range(k):
+                for j in range(ABREAST):
+                    y[0, i, j] = y[1, i, j]
+        for i in range(k):
+            for j in range(ABREAST):
+                tangent[columns[4 * i + 2, c + j]] = y[0, i, j]
+
+
+@subroutine
+def recur(k: int, columns: Indices, flat: Array, count: int, tangent: Array, y: Array) -> None:
+    """Run a recurrence of k states, as laid down in `Program.columns`."""
+    places, rest = columns[: k * k], columns[k * k :]
+    chosen = rest.reshape(4 * k, rest.size // (4 * k))
+    if k == 1:
+        follow(flat[places[0] :], chosen, flat, count, tangent)
+    elif k == 2:
+        follow_pair(places, chosen, flat, count, tangent)
+    else:
+        follow_each_other(k, places, chosen, flat, count, tangent, y)
+
+
+@subroutine
 def integrate_row(row: Array, first: int, count: int, step: float, state: Array) -> None:
     """Replace a rate by its trapezoidal integral over the whole record.
 
@@ -232,9 +327,16 @@ def integrate_row(row: Array, first: int, count: int, step: float, state: Array)
     state[0], state[1] = total, last
 
 
-@kernel
+@subroutine
 def low_pass(
-    kept: float, fresh: bool, count: int, filled: Indices, factor: Array, state: Array, rows: Array
+    kept: float,
+    fresh: bool,
+    count: int,
+    columns: Indices,
+    factor: Array,
+    state: Array,
+    rows: Array,
+    flat: Array,
 ) -> None:
     """Replace the rows of an observation by what a first-order low pass makes of them.
 
@@ -256,10 +358,10 @@ def low_pass(
             state[c] = row[CARRIED]
         for m in range(count):
             row[CARRIED + m] = gain * row[CARRIED + m]
-    follow(factor, rows, filled, CARRIED, count, state)
+    follow(factor, columns, flat, count, state)
 
 
-@kernel
+@subroutine
 def place(
     seen: Array, base: int, plan: Plan, r: int, at: int, count: int, sink: Sink, to: int
 ) -> None:
@@ -313,7 +415,7 @@ def place(
     sink.squares[r] += squares
 
 
-@kernel
+@subroutine
 def rotate(
     seen: Array,
     base: int,
@@ -362,7 +464,7 @@ def rotate(
     return used
 
 
-@kernel
+@subroutine
 def carry(room: Room, count: int) -> None:
     """Keep what interpolation looks back at, from the end of the block before."""
     for r in range(room.seen.shape[0]):
@@ -372,13 +474,12 @@ def carry(room: Room, count: int) -> None:
             row[CARRIED - 1] = row[CARRIED + count - 1]
 
 
-@kernel
+@subroutine
 def deliver(
     program: Program,
     plan: Plan,
     sink: Sink,
     room: Room,
-    progress: Indices,
     used: int,
     span: tuple[int, int, int],
     step: float,
@@ -387,8 +488,6 @@ def deliver(
 
     Parameters
     ----------
-    progress : (r,) array
-        First stamp of each observation that is not yet dealt with; moved on.
     used : int
         Rows that wait in the sink to be rotated.
     span : (int, int, int)
@@ -403,7 +502,8 @@ def deliver(
     """
     first, count, size = span
     derived = program.derived
-    combine(room.table, program.seen, count, room.flat_seen, CARRIED)
+    targets = program.terms.target.size
+    combine(room.flat, program.terms, program.seen, targets, count, room.flat_seen)
     base, last = first - CARRIED, first + count == size
     for r in range(plan.first.size - 1):
         rows = room.seen[r]
@@ -416,15 +516,17 @@ def deliver(
         for q in range(plan.kept.shape[1]):
             kept = plan.kept[r, q]
             if kept > 0.0:
-                low_pass(kept, first == 0, count, room.filled, room.aside, room.passed[r, q], rows)
+                state, columns = room.passed[r, q], room.columns[r]
+                fresh = first == 0
+                low_pass(kept, fresh, count, columns, room.aside, state, rows, room.flat_seen)
         # off the grid, and for a slope, the point behind the stamp must be known as well
         alone = last or (plan.regular[r] and plan.clock_column[r] < 0)
         known = first + count if alone else first + count - 1
-        at = progress[r]
+        at = room.progress[r]
         end = at
         while end < plan.first[r + 1] and plan.cell[end] < known:
             end += 1
-        progress[r] = end
+        room.progress[r] = end
         if sink.factor.size > 0:
             used = rotate(rows, base, plan, r, at, end, sink, used, room.products)
         elif end > at:
@@ -432,7 +534,7 @@ def deliver(
     return used
 
 
-@kernel
+@subroutine
 def finish(sink: Sink, room: Room, used: int) -> None:
     """Rotate the rows that still wait."""
     if used > 0 and sink.factor.size > 0:
@@ -440,3 +542,49 @@ def finish(sink: Sink, room: Room, used: int) -> None:
             for i in range(used, sink.rows.shape[1]):
                 sink.rows[c, i] = 0.0
         absorb(sink.rows, sink.factor, room.products)
+
+
+@kernel
+def march_observed(
+    pieces: Any,
+    arrays: tuple[Any, ...],
+    size: int,
+    block: int,
+    h: float,
+    tangent: Array,
+    program: Program,
+    plan: Plan,
+    sink: Sink,
+    room: Room,
+) -> None:
+    """March block by block, and compare what comes with what was observed.
+
+    Parameters
+    ----------
+    pieces : (p,) array
+        Addresses of the generated pieces; the first one marches.
+    arrays : tuple of array
+        What they take, from ``records`` on (see `pieces.PIECE`).
+    size, block : int
+        Samples of the record, and most of them in a block.
+    h : float
+        Step. [s]
+    tangent : array
+        Derivatives of the states at the first sample, replaced by those behind the last.
+    program, plan, sink, room :
+        What to do, where to look, what to fill, where to work.
+    """
+    used, count, flat = int(plan.first[0]), 0, room.flat
+    for first in range(0, size, block):
+        carry(room, count)
+        count = min(block, size - first)
+        for step in range(program.todo.shape[0]):
+            what, a, b, c = program.todo[step]
+            if what == CALL:
+                call(pieces[a], count, first, h, arrays)
+            elif what == COMBINE:
+                combine(flat, program.terms, a, b, count, flat)
+            else:
+                recur(a, program.columns[b:c], flat, count, tangent, room.waiting)
+        used = deliver(program, plan, sink, room, used, (first, count, size), h)
+    finish(sink, room, used)

@@ -1,4 +1,4 @@
-"""Derivatives of functions that are known by their rule: declared ones, roots, tables."""
+"""Derivatives of what is known by a rule: declared functions, roots, tables, loops."""
 
 from collections.abc import Callable
 from typing import Any
@@ -6,8 +6,8 @@ from typing import Any
 from swashplate.equations import expressions as ex
 from swashplate.equations.derived import Derived, function_name, listing, result_paths, word
 from swashplate.equations.equation import module_of
-from swashplate.equations.primitives import hat, located
-from swashplate.equations.program import Primitive, Program, Tuple, floats, rebuilt
+from swashplate.equations.primitives import blank, hat, located
+from swashplate.equations.program import Primitive, Program, Tuple, floats, paths, rebuilt
 from swashplate.equations.writing import Call, Names, Region, Result, call_text, written
 
 Derive = Callable[[Any, tuple[str, ...]], Derived]
@@ -48,7 +48,7 @@ def of_rule(program: Program, inputs: tuple[str, ...], outputs: tuple[int, ...])
 
 def of_root(primitive: Primitive, inputs: tuple[str, ...], derive: Derive) -> Derived:
     """A root: the implicit function theorem within the bracket, its ends at the ends."""
-    residual = primitive.residual
+    residual = primitive.inner
     assert residual is not None
     x = residual.arguments[0][0]
     (low, _), (high, _), *rest = primitive.arguments
@@ -56,7 +56,7 @@ def of_root(primitive: Primitive, inputs: tuple[str, ...], derive: Derive) -> De
     inner = derive(residual, by)
     names = Names(primitive)
     function = names.of(primitive.function, "root")
-    its = names.residual(primitive)
+    its = names.inner(primitive)
     assert its is not None
     name = function_name(f"root_of_{its}", primitive, inputs, (0,))
     x = names.fresh(x if x != "value" else "x")
@@ -95,6 +95,73 @@ def of_root(primitive: Primitive, inputs: tuple[str, ...], derive: Derive) -> De
         ]
     )
     return Derived(name, ("value",), inputs, tuple(entries), source, (inner,), names.references)
+
+
+def of_repeated(primitive: Primitive, inputs: tuple[str, ...], derive: Derive) -> Derived:
+    """A loop: the derivatives of the state by every input, carried along step by step."""
+    step = primitive.inner
+    assert step is not None
+    count, state, *rest = (name for name, _ in primitive.arguments)
+    structure = dict(primitive.arguments)[state]
+    assert isinstance(structure, Tuple)
+    own, width = paths(state, structure), len(inputs)
+    inner = derive(step, (*own, *(p for p in inputs if p not in own)))
+    names = Names(primitive)
+    name = function_name(f"repeated_{step.source.name}", primitive, inputs, range(len(own)))
+    cls, empty = names.of(structure.cls, structure.cls.__name__), names.of(blank, "blank")
+    slopes, number, c = (names.fresh(each) for each in ("slopes", "number", "c"))
+    now = [names.fresh(field) for field in structure.fields]
+    new = [names.fresh(f"new_{field}") for field in structure.fields]
+    before = [names.fresh(f"by_{field}") for field in structure.fields]
+    partials = [names.fresh(f"d_{new[o]}_{word(inner.inputs[i])}") for o, i in inner.entries]
+    carried, direct = [list[str]() for _ in own], []
+    for partial, (o, i) in zip(partials, inner.entries, strict=True):
+        if inner.inputs[i] in own:
+            carried[o].append(f"{partial} * {before[own.index(inner.inputs[i])]}")
+        if inner.inputs[i] in inputs and inner.inputs[i] not in own:
+            direct.append(f"{slopes}[{o * width + inputs.index(inner.inputs[i])}] += {partial}")
+    arguments = [f"{cls}({', '.join(now)})", f"float({number})", *rest]
+    body = [
+        f"{', '.join([*new, *partials])}, = {call_text(inner.name, arguments)}",
+        f"for {c} in range({width}):",
+        *(f"    {each} = {slopes}[{k * width} + {c}]" for k, each in enumerate(before)),
+        *(
+            f"    {slopes}[{k * width} + {c}] = {' + '.join(terms) or '0.0'}"
+            for k, terms in enumerate(carried)
+        ),
+        *direct,
+        f"{', '.join(now)} = {', '.join(new)}",
+    ]
+    entries = [
+        (o, i)
+        for o, followed in enumerate(primitive.moving)
+        for i, path in enumerate(inputs)
+        if path in followed
+    ]
+    back = [*now, *(f"{slopes}[{o * width + i}]" for o, i in entries)]
+    lines = [
+        f"{', '.join(now)}, = {state}",
+        f"{slopes} = {call_text(empty, [str(len(own) * width)])}",
+        *(
+            f"{slopes}[{k * width + inputs.index(path)}] = 1.0"
+            for k, path in enumerate(own)
+            if path in inputs
+        ),
+        f"for {number} in range(int({count})):",
+        *(f"    {line}" for line in body),
+        f"return {', '.join(back)}",
+    ]
+    says = f"{step.source.name}, repeated, with its derivatives by {listing(inputs)}"
+    source = "\n".join(
+        [
+            f"def {name}({', '.join([count, state, *rest])}):",
+            f'    """{says}."""',
+            *(f"    {line}" for line in lines),
+            "",
+        ]
+    )
+    outputs = tuple(path.rpartition(".")[2] for path in own)
+    return Derived(name, outputs, inputs, tuple(entries), source, (inner,), names.references)
 
 
 def of_table(primitive: Primitive, inputs: tuple[str, ...]) -> Derived:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from swashplate.equations.equation import inlined, interpreted
 from swashplate.equations.fields import floats_of, made, numbers_of, value_at
 from swashplate.equations.lowering import generating
 from swashplate.equations.march import Stored, march_source, observe_source, taps_of
-from swashplate.equations.model import Link, Model, Place, arguments_of, place
+from swashplate.equations.model import Link, Model, Place, arguments_of, place, plain
 from swashplate.equations.windows import Window
 from swashplate.errors import DomainError, InputError
 
@@ -72,17 +73,17 @@ class Instance:
     parts: tuple[Part, ...]
     name: str
 
-    @property
+    @cached_property
     def options(self) -> tuple[Any, ...]:
         """Options of each part."""
         return tuple(part.options for part in self.parts)
 
-    @property
+    @cached_property
     def params(self) -> Array:
         """All parameters as numbers, in the order of `march.Numbers`."""
         return np.array([number for part in self.parts for number in numbers_of(part.p)])
 
-    @property
+    @cached_property
     def given(self) -> Array:
         """All givens as numbers."""
         found = [part.given for part in self.parts if part.given is not None]
@@ -92,13 +93,29 @@ class Instance:
         """Where every tap reads at a step of `h`."""
         found: list[Place] = []
         for each in taps_of(self.model, signals):
-            p, delay = self.parts[each.part].p, each.tap.delay
-            found.append(place(each.tap, float(value_at(p, delay)) if delay else 0.0, h))
+            name, p = each.tap.delay, self.parts[each.part].p
+            delay = float(value_at(p, name)) if name else 0.0
+            if not 0.0 <= delay < math.inf:
+                raise InputError(f"{self.name}: {name} is {delay:g} s, but a delay is at least 0.")
+            found.append(place(each.tap, delay, h))
         return Places(
             np.array([each.whole for each in found], dtype=np.int64),
             np.array([each.fraction for each in found]),
             np.array([each.slope for each in found]),
         )
+
+    def check_inputs(self, signals: Collection[str]) -> None:
+        """Refuse external signals that the model does not know, and the lack of those it needs."""
+        known = self.model.external
+        for signal in signals:
+            if signal not in known:
+                raise InputError(f"{self.name} has no input '{signal}'; it has {', '.join(known)}.")
+        for i, part in enumerate(self.model.parts):
+            for name in part.input_types:
+                signal = part.tap(name).signal
+                outside = self.model.link_of(i, name) is None and name not in part.defaults
+                if outside and signal not in signals:
+                    raise InputError(f"{self.name}: {part.name} needs the signal '{signal}'.")
 
     def start(
         self,
@@ -124,9 +141,15 @@ class Instance:
         Raises
         ------
         InputError
-            If a signal is missing, or the model cannot start settled.
+            If a signal is missing or unknown, or the model cannot start settled.
+        DomainError
+            If constants or the state cannot be computed for these numbers.
         """
+        key = (tuple(first.items()), h, start)
+        if chosen is None and key in self._starts:
+            return self._starts[key]
         check_start(start)
+        self.check_inputs(first)
         before = {name: value if start == "steady" else 0.0 for name, value in first.items()}
         states: list[Any] = []
         found: list[Mapping[str, Any]] = []
@@ -134,7 +157,7 @@ class Instance:
             known: dict[str, Any] = {"p": own.p, "options": own.options, "given": own.given}
             known["h"] = h
             if part.constants is not None:
-                known["k"] = called(part.constants, known)
+                known["k"] = self._called(part.constants, known)
             for name in part.input_types:
                 known[name] = self._input(i, name, first, before, states, found)
             if part.inputs is not None:
@@ -144,12 +167,28 @@ class Instance:
             if part.sample is not None:
                 known["signals"] = _sampled(part, known)
             found.append(known)
-        return Started(tuple(states), before, tuple(found))
+        made_now = Started(tuple(states), before, tuple(found))
+        if chosen is None:
+            if len(self._starts) > 64:
+                self._starts.clear()
+            self._starts[key] = made_now
+        return made_now
+
+    @cached_property
+    def _starts(self) -> dict[Any, Started]:
+        """What `start` found lately: a fit asks for the same ones with every set."""
+        return {}
 
     def _state(self, part: Model, known: Mapping[str, Any], start: Start) -> Any:
         equation = part.rest if start == "rest" else part.settled
         if equation is not None:
-            return called(equation, known)
+            found = self._called(equation, known)
+            if not isinstance(found, part.state):
+                raise InputError(
+                    f"{self.name}: {plain(equation).__name__} must return a "
+                    f"{part.state.__name__}, not {found!r}."
+                )
+            return found
         if start == "steady" and floats_of(part.state):
             raise InputError(
                 f"{self.name}: {part.name} has no equation for its steady state ('settled'), so "
@@ -158,6 +197,15 @@ class Instance:
         defaults = part.state._field_defaults
         empty = [path for path in floats_of(part.state) if path.split(".")[0] not in defaults]
         return made(part.state, dict.fromkeys(empty, 0.0))
+
+    def _called(self, equation: Callable[..., Any], known: Mapping[str, Any]) -> Any:
+        try:
+            return called(equation, known)
+        except (ValueError, ZeroDivisionError, OverflowError) as error:
+            raise DomainError(
+                f"{self.name}: {plain(equation).__name__} cannot be computed for these numbers "
+                f"({error})."
+            ) from None
 
     def _input(
         self,
@@ -175,10 +223,8 @@ class Instance:
         tap = own.tap(name)
         if tap.signal in first:
             value = before[tap.signal] if own.looked_at(name) else first[tap.signal]
-        elif name in own.defaults:
-            value = float(value_at(self.parts[part].p, own.defaults[name]))
         else:
-            raise InputError(f"{self.name}: {own.name} needs the signal '{tap.signal}'.")
+            value = float(value_at(self.parts[part].p, own.defaults[name]))
         return Window((value,) * tap.width, 0.0) if tap.width else value
 
 
@@ -324,5 +370,11 @@ def check_domain(instance: Instance, states: Array, worst: float, cause: str) ->
 
 def outside(model: Model, worst: float, cause: str) -> str:
     """What has happened where the margin is not above 0."""
-    said = next((part.outside for part in model.parts if part.domain is not None), model.outside)
-    return said(worst, cause) if callable(said) else f"{said} under this {cause}."
+    parts = [part for part in model.parts if part.domain is not None]
+    said = [
+        each.outside(worst, cause)
+        if callable(each.outside)
+        else f"{each.outside} under this {cause}."
+        for each in parts or [model]
+    ]
+    return " Or: ".join(said)

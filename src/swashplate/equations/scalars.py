@@ -6,10 +6,13 @@ results keep their last bit, and nothing else: what no wanted result needs is le
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from hashlib import blake2b
 from typing import Any
 
 from swashplate.equations import expressions as ex
+from swashplate.equations.equation import equation_of_text
 from swashplate.equations.expressions import Node
 from swashplate.equations.lowering import lower
 from swashplate.equations.program import (
@@ -30,6 +33,7 @@ from swashplate.equations.program import (
     shapes_of,
 )
 from swashplate.equations.syntax import plain
+from swashplate.equations.terms import repeated_moving
 
 
 class Code:
@@ -47,6 +51,11 @@ class Code:
         self.taken: set[str] = set()
         self.names: dict[str, Any] = {}
         self._called: dict[int, str] = {}
+
+    @property
+    def repeats(self) -> bool:
+        """Whether there are sub-steps in it."""
+        return any(isinstance(each, Invoke) and _is_loop(each.callee) for each in self.items)
 
     def fresh(self, stem: str) -> str:
         """A name that is not yet taken."""
@@ -88,8 +97,9 @@ class Code:
         for name, formal in program.arguments:
             if isinstance(formal, Flag) or not list(leaves(formal)):
                 continue
-            for (_, inner), (_, outer) in zip(leaves(formal), leaves(given[name]), strict=True):
-                env[inner.value] = outer
+            outer = dict(leaves(given[name]))  # it may have more fields than are asked for
+            for path, inner in leaves(formal):
+                env[inner.value] = outer[path]
         stem = plain(equation).__name__
         return self._named(self._body(program.body, env, self.items), stem, self.items)
 
@@ -168,6 +178,9 @@ class Code:
                     new = ex.name(name, new.kind)
                 env[old.value] = new
             return
+        if _is_loop(callee):
+            assert isinstance(callee, Primitive)
+            callee, arguments = flattened(callee, arguments, self.ruled)
         named = []
         for _, old in leaves(item.result):
             name = self.fresh(old.value)
@@ -186,11 +199,18 @@ class Code:
 
     def lines(self, wanted: Iterable[Node]) -> list[str]:
         """Text of the items that some results need."""
+        return self.written(self.kept(wanted))
+
+    def kept(self, wanted: Iterable[Node]) -> list[Item]:
+        """Items that some results need."""
         needed: set[str] = set()
         for node in wanted:
             needed |= node.reads
-        kept = self._live(self.items, needed)
-        return list(self._lines(kept))
+        return self._live(self.items, needed)
+
+    def written(self, items: Iterable[Item]) -> list[str]:
+        """Text of items."""
+        return list(self._lines(items))
 
     def reads(self, wanted: Iterable[Node]) -> set[str]:
         """Names from outside that some results need, decisions included."""
@@ -226,7 +246,7 @@ class Code:
                     kept.append(item)
         return kept[::-1]
 
-    def _lines(self, items: Sequence[Item]) -> Iterator[str]:
+    def _lines(self, items: Iterable[Item]) -> Iterator[str]:
         for item in items:
             if isinstance(item, Let):
                 yield f"{item.name} = {text(item.node)}"
@@ -243,10 +263,26 @@ class Code:
             else:
                 targets = ", ".join(node.value for _, node in leaves(item.result))
                 arguments = [self._argument(each) for each in item.arguments]
+                if _is_loop(item.callee) and not self.ruled:
+                    yield from self._loop(item, targets, arguments)
+                    continue
                 called = self.name_of(item.callee.function)
-                if isinstance(item.callee, Primitive) and item.callee.residual is not None:
-                    arguments.insert(0, self.name_of(item.callee.residual.function))
+                if isinstance(item.callee, Primitive) and item.callee.inner is not None:
+                    arguments.insert(0, self.name_of(item.callee.inner.function))
                 yield f"{targets} = {called}({', '.join(arguments)})"
+
+    def _loop(self, item: Invoke, targets: str, arguments: Sequence[str]) -> Iterator[str]:
+        """A loop written out: what `repeated` does, without passing a function."""
+        count, state, *rest = arguments
+        number = f"{targets.partition(',')[0]}_number"
+        assert isinstance(item.callee, Primitive)
+        assert item.callee.inner is not None
+        assert isinstance(item.callee.result, Tuple)
+        called = self.name_of(item.callee.inner.function)
+        given = f"{self.name_of(item.callee.result.cls)}({targets}), float({number})"
+        yield f"{targets} = {state}"
+        yield f"for {number} in range(int({count})):"
+        yield f"    {targets} = {called}({', '.join([given, *rest])})"
 
     def _argument(self, value: Value) -> str:
         if isinstance(value, Node):
@@ -258,6 +294,49 @@ class Code:
             return repr(value.value)
         assert isinstance(value, Open)
         return value.text
+
+
+def _is_loop(callee: Program | Primitive) -> bool:
+    return isinstance(callee, Primitive) and callee.kind == "repeated"
+
+
+def flattened(
+    loop: Primitive, arguments: tuple[Value, ...], ruled: bool
+) -> tuple[Primitive, tuple[Value, ...]]:
+    """A loop whose step is straight code of the scalars that it reads, and its arguments."""
+    step = loop.inner
+    assert step is not None
+    code, env = Code(ruled=ruled), dict[str, Node]()
+    formals, actuals = list[str](), list[Value]()
+    (state, _), (number, _), *rest = step.arguments
+    code.taken = {state, number, *vars(math)}
+    for name, value in rest:
+        for path, node in leaves(value):
+            env[node.value] = ex.name(code.fresh(f"{name}_{path}" if path else name), node.kind)
+    result = code._named(code._body(step.body, env, code.items), "value", code.items)
+    ends = [node for _, node in leaves(result)]
+    read = code.reads(ends)
+    for (_, value), given in zip(rest, arguments[2:], strict=True):
+        for (_, node), actual in zip(leaves(value), leaves(given), strict=True):
+            if env[node.value].value in read:
+                formals.append(env[node.value].value)
+                actuals.append(actual[1])
+    assert isinstance(result, Tuple)
+    kind = code.name_of(result.cls)
+    typed = ", ".join(f"{each}: float" for each in (number, *formals))
+    body = [*code.lines(ends), f"return {kind}({', '.join(text(each) for each in ends)})"]
+    lines = "\n".join(f"    {line}" for line in body)
+    lines = f"({state}: {kind}, {typed}) -> {kind}:\n{lines}\n"
+    name = f"{step.source.name}_{blake2b(lines.encode(), digest_size=4).hexdigest()}"
+    made = equation_of_text(f"def {name}{lines}", name, code.names)
+    inner = lower(made, shapes_of(made, {}, {}))
+    shown = [(n, ex.name(n)) for n in formals]
+    flat = (*loop.arguments[:2], *shown)
+    moving = repeated_moving(inner)
+    return Primitive(loop.kind, loop.function, inner, flat, moving, loop.result), (
+        *arguments[:2],
+        *actuals,
+    )
 
 
 def text(node: Node) -> str:

@@ -43,6 +43,7 @@ from swashplate.equations.syntax import (
 
 ROOT: list[Any] = []
 INTERPOLATE: list[Any] = []
+REPEATED: list[Any] = []
 """The primitives, entered by the module that defines them."""
 
 Environment = dict[str, Value]
@@ -406,6 +407,8 @@ class Terms:
             return self.root(node, env, items, hint)
         if found in INTERPOLATE or plain(found) in INTERPOLATE:
             return self.interpolation(node, env, items, hint)
+        if found in REPEATED or plain(found) in REPEATED:
+            return self.repetition(node, env, items, hint)
         f = plain(found)
         if not isinstance(f, FunctionType) or (f is found and not _interpreted()):
             text = ast.unparse(node.func)
@@ -420,12 +423,9 @@ class Terms:
         self, callee: Program | Primitive, given: tuple[Value, ...], items: list[Item], hint: Any
     ) -> Value:
         """Names for the scalars of a result; those that are numbers need none."""
-        if isinstance(callee, Primitive):
-            structure: Value = ex.ONE
-            stem = hint if isinstance(hint, str) else callee.kind
-        else:
-            structure = callee.result
-            stem = hint if isinstance(hint, str) else callee.source.name
+        structure = callee.result
+        called = callee.kind if isinstance(callee, Primitive) else callee.source.name
+        stem = hint if isinstance(hint, str) else called
         names: list[Node] = []
         for path, leaf in leaves(structure):
             first, *rest = path.split(".")
@@ -489,21 +489,28 @@ class Terms:
             new[keyword.arg] = self.value(keyword.value, env, items, keyword.arg)
         return Tuple(value.cls, tuple(new.values()))
 
+    def given_equation(self, node: ast.Call, what: str) -> FunctionType:
+        """The equation that a primitive is given by its name."""
+        first = node.args[0]
+        call = ast.copy_location(ast.Call(first, [], []), first)
+        named = isinstance(first, ast.Attribute)
+        named |= isinstance(first, ast.Name) and first.id not in self.local
+        found = self.callee(call, env={}) if named else None
+        f = plain(found)
+        if not isinstance(f, FunctionType) or (f is found and not _interpreted()):
+            self.source.refuse(
+                node, f"{what} of something else", "give it the name of an @equation"
+            )
+        parsed(found)
+        return f
+
     def root(self, node: ast.Call, env: Environment, items: list[Item], hint: Any) -> Value:
         """Value of `root`."""
         if len(node.args) < 3 or node.keywords:
             self.source.refuse(
                 node, "root with other arguments", "write root(residual, low, high, a, b, ...)"
             )
-        first = node.args[0]
-        call = ast.copy_location(ast.Call(first, [], []), first)
-        named = isinstance(first, ast.Attribute)
-        named |= isinstance(first, ast.Name) and first.id not in self.local
-        residual = self.callee(call, env) if named else None
-        f = plain(residual)
-        if not isinstance(f, FunctionType) or (f is residual and not _interpreted()):
-            self.source.refuse(node, "root of something else", "give it the name of an @equation")
-        parsed(residual)
+        f = self.given_equation(node, "root")
         given = tuple(self.value(a, env, items, "value") for a in node.args[1:])
         if len(parsed(f).arguments) != len(given) - 1:
             self.source.refuse(
@@ -521,6 +528,48 @@ class Terms:
         ordered = [p for n, v in formal for p in paths(n, v) if p in moves]
         return self.invoke(
             Primitive("root", ROOT[0], program, formal, (tuple(ordered),)), given, items, hint
+        )
+
+    def repetition(self, node: ast.Call, env: Environment, items: list[Item], hint: Any) -> Value:
+        """Value of `repeated`."""
+        if len(node.args) < 3 or node.keywords:
+            self.source.refuse(
+                node,
+                "repeated with other arguments",
+                "write repeated(step, count, state, a, b, ...)",
+            )
+        f = self.given_equation(node, "repeated")
+        count, state, *rest = (self.value(a, env, items, "value") for a in node.args[1:])
+        names = [a.arg for a in parsed(f).arguments]
+        if len(names) != len(rest) + 2:
+            self.source.refuse(
+                node,
+                f"repeated of {f.__name__} with other arguments",
+                "let it take a state, the number of the repetition and the rest",
+            )
+        flat = (
+            isinstance(state, Tuple)
+            and state.cls is not None
+            and all(isinstance(each, Node) for each in state.items)
+        )
+        program = self.lower(f, (shape(state), "float", *(shape(each) for each in rest)))
+        if not flat or shape(program.result) != shape(state):
+            self.source.refuse(
+                node,
+                f"repeated of {f.__name__}, which does not return a state",
+                "let it take and return the same named tuple of floats",
+            )
+        number = "count" if "count" not in names else "count_"
+        formal = tuple(
+            (n, argument(shape(v), n))
+            for n, v in zip([number, names[0], *names[2:]], [count, state, *rest], strict=True)
+        )
+        moving = repeated_moving(program)
+        return self.invoke(
+            Primitive("repeated", REPEATED[0], program, formal, moving, program.result),
+            (count, state, *rest),
+            items,
+            hint,
         )
 
     def interpolation(
@@ -547,6 +596,23 @@ class Terms:
         return self.invoke(
             Primitive("interpolate", INTERPOLATE[0], None, formal, (moving,)), given, items, hint
         )
+
+
+def repeated_moving(step: Program) -> tuple[tuple[str, ...], ...]:
+    """Of each number of a state what it may follow once a step has been repeated, in order."""
+    state, number = (name for name, _ in step.arguments[:2])
+    own = paths(state, step.arguments[0][1])
+    reach = [
+        {own.index(p) for p in moving if p in own} | {i} for i, moving in enumerate(step.moving)
+    ]
+    for _ in own:
+        reach = [set[int]().union(each, *(reach[k] for k in each)) for each in reach]
+    order = [p for n, v in step.arguments if n != number for p in paths(n, v)]
+    found = []
+    for each in reach:
+        followed = {own[k] for k in each}.union(*(step.moving[k] for k in each))
+        found.append(tuple(p for p in order if p in followed))
+    return tuple(found)
 
 
 def _interpreted() -> bool:

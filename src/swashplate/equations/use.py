@@ -1,4 +1,4 @@
-"""A model of one's own in use: simulated, differentiated, many sets at once.
+"""A model of one's own in use: simulated and differentiated.
 
 Examples
 --------
@@ -27,9 +27,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.fields import floats_of, made, numbers_of
+from swashplate.equations.fields import floats_of, is_real, made, numbers_of, value_at
 from swashplate.equations.jacobian import jacobian, state_paths
-from swashplate.equations.lanes import LANES, march_lanes
 from swashplate.equations.march import Stored, output_of
 from swashplate.equations.model import Model
 from swashplate.equations.observation import Observation, ObservedRecord, Own
@@ -107,6 +106,12 @@ def instance_of(
                 raise InputError(
                     f"Model {part.name}: its {what} must be a {kind.__name__}, not {number!r}."
                 )
+            for path in () if kind is None or what == "options" else floats_of(kind):
+                value = value_at(number, path)
+                if not is_real(value):
+                    raise InputError(
+                        f"Model {part.name}: {path} is {value!r}, but must be a real number."
+                    )
         chosen = numbers[1]
         if chosen is None and part.options is not None:
             chosen = part.options()
@@ -122,20 +127,16 @@ def records_of(
     Raises
     ------
     InputError
-        For a missing or unknown signal, another length, or a sample that is not finite.
+        For a missing or unknown signal, another length, or a sample that is no finite number.
     """
-    model = instance.model
-    if not rate > 0.0:
-        raise InputError(f"The rate is {rate:g} Hz, but must be above 0.")
+    if not is_real(rate) or not 0.0 < rate < np.inf:
+        raise InputError(f"The rate is {rate!r} Hz, but must be a number above 0.")
     found: dict[str, Array] = {}
     for name, values in inputs.items():
-        if name not in model.external:
-            raise InputError(
-                f"{model.name} has no input '{name}'; it has {', '.join(model.external)}."
-            )
-        samples = np.array(values, dtype=np.float64)
-        if samples.ndim != 1 or samples.size == 0:
-            raise InputError(f"{name} must be one column of samples, at least one.")
+        given = np.asarray(values)
+        if given.ndim != 1 or given.size == 0 or given.dtype.kind not in "fiub":
+            raise InputError(f"{name} must be one column of real numbers, at least one.")
+        samples = np.array(given, dtype=np.float64)
         if not np.isfinite(samples).all():
             bad = int(np.argmax(~np.isfinite(samples)))
             raise InputError(f"{name} is {samples[bad]} at sample {bad}; it must be finite.")
@@ -144,8 +145,9 @@ def records_of(
     if len(set(sizes.values())) > 1:
         listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
         raise InputError(f"All inputs need the same number of samples: {listed}.")
+    instance.check_inputs(found)
     if not found:
-        raise InputError(f"{model.name} needs a record of {', '.join(model.external)}.")
+        raise InputError(f"{instance.name} needs a record of {', '.join(instance.model.external)}.")
     return found
 
 
@@ -165,6 +167,8 @@ def started(
             raise InputError(
                 f"{instance.name} has no state '{path}' to start from; it has {', '.join(known)}."
             )
+        if not is_real(begin[path]) or not np.isfinite(begin[path]):
+            raise InputError(f"{path} begins at {begin[path]!r}, but must be a finite number.")
     states = list(found.states)
     for i, part in enumerate(instance.model.parts):
         prefix = f"{part.name}." if len(instance.model.parts) > 1 else ""
@@ -280,56 +284,6 @@ def sensitivities(
         {name: records[name] for name in others},
     )
     return jacobian(instance, observed, columns, Own(begin or {})).columns
-
-
-def simulate_many(
-    model: Model,
-    p: Any,
-    changes: Mapping[str, ArrayLike],
-    inputs: Mapping[str, ArrayLike],
-    rate: float,
-    *,
-    output: str,
-    options: Any = None,
-) -> Array:
-    """(m, n) a signal of many parameter sets over one record, from rest.
-
-    Parameters
-    ----------
-    model, p, inputs, rate, options :
-        As in `simulate`.
-    changes : mapping of str to (m,) array_like
-        Values of parameters, by path; the others are those of `p`.
-    output : str
-        The signal.
-    """
-    instance = instance_of(model, p, options=options)
-    records = records_of(instance, inputs, rate)
-    values = {path: np.asarray(each, dtype=np.float64) for path, each in changes.items()}
-    sizes = {each.shape for each in values.values()}
-    if len(sizes) != 1 or len(next(iter(sizes))) != 1:
-        raise InputError("All changes need as many values as there are sets, in one row each.")
-    (count,) = next(iter(sizes))
-    unknown = [path for path in values if path not in parameter_paths(model)]
-    if unknown:
-        raise InputError(f"{model.name} has no parameter '{unknown[0]}'.")
-    base = dict(zip(parameter_paths(model), instance.params, strict=True))
-    size = next(iter(records.values())).size
-    nothing = np.zeros(size)
-    found = np.empty((count, size))
-    for begin in range(0, count, LANES):
-        chosen = np.resize(np.arange(begin, min(begin + LANES, count)), LANES)
-        numbers = {
-            path: values[path][chosen] if path in values else np.full(LANES, number)
-            for path, number in base.items()
-        }
-        block = march_lanes(
-            model, instance.options, numbers, records, 1.0 / rate, output, nothing, nothing, True
-        )
-        good = np.isfinite(block.end) & (block.worst > 0.0)
-        rows = np.where(good[:, None], block.outputs.T, np.nan)
-        found[begin : begin + LANES] = rows[: min(LANES, count - begin)]
-    return found
 
 
 def parameter_paths(model: Model) -> tuple[str, ...]:

@@ -194,10 +194,10 @@ class Names:
         self.references[name] = thing
         return name
 
-    def residual(self, callee: Program | Primitive) -> str | None:
-        """Name of the function whose root is looked for."""
-        if isinstance(callee, Primitive) and callee.residual is not None:
-            return self.of(callee.residual.function, callee.residual.source.name)
+    def inner(self, callee: Program | Primitive) -> str | None:
+        """Name of the function that a primitive is given."""
+        if isinstance(callee, Primitive) and callee.inner is not None:
+            return self.of(callee.inner.function, callee.inner.source.name)
         return None
 
     def suggest(self, node: Node, name: str) -> None:

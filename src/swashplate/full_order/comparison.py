@@ -1,11 +1,13 @@
-"""One run of the full-order model beside the one-state model under the same current.
+"""The drive with five states beside the one with one state, under the same current.
 
-The reduced model is marched in fine steps, so that what is compared are the equations: its own step
-error at 512 Hz is given beside.
+`compare` has one run, `validity` a table of manoeuvres for which one state does, and `convergence`
+shows that it is the limit of five. The reduced model is marched in fine steps, so that what is
+compared are the equations: its own step error at 512 Hz is given beside.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
@@ -13,8 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from swashplate import maneuvers
 from swashplate.equations.record import SOURCE_RATE, least_substeps
 from swashplate.equations.run import Start
 from swashplate.full_order.drive import FullOrderDrive, Method
@@ -24,6 +27,7 @@ from swashplate.simulation.result import read_only
 if TYPE_CHECKING:
     import polars
 
+    from swashplate.maneuvers import Maneuver
     from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
@@ -37,6 +41,35 @@ STILL = 1e-6
 """Top speed up to which a drive does not move. [rad/s]"""
 BANDS = (0.001, 0.01)
 """Differences, over the largest speed, that the table sorts by."""
+TABLE_MANEUVERS: tuple[tuple[str, Maneuver], ...] = (
+    ("step 1 V", maneuvers.step(1.0, start=1.0, length=10.0)),
+    ("step 2 V", maneuvers.step(2.0, start=1.0, length=10.0)),
+    ("step 4 V", maneuvers.step(4.0, start=1.0, length=10.0)),
+    ("step 9 V", maneuvers.step(9.0, start=1.0, length=10.0)),
+    ("step -9 V", maneuvers.step(-9.0, start=1.0, length=10.0)),
+    ("ramp 1 V/s", maneuvers.ramp(1.0)),
+    *(
+        (
+            f"sine 6.5 V {frequency:g} Hz",
+            maneuvers.sine(
+                6.5, frequency, settle=None, length=max(10.0, ceil(4.0 + 2.0 / frequency))
+            ),
+        )
+        for frequency in (0.05, 0.1, 0.3, 1.0, 3.0)
+    ),
+)
+"""Manoeuvres of the table of the reduction's validity."""
+VALIDITY = {
+    "axis": str,
+    "maneuver": str,
+    "top_speed": float,
+    "largest_percent": float,
+    "rms_percent": float,
+    "step_error_percent": float,
+    "within_1_percent": bool,
+    "within_0_1_percent": bool,
+}
+"""Columns of that table; the top speed is in rad/s."""
 
 
 @dataclass(frozen=True)
@@ -180,3 +213,71 @@ def fine_steps(rate: float, samples: int) -> int:
     """
     wanted = ceil(FINE_STEPS * SOURCE_RATE / rate)
     return max(min(wanted, MOST_STEPS // samples), LEAST_FINE_STEPS)
+
+
+def convergence(
+    full: FullOrderDrive,
+    voltage: ArrayLike,
+    epsilons: Sequence[float] = (1.0, 0.25, 0.0625, 0.015625, 0.00390625),
+    rate: float = SOURCE_RATE,
+) -> list[tuple[float, Difference]]:
+    """Differences as inertias shrink with ε and dampings with √ε: they shrink like √ε.
+
+    Parameters
+    ----------
+    epsilons : sequence of float
+        Each above 0.
+    full : FullOrderDrive
+        The full-order model; the reduced one has its lumps.
+    voltage : (n,) array_like
+        Command. [V]
+    rate : float
+        Samples a second. [Hz]
+    """
+    drives = [full.scaled(epsilon) for epsilon in epsilons]
+    found = [compare(each, each.drive.simulate(voltage, rate)).difference for each in drives]
+    return list(zip(epsilons, found, strict=True))
+
+
+def validity(
+    full: FullOrderDrive,
+    rate: float = SOURCE_RATE,
+    *,
+    begin: Callable[[str], object] | None = None,
+) -> polars.DataFrame:
+    """For which of `TABLE_MANEUVERS` the one-state model is within 1 % and 0.1 %, for one drive.
+
+    Parameters
+    ----------
+    full : FullOrderDrive
+        The full-order model; the reduced one has its lumps.
+    begin : callable, optional
+        Called with the name of each manoeuvre before it is simulated.
+
+    Returns
+    -------
+    polars.DataFrame
+        A row for each manoeuvre: top speed, largest and rms difference and step error in percent
+        of it, and whether the largest difference is within 1 % and 0.1 %; null where the drive
+        does not move.
+    """
+    import polars as pl
+
+    rows = []
+    for title, maneuver in TABLE_MANEUVERS:
+        if begin is not None:
+            begin(title)
+        run = full.drive.simulate(maneuver.sample(rate), rate)
+        found = compare(full, run).difference
+        percent = 100.0 / found.top_speed if found.moves else None
+        shares = (found.largest, found.rms, found.step_error)
+        rows.append(
+            (
+                full.physical.name,
+                title,
+                found.top_speed,
+                *(None if percent is None else share * percent for share in shares),
+                *(found.relative <= band if found.moves else None for band in reversed(BANDS)),
+            )
+        )
+    return pl.DataFrame(rows, schema=VALIDITY, orient="row")

@@ -1,15 +1,35 @@
-"""From lumped parameters and a few chosen values to a whole physical set."""
+"""Physical sets from lumped parameters and a few chosen values, and from and to TOML files."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
 from math import sqrt
+from types import MappingProxyType
+from typing import Literal
 
-from swashplate.errors import ParameterError
-from swashplate.full_order.lumps import AGREES, static_pressure
-from swashplate.full_order.physical_set import PhysicalSet, PhysicalValue, quantity_of, value_of
-from swashplate.full_order.quantities import CHOICES, QUANTITIES
+from pydantic import BaseModel, ConfigDict
+
+from swashplate.documents import parse_toml, validated
+from swashplate.equations.definition import Declared
+from swashplate.errors import InputError, ParameterError
+from swashplate.full_order.physical_set import (
+    AGREES,
+    CHOICES,
+    QUANTITIES,
+    PhysicalSet,
+    PhysicalValue,
+    quantity_of,
+    rest_modulus,
+    rest_pressure,
+    value_of,
+)
+from swashplate.parameters.files import AXES
+from swashplate.parameters.files import load_preset as load_parameters
 from swashplate.parameters.parameter_set import Change, Pair, ParameterSet, Value
+from swashplate.parameters.schema import Entry
+from swashplate.units import to_si
 
 ASSUMED: Mapping[str, float] = {
     "feedback_spring_arm": 0.03,
@@ -40,6 +60,11 @@ IN_PLACE_OF: Mapping[str, str] = {
 """Quantities that may be chosen in place of a frequency or a damping ratio."""
 
 
+def chosen_quantity(name: str) -> Declared:
+    """What may be chosen by a name: a quantity, or one of `CHOICES`."""
+    return CHOICES[name] if name in CHOICES else quantity_of(name)
+
+
 def chosen_over(
     assumed: Mapping[str, PhysicalValue], chosen: Mapping[str, Change]
 ) -> dict[str, PhysicalValue]:
@@ -60,7 +85,7 @@ def chosen_over(
     """
     entries = dict(assumed)
     for name, change in chosen.items():
-        quantity = CHOICES[name] if name in CHOICES else quantity_of(name)
+        quantity = chosen_quantity(name)
         entries[name] = PhysicalValue(quantity, value_of(quantity, change))
         instead = IN_PLACE_OF.get(name)
         if instead is not None and instead not in chosen:
@@ -111,23 +136,24 @@ def from_lumped(
             )
     numbers = {**ASSUMED}
     for entry in given.values():
-        for column, value in zip(entry.quantity.columns, entry.values, strict=True):
-            entry.quantity.check(owner, column, value)
-            numbers[column] = value
+        entry.check(owner)
+        numbers |= zip(entry.quantity.columns, entry.values, strict=True)
     following = _completed(owner, parameters.numbers, numbers, set(given))
     complete = {}
-    for quantity in QUANTITIES.values():
+    for symbol, quantity in QUANTITIES.items():
         columns = quantity.columns
         if all(column in following for column in columns):
-            made, why = [following[column] for column in columns], following_from(quantity.name)
+            made, why = [following[column] for column in columns], f"from {_ORIGINS[symbol]}"
+        elif columns[0] not in numbers:  # left out, as its default has it
+            continue
         else:
             made, why = [numbers[column] for column in columns], "assumed"
-        if quantity.name in given:
-            _check_agreement(owner, given[quantity.name], made, why)
-            complete[quantity.name] = given[quantity.name]
+        if symbol in given:
+            _check_agreement(owner, given[symbol], made, why)
+            complete[symbol] = given[symbol]
         else:
-            follows: Value = Pair(*made) if quantity.directional else made[0]
-            complete[quantity.name] = PhysicalValue(quantity, follows, why, "assumed")
+            follows: Value = Pair(*made) if len(made) > 1 else made[0]
+            complete[symbol] = PhysicalValue(quantity, follows, why, "assumed")
     return PhysicalSet(owner, title, complete)
 
 
@@ -153,11 +179,6 @@ _ORIGINS = {
 }
 
 
-def following_from(name: str) -> str:
-    """What a quantity follows from when a set is completed."""
-    return f"from {_ORIGINS[name]}"
-
-
 def _completed(
     owner: str, Z: Mapping[str, float], chosen: dict[str, float], given: set[str]
 ) -> dict[str, float]:
@@ -168,7 +189,8 @@ def _completed(
             "counted from the one that holds the load (eq. 6.56)."
         )
     arm, area = chosen["swash_arm"], chosen["piston_area"]
-    stiffness = chosen["bulk_modulus"] / chosen["oil_volume"]
+    supply = Z["Z9"] + rest_pressure(chosen)
+    stiffness = rest_modulus({**chosen, "supply_pressure": supply}) / chosen["oil_volume"]
     spring_rate = area / (Z["Z1"] * arm)
     gauge = (1.0 + area**2 * stiffness / spring_rate) / (1.0 + Z["Z6"]) / stiffness
     made = {
@@ -181,7 +203,7 @@ def _completed(
         "orifice_opening_minus": Z["Z16_minus"],
         "valve_flow_gain": Z["Z8"] * gauge,
         "piston_leakage": Z["Z7"] * gauge,
-        "supply_pressure": Z["Z9"] + static_pressure(chosen),
+        "supply_pressure": supply,
         "relief_pressure": Z["Z15"],
         "return_spring_rate": spring_rate,
         "swash_stop_plus": Z["Z13_plus"],
@@ -253,6 +275,129 @@ def _check_agreement(owner: str, entry: PhysicalValue, made: list[float], why: s
     for column, value, follows in zip(entry.quantity.columns, entry.values, made, strict=True):
         if value != follows and not abs(value - follows) <= AGREES * abs(follows):
             raise ParameterError(
-                f"{owner}: {column} is given as {value:.9g} {entry.quantity.unit}, but "
+                f"{owner}: {column} is given as {value:.9g} {entry.unit}, but "
                 f"{follows:.9g} follows {why}; leave it out or change one of these."
             )
+
+
+# --- files ----------------------------------------------------------------------------------------
+
+
+class PhysicalFile(BaseModel):
+    """A physical set; with `lumps`, what is not given follows from a packaged parameter set."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    format: Literal[1] = 1
+    name: str
+    title: str = ""
+    lumps: str | None = None
+    physical: dict[str, Entry]
+
+
+@cache
+def load_preset(name: str) -> PhysicalSet:
+    """A packaged set.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown name; the sentence lists the right ones.
+    """
+    return read_set(_packaged(name), f"{name}.toml")
+
+
+@cache
+def load_choices(name: str) -> Mapping[str, PhysicalValue]:
+    """What a packaged set assumes; everything else in it follows from the lumps.
+
+    Raises
+    ------
+    ParameterError
+        For an unknown name; the sentence lists the right ones.
+    """
+    origin = f"{name}.toml"
+    contents = validated(parse_toml(_packaged(name), origin), PhysicalFile, origin)
+    return MappingProxyType(_entries(contents))
+
+
+def nearest_set(name: str) -> str:
+    """Name of the packaged set that a drive of this name is taken to be like: its own, or hoist."""
+    return name if name in AXES else AXES[0]
+
+
+def _packaged(name: str) -> str:
+    if name not in AXES:
+        raise ParameterError(
+            f"There is no packaged physical set '{name}'; there are {', '.join(AXES)}."
+        )
+    return files("swashplate.full_order").joinpath("sets", f"{name}.toml").read_text("utf-8")
+
+
+def read_set(text: str, origin: str) -> PhysicalSet:
+    """A physical set from TOML text; `origin` names it in errors."""
+    contents = validated(parse_toml(text, origin), PhysicalFile, origin)
+    try:
+        entries = _entries(contents)
+        if contents.lumps is None:
+            return PhysicalSet(contents.name, contents.title, entries)
+        parameters = load_parameters(contents.lumps)
+        return from_lumped(parameters, name=contents.name, title=contents.title, entries=entries)
+    except (ParameterError, InputError) as error:
+        raise ParameterError(f"{origin}: {error}") from None
+
+
+def dump_set(physical: PhysicalSet) -> str:
+    """A physical set as TOML text that `read_set` turns back into an equal set."""
+    from tomlkit import comment, document, dumps, inline_table, table
+
+    text = document()
+    text.add(comment("swashplate physical set; SI units; [plus, minus] as magnitudes"))
+    text.add("format", 1)
+    text.add("name", physical.name)
+    text.add("title", physical.title)
+    entries = table()
+    for name, each in physical.items():
+        if each.status == "inactive":  # left out, as its default has it
+            continue
+        entry = inline_table()
+        pair = isinstance(each.value, Pair)
+        entry.append("value", list(each.values) if pair else each.value)
+        entry.append("unit", each.unit)
+        if each.source:
+            entry.append("source", each.source)
+        entry.append("status", each.status)
+        entries.add(name, entry)
+    text.add("physical", entries)
+    return dumps(text)
+
+
+def si_value(quantity: Declared, number: float, unit: str) -> float:
+    """A quantity's number in SI.
+
+    Raises
+    ------
+    InputError
+        If the unit is unknown or measures something else.
+    """
+    definition = quantity.definition
+    return to_si(number, unit, definition.unit, f"{quantity.symbol} ({definition.name})")
+
+
+def _entries(contents: PhysicalFile) -> dict[str, PhysicalValue]:
+    completed = contents.lumps is not None
+    return {name: _value(name, entry, completed) for name, entry in contents.physical.items()}
+
+
+def _value(name: str, entry: Entry, completed: bool) -> PhysicalValue:
+    """One entry of a file, in SI."""
+    quantity = chosen_quantity(name) if completed else quantity_of(name)
+    several = len(quantity.fields) > 1
+    if entry.bounds is not None:
+        raise ParameterError(f"{name} has bounds; leave them out, a fit is given its own.")
+    given = entry.value if isinstance(entry.value, list) else [entry.value]
+    if len(given) == 2 and not several:
+        raise ParameterError(f"{name} has one value, not a plus and a minus one.")
+    numbers = [si_value(quantity, number, entry.unit) for number in given]
+    value = Pair(numbers[0], numbers[-1]) if several else numbers[0]
+    return PhysicalValue(quantity, value, entry.source, entry.status)

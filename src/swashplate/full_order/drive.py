@@ -2,50 +2,72 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil
+from math import ceil, floor
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.drive import Drive
+from swashplate.equations.equation import interpreted
+from swashplate.equations.jacobian import jacobian
+from swashplate.equations.march import Stored
+from swashplate.equations.observation import Observation, ObservedRecord
 from swashplate.equations.record import SOURCE_RATE, Interpolation, Record, record_of
-from swashplate.equations.run import Start, check_start
+from swashplate.equations.run import Instance, Part, Start, check_start, marched
 from swashplate.errors import DomainError, InputError
-from swashplate.full_order.completion import chosen_over, from_lumped
-from swashplate.full_order.equilibrium import fastest_rate, rest_row, steady_row
-from swashplate.full_order.files import load_choices, nearest_set
-from swashplate.full_order.lumps import static_pressure
-from swashplate.full_order.machine import build_machine
-from swashplate.full_order.march import N_ROW, march
-from swashplate.full_order.modes import Modes, modes_at
-from swashplate.full_order.observe import observe_force
+from swashplate.full_order.completion import chosen_over, from_lumped, load_choices, nearest_set
+from swashplate.full_order.modes import Modes, modes_of, state_matrix
 from swashplate.full_order.physical_set import PhysicalSet
 from swashplate.full_order.result import FullOrderSimulation
-from swashplate.full_order.stiff import StiffMethod, solve
+from swashplate.full_order.stiff import Case, Feed, solve
+from swashplate.models import full_order as model
+from swashplate.models.drive import Source
+from swashplate.models.machine import Machine, fastest_rate
+from swashplate.models.pump import Solenoids, solenoid_force
 from swashplate.parameters.parameter_set import Change
-from swashplate.simulation.instance import pump_of
+from swashplate.simulation.instance import PATHS, card_of, card_options, check_filter_stability
 
 if TYPE_CHECKING:
-    from swashplate.full_order.machine import Plate
-    from swashplate.models.pump import Pump
     from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
-Method = Literal["march", "radau", "lsoda"]
+Method = Literal["march", "radau"]
 
 RESOLUTION = 1.0
-"""Largest product of a Runge-Kutta step and the fastest natural frequency."""
-STABLE = 2.5
-"""The same where the march is still stable, with some reserve: its limit is 2.78."""
+"""Largest product of a sub-step and the fastest natural frequency."""
+STABLE = 2.0
+"""The same where the march is no longer stable."""
 LEAST_SUBSTEPS = 8
-"""Runge-Kutta steps a sample that kinks of the flow, at the orifices' limits, are worth."""
+"""Sub-steps a sample that kinks of the flow, at the orifices' limits, are worth."""
 MOST_SUBSTEPS = 20_000
-"""Runge-Kutta steps a sample, beyond which the solvers are the better way."""
+"""Sub-steps a sample, beyond which the solver is the better way."""
 LOOSEST = 1e-3
 """Largest relative tolerance."""
+STATES = tuple(Stored(1, "signals", name) for name in model.Motion._fields)
+
+
+def path_of(name: str) -> str:
+    """Path in the model of a quantity, or of a parameter of card or solenoids, by its column.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    if name in Machine._fields:
+        return f"plant.machine.{name}"
+    if name in Solenoids._fields:
+        return f"plant.solenoids.{name}"
+    if PATHS.get(name, "").startswith("card."):
+        return PATHS[name]
+    raise InputError(
+        f"A drive with five states has no parameter '{name}'; it has those of the card, "
+        f"{', '.join((*Solenoids._fields, *Machine._fields))}."
+    )
 
 
 @dataclass(frozen=True)
@@ -125,39 +147,74 @@ class FullOrderDrive:
         return self.drive.replace(**self.physical.to_lumped(Z6))
 
     @cached_property
-    def machine(self) -> Plate:
-        """The physical set, ready for compiled code."""
-        return build_machine(self.physical, self.drive.parameters.pressure_root)
+    def plant(self) -> model.Plant:
+        """Machine and solenoids, as the equations take them."""
+        numbers = self.drive.parameters.numbers
+        return model.Plant(
+            self.physical.machine, Solenoids(*(numbers[name] for name in Solenoids._fields))
+        )
 
-    @cached_property
-    def _pump(self) -> Pump:
-        return pump_of(self.drive.parameters)
+    def options(self, *, held: bool = False) -> model.PlantOptions:
+        """Forms of the equations; with `held` the current keeps its value between samples."""
+        symmetric = self.drive.parameters.pressure_root == "symmetric"
+        return model.PlantOptions(
+            True if symmetric else None, self.physical.air, True if held else None
+        )
+
+    def instance(
+        self, step: float, *, substeps: int | None = None, card: bool = True, held: bool = False
+    ) -> Instance:
+        """The model with numbers, for the engine: behind a voltage, or without a card a current.
+
+        Parameters
+        ----------
+        step : float
+            Distance of the samples. [s]
+        substeps : int, optional
+            As in `simulate_current`.
+        card : bool, optional
+            False for `swashplate.models.full_order.full_machine`.
+        held : bool, optional
+            As in `options`.
+        """
+        behind = self._machine(self.substeps(step, substeps), held)
+        if not card:
+            return behind
+        parameters = self.drive.parameters
+        check_filter_stability(parameters, step)
+        front = Part(card_of(parameters), card_options(parameters))
+        return Instance(model.full_drive, (front, behind.parts[1]), self.physical.name)
+
+    def _machine(self, substeps: int, held: bool = False) -> Instance:
+        given = model.Substeps(float(substeps))
+        plant = Part(self.plant, self.options(held=held), given)
+        return Instance(model.full_machine, (Part(Source()), plant), self.physical.name)
 
     def substeps(self, step: float, wanted: int | None = None) -> int:
-        """Runge-Kutta steps that a step of the record takes.
+        """Sub-steps that a step of the record takes.
 
         Parameters
         ----------
         step : float
             Step of the record. [s]
         wanted : int, optional
-            By default 8, or so many that the fastest mode takes six steps a turn.
+            By default 8, or so many that the fastest mode takes six a turn.
 
         Raises
         ------
         DomainError
-            If the machine is too stiff for a fixed step.
+            If the machine is too stiff for the march.
         InputError
             If so few are wanted that the march would be unstable.
         """
-        fastest = fastest_rate(self.machine)
+        fastest = float(interpreted(fastest_rate)(self.physical.machine))
         needed = max(ceil(fastest * step / RESOLUTION), LEAST_SUBSTEPS)
         if wanted is not None:
-            least = ceil(fastest * step / STABLE)
-            if wanted < max(least, 1):
+            least = floor(fastest * step / STABLE) + 1
+            if wanted < least:
                 raise InputError(
                     f"substeps is {wanted}, but the fastest mode, at {fastest:.3g} rad/s, needs "
-                    f"at least {max(least, 1)} to be stable and {needed} to be followed."
+                    f"at least {least} to be stable and {needed} to be followed."
                 )
             return wanted
         if needed > MOST_SUBSTEPS:
@@ -214,8 +271,7 @@ class FullOrderDrive:
         method, start, substeps, tolerance :
             As in `simulate_current`.
         """
-        current = run_current(run)
-        record = Record(current, run.record.start, run.record.rate, run.record.substeps)
+        record = Record(run.fine("current"), run.record.start, run.record.rate, run.record.substeps)
         return self._integrate(record, False, method, start, substeps, tolerance)
 
     def simulate_current(
@@ -238,14 +294,14 @@ class FullOrderDrive:
             Current, positive towards more speed. [A]
         rate, time, interpolation, start :
             As in `Drive.simulate`.
-        method : {"march", "radau", "lsoda"}
-            Compiled fixed-step Runge-Kutta march with located events, or one of SciPy's stiff
-            solvers, restarted at each event, to check it by.
+        method : {"march", "radau"}
+            Compiled march in fixed sub-steps, or SciPy's stiff solver, restarted at each event, to
+            check it by.
         substeps : int, optional
-            Steps of the march a sample, at least 512 samples a second; by default 8, or so
+            Sub-steps of the march a sample, at least 512 samples a second; by default 8, or so
             many that the fastest mode takes six steps a turn.
         tolerance : float
-            Relative tolerance of the solvers.
+            Relative tolerance of the solver.
 
         Returns
         -------
@@ -257,7 +313,7 @@ class FullOrderDrive:
         InputError
             For a record or option that cannot be simulated.
         DomainError
-            If a solver gives up or the machine is too stiff for the march.
+            If the solver gives up or the machine is too stiff for the march.
         """
         record = record_of(current, rate, what="current", time=time, interpolation=interpolation)
         return self._integrate(
@@ -272,20 +328,47 @@ class FullOrderDrive:
         InputError
             If the current is no finite number.
         """
-        force = self._force(current)
-        row = steady_row(force, self.machine)
-        return modes_at(row, float(current), self.machine, self._pump)
+        if not np.isfinite(current):
+            raise InputError(f"The current is {current}, but must be a finite number of amperes.")
+        first = {"current": float(current)}
+        state = self._machine(1).start(first, 1.0 / SOURCE_RATE, "steady").states[1]
+        force = float(interpreted(solenoid_force)(float(current), self.plant.solenoids))
+        at = np.array(state.motion)
+        return modes_of(state_matrix(at, force, self.plant.machine, self.options()))
 
     def eigenvalues(self, current: float = 0.0) -> NDArray[np.complex128]:
         """Eigenvalues of the five states about an equilibrium, see `modes`. [rad/s]"""
         return self.modes(current).eigenvalues
 
-    def _force(self, current: float) -> float:
-        if not np.isfinite(current):
-            raise InputError(f"The current is {current}, but must be a finite number of amperes.")
-        force = np.empty(1)
-        observe_force(np.array([float(current)]), self._pump, force)
-        return float(force[0])
+    def sensitivities(
+        self,
+        voltage: ArrayLike,
+        rate: float = SOURCE_RATE,
+        *,
+        parameters: Sequence[str],
+        signal: str = "shaft_speed",
+        start: Start = "rest",
+        substeps: int | None = None,
+    ) -> Array:
+        """(n, k) exact derivatives of a signal by parameters, those of the march's own steps.
+
+        Parameters
+        ----------
+        voltage, rate, start, substeps :
+            As in `simulate`.
+        parameters : sequence of str
+            Columns of physical quantities (``"swash_inertia"``, ``"swash_stop_plus"``), of the
+            solenoids (``"Z19_plus"``) and of the card (``"omega_plus"``, ``"tau"``).
+        signal : str
+            Of `swashplate.models.full_order.PlantSignals`, ``"shaft_position"`` or a current.
+        """
+        record = record_of(voltage, rate, what="voltage")
+        columns = [path_of(name) for name in parameters]
+        zeros = np.zeros(record.time.size)
+        observed = ObservedRecord(
+            record, [Observation(signal, record.time, zeros)], "voltage", start
+        )
+        return jacobian(self.instance(record.step, substeps=substeps), observed, columns).columns
 
     def _integrate(
         self,
@@ -297,48 +380,21 @@ class FullOrderDrive:
         tolerance: float,
     ) -> FullOrderSimulation:
         check_start(start)
-        machine, pump = self.machine, self._pump
-        current = np.ascontiguousarray(record.values)
-        force = np.empty_like(current)
-        observe_force(current, pump, force)
-        begin = (rest_row if start == "rest" else steady_row)(float(force[0]), machine)
-        if method == "march":
-            rows = np.empty((current.size, N_ROW))
-            rows[0] = begin
-            holds, losses = np.zeros((current.size, 3), np.int8), np.zeros((current.size, 2))
-            steps = self.substeps(record.step, substeps)
-            events = march(current, held, record.step, steps, machine, pump, rows, holds, losses)
-            if events < 0:
-                at = record.start + (-1 - events) * record.step
-                raise DomainError(
-                    f"{self.physical.name}: the march breaks down after {at:.6g} s; check the "
-                    "physical set, or use method='radau'."
-                )
-        elif method in ("radau", "lsoda"):
-            if not 0.0 < tolerance <= LOOSEST:
-                raise InputError(
-                    f"tolerance is {tolerance:g}, but must be above 0 and at most {LOOSEST:g}."
-                )
-            stiff: StiffMethod = method
-            rows, holds, losses, events = solve(
-                stiff, current, force, held, record.step, machine, pump, begin, tolerance
+        if method not in ("march", "radau"):
+            raise InputError(f"method is '{method}'; it is 'march' or 'radau'.")
+        if not 0.0 < tolerance <= LOOSEST:
+            raise InputError(
+                f"tolerance is {tolerance:g}, but must be above 0 and at most {LOOSEST:g}."
             )
+        step, records = record.step, {"current": np.ascontiguousarray(record.values)}
+        instance = self._machine(self.substeps(step, substeps) if method == "march" else 1, held)
+        started = instance.start({"current": float(record.values[0])}, step, start)
+        plant = instance.parts[1]
+        case = Case(plant.p, started.arguments[1]["k"], plant.options)
+        if method == "march":
+            out, _ = marched(instance, records, step, started, STATES, "current")
+            states = np.ascontiguousarray(out.T)
         else:
-            raise InputError(f"method is '{method}'; it is 'march', 'radau' or 'lsoda'.")
-        return FullOrderSimulation(
-            self.physical.name,
-            method,
-            record,
-            machine,
-            force,
-            rows,
-            holds,
-            losses,
-            events,
-            static_pressure(self.physical.numbers),
-        )
-
-
-def run_current(run: Simulation) -> Array:
-    """Signed current of a run on the grid of its march. [A]"""
-    return run.fine("current")
+            feed = Feed(records["current"], held, step)
+            states = solve(feed, case, started.states[1].motion, tolerance)
+        return FullOrderSimulation(self.physical.name, method, record, case, states)

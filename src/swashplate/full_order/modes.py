@@ -1,18 +1,46 @@
-"""Natural modes of the full-order model about an equilibrium."""
+"""Natural modes of the drive with five states about an equilibrium."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.full_order.machine import Plate
-from swashplate.full_order.march import N_STATES, jacobian_at
-from swashplate.models.pump import Pump
+from swashplate.equations.derivatives import derive
+from swashplate.equations.lowering import generating
+from swashplate.equations.run import module
+from swashplate.models.full_order import Motion, PlantOptions, free_rates
+from swashplate.models.machine import Machine
 
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
+
+N_STATES = len(Motion._fields)
+
+
+@generating
+def slopes_of(options: PlantOptions) -> Callable[..., None]:
+    """The compiled derivatives of the rates by the five states, as rows of a matrix."""
+    made = derive(free_rates, by="state", options={"options": options})
+    text = "\n\n".join(f"@inlined\n{each}" for each in made.texts.values())
+    lines = [
+        f"matrix[{(1, 2, 4)[row]}, {column}] = found[{len(made.outputs) + place}]"
+        for place, (row, column) in enumerate(made.entries)
+    ]
+    text += "\n\n@kernel\ndef slopes(state, force, p, options, matrix):\n"
+    text += f"    found = {made.name}(state, force, p, options)\n    "
+    text += "\n    ".join(lines) + "\n"
+    return module("full_order_slopes", text, made.names)["slopes"]  # type: ignore[no-any-return]
+
+
+def state_matrix(state: Array, force: float, p: Machine, options: PlantOptions) -> Array:
+    """(5, 5) derivatives of the rates of the five states by themselves, no limit holding."""
+    matrix = np.zeros((N_STATES, N_STATES))
+    slopes_of(options)(Motion(*state), force, p, options, matrix)
+    matrix[0, 1] = matrix[3, 4] = 1.0
+    return matrix
 
 
 @dataclass(frozen=True)
@@ -41,20 +69,12 @@ class Modes:
         return -mode.real / abs(mode)
 
 
-def state_matrix(row: Array, current: float, machine: Plate, pump: Pump) -> Array:
-    """Derivatives of the five rates by the five states, no limit holding. (5, 5)"""
-    record = np.array([current, current])
-    jacobian = jacobian_at(0.0, row, record, True, 1.0, (0, 0, 0), machine, pump)
-    return np.ascontiguousarray(jacobian[:N_STATES, :N_STATES])
-
-
-def modes_at(row: Array, current: float, machine: Plate, pump: Pump) -> Modes:
-    """Modes about a row.
+def modes_of(matrix: Array) -> Modes:
+    """Modes of a state matrix.
 
     The slow pole is the eigenvalue nearest zero. The spool's mode is the one in which position and
     velocity of the spool take the largest part, by the product of left and right eigenvectors.
     """
-    matrix = state_matrix(row, current, machine, pump)
     values, right = np.linalg.eig(matrix)
     left = np.linalg.inv(right)
     parts = np.abs(left.T * right)  # (state, mode), free of the states' units

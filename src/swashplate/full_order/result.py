@@ -1,4 +1,4 @@
-"""What a full-order simulation returns: the five states and everything that follows from them."""
+"""What a simulation with five states returns: the states and everything that follows from them."""
 
 from __future__ import annotations
 
@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.equations.cache import kernel
 from swashplate.equations.record import Record
-from swashplate.full_order.machine import Plate
-from swashplate.full_order.march import ACCOUNTS, N_STATES
-from swashplate.full_order.observe import observe_flows, observe_speeds
+from swashplate.full_order.stiff import Case
+from swashplate.models.full_order import Motion, PlantSignals, plant_signals
 from swashplate.simulation.result import read_only
 
 if TYPE_CHECKING:
     import polars
-
-    from swashplate.full_order.balances import Balances
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
@@ -42,6 +40,16 @@ SIGNALS = (
 """Signals in the order of the chain."""
 
 
+@kernel
+def observe(states: Array, current: Array, case: Case, out: Array) -> None:
+    """Every signal of `PlantSignals`, a column each, at known states (n, 5)."""
+    for n in range(current.size):
+        motion = Motion(states[n, 0], states[n, 1], states[n, 2], states[n, 3], states[n, 4])
+        found = plant_signals(motion, current[n], case.p, case.k, case.options)
+        for c in range(len(found)):
+            out[n, c] = found[c]
+
+
 @dataclass(frozen=True, eq=False)
 class FullOrderSimulation:
     """Signals of one record, read-only arrays of the record's length, all SI.
@@ -53,25 +61,25 @@ class FullOrderSimulation:
     name: str
     """Name of the physical set."""
     method: str
-    """How it was integrated: ``"march"``, ``"radau"`` or ``"lsoda"``."""
+    """How it was integrated: ``"march"`` or ``"radau"``."""
     record: Record
     """The signed current, on the grid that was marched. [A]"""
-    machine: Plate
-    force: Array
-    """Net solenoid force on that grid. [N]"""
-    rows: Array
-    """States and accounts on that grid, a row a sample; see `swashplate.full_order.march`."""
-    holds: Flags
-    """Limits that hold on that grid: spool at its stroke, relief valve, swash plate at a stop."""
-    losses: Array
-    """Energy that the stops of spool and swash plate have taken so far, on that grid. [J]"""
-    events: int
-    """How often a limit began or ceased to hold."""
-    rest_pressure: float
-    """Stroker pressure P0 that holds the load at rest. [Pa]"""
+    case: Case
+    """The machine."""
+    states: Array
+    """(n, 5) the states on that grid, in the order of `swashplate.models.full_order.Motion`."""
 
     def __repr__(self) -> str:
         return f"FullOrderSimulation({self.name!r}, {self.time.size} samples, {self.method})"
+
+    @cached_property
+    def _signals(self) -> dict[str, Array]:
+        """All signals on the grid that was marched."""
+        out = np.empty((self.states.shape[0], len(PlantSignals._fields)))
+        observe(self.states, self.record.values, self.case, out)
+        return {
+            name: np.ascontiguousarray(out[:, c]) for c, name in enumerate(PlantSignals._fields)
+        }
 
     def _sampled(self, fine: Array) -> Array:
         return read_only(np.ascontiguousarray(fine[:: self.record.substeps]))
@@ -89,99 +97,83 @@ class FullOrderSimulation:
     @cached_property
     def solenoid_force(self) -> Array:
         """Net force of both solenoids on the spool. [N]"""
-        return self._sampled(self.force)
+        return self._sampled(self._signals["solenoid_force"])
 
     @cached_property
     def spool_position(self) -> Array:
         """Displacement of the spool. [m]"""
-        return self._sampled(self.rows[:, 0])
+        return self._sampled(self._signals["spool_position"])
 
     @cached_property
     def spool_velocity(self) -> Array:
         """Velocity of the spool. [m/s]"""
-        return self._sampled(self.rows[:, 1])
+        return self._sampled(self._signals["spool_velocity"])
+
+    @cached_property
+    def orifice_opening(self) -> Array:
+        """Effective opening, what the orifices leave of the spool's displacement. [m]"""
+        return self._sampled(self._signals["orifice_opening"])
+
+    @cached_property
+    def valve_flow(self) -> Array:
+        """Flow through the valve towards the stroking piston. [m³/s]"""
+        return self._sampled(self._signals["valve_flow"])
 
     @cached_property
     def stroker_pressure(self) -> Array:
         """Stroking pressure δP about the one that holds the load at rest. [Pa]"""
-        return self._sampled(self.rows[:, 2] - self.rest_pressure)
+        return self._sampled(self._signals["stroker_pressure"])
 
     @cached_property
     def swash_angle(self) -> Array:
         """Angle of the swash plate. [rad]"""
-        return self._sampled(self.rows[:, 3])
+        return self._sampled(self._signals["swash_angle"])
 
     @cached_property
     def swash_rate(self) -> Array:
         """Rate of the swash plate. [rad/s]"""
-        return self._sampled(self.rows[:, 4])
+        return self._sampled(self._signals["swash_rate"])
 
     @cached_property
     def shaft_speed(self) -> Array:
         """Speed of the shaft, of the turret for slew. [rad/s]"""
-        speed = np.empty(self.rows.shape[0])
-        observe_speeds(self.rows, self.machine.p, speed)
-        return self._sampled(speed)
+        return self._sampled(self._signals["shaft_speed"])
 
     @cached_property
     def shaft_position(self) -> Array:
-        """Angle of the shaft, zero at the start. [rad]"""
-        return self.account("shaft_position")
-
-    @cached_property
-    def _flows(self) -> tuple[Array, Array]:
-        opening, flow = np.empty((2, self.rows.shape[0]))
-        observe_flows(self.rows, self.machine.p, self.machine.symmetric, opening, flow)
-        return self._sampled(opening), self._sampled(flow)
-
-    @property
-    def orifice_opening(self) -> Array:
-        """Effective opening, what the orifices leave of the spool's displacement. [m]"""
-        return self._flows[0]
-
-    @property
-    def valve_flow(self) -> Array:
-        """Flow through the valve towards the stroking piston. [m³/s]"""
-        return self._flows[1]
+        """Angle of the shaft, zero at the start: the trapezoidal integral of its speed. [rad]"""
+        speed = self._signals["shaft_speed"]
+        turned = np.zeros_like(speed)
+        np.cumsum(0.5 * self.record.step * (speed[:-1] + speed[1:]), out=turned[1:])
+        return self._sampled(turned)
 
     @cached_property
     def motor_pressure_drop(self) -> Array:
         """Pressure drop across the motor, P_hi - P_lo, under load inertia and gravity. [Pa]"""
-        m = self.machine.p
-        torque = (
-            m.load_inertia * m.motor_constant * m.pump_flow_gain * self.swash_rate + m.load_torque
-        )
-        return read_only(m.motor_constant * torque)
+        return self._sampled(self._signals["motor_pressure_drop"])
 
     @cached_property
     def pump_flow(self) -> Array:
         """Flow of the pump to the motor. [m³/s]"""
-        return read_only(self.machine.p.pump_flow_gain * self.swash_angle)
-
-    def account(self, name: str) -> Array:
-        """What has passed since the start, one of `swashplate.full_order.march.ACCOUNTS`."""
-        return self._sampled(self.rows[:, N_STATES + ACCOUNTS.index(name)])
-
-    @property
-    def plate_hold(self) -> Flags:
-        """1 or -1 where the swash plate rests on a stop."""
-        return self.holds[:: self.record.substeps, 2]
-
-    @property
-    def relief_hold(self) -> Flags:
-        """1 or -1 where the relief valve holds the stroker pressure."""
-        return self.holds[:: self.record.substeps, 1]
+        return self._sampled(self._signals["pump_flow"])
 
     @property
     def spool_hold(self) -> Flags:
         """1 or -1 where the spool is at its stroke."""
-        return self.holds[:: self.record.substeps, 0]
+        stroke = self.case.p.machine.spool_stroke
+        return _beyond(self.spool_position, -stroke, stroke)
 
-    def balances(self) -> Balances:
-        """Energy and flow balances; see `swashplate.full_order.balances`."""
-        from swashplate.full_order.balances import balances_of
+    @property
+    def relief_hold(self) -> Flags:
+        """1 or -1 where the relief valve holds the stroker pressure."""
+        pressure = self._sampled(self._signals["piston_pressure"])
+        return _beyond(pressure, self.case.k.lower, self.case.k.upper)
 
-        return balances_of(self)
+    @property
+    def plate_hold(self) -> Flags:
+        """1 or -1 where the swash plate rests on a stop."""
+        m = self.case.p.machine
+        return _beyond(self.swash_angle, -m.swash_stop_minus, m.swash_stop_plus)
 
     def to_polars(self) -> polars.DataFrame:
         """Table of time, all signals and the limits that hold."""
@@ -189,8 +181,7 @@ class FullOrderSimulation:
 
         columns: dict[str, NDArray[np.generic]] = {"time": self.time}
         columns.update((signal, getattr(self, signal)) for signal in SIGNALS)
-        for limit in ("spool_hold", "relief_hold", "plate_hold"):
-            columns[limit] = np.ascontiguousarray(getattr(self, limit))
+        columns.update((limit, getattr(self, limit)) for limit in HOLDS)
         return pl.DataFrame(columns)
 
     def write(self, path: str | Path) -> None:
@@ -204,3 +195,11 @@ class FullOrderSimulation:
         from swashplate.tables import write_table
 
         write_table(self.to_polars(), path)
+
+
+HOLDS = ("spool_hold", "relief_hold", "plate_hold")
+"""Limits that can hold."""
+
+
+def _beyond(values: Array, lower: float, upper: float) -> Flags:
+    return (values >= upper).astype(np.int8) - (values <= lower).astype(np.int8)

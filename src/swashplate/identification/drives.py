@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from swashplate.campaign.experiment import Experiment
-from swashplate.equations.record import SLOWEST, SOURCE_RATE, Record, record_of
+from swashplate.equations.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.equations.run import Start
 from swashplate.errors import InputError
 from swashplate.parameters.parameter_set import ParameterSet
@@ -80,17 +78,9 @@ def at_rate_of(
 def _record(experiment: Experiment, what: str) -> Record:
     """The input on a uniform grid, its own where its stamps are even."""
     time, values = experiment.input.time, experiment.input.values
-    rate = (time.size - 1) / (time[-1] - time[0])
-    even = time[0] + np.arange(time.size) / rate
-    if rate >= SLOWEST and np.abs(time - even).max() < 0.02 / rate:
-        if abs(rate - round(rate)) < 1e-6 * rate:
-            rate = round(rate)
-        own = record_of(values, rate, what=what, interpolation=experiment.input.interpolation)
+    interpolation = experiment.input.interpolation
+    rate = even_rate(time)
+    if rate is not None and rate >= SLOWEST:
+        own = record_of(values, rate, what=what, interpolation=interpolation)
         return Record(own.values, float(time[0]), own.rate, own.substeps)
-    return record_of(
-        values,
-        SOURCE_RATE,
-        what=what,
-        time=time,
-        interpolation=experiment.input.interpolation,
-    )
+    return record_of(values, SOURCE_RATE, what=what, time=time, interpolation=interpolation)

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from swashplate.__about__ import __version__
 from swashplate.campaign.experiment import Experiment
+from swashplate.executors import Executor, Serial
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.drives import at_rate_of
-from swashplate.identification.executors import Executor, Serial
 from swashplate.identification.prior_weights import weighed
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Setup, Stage

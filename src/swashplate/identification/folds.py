@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
-from swashplate.identification.executors import Executor, Serial
+from swashplate.executors import Executor, Serial
 from swashplate.identification.fit import Fit, fit, smooth
 from swashplate.identification.fold_results import (
     CrossValidation,

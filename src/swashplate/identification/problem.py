@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.equations import Model as OfEquations
 from swashplate.errors import InputError
+from swashplate.identification.equation_model import OwnModel
 from swashplate.identification.model import Linearised, Model, Reducing, linearised, simulated
 from swashplate.identification.solving import Evaluation
 from swashplate.identification.unknowns import Unknowns
@@ -31,6 +33,7 @@ class Problem:
     """
 
     model: Model
+    """One of equations stands for itself, or as an `OwnModel` with more said about it."""
     experiments: tuple[Experiment, ...]
     unknowns: Unknowns
     channels: tuple[str, ...]
@@ -41,8 +44,13 @@ class Problem:
     """Values of the model's names that are not unknown but differ from the model's own."""
     threads: int = 1
     """Threads over experiments, for a model that releases the interpreter's lock."""
+    compare: Callable[[Channel, Array], Array] | None = None
+    """Linear map of a channel's samples, (m,) or (m, k), before they are compared: a position that
+    drifts by its motion since the last anchor, for example."""
 
     def __post_init__(self) -> None:
+        if isinstance(self.model, OfEquations):
+            object.__setattr__(self, "model", OwnModel(self.model))
         if not self.unknowns:
             raise InputError("A fit needs at least one unknown.")
         if not self.experiments:
@@ -82,7 +90,7 @@ class Problem:
 
     def evaluate(self, vector: Array, *, compressed: bool = True) -> Evaluation:
         """Residuals and Jacobian by the vector, see `solving.Objective`."""
-        if compressed and isinstance(self.model, Reducing):
+        if compressed and self.compare is None and isinstance(self.model, Reducing):
             parts = self._each(lambda k: self._reduced(vector, k))
         else:
             parts = self._each(lambda k: self._full(vector, k))
@@ -110,10 +118,10 @@ class Problem:
 
     def residuals(self, vector: Array, number: int) -> Array:
         """Weighted residuals of one experiment, channel after channel, ignored samples as 0."""
-        outputs = self.outputs(vector, number)
+        outputs, experiment = self.outputs(vector, number), self.experiments[number]
         return np.concatenate(
             [
-                weight * (outputs[name] - self.experiments[number][name].values)
+                weight * self._compared(experiment[name], outputs[name] - experiment[name].values)
                 for name, weight in self.weights[number].items()
             ]
         )
@@ -135,8 +143,14 @@ class Problem:
             if offset in names:
                 by[:, names.index(offset)] = 1.0
             shifted = output.values + values.get(offset, 0.0) - experiment[name].values
-            made[name] = Linearised(weight * shifted, weight[:, None] * (by @ chain))
+            made[name] = Linearised(
+                weight * self._compared(experiment[name], shifted),
+                weight[:, None] * self._compared(experiment[name], by @ chain),
+            )
         return made
+
+    def _compared(self, channel: Channel, rows: Array) -> Array:
+        return rows if self.compare is None else self.compare(channel, rows)
 
     def _full(self, vector: Array, number: int) -> Evaluation:
         parts = self.linearised(vector, number).values()

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import DomainError
+from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.bootstrap import Bootstrap, refit_bootstrap
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.drives import simulated_current
-from swashplate.identification.executors import Executor, Serial
 from swashplate.identification.fit import StageFit
 from swashplate.identification.held import minimiser
 from swashplate.identification.problem import Problem

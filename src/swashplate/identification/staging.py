@@ -10,9 +10,9 @@ import numpy as np
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import InputError, ParameterError
+from swashplate.executors import available_cores
 from swashplate.identification.drive_model import CURRENTS, SIGNALS, DriveModel
 from swashplate.identification.drives import simulated_current
-from swashplate.identification.executors import available_cores
 from swashplate.identification.forces import Forces
 from swashplate.identification.measured_current import measured_current
 from swashplate.identification.problem import Problem, noise_scales

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import DomainError, FileError
+from swashplate.executors import Executor, Serial
 from swashplate.identification.dormant import nominal_effects, woken
 from swashplate.identification.drawing import sobol_starts as sobol_starts
 from swashplate.identification.edges import past_edge
-from swashplate.identification.executors import Executor, Serial
 from swashplate.identification.rising import by_increments
 from swashplate.identification.solving import Method, Objective, Solution, solve
 from swashplate.identification.trust_region import LEG

@@ -145,6 +145,20 @@ class Pump(NamedTuple):
     # fmt: on
 
 
+class Solenoids(NamedTuple):
+    """Parameters of the solenoids, those of `Pump` by the same names."""
+
+    Z17: float
+    Z19_plus: float
+    Z19_minus: float
+    Z20_plus: float
+    Z20_minus: float
+    Z21_plus: float
+    Z21_minus: float
+    Z22_plus: float
+    Z22_minus: float
+
+
 class PumpInputs(NamedTuple):
     """What drives the pump at a sample; where nothing was measured, the parameter's value."""
 
@@ -299,14 +313,30 @@ def _effective_current(current: float, Z17: float) -> tuple[float, float]:
 
 
 @equation
-def solenoid_force(current: float, p: Pump) -> float:
+def solenoids_of(p: Pump) -> Solenoids:
+    """The solenoids of a pump."""
+    return Solenoids(
+        p.Z17,
+        p.Z19_plus,
+        p.Z19_minus,
+        p.Z20_plus,
+        p.Z20_minus,
+        p.Z21_plus,
+        p.Z21_minus,
+        p.Z22_plus,
+        p.Z22_minus,
+    )
+
+
+@equation
+def solenoid_force(current: float, p: Solenoids) -> float:
     """Net force of both solenoids on the spool.
 
     Parameters
     ----------
     current : float
         Signed current, that of the positive channel less that of the negative one. [A]
-    p : Pump
+    p : Solenoids
         Dead zone Z17, the same both ways [A]; polynomial coefficients Z19 to Z22 of each direction,
         degrees 1 to 4 [N/A ... N/A⁴].
 
@@ -730,7 +760,7 @@ def pump_sample(
     current = inputs.current
     if options.hysteresis is not None:
         current = magnetising_current(current, state.magnetising_current, p.solenoid_hysteresis)
-    force = solenoid_force(current, p)
+    force = solenoid_force(current, solenoids_of(p))
 
     plate = state.pressure if options.damping is None else state.plate_pressure
     spool = spool_balance(force, arm_sine(plate, p), p)
@@ -935,6 +965,23 @@ def closed_pressure(force: float, p: Pump, k: PumpConstants) -> float:
 
 
 @equation
+def leaked_pressure(
+    pressure: float, Z9: float, p: Pump, k: PumpConstants, symmetric: Flag
+) -> float:
+    """What leakage around the stroking piston takes from the pressure at which the spool closes.
+
+    The spool opens by x = Z7 δP/(Z8 √head), and x falls by Z1 Z3 (Z5² + Z18²)/(Z5 cos α) for each
+    pascal: the first order, which is all that the derivative at Z7 = 0 needs. [Pa]
+    """
+    head, _ = flow_head(pressure, pressure, Z9, symmetric)
+    if not k.lower < pressure < k.upper or head <= 0.0:
+        return 0.0
+    s = arm_sine(pressure, p)
+    stiffness = p.Z1 * p.Z3 * (p.Z5 * p.Z5 + p.Z18 * p.Z18) / (p.Z5 * sqrt(1.0 - s * s))
+    return p.Z7 * pressure / (p.Z8 * sqrt(head) * stiffness)
+
+
+@equation
 def pressure_gain(pressure: float, force: float, Z9: float, p: Pump, options: PumpOptions) -> float:
     """Rate of the stroking pressure under a force; it falls with the pressure. [Pa/s]"""
     opening = orifice_opening(spool_balance(force, arm_sine(pressure, p), p), p)
@@ -947,9 +994,10 @@ def settled_pressure(inputs: PumpInputs, p: Pump, k: PumpConstants, options: Pum
 
     Without leakage where the spool closes, with it where the flow through the spool is what leaks.
     """
-    force = solenoid_force(inputs.current, p)
+    force = solenoid_force(inputs.current, solenoids_of(p))
     if options.leaky is None:
-        return closed_pressure(force, p, k)
+        closed = closed_pressure(force, p, k)
+        return closed - leaked_pressure(closed, inputs.supply_pressure, p, k, options.symmetric)
     return root(pressure_gain, k.lower, k.upper, force, inputs.supply_pressure, p, options)
 
 
@@ -972,7 +1020,7 @@ def settled_speed(inputs: PumpInputs, p: Pump, k: PumpConstants, options: PumpOp
     pressure = settled_pressure(inputs, p, k, options)
     tangent = swash_tangent(pressure, p)
     angle = swash_angle(tangent, p, options.steep)
-    force = solenoid_force(inputs.current, p)
+    force = solenoid_force(inputs.current, solenoids_of(p))
     rising = pressure_gain(pressure, force, inputs.supply_pressure, p, options)
     rate = plate_rate(pressure, rising, p, k)
     flow = flow_speed(angle, tangent, rate, inputs, p, k, options)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from swashplate.equations.cache import kernel
 from swashplate.errors import ParameterError
 from swashplate.models.card import Channel, channel_level
-from swashplate.models.pump import Pump, moment_sine, solenoid_force
+from swashplate.models.pump import Pump, moment_sine, solenoid_force, solenoids_of
 from swashplate.parameters.definitions import (
     DEFAULTS,
     OPTIONS,
@@ -288,12 +288,13 @@ def static_extremes(
     """
     for i in range(pumps.shape[0]):
         pump = Pump(*tuple_of(pumps[i], N_PUMP))
+        solenoids = solenoids_of(pump)
         for side in range(2):
             channel = Channel(*tuple_of(channels[i, side], N_CHANNEL))
             least, most = np.inf, 0.0
             for voltage in voltages:
                 current = channel_level(voltage, channel)
-                force = solenoid_force(-current if side == 1 else current, pump)
+                force = solenoid_force(-current if side == 1 else current, solenoids)
                 sine = abs(moment_sine(force, pump))
                 # what is no number stays
                 least = current if current < least or current != current else least

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from swashplate.full_order.comparison import Comparison
+from swashplate.full_order import Comparison
 from swashplate.report.panels import NARROW, WIDE, Mark, Trace, fill_panel
 from swashplate.report.shading import shade_handle, shade_stretches, stretches
 from swashplate.report.style import (
@@ -60,7 +60,7 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
     Parameters
     ----------
     found : Comparison
-        What `swashplate.full_order.comparison.compare` found. Limits that hold are shaded.
+        What `swashplate.full_order.compare` found. Limits that hold are shaded.
     title : str, optional
         By default the name of the physical set.
     """
@@ -100,7 +100,7 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
 
 def _panels(found: Comparison) -> list[Panel]:
     full, differ = found.full, found.difference
-    machine = full.machine.p
+    machine = full.case.p.machine
     command = (
         Panel("current\n(A)", (Trace(full.current, INK),))
         if found.voltage is None

@@ -57,6 +57,17 @@ class Own(NamedTuple):
 NOTHING_OWN = Own()
 
 
+class Ready(NamedTuple):
+    """A model with numbers, and what of it is asked for, in the engine's words."""
+
+    instance: Instance
+    own: EngineOwn
+    paths: Sequence[str] = ()
+    """Columns of derivatives."""
+    moved: Sequence[bool] | None = None
+    """Whether the record may depend on a column at all."""
+
+
 def residuals(
     parameters: ParameterSet,
     observed: ObservedRecord,
@@ -65,8 +76,8 @@ def residuals(
     block: int = BLOCK,
 ) -> Array:
     """Weighted residuals of all observations, one after the other; see `jacobian.residuals`."""
-    instance, inner = _instance(parameters, observed, own, ())
-    return engine.residuals(instance, observed, inner, block=block)
+    ready = made_ready(parameters, observed, (), own)
+    return engine.residuals(ready.instance, observed, ready.own, block=block)
 
 
 def jacobian(
@@ -97,9 +108,7 @@ def jacobian(
         Samples marched at a time, 2 to 512.
     """
     names = wanted_columns(columns)
-    instance, inner = _instance(parameters, observed, own, names)
-    moved = moved_by(parameters, observed, names)
-    paths = [path_of(name) for name in names]
+    instance, inner, paths, moved = made_ready(parameters, observed, names, own)
     found = engine.jacobian(instance, observed, paths, inner, moved=moved, out=out, block=block)
     return found._replace(names=(*names, *observed.own_columns))
 
@@ -114,9 +123,7 @@ def triangle(
 ) -> Triangle:
     """Triangular factor of [J r]; arguments as in `jacobian`, which is never held."""
     names = wanted_columns(columns)
-    instance, inner = _instance(parameters, observed, own, names)
-    moved = moved_by(parameters, observed, names)
-    paths = [path_of(name) for name in names]
+    instance, inner, paths, moved = made_ready(parameters, observed, names, own)
     found = engine.triangle(instance, observed, paths, inner, moved=moved, block=block)
     return found._replace(names=(*names, *observed.own_columns))
 
@@ -170,10 +177,16 @@ def moved_by(
     return found
 
 
-def _instance(
-    parameters: ParameterSet, observed: ObservedRecord, own: Own, names: Sequence[str]
-) -> tuple[Instance, EngineOwn]:
-    """The model with its numbers, and the experiment's own in its words."""
+def made_ready(
+    parameters: ParameterSet, observed: ObservedRecord, names: Sequence[str], own: Own
+) -> Ready:
+    """The drive's model with its numbers, for some columns.
+
+    Raises
+    ------
+    InputError
+        If a signal cannot be observed, the filter is unstable, or a start has no value.
+    """
     by_voltage = observed.driven_by == "voltage"
     for each in observed.observations:
         if each.signal not in OBSERVABLE:
@@ -182,10 +195,8 @@ def _instance(
             )
     if by_voltage:
         check_filter_stability(parameters, observed.record.step)
-    # what is differentiated by counts, at 0 as well
-    asked = frozenset(SWITCHES[name] for name in names if name in SWITCHES)
-    if observed.start != "steady":
-        asked -= {"leaky"}  # at 0 a step has a derivative by Z7 of its own, a settled pressure none
+    # what is differentiated by counts, at 0 as well; at Z7 = 0 there are derivatives for that
+    asked = frozenset(SWITCHES[name] for name in names if name in SWITCHES) - {"leaky"}
     instance = instance_of(_switched_on(parameters, asked), by_voltage)
     start: dict[str, float] = {}
     if own.start_pressure is not None:
@@ -196,7 +207,12 @@ def _instance(
             start["pump.plate_pressure"] = pressure
     elif START_PRESSURE in names:
         raise InputError(f"{START_PRESSURE} is a column, so Own needs a value of it.")
-    return instance, EngineOwn(start, own.offsets, own.clock_offsets)
+    return Ready(
+        instance,
+        EngineOwn(start, own.offsets, own.clock_offsets),
+        [path_of(name) for name in names],
+        moved_by(parameters, observed, names),
+    )
 
 
 @lru_cache(maxsize=64)

@@ -1,10 +1,12 @@
-"""Where independent pieces of work run: here, in processes, or on a Dask cluster."""
+"""Where independent pieces of work run: here, in threads or processes, or on a Dask cluster."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import islice
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from swashplate.errors import InputError
@@ -46,6 +48,24 @@ class Serial:
         """See `Executor.run`."""
         for position, item in enumerate(items):
             yield position, function(shared, item)
+
+
+@dataclass(frozen=True)
+class Threads:
+    """Threads of this process, for work that releases the interpreter's lock, as marches do."""
+
+    workers: int | None = None
+    """How many; by default one for each core that this process may use."""
+
+    def run(
+        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
+    ) -> Iterator[tuple[int, Result]]:
+        """See `Executor.run`."""
+        from concurrent.futures import ThreadPoolExecutor
+
+        workers = self.workers or available_cores()
+        with ThreadPoolExecutor(workers) as pool:
+            yield from _completed(pool, partial(function, shared), items, workers)
 
 
 _shared: Any = None
@@ -90,7 +110,7 @@ class Processes:
             workers, get_context("spawn"), initializer=_receive, initargs=(shared,)
         ) as pool:
             try:
-                yield from _completed(pool, function, items)
+                yield from _completed(pool, partial(_apply, function), items, workers)
             except BrokenProcessPool:
                 raise InputError(
                     "A worker process died or could not import the model; a model must stand in a "
@@ -99,16 +119,23 @@ class Processes:
 
 
 def _completed(
-    pool: Pool, function: Callable[[Any, Item], Result], items: Sequence[Item]
+    pool: Pool, function: Callable[[Item], Result], items: Sequence[Item], workers: int
 ) -> Iterator[tuple[int, Result]]:
-    from concurrent.futures import as_completed
+    """Results as they come; no more are waiting than it takes to keep all workers busy."""
+    from concurrent.futures import FIRST_COMPLETED, Future, wait
 
-    futures = {pool.submit(_apply, function, item): k for k, item in enumerate(items)}
+    waiting = iter(enumerate(items))
+    running: dict[Future[Result], int] = {}
     try:
-        for future in as_completed(futures):
-            yield futures[future], future.result()
+        while True:
+            for k, item in islice(waiting, 2 * workers - len(running)):
+                running[pool.submit(function, item)] = k
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                yield running.pop(future), future.result()
     finally:
-        for future in futures:
+        for future in running:
             future.cancel()
 
 
@@ -148,7 +175,7 @@ class Dask:
                 for k, item in enumerate(items)
             }
             for future, result in as_completed(list(futures), loop=client.loop, with_results=True):
-                yield futures[future], result
+                yield futures.pop(future), result
 
 
 def available_cores() -> int:

@@ -1,0 +1,165 @@
+"""One equation of a model replaced by another, without a change to the model's own text.
+
+Equations call each other by name, so a replacement needs new versions of all that lead to it: each
+is the same function with other names around it. They are equations like any others, and everything
+made of a model follows: derivatives, marches, batches, linear models, fits.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from types import CellType, FunctionType
+from typing import Any, get_type_hints
+
+from swashplate.equations.equation import closure, equation, equation_of_text, is_function
+from swashplate.equations.fields import is_named_tuple
+from swashplate.equations.model import Equation, Model, arguments_of, join, plain
+from swashplate.equations.syntax import parsed
+from swashplate.errors import InputError
+
+
+def replaced(
+    model: Model, old: Equation, new: Equation, parameters: type[Any] | None = None
+) -> Model:
+    """A model in which one equation stands for another wherever that is called.
+
+    Parameters
+    ----------
+    model : Model
+        A single model, or a joined one.
+    old : equation
+        One that the model uses.
+    new : equation
+        Its replacement: the same arguments, and behind them, by name, any further parameters.
+    parameters : class of named tuples, optional
+        Parameters that the model gets in addition, each a float with its `Definition` and a
+        default.
+
+    Returns
+    -------
+    Model
+        A new one; the old one is as it was.
+
+    Raises
+    ------
+    InputError
+        If the model does not use the equation, or the arguments do not fit.
+    """
+    parts = [_part(part, old, new, parameters) for part in model.parts]
+    if all(part is own for part, own in zip(parts, model.parts, strict=True)):
+        raise InputError(f"Model {model.name} does not use {plain(old).__name__}.")
+    if len(parts) == 1:
+        return parts[0]
+    links = {name: link.equation for name, link in model.links.items() if link.equation}
+    return join(
+        model.name,
+        *parts,
+        links=links,
+        integrals=model.integrals,
+        outputs=model.outputs,
+        free_start=model.free_start,
+    )
+
+
+def _part(part: Model, old: Equation, new: Equation, parameters: type[Any] | None) -> Model:
+    """A part with the replacement, itself if it does not use the equation."""
+    equations = {
+        each.name: getattr(part, each.name)
+        for each in fields(part)
+        if is_function(getattr(part, each.name))
+    }
+    leading = {name: each for name, each in equations.items() if _reaches(each, old)}
+    if not leading:
+        return part
+    kind = part.parameters if parameters is None else _extended(part.parameters, parameters)
+    names = {part.parameters.__name__: kind}
+    made = {plain(old): _called_like(old, new, part.name, kind)}
+    return replace(
+        part,
+        parts=(),
+        parameters=kind,
+        **{name: _rebuilt(each, old, made, names) for name, each in leading.items()},
+    )
+
+
+def _reaches(function: Any, old: Equation) -> bool:
+    return any(plain(each) is plain(old) for each in closure(function).values())
+
+
+def _extended(kind: type[Any], more: type[Any]) -> type[Any]:
+    """A class of named tuples with the fields of two."""
+    hints: dict[str, Any] = {}
+    defaults: dict[str, Any] = {}
+    for each in (kind, more):
+        twice = sorted(set(hints) & set(each._fields))
+        if twice:
+            raise InputError(f"{kind.__name__} has a parameter {twice[0]} already.")
+        hints |= get_type_hints(each, include_extras=True)
+        defaults |= each._field_defaults
+    bare = [name for name in more._fields if name not in more._field_defaults]
+    if bare:
+        raise InputError(f"{more.__name__}.{bare[0]} needs a default: old numbers lack it.")
+    order = sorted(hints, key=lambda name: name in defaults)
+    make: Any = namedtuple
+    made = make(kind.__name__, order, defaults=[defaults[n] for n in order if n in defaults])
+    made.__annotations__ = {name: hints[name] for name in order}
+    made.__module__ = more.__module__
+    return made  # type: ignore[no-any-return]
+
+
+def _called_like(old: Equation, new: Equation, part: str, kind: type[Any]) -> Equation:
+    """The new equation with the arguments of the old one."""
+    taken, wanted = arguments_of(old), arguments_of(new)
+    name = plain(old).__name__
+    if wanted[: len(taken)] != taken:
+        raise InputError(
+            f"{plain(new).__name__} must begin with the arguments of {name}: {', '.join(taken)}."
+        )
+    more = wanted[len(taken) :]
+    if not more:
+        return new
+    unknown = [each for each in more if each not in kind._fields]
+    if unknown:
+        raise InputError(f"{plain(new).__name__} asks for {unknown[0]}, no parameter of {part}.")
+    if "p" not in taken:
+        raise InputError(
+            f"{name} does not take the parameters p, so {plain(new).__name__} cannot have "
+            f"{more[0]}; replace an equation that calls it and takes p."
+        )
+    hints = get_type_hints(plain(old)) | {"p": kind}
+    names: dict[str, Any] = {"own_equation": new}
+    texts = {}
+    for each in (*taken, "return"):
+        texts[each] = f"Type_{each}"
+        names[texts[each]] = hints[each]
+    arguments = ", ".join(f"{each}: {texts[each]}" for each in taken)
+    passed = ", ".join((*taken, *(f"p.{each}" for each in more)))
+    text = f"def {name}({arguments}) -> {texts['return']}:\n    return own_equation({passed})\n"
+    return equation_of_text(text, name, names)  # type: ignore[no-any-return]
+
+
+def _rebuilt(function: Any, old: Equation, made: dict[Any, Any], names: Mapping[str, Any]) -> Any:
+    """A function that leads to the old equation, leading to the new one."""
+    if plain(function) not in made:
+        f: Any = parsed(function).function  # as it was written, before defaults were put in
+        space = {**f.__globals__, **{k: v for k, v in names.items() if k in f.__globals__}}
+        for name, each in f.__globals__.items():
+            if name in f.__code__.co_names and is_function(each) and _reaches(each, old):
+                space[name] = _rebuilt(each, old, made, names)
+        cells = tuple(
+            CellType(_rebuilt(cell.cell_contents, old, made, names))
+            if is_function(cell.cell_contents) and _reaches(cell.cell_contents, old)
+            else cell
+            for cell in f.__closure__ or ()
+        )
+        copy = FunctionType(f.__code__, space, f.__name__, f.__defaults__, cells or None)
+        copy.__kwdefaults__, copy.__module__ = f.__kwdefaults__, f.__module__
+        copy.__annotations__ = {
+            key: names.get(each.__name__, each) if is_named_tuple(each) else each
+            for key, each in f.__annotations__.items()
+        }
+        copy.__doc__, copy.__qualname__ = f.__doc__, f.__qualname__
+        made[plain(function)] = equation(copy)
+    return made[plain(function)]

@@ -1,0 +1,170 @@
+"""Straight code: decisions without branches, so that a loop becomes vector instructions.
+
+The compiler turns a loop into vector instructions if there is nothing in it but arithmetic on rows
+of neighbouring numbers. Hence
+
+- a decision is not a branch: both ways are computed, and one result is taken;
+- what does not change over the march is computed once, ahead of it: the compiler moves it out of a
+  loop over samples by itself, but not out of one over lanes within;
+- a call of a library has a loop of its own, between those that become vectors.
+
+The operations and their order stay as they are, and so does the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import reduce
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import config, types
+from numba.extending import intrinsic
+
+from swashplate.equations import expressions as ex
+from swashplate.equations.expressions import Node
+from swashplate.equations.program import Choice, Invoke, Item, Let, leaves
+from swashplate.equations.scalars import Code, text
+
+
+def _choose(test: bool, one: Any, two: Any) -> Any:
+    return one if test else two
+
+
+def _selected(typing: Any, test: Any, one: Any, two: Any) -> Any:
+    kind = types.boolean if one == two == types.boolean else types.float64
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return builder.select(*values)
+
+    return kind(types.boolean, kind, kind), generate
+
+
+CALLED: dict[str, Any] = {"choose": intrinsic(_selected)}
+"""What the text calls. ``choose(test, a, b)`` is one of two numbers that both have been computed:
+from ``a if test else b`` the compiler makes a choice between two addresses, and gathers."""
+if config.DISABLE_JIT:  # type: ignore[attr-defined]
+    # a root that nobody asks for may be one of a number below zero, which compiled code allows
+    CALLED = {"choose": _choose, "sqrt": np.sqrt}
+
+SHORT = 16
+"""Statements that are not worth a loop of their own."""
+VECTOR = {*ex.CHEAP, "choose", "/", "sqrt", "**"}
+"""Operations that processors have for many numbers at once."""
+
+
+def is_vector(node: Node) -> bool:
+    """Whether a processor can compute an expression for many lanes at once."""
+    return node.op in VECTOR and all(map(is_vector, node.args))
+
+
+def is_flat(item: Item) -> bool:
+    """Whether all of an item can be computed for many lanes at once, whatever its tests say."""
+    if isinstance(item, Choice):
+        merged = [node for each in item.merged for node in each[1:]]
+        return all(map(is_flat, (*item.then, *item.other))) and all(map(is_vector, merged))
+    return isinstance(item, Let) and is_vector(item.node)
+
+
+def made_by(item: Choice | Invoke) -> tuple[str, ...]:
+    """Names that an item gives their values."""
+    if isinstance(item, Choice):
+        return tuple(name for name, _, _ in item.merged)
+    return tuple(node.value for _, node in leaves(item.result))
+
+
+class Statement(NamedTuple):
+    """Lines that give some names their values."""
+
+    names: tuple[str, ...]
+    lines: list[str]
+    reads: frozenset[str]
+    vector: bool
+    """Whether a processor can do it for many lanes at once."""
+
+
+class Straight:
+    """Code of a sample without branches, and what can be computed ahead of the march.
+
+    Parameters
+    ----------
+    still : iterable of str
+        Names of numbers that do not change over the march.
+    fresh : callable
+        Gives a name that is not taken.
+
+    Attributes
+    ----------
+    ahead : list of Statement
+        What follows nothing but still numbers.
+    loops : list of list of Statement
+        The rest, cut into loops over lanes.
+    """
+
+    def __init__(self, still: Iterable[str], fresh: Callable[[str], str]) -> None:
+        self.still, self.fresh = {"h", *still}, fresh
+        self.ahead: list[Statement] = []
+        self.loops: list[list[Statement]] = [[]]
+        self._moved: dict[Node, Node] = {}
+
+    def add(self, code: Code, items: Iterable[Item]) -> None:
+        """Append items of some code."""
+        for item in items:
+            if isinstance(item, Let):
+                self.let(item.name, item.node)
+            elif isinstance(item, Choice) and is_flat(item):
+                self.add(code, (*item.then, *item.other))
+                for name, one, two in item.merged:
+                    self.let(name, ex.make("if", item.test, one, two))
+            else:
+                names = made_by(item)
+                alone = Code()
+                alone.items = [item]
+                reads = frozenset(alone.reads(map(ex.name, names)))
+                self._append(Statement(names, code.written([item]), reads, False))
+
+    def let(self, name: str, node: Node) -> None:
+        """Append a name and what it stands for."""
+        made = node if node.reads <= self.still else self.node(node)
+        self._append(Statement((name,), [f"{name} = {text(made)}"], made.reads, is_vector(made)))
+
+    def _append(self, statement: Statement) -> None:
+        if statement.names and statement.reads <= self.still:
+            self.still.update(statement.names)
+            self.ahead.append(statement)
+        else:
+            if self.loops[-1] and self.loops[-1][-1].vector != statement.vector:
+                self.loops.append([])
+            self.loops[-1].append(statement)
+
+    def cut(self) -> None:
+        """Begin another loop over lanes, unless the present one is short.
+
+        While one vector waits for its own results, a processor looks only so far ahead for others.
+        """
+        if len(self.loops[-1]) > SHORT:
+            self.loops.append([])
+
+    def become(self, row: str, node: Node) -> None:
+        """Append what becomes of a row."""
+        made = self.node(node)
+        self._append(Statement((), [f"{row} = {text(made)}"], made.reads, True))
+
+    def node(self, node: Node) -> Node:
+        """An expression without branches, and without what can be computed ahead of the march."""
+        if node.op in ex.LEAVES:
+            return node
+        if node.reads and node.reads <= self.still:
+            if node not in self._moved:
+                name = self.fresh("still")
+                self.let(name, node)
+                self._moved[node] = ex.name(name, node.kind)
+            return self._moved[node]
+        args = [self.node(each) for each in node.args]
+        if node.op == "if" and node.kind != "int":
+            return ex.make("choose", *args, kind=node.kind)
+        if node.op == "and":
+            return reduce(lambda a, b: ex.make("choose", a, b, ex.number(False), kind="bool"), args)
+        if node.op == "or":
+            return reduce(lambda a, b: ex.make("choose", a, ex.number(True), b, kind="bool"), args)
+        return ex.make(node.op, *args, value=node.value)

@@ -1,0 +1,12 @@
+from .drive_model import DriveModel as DriveModel
+from .equation_model import OwnModel as OwnModel
+from .linearising import linearised_fit as linearised_fit
+from .model import Linearised as Linearised
+from .problem import Problem as Problem
+from .solving import Solution as Solution
+from .solving import solve as solve
+from .starts import sobol_starts as sobol_starts
+from .starts import solve_from as solve_from
+from .unknowns import Prior as Prior
+from .unknowns import Unknown as Unknown
+from .unknowns import Unknowns as Unknowns

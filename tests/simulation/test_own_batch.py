@@ -1,0 +1,209 @@
+"""Many sets at once of models of one's own and of drives: costs, outputs, files, executors."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swashplate import (
+    Drive,
+    FileError,
+    InputError,
+    Processes,
+    Serial,
+    SquaredError,
+    Threads,
+    simulate_many,
+)
+from swashplate.equations import Model, Tap, equation, simulate
+from swashplate.models.drive import pump_drive
+from swashplate.simulation import batch as batches
+from swashplate.simulation.instance import instance_of
+
+RATE, COUNT = 100.0, 37
+COMMAND = np.sin(np.arange(400) / 25.0) + 0.3
+INPUTS = {"command": COMMAND}
+
+
+class Valve(NamedTuple):
+    lag: float
+    gain: float
+    delay: float = 0.03
+
+
+class Rod(NamedTuple):
+    opening: float
+    position: float
+
+
+class Stroke(NamedTuple):
+    low: float
+    high: float
+
+
+@equation
+def step(state: Rod, command: float, p: Valve, h: float, given: Stroke) -> Rod:
+    opening = state.opening + h / p.lag * (command - state.opening)
+    return Rod(opening, min(max(state.position + h * p.gain * opening, given.low), given.high))
+
+
+@equation
+def room(state: Rod) -> float:
+    return 10.0 - abs(state.opening)
+
+
+valve = Model(
+    "valve",
+    Valve,
+    Rod,
+    step,
+    given=Stroke,
+    taps={"command": Tap("command", delay="delay")},
+    domain=room,
+    outside="the valve bursts",
+)
+P, STROKE = Valve(0.05, 0.4), Stroke(-0.05, 0.3)
+SETS = {
+    "gain": np.linspace(0.1, 0.9, COUNT),
+    "lag": np.full(COUNT, 0.05),
+    "delay": np.linspace(0.0, 0.1, COUNT),
+}
+SETS["gain"][5], SETS["lag"][7], SETS["delay"][9] = np.nan, 1e-4, -0.01
+FAILED = [5, 7, 9]
+
+
+def many(**options):
+    return simulate_many(valve, P, SETS, INPUTS, RATE, given=STROKE, **options)
+
+
+def test_each_set_is_what_it_is_alone_to_the_last_bit() -> None:
+    found = many(output="position")
+    assert found.output.shape == (COUNT, COMMAND.size)
+    for k, row in enumerate(found.output):
+        if k in FAILED:
+            assert np.isnan(row).all()
+            continue
+        p = Valve(*(float(SETS[name][k]) for name in Valve._fields))
+        assert (simulate(valve, p, INPUTS, RATE, given=STROKE)["position"] == row).all()
+    assert list(found.failures) == FAILED
+    assert found.failures[5] == "valve: gain is nan, but must be a finite number."
+    assert found.failures[7] == "valve: the valve bursts under this input."
+    assert found.failures[9] == "valve: delay is -0.01, but must be a finite number, at least 0."
+    assert found.output[20].max() == STROKE.high
+
+
+def test_costs_are_those_of_the_outputs() -> None:
+    measured, weight = np.cos(COMMAND), np.linspace(0.0, 1.0, COMMAND.size)
+    found = many(cost=SquaredError(measured, weight, "position"))
+    assert found.output is None
+    expected = np.sum(weight * (many(output="position").output - measured) ** 2, axis=1)
+    assert found.cost == pytest.approx(np.where(np.isnan(expected), np.inf, expected))
+
+
+@pytest.mark.parametrize("per_file", [2**23, 1])
+def test_outputs_are_streamed_to_files(tmp_path: Path, monkeypatch, per_file: int) -> None:
+    monkeypatch.setattr(batches, "SAMPLES_A_FILE", per_file)
+    found = many(output="position", to=tmp_path / "outputs")
+    assert found.output is None
+    assert sorted(found.files) == sorted((tmp_path / "outputs").iterdir())
+    assert len(found.files) == (1 if per_file > 1 else 3)
+    assert list(found.failures) == FAILED
+    wanted, seen = many(output="position").output, []
+    for path in found.files:
+        table = pl.read_parquet(path)
+        assert (table["time"].to_numpy() == np.arange(COMMAND.size) / RATE).all()
+        for name in table.columns[1:]:
+            seen.append(int(name))
+            assert np.array_equal(table[name].to_numpy(), wanted[int(name)], equal_nan=True)
+    assert sorted(seen) == [k for k in range(COUNT) if k not in (5, 9)]
+    with pytest.raises(
+        FileError, match=r"outputs holds 0.*\.parquet already; name an empty folder"
+    ):
+        many(output="position", to=tmp_path / "outputs")
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(FileError, match="file cannot be made"):
+        many(output="position", to=tmp_path / "file")
+
+
+def test_executors_give_the_same(tmp_path: Path) -> None:
+    """Of a packaged model, which other processes can import."""
+    hoist = Drive.preset("hoist")
+    instance = instance_of(hoist.parameters, False)
+    current = 0.9 * np.sin(np.arange(300) / 40.0)
+    numbers = 1.2e-4 * np.linspace(0.8, 1.2, 20)
+    parts = [part.p for part in instance.parts]
+    options = pump_drive.options(pump=instance.parts[1].options)
+
+    def run(executor, **more):
+        return simulate_many(
+            pump_drive,
+            pump_drive.parameters(*parts),
+            {"pump.Z16_plus": numbers},
+            {"current": current},
+            512.0,
+            output="shaft_speed",
+            options=options,
+            executor=executor,
+            **more,
+        )
+
+    by_drive = hoist.simulate_many({"Z16_plus": numbers}, current=current)
+    for executor in (Serial(), Threads(3), Processes(2)):
+        assert (run(executor).output == by_drive.output).all()
+    files = run(Processes(2), to=tmp_path).files
+    table = pl.read_parquet(files[0])
+    assert (table["19"].to_numpy() == by_drive.output[19]).all()
+    drives = hoist.simulate_many(
+        {"Z16_plus": numbers}, current=current, to=tmp_path / "drives", executor=Serial()
+    )
+    assert pl.read_parquet(drives.files[0]).equals(table)
+
+
+REFUSED = {
+    "parameter": ({"changes": {"lead": [1.0]}}, "no parameter 'lead'; it has lag, gain, delay"),
+    "sizes": ({"changes": {"lag": [1.0], "gain": [1.0, 2.0]}}, "same number of sets, .*: lag 1, g"),
+    "no sets": ({"changes": {}}, "at least one"),
+    "one number": ({"changes": {"lag": 1.0}}, "one number a set, in one row"),
+    "text": ({"changes": {"lag": ["slow"]}}, "one number a set, in one row"),
+    "complex": ({"changes": {"lag": [1j]}}, "one number a set, in one row"),
+    "output": ({"output": "speed"}, "valve has no signal 'speed'; it has opening, position"),
+    "nothing wanted": ({"output": ""}, "valve: say which output of the sets is wanted"),
+    "both": ({"cost": SquaredError(COMMAND, output="position"), "to": "out"}, "costs are not"),
+    "cost": ({"cost": SquaredError(COMMAND)}, "valve has no signal 'shaft_speed'"),
+    "measured": (
+        {"cost": SquaredError([1.0], output="position")},
+        "400 samples, but 1 were measured",
+    ),
+    "given": ({"given": None}, "its given must be a Stroke, not None"),
+    "input": ({"inputs": {"voltage": COMMAND}}, "valve has no input 'voltage'; it has command"),
+    "no input": ({"inputs": {}}, "valve: valve needs the signal 'command'"),
+    "memory": (
+        {"changes": {"lag": np.full(100_000, 0.1)}, "inputs": {"command": np.zeros(2_000_000)}},
+        "100000 sets, 2000000 samples each, take 1.49e.03 GiB, .* ask for a cost, or .* to=FOLDER",
+    ),
+    "processes": ({"executor": Processes(2)}, "valve cannot be sent to another process"),
+}
+
+
+@pytest.mark.parametrize(("options", "sentence"), REFUSED.values(), ids=REFUSED)
+def test_bad_batches_are_refused(options, sentence: str) -> None:
+    if "another process" in sentence:
+        unnamed = Model("valve", Valve, Rod, step, given=Stroke)
+        options = {**options, "model": unnamed}
+    asked = {
+        "model": valve,
+        "p": P,
+        "changes": {"lag": np.full(40, 0.1)},
+        "inputs": INPUTS,
+        "rate": RATE,
+        "output": "position",
+        "given": STROKE,
+        **options,
+    }
+    with pytest.raises(InputError, match=sentence):
+        simulate_many(**asked)
