@@ -197,7 +197,7 @@ NOMENCLATURE = HERE / "nomenclature.md"
 HEADS: Mapping[Block, tuple[str, ...]] = {
     "control_card": ("equation",),
     "pump_motor": ("lump", "equation"),
-    "refinements": ("not given", "switch", "of"),
+    "refinements": ("not given", "option", "of"),
 }
 """Columns of a block's table after those of all tables."""
 
@@ -235,7 +235,7 @@ def cells(each: Definition) -> tuple[str, ...]:
         case "pump_motor":
             return (*first, each.stands_for or "—", each.source)
         case "refinements":
-            return (*first, f"{each.default:g}", "yes" if each.switch else "no", each.stands_for)
+            return (*first, f"{each.default:g}", each.switch or "—", each.stands_for)
 
 
 def row(cells: tuple[str, ...]) -> str:

@@ -73,11 +73,11 @@ def show_parameters(
     )
     if any(each.definition.block == "refinements" for each in parameters.values()):
         show(_block(parameters, "refinements", "Refinements"))
-    roots, sign = parameters.pressure_root, parameters.coulomb_sign
-    decay = parameters.card_switch
+    rate = "any rate" if parameters.rate is None else f"{parameters.rate:g} Hz"
     say(
-        f"Variants of the equations: pressure_root {roots}, coulomb_sign {sign}, "
-        f"card_switch {decay}"
+        f"Variants of the equations: pressure_root {parameters.pressure_root}, coulomb_sign "
+        f"{parameters.coulomb_sign}, card_switch {parameters.card_switch}, card's filter for "
+        f"{rate}, options {', '.join(sorted(parameters.options)) or 'none'}"
     )
 
 
