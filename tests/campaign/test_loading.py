@@ -29,6 +29,16 @@ def test_signals_are_in_si(campaign_folder: Path) -> None:
     assert up.start == "rest"
 
 
+def test_logs_may_lie_in_another_folder(campaign_folder: Path, tmp_path: Path) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    path = (campaign_folder / "campaign.toml").rename(elsewhere / "campaign.toml")
+    tests = Campaign.from_toml(path, logs=campaign_folder)
+    assert [each.name for each in tests] == ["up", "down"]
+    with pytest.raises(FileError, match=r"elsewhere"):
+        Campaign.from_toml(path)
+
+
 def test_selection_and_drive(campaign_folder: Path) -> None:
     tests = Campaign.from_toml(campaign_folder / "campaign.toml")
     assert [each.name for each in tests.select(role="validate")] == ["down"]

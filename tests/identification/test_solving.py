@@ -9,7 +9,7 @@ import pytest
 from swashplate import Channel, DomainError, Experiment, FileError, InputError, maneuvers
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.executors import Processes, Serial
+from swashplate.executors import Processes, Serial, Threads
 from swashplate.identification.model import Linearised
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import Free, Stage
@@ -222,14 +222,15 @@ def card_problem(tests: rig.VirtualTests) -> Problem:
     return stage_problem(stage, tests.nominal.parameters, [experiment], threads=1)
 
 
-def test_processes_give_the_same_as_one_after_another() -> None:
+def test_threads_and_processes_give_the_same_as_one_after_another() -> None:
     tests = rig.run("hoist", [maneuvers.step(4.0, stop=2.0, length=3.0)], seed=1)
     problem = card_problem(tests)
     starts = list(sobol_starts(problem, 3, seed=2))
     here = solve_from(problem, starts, executor=Serial())
-    there = solve_from(problem, starts, executor=Processes(2))
-    for one, other in zip(here, there, strict=True):
-        assert (one.number, one.vector, one.cost) == (other.number, other.vector, other.cost)
+    for executor in (Threads(2), Processes(2)):
+        there = solve_from(problem, starts, executor=executor)
+        for one, other in zip(here, there, strict=True):
+            assert (one.number, one.vector, one.cost) == (other.number, other.vector, other.cost)
 
 
 def test_what_is_done_is_on_disk_and_is_not_done_again(problem: Problem, tmp_path: Path) -> None:
