@@ -1,11 +1,16 @@
 """From a set-up to its problem: the source's weights, clocks and pressures that are free."""
 
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
-from swashplate import Campaign, Drive
+from swashplate import Campaign, Channel, Drive, Experiment
 from swashplate.campaign import rig
+from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.drives import at_rate_of
 from swashplate.identification.fit import fit, smooth
 from swashplate.identification.setup import Free, Setup, Stage, load_setup, setup_names
 from swashplate.identification.staging import stage_problem
@@ -76,3 +81,52 @@ def test_a_clock_that_is_late_is_found(campaign: Campaign) -> None:
     found = fit(late, Drive.preset("hoist").parameters, Setup(stages=(stage,))).stages[-1].values
     (offset,) = [value for name, value in found.items() if name.startswith("clock")]
     assert abs(offset) == pytest.approx(0.02, abs=2e-4)
+
+
+def test_what_is_freed_is_on_and_stays_above_off(campaign: Campaign) -> None:
+    """Whatever the values on the way, the equations are those that the fit began with."""
+    free = {
+        "solenoid_hysteresis": Free(bounds=(0.0, 0.05)),
+        "cam_ripple": Free(relative=(0.0, 2.0)),
+        "Z12": Free(bounds=(-0.1, 0.1)),
+    }
+    nominal = Drive.preset("hoist").replace(cam_ripple=0.02).parameters
+    stage = Stage(name="all", part="chain", free=free)
+    problem = stage_problem(stage, nominal, campaign.experiments)
+    by_name = dict(zip(problem.unknowns.names, problem.unknowns, strict=True))
+    assert by_name["solenoid_hysteresis"].start == by_name["solenoid_hysteresis"].low == 1e-8
+    assert by_name["solenoid_hysteresis"].scale == pytest.approx(0.25 * 0.05)
+    assert by_name["cam_ripple"].low == 1e-9
+    model = problem.model
+    assert isinstance(model, DriveModel)
+    on = {"hysteresis", "ripple", "loaded"}
+    assert model.parameters.options == on
+    for number in (-0.05, 0.0, 0.05):
+        assert model.parameters_at({"Z12": number, "cam_ripple": 1e-9}).options == on
+    assert nominal.options == {"ripple"}
+
+
+def test_a_recursion_of_another_rate_gives_way_to_its_equation() -> None:
+    """Runs of 200 Hz are marched at 600 Hz: ζ and ω are found as they mean at every rate."""
+    truth = Drive.preset("hoist").at_every_rate().scale(omega=1.05, zeta=0.95)
+    maneuver = source_tests("hoist")["sine 9 V 0.3 Hz"]
+    voltage, time = maneuver.sample(200.0), maneuver.time(200.0)
+    truth = Drive(smooth(truth.parameters))
+    current = truth.simulate(voltage, 200.0).current_positive
+    source = Source(Path("log.csv"), "I")
+    given = InputSignal("voltage", "V", time, voltage, "linear", source)
+    channel = Channel("I", "current_plus", "A", time, current, np.ones(time.size), source)
+    run = Experiment("slow", "hoist", "slow", "fit", "rest", None, given, {"I": channel})
+    names = ("zeta_plus", "omega_plus")
+    free = {name: Free(relative=(0.5, 2.0)) for name in names}
+    setup = Setup(stages=(Stage(name="card", part="card", free=free),))
+    found = fit([run], Drive.preset("hoist").parameters, setup, tolerance=1e-12)
+    assert found.parameters.rate is found.nominal.rate is None
+    for name in names:
+        assert found.parameters.numbers[name] == pytest.approx(truth.parameters.numbers[name])
+    (said,) = found.doubts
+    assert said.startswith(
+        "slow is marched at 600 Hz, but the card's filter of hoist is a recursion"
+    )
+    own = Drive.preset("neutral").parameters
+    assert at_rate_of([run], own) == (own, ())
