@@ -547,8 +547,11 @@ class Terms:
                 f"repeated of {f.__name__} with other arguments",
                 "let it take a state, the number of the repetition and the rest",
             )
-        flat = isinstance(state, Tuple) and state.cls is not None
-        flat = flat and all(isinstance(each, Node) for each in state.items)
+        flat = (
+            isinstance(state, Tuple)
+            and state.cls is not None
+            and all(isinstance(each, Node) for each in state.items)
+        )
         program = self.lower(f, (shape(state), "float", *(shape(each) for each in rest)))
         if not flat or shape(program.result) != shape(state):
             self.source.refuse(
