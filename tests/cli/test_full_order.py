@@ -34,8 +34,6 @@ def test_a_run(done, number):
     assert number(text, "largest difference") == pytest.approx(1.96 * 0.261, abs=2e-3)
     assert cells(text, "within 1 %") == ["yes"]
     assert cells(text, "within 0.1 %") == ["no"]
-    assert number(text, "worst energy balance, of the turnover") < 1e-6
-    assert number(text, "oil's volume balance, of the turnover") < 1e-6
     assert "One state is enough here: within 1 % of the top speed, at most 0.26 %" in text
     words = " ".join(text.split())
     assert re.search(r"which make the speed 2\.\d ms later \(9\d % of the mean squared", words)

@@ -43,8 +43,9 @@ def equation(function: F) -> F:
     function : callable
         Assignments, `if`, loops over a literal range, `return`; arithmetic, comparisons,
         conditional expressions, `min`, `max`, `abs`, functions of `math`, powers with whole
-        numbers; fields of named tuples and elements of tuples; other equations, `root` and
-        `interpolate`; constants of the module that are numbers. Its arguments have types.
+        numbers; fields of named tuples and elements of tuples; other equations, `root`,
+        `interpolate` and `repeated`; constants of the module that are numbers. Its arguments have
+        types.
 
     Returns
     -------
