@@ -228,13 +228,20 @@ def listed(start: str, parts: list[str], end: str, pad: str) -> list[str]:
 
 def filled(parts: list[str], pad: str) -> list[str]:
     """Parts on lines of their own within brackets."""
-    lines, line = [], f"{pad}    "
+    lines, line = list[str](), f"{pad}    "
     for part in parts:
+        start, bracket, rest = part.partition("(")
+        if len(pad) + len(part) + 5 > WIDTH and bracket:  # a tuple, in lines of its own
+            lines += [line.rstrip()] if line.strip() else []
+            *more, last = listed(f"{start}(", rest[:-1].split(", "), ")", f"{pad}    ")
+            lines += [*more, f"{last},"]
+            line = f"{pad}    "
+            continue
         if len(line) + len(part) + 1 > WIDTH and line.strip():
             lines.append(line.rstrip())
             line = f"{pad}    "
         line += f"{part}, "
-    return [*lines, line.rstrip()]
+    return [*lines, line.rstrip()] if line.strip() else lines
 
 
 class _Writer:
@@ -340,6 +347,8 @@ class _Writer:
         lines: list[str] = []
         text = self.fitted(node, region, pad, lines, len(name))
         region.known.setdefault(node.same, name)
+        if len(pad) + len(name) + len(text) + 3 > WIDTH:  # names alone are too long
+            return [*lines, f"{pad}{name} = (", f"{pad}    {text}", f"{pad})"]
         return [*lines, f"{pad}{name} = {text}"]
 
     def fitted(self, node: Node, region: Region, pad: str, lines: list[str], used: int = 0) -> str:
