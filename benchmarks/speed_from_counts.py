@@ -9,11 +9,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-
-from swashplate.campaign.encoder import interpolate_counts, radians_per_count, unwrap_counts
-from swashplate.campaign.filters import matched_speed, path_delay, speed_from_counts
 from swashplate.campaign.kalman import smooth_counts
-from swashplate.campaign.savitzky_golay import savitzky_golay_speed
+
+from swashplate.campaign import (
+    interpolate_counts,
+    matched_speed,
+    path_delay,
+    radians_per_count,
+    savitzky_golay_speed,
+    speed_from_counts,
+    unwrap_counts,
+)
 
 PAGE = Path(__file__).parent.parent / "docs" / "speed-from-counts.md"
 RATE = 512

@@ -12,8 +12,7 @@ from swashplate.analysis.bands import bands
 from swashplate.analysis.draws import independent_drives
 from swashplate.analysis.monte_carlo import Deviations, draw_deviations, drives
 from swashplate.analysis.stored_draws import stored_draws
-from swashplate.campaign import rig
-from swashplate.campaign.campaign import Campaign
+from swashplate.campaign import Campaign, rig
 from swashplate.errors import FileError
 from swashplate.identification.assessment import assess
 from swashplate.identification.drive_model import DriveModel

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swashplate.campaign.ammeter import rectified_current, signed_by_command, zero_crossings
+from swashplate.campaign import rectified_current, signed_by_command, zero_crossings
 from swashplate.errors import InputError
 
 TIME = np.arange(11) * 0.1

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swashplate.campaign.encoder import (
+from swashplate.campaign import (
     find_lost_counts,
     interpolate_counts,
     radians_per_count,

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lsim
 
-from swashplate.campaign.filters import (
+from swashplate.campaign import (
     DIFFERENTIATOR,
     LOW_PASS,
     matched_speed,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swashplate.campaign.savitzky_golay import savitzky_golay_speed
+from swashplate.campaign import savitzky_golay_speed
 from swashplate.errors import InputError
 
 TIME = np.arange(300) / 512.0

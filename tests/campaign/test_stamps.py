@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swashplate.campaign.stamps import (
+from swashplate.campaign import (
     even_period,
     increasing,
     samples,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from swashplate import Campaign, Channel, Experiment
-from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.campaign import InputSignal, Source
 from swashplate.equations import simulate
 from swashplate.identification import Linearised, Problem, Unknown, Unknowns, solve
 

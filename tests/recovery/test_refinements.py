@@ -9,9 +9,8 @@ from pathlib import Path
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.campaign import rig
+from swashplate.campaign import ChannelKind, rig
 from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.kinds import ChannelKind
 from swashplate.identification.fit import StageFit, fit
 from swashplate.identification.setup import Free, Setup, Stage
 from swashplate.parameters.definitions import OPTIONS, REFINEMENTS

@@ -9,7 +9,7 @@ from matplotlib.colors import to_hex
 from matplotlib.offsetbox import TextArea
 
 from swashplate import InputError
-from swashplate.campaign.experiment import Channel, Encoder, Experiment, InputSignal, Source
+from swashplate.campaign import Channel, Encoder, Experiment, InputSignal, Source
 from swashplate.report.figures import plot_campaign
 from swashplate.report.style import BLUE, GREY, INK
 

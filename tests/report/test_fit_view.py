@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swashplate import Channel, Experiment
-from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.campaign import InputSignal, Source
 from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.fit import StageFit

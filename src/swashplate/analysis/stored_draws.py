@@ -7,7 +7,7 @@ from pathlib import Path
 
 from swashplate.analysis.draws import Draws, independent_drives
 from swashplate.analysis.monte_carlo import drives
-from swashplate.campaign.campaign import Campaign
+from swashplate.campaign import Campaign
 from swashplate.documents import read_text
 from swashplate.drive import Drive
 from swashplate.errors import FileError, InputError

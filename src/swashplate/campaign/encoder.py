@@ -1,11 +1,11 @@
 """Encoder counts: roll-overs taken out, staircases filled, jumps found, angles made of them."""
 
+from math import ceil, log2
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swashplate.campaign.counters import CounterRangeError
 from swashplate.campaign.stamps import Array, Rows, increasing, signal
 from swashplate.errors import InputError
 from swashplate.maneuvers.checks import positive, row, whole
@@ -16,6 +16,22 @@ SUSTAINED = 5
 """A speed lasts if the median of this many neighbouring intervals has it."""
 MARGIN = 1.5
 """A jump is this much faster than anything that lasts."""
+GAP = 1.5
+"""An interval of more than this many usual ones is a gap."""
+FEWEST = 32
+"""Readings that a counter shows at least; fewer may be those of a switch."""
+ORDINARY = 0.998
+"""Share of the steps that are no larger than those about a roll-over; others lead across gaps."""
+NEAR = 1.05
+"""The counts of a turn are the size where they are at most this much more than the range."""
+
+
+class CounterRangeError(InputError):
+    """A reading outside its counter; `said` leaves out what would be right."""
+
+    def __init__(self, said: str) -> None:
+        super().__init__(f"{said}; give the right bits or modulus.")
+        self.said = said
 
 
 class Unwrapped(NamedTuple):
@@ -124,6 +140,32 @@ def _check_range(readings: Array, size: int) -> None:
         )
 
 
+def ambiguous_gaps(time: Array, readings: Array, modulus: int) -> Rows:
+    """Rows after a gap so long that a counter of `modulus` may have gone round in it unseen.
+
+    A shaft that goes on at 1.5 times its greatest lasting speed passes half the counter within the
+    gap: the shortest way round need not be the one that it took. [row]
+    """
+    intervals = np.diff(time)
+    gaps = np.flatnonzero(intervals > GAP * np.median(intervals))
+    if not gaps.size or readings.size < 2 * SUSTAINED or np.any(readings != np.floor(readings)):
+        return np.zeros(0, dtype=np.intp)
+    steps = np.diff(readings)
+    short = steps - modulus * np.floor(steps / modulus + 0.5)
+    usual = np.delete(np.arange(steps.size), gaps)
+    # across a gap the shortest way round says nothing of the speed
+    fastest = MARGIN * _lasting(short[usual], intervals[usual])
+    return gaps[fastest * intervals[gaps] >= 0.5 * modulus] + 1
+
+
+def _lasting(steps: Array, intervals: Array) -> float:
+    """Greatest speed that lasts: the median over a few neighbouring intervals. [count/s]"""
+    from scipy.ndimage import median_filter
+
+    speeds = np.abs(steps) / intervals
+    return float(median_filter(speeds, size=SUSTAINED, mode="nearest").max())
+
+
 def interpolate_counts(time: ArrayLike, counts: ArrayLike) -> Array:
     """Fill the samples that share a count: the source's smoothing of an encoder's staircase.
 
@@ -220,8 +262,6 @@ def find_lost_counts(
         If the stamps do not increase, a number is not finite, or the record is too short for an
         estimate.
     """
-    from scipy.ndimage import median_filter
-
     stamps = increasing(time)
     steps = np.diff(signal("counts", counts, stamps.size))
     intervals = np.diff(stamps)
@@ -233,7 +273,51 @@ def find_lost_counts(
             "max_speed."
         )
     else:
-        lasting = median_filter(np.abs(steps) / intervals, size=SUSTAINED, mode="nearest")
-        limit = MARGIN * float(lasting.max())
+        limit = MARGIN * _lasting(steps, intervals)
     jumps = np.flatnonzero(np.abs(steps) > limit * intervals + 1.0)
     return LostCounts(jumps + 1, steps[jumps], limit)
+
+
+def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int | None:
+    """Counts after which a counter begins anew, None where the numbers are not such a counter's.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Of a column.
+    counts_per_turn : float, optional
+        Of its encoder: a likely size.
+
+    Notes
+    -----
+    The numbers are whole and many, and some steps go over more than half of their range, which
+    become as small as the others when they are taken the other way round. Numbers that only go up
+    by the same step each time count the samples.
+    """
+    if values.size < 2 or not np.isfinite(values).all() or np.any(values != np.floor(values)):
+        return None
+    if np.unique(values).size < FEWEST:
+        return None
+    low, high = float(values.min()), float(values.max())
+    span = high + 1.0 if low >= 0.0 else 2.0 * max(-low, high + 1.0)
+    steps = np.diff(values)
+    over = np.abs(steps) > 0.5 * span
+    if not over.any() or over.all():
+        return None
+    ordinary = float(np.quantile(np.abs(steps[~over]), ORDINARY))
+    # the steps beside a roll-over are as large as the one across it, taken the other way round
+    beside = np.interp(np.flatnonzero(over), np.flatnonzero(~over), steps[~over])
+    turn = 0.0 if counts_per_turn is None else float(counts_per_turn)
+    sizes = {1 << ceil(log2(span)), 100 * ceil(span / 100.0)}
+    if turn.is_integer() and span <= turn <= NEAR * span:
+        sizes = {int(turn)}
+    best, error = 0, np.inf
+    for size in sorted(sizes):
+        short = steps[over] - size * np.round(steps[over] / size)
+        off = float(np.median(np.abs(short - beside)))
+        if off < error:
+            best, error, across = size, off, short
+    # across a gap any step may be; the counter's size is known to what the largest reading leaves
+    small = np.mean(np.abs(across) <= 2.0 * ordinary + (best - span)) >= 0.5
+    level = np.ptp(np.concatenate([steps[~over], across])) == 0.0
+    return None if level or not small or ordinary >= 0.25 * best else best

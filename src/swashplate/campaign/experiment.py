@@ -11,9 +11,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.kinds import ChannelKind, InputKind
 from swashplate.campaign.recognition import Recognised
-from swashplate.campaign.schema import InitialState, Role
+from swashplate.campaign.schema import ChannelKind, InitialState, InputKind, Role
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]
@@ -129,6 +128,8 @@ class Experiment:
     recognised: Recognised | None = None
     ignored: tuple[tuple[float, float, str], ...] = ()
     """Windows left out of every channel: first and last instant [s], and why."""
+    notes: tuple[str, ...] = ()
+    """What reading did that nobody asked for, one sentence each: a channel left out, a split."""
 
     def __getitem__(self, channel: str) -> Channel:
         """A channel by its name.

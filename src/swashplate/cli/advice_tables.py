@@ -86,7 +86,7 @@ def _percent(error: float) -> str:
 
 def described(sensor: Sensor) -> str:
     """A sensor in a line: its noise, and where that is known from."""
-    from swashplate.campaign.kinds import KINDS
+    from swashplate.campaign import KINDS
 
     unit = KINDS[sensor.kind].units[0]
     return (

@@ -25,7 +25,7 @@ from swashplate.errors import InputError
 from swashplate.tables import TABLE
 
 if TYPE_CHECKING:
-    from swashplate.campaign.kinds import ChannelKind
+    from swashplate.campaign import ChannelKind
     from swashplate.identification.bench import Bench
     from swashplate.identification.sensors import Sensor
     from swashplate.parameters.parameter_set import ParameterSet
@@ -169,7 +169,7 @@ def _bench(
     free: Sequence[str],
     noise: Sequence[str],
 ) -> Bench:
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
     from swashplate.identification.bench import bench
     from swashplate.identification.fit import smooth
     from swashplate.identification.setup import load_setup
@@ -212,7 +212,7 @@ def _kind(word: str) -> ChannelKind:
 
 def _noises(words: Sequence[str], fresh: ParameterSet | None = None) -> list[Sensor]:
     """Sensors of stated noise; for a fresh plan the usual ones with what is stated put in."""
-    from swashplate.campaign.kinds import KINDS
+    from swashplate.campaign import KINDS
     from swashplate.drive import Drive
     from swashplate.identification.sensors import Sensor, default_sensors
     from swashplate.units import to_si

@@ -38,8 +38,7 @@ def demo(
     pump and motor to ten of them, predicts the other three and writes a report.
     Takes less than a minute.
     """
-    from swashplate.campaign import rig
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
     from swashplate.identification.fit import fit
     from swashplate.identification.known_truth import drawn

@@ -86,7 +86,7 @@ def excitation(
     reach, how much each unknown changes what was measured, and which unknowns
     can move together unseen. Proposes a set-up in which all is determined.
     """
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
     from swashplate.identification.excitation import outlook
     from swashplate.identification.fit import smooth
     from swashplate.identification.reparameterise import propose, proposed_setup, setup_text

@@ -120,7 +120,7 @@ def fit(
     and what 'report' needs to write the report again. Ctrl-C keeps the best so
     far. The exit code is 1 if the result is not usable.
     """
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
     from swashplate.executors import Dask, Processes
     from swashplate.identification.fit import fit as fitted
     from swashplate.identification.fit import refined
@@ -163,6 +163,9 @@ def fit(
     if figures is not None:
         lines.append(found.drawn(out, figures))
     note(f"{campaign.title}{' (virtual)' if campaign.virtual else ''}: fitted in {seconds:.2f} s")
+    for each_run in runs:
+        for sentence in each_run.notes:
+            say(f"- {each_run.name}: {sentence}.")
     for sentence in result.doubts:
         say(f"! {sentence}")
     for each in found.assessments:

@@ -11,8 +11,7 @@ from swashplate.cli.terminal import working
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
-    from swashplate.campaign.campaign import Campaign
-    from swashplate.campaign.experiment import Experiment
+    from swashplate.campaign import Campaign, Experiment
     from swashplate.executors import Executor
     from swashplate.identification.assessment import Assessment, RunQuality
     from swashplate.identification.bootstrap import Bootstrap

@@ -13,7 +13,7 @@ from swashplate.cli.validate import made_folder
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
     from swashplate.identification.storing import StoredFit
 
 EXAMPLES = """\
@@ -67,7 +67,7 @@ def report(
     Nothing is fitted. The campaign must be the one that was fitted: if its
     samples, weights or ignored windows have changed, the report is refused.
     """
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
     from swashplate.identification.assessment import assess
     from swashplate.identification.validation import predict
     from swashplate.identification.verdict import verdict

@@ -23,7 +23,7 @@ from swashplate.cli.validation_tables import (
 from swashplate.errors import FileError, InputError
 
 if TYPE_CHECKING:
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
     from swashplate.identification.assessment import RunQuality
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
@@ -67,7 +67,7 @@ def validate(
     what is left in the residuals, and a verdict. The exit code is 1 if the drive
     is not usable for these runs.
     """
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
     from swashplate.identification.validation import (
         channel_errors,
         predict,

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign import KINDS
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Source
-from swashplate.campaign.kinds import KINDS
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.advice import Candidate

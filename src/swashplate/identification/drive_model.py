@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.kinds import ChannelKind
 from swashplate.equations.observation import ObservedRecord
 from swashplate.equations.record import Record
 from swashplate.errors import DomainError, InputError, ParameterError

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -209,6 +209,8 @@ def _lost(result: Fit, held: Sequence[Experiment], threads: int | None) -> tuple
     for stage in result.stages:
         try:
             apart = stage_problem(stage.stage, before, held, threads=threads)
+            # in the units of all runs: information in other units cannot be compared
+            apart = replace(apart, scales=stage.problem.scales)
         except InputError:  # none of them has a channel of this stage
             before = stage.parameters
             continue

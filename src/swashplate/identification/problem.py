@@ -220,7 +220,9 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
             # rounding to whole counts leaves an error between -1/2 and 1/2 of one
             scales[name] = abs(having[0].encoder.angle_per_count) / np.sqrt(12.0)
             continue
-        scales[name] = 0.01 * max(float(np.ptp(each.values)) for each in having)
+        # an ignored spike says nothing of the range
+        used = [each.values[each.used] for each in having if each.used.any()]
+        scales[name] = 0.01 * max((float(np.ptp(each)) for each in used), default=0.0)
         if scales[name] == 0.0:
             raise InputError(f"The channel '{name}' never changes: nothing can be fitted to it.")
     return scales

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swashplate.campaign.kinds import ChannelKind
-from swashplate.campaign.rig.bench import COUNTS_PER_TURN
+from swashplate.campaign import ChannelKind
+from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import CURRENTS, SIGNALS, Part

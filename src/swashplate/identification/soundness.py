@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign.quality import unsigned_currents
 from swashplate.errors import InputError
 from swashplate.identification.activation import simulated_run
 from swashplate.identification.contradictions import Finding as Finding
@@ -84,7 +85,11 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
     DomainError
         If the model does not hold at the nominal values.
     """
-    found = [finding for each in experiments for finding in _samples(each)]
+    found = [
+        Finding("refuse", None, name, f"{said}.")
+        for (_, name), said in unsigned_currents(experiments).items()
+    ]
+    found += [finding for each in experiments for finding in _samples(each)]
     if not _refused(found):
         found += idle_commands(experiments, nominal)
     if _refused(found):

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from swashplate.campaign import applying, inside
 from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.weighting import applying, inside
 from swashplate.errors import InputError
 from swashplate.identification.setup import Stage
 

@@ -7,9 +7,7 @@ from tempfile import TemporaryDirectory
 
 from scipy.optimize import brentq
 
-from swashplate.campaign import rig
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Experiment
+from swashplate.campaign import Campaign, Experiment, rig
 from swashplate.drive import Drive
 from swashplate.parameters.rules import FULL_VOLTAGE
 

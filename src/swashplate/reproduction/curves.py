@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.analysis.levers import pulled
-from swashplate.campaign.ammeter import rectified_current
-from swashplate.campaign.filters import matched_speed
+from swashplate.campaign import matched_speed, rectified_current
 from swashplate.drive import Drive
 from swashplate.maneuvers import source_tests
 from swashplate.reproduction.catalogue import Shown

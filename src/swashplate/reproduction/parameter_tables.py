@@ -9,7 +9,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import NamedTuple
 
-from swashplate.campaign.rig.bench import COUNTS_PER_TURN
+from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
 from swashplate.reproduction.content import Cell, Table
 

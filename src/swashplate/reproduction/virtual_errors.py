@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any, Literal
 
-from swashplate.campaign.experiment import Experiment
+from swashplate.campaign import Experiment
 from swashplate.drive import Drive
 from swashplate.identification.assessment import RunQuality
 from swashplate.identification.error_tables import LargestError, sine_error

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from swashplate.campaign.encoder import interpolate_counts
+from swashplate.campaign import interpolate_counts
 from swashplate.drive import Drive
 from swashplate.identification.measured_current import measured_current
 from swashplate.reproduction.bench import ON_CURRENT, Bench

@@ -8,8 +8,7 @@ import pytest
 from scipy.io import loadmat
 
 from swashplate import Drive, FileError, InputError, maneuvers
-from swashplate.campaign import rig
-from swashplate.campaign.campaign import Campaign
+from swashplate.campaign import Campaign, rig
 
 STEP = maneuvers.step(4.0)
 SINE = maneuvers.sine(4.0, 0.2, length=12.0)

@@ -10,6 +10,7 @@ Everything that is written says that it is virtual.
 >>> rig.write(tests, "virtual-hoist")
 """
 
+from swashplate.campaign.rig.bench import COUNTS_PER_TURN as COUNTS_PER_TURN
 from swashplate.campaign.rig.bench import VirtualRun as VirtualRun
 from swashplate.campaign.rig.bench import VirtualTests as VirtualTests
 from swashplate.campaign.rig.bench import run as run

@@ -10,9 +10,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.kinds import CHANNEL_KINDS, ChannelKind
 from swashplate.campaign.rig.instruments import SEVERITIES, Instruments, Severity
 from swashplate.campaign.rig.readings import logged, put_out, stream
+from swashplate.campaign.schema import CHANNEL_KINDS, ChannelKind
 from swashplate.drive import Drive
 from swashplate.equations.record import SOURCE_RATE
 from swashplate.errors import InputError, ParameterError

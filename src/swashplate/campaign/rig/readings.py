@@ -11,8 +11,8 @@ from hashlib import blake2b
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.kinds import ChannelKind
 from swashplate.campaign.rig.instruments import Instruments
+from swashplate.campaign.schema import ChannelKind
 from swashplate.errors import InputError
 from swashplate.simulation.result import Simulation
 

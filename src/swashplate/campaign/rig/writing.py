@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.__about__ import __version__
-from swashplate.campaign.kinds import KINDS
 from swashplate.campaign.rig.bench import VirtualRun, VirtualTests
 from swashplate.campaign.rig.readings import COLUMNS
+from swashplate.campaign.schema import KINDS
 from swashplate.errors import FileError, InputError
 from swashplate.tables import write_text, write_whole
 

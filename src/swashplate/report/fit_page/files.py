@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from swashplate.campaign.campaign import Campaign
+from swashplate.campaign import Campaign
 from swashplate.errors import FileError
 from swashplate.identification.assessment import Assessment, RunQuality, assess
 from swashplate.identification.fit import Fit

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from swashplate.campaign.campaign import Campaign
+from swashplate.campaign import Campaign
 from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment, RunQuality, assess
 from swashplate.identification.fit import Fit, StageFit

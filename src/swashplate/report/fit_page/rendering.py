@@ -11,7 +11,7 @@ from bokeh.resources import Resources
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from swashplate.campaign.campaign import Campaign
+from swashplate.campaign import Campaign
 from swashplate.identification.residual_tests import ResidualTest
 from swashplate.identification.validation import source_rules
 from swashplate.parameters.parameter_set import ParameterSet

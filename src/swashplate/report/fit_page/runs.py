@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign import Channel, Experiment
 from swashplate.identification.assessment import Assessment, RunQuality
 from swashplate.identification.validation import ignored_windows, with_speeds
 from swashplate.report.display_units import DisplayUnit, display_unit

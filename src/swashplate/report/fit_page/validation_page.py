@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from swashplate.campaign.campaign import Campaign
+from swashplate.campaign import Campaign
 from swashplate.identification.assessment import RunQuality
 from swashplate.identification.verdict import Verdict, verdict
 from swashplate.parameters.parameter_set import ParameterSet
