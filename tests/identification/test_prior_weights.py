@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from swashplate import Experiment
 from swashplate.campaign.experiment import Channel, InputSignal, Source
 from swashplate.identification.intervals import estimates
-from swashplate.identification.linearising import linearised_fit
+from swashplate.identification.linearised import linearised_fit
 from swashplate.identification.prior_weights import prior_sentences, weighed
 from swashplate.identification.problem import Problem
 from swashplate.identification.solving import solve

@@ -39,7 +39,6 @@ Examples:
 FEWEST_DRAWS = 40
 """Of a bootstrap: one beyond each end of a 95 % interval."""
 
-Method = Literal["trf", "slsqp"]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
 Figures = Literal["svg", "pdf"]
 
@@ -100,9 +99,6 @@ def fit(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the starts that DIR holds already.")
     ] = False,
-    method: Annotated[
-        Method, typer.Option(help="Trust region on exact derivatives, or SQP by differences.")
-    ] = "trf",
     loss: Annotated[Loss, typer.Option(help="Robust losses forgive outliers.")] = "linear",
     report: Annotated[
         bool, typer.Option(help="Write report.html, one file that works offline.")
@@ -151,11 +147,11 @@ def fit(
             )
 
         search = _search(starts, seed, executor, out, resume, shown) if starts else None
-        result = fitted(runs, nominal, plan, method=method, loss=loss, search=search, watch=watch)
+        result = fitted(runs, nominal, plan, loss=loss, search=search, watch=watch)
         if joint and len(plan.stages) > 1 and not result.interrupted:
             result = refined(result, runs, watch=watch)
     seconds = perf_counter() - begun
-    wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, method, loss)
+    wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, loss)
     found = judged_fit(campaign, chosen, runs, nominal, plan, result, wanted)
     lines = [*written(result, found.assessments, out, found.bootstraps), found.stored(out)]
     if report:

@@ -15,8 +15,7 @@ from swashplate.identification.fit import StageFit
 from swashplate.identification.handed_on import Handed, slopes_by_earlier
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import reach
-from swashplate.identification.linearised import LinearisedFit
-from swashplate.identification.linearising import linearised_fit
+from swashplate.identification.linearised import LinearisedFit, linearised_fit
 from swashplate.identification.measures import Measures, measures
 from swashplate.identification.prior_weights import prior_sentences
 from swashplate.identification.problem import Problem

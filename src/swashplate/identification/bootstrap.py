@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swashplate.errors import InputError
 from swashplate.identification.resampling import Resampling
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 class Bootstrap:
     """Estimates from resampled noise."""
 
-    variables: Variables
+    variables: Unknowns
     vectors: Array
     """(draws, K) solver's vectors; held ones stay."""
     determined: NDArray[np.bool_]

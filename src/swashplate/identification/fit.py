@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from swashplate.__about__ import __version__
 from swashplate.campaign.experiment import Experiment
 from swashplate.executors import Executor, Serial
-from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.drives import at_rate_of
+from swashplate.identification.drive_model import DriveModel, at_rate_of
 from swashplate.identification.prior_weights import weighed
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Setup, Stage
-from swashplate.identification.solving import Loss, Method, Progress, Solution, solve
+from swashplate.identification.solving import Loss, Progress, Solution, solve
 from swashplate.identification.soundness import check_sound, refuse_unsound
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.starts import StartResult, sobol_starts, solve_from
@@ -88,7 +87,6 @@ def fit(
     nominal: ParameterSet,
     setup: Setup,
     *,
-    method: Method = "trf",
     loss: Loss = "linear",
     tolerance: float = 1e-10,
     max_evaluations: int = 300,
@@ -107,7 +105,7 @@ def fit(
         card's filter one that holds at the rate of the runs.
     setup : Setup
         Stages and their free parameters.
-    method, loss, tolerance, max_evaluations :
+    loss, tolerance, max_evaluations :
         As of `solving.solve`, in each stage.
     threads : int, optional
         Threads over experiments; all cores by default. The result does not depend on it.
@@ -132,11 +130,10 @@ def fit(
         begin: Array | None = None
         results: tuple[StartResult, ...] = ()
         if search is not None and search.starts > 0:
-            results = _searched(stage, problem, search, method, tolerance, max_evaluations)
+            results = _searched(stage, problem, search, tolerance, max_evaluations)
             begin = np.array(min(results, key=lambda each: each.cost).vector)
         solved = partial(
             solve,
-            method=method,
             loss=loss,
             tolerance=tolerance,
             max_evaluations=max_evaluations,
@@ -202,7 +199,6 @@ def _searched(
     stage: Stage,
     problem: Problem,
     search: Search,
-    method: Method,
     tolerance: float,
     max_evaluations: int,
 ) -> tuple[StartResult, ...]:
@@ -214,9 +210,8 @@ def _searched(
         [problem.start, *sobol_starts(alone, search.starts, search.seed)],
         executor=search.executor,
         store=None if search.store is None else search.store / stage.name,
-        fingerprint=_fingerprint(stage, problem, search, method, tolerance, max_evaluations),
+        fingerprint=_fingerprint(stage, problem, search, tolerance, max_evaluations),
         resume=search.resume,
-        method=method,
         tolerance=tolerance,
         max_evaluations=max_evaluations,
         watch=None if watch is None else (lambda result, done: watch(stage.name, result, done)),

@@ -20,7 +20,7 @@ from swashplate.identification.fold_results import (
     HeldRun,
 )
 from swashplate.identification.setup import Setup
-from swashplate.identification.solving import Loss, Method
+from swashplate.identification.solving import Loss
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.validation import predict, with_speeds
 from swashplate.parameters.parameter_set import ParameterSet
@@ -39,7 +39,6 @@ class _Task:
     experiments: tuple[Experiment, ...]
     nominal: ParameterSet
     setup: Setup
-    method: Method
     loss: Loss
     tolerance: float
     max_evaluations: int
@@ -59,7 +58,6 @@ def cross_validate(
     folds: int = 5,
     seed: int = 0,
     executor: Executor | None = None,
-    method: Method = "trf",
     loss: Loss = "linear",
     tolerance: float = 1e-10,
     max_evaluations: int = 300,
@@ -81,7 +79,7 @@ def cross_validate(
         Of the dealing; the same seed, the same folds.
     executor : Executor, optional
         Where the fits run; here, one after another, by default. The results do not depend on it.
-    method, loss, tolerance, max_evaluations :
+    loss, tolerance, max_evaluations :
         As of `fit.fit`.
     watch : callable, optional
         Told of each fold and how many there are by now. Ctrl-C ends it; folds that are done are
@@ -98,7 +96,6 @@ def cross_validate(
         tuple(experiments),
         nominal,
         setup,
-        method,
         loss,
         tolerance,
         max_evaluations,
@@ -176,7 +173,6 @@ def _fold(task: _Task, item: _Item) -> Fold:
             others,
             task.nominal,
             task.setup,
-            method=task.method,
             loss=task.loss,
             tolerance=task.tolerance,
             max_evaluations=task.max_evaluations,
@@ -214,7 +210,7 @@ def _lost(result: Fit, held: Sequence[Experiment], threads: int | None) -> tuple
             continue
         before = stage.parameters
         left = _information(stage.problem.evaluate(stage.solution.vector).jacobian)
-        there = _information(apart.evaluate(apart.unknowns.vector(stage.values)).jacobian)
+        there = _information(apart.evaluate(apart.unknowns.vector_of(stage.values)).jacobian)
         told = dict(zip(apart.unknowns.names, there, strict=True))
         lost += [
             unknown.name

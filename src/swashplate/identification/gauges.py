@@ -10,7 +10,7 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 from swashplate.models.pump import ANGLE, FORCE, MOTION, PRESSURE, TILT, TRAVEL, ZERO
 from swashplate.parameters.definitions import CATALOGUE
 
@@ -42,12 +42,12 @@ class Gauge:
     needs: frozenset[str] = frozenset()
     """Symbols whose values the moves depend on."""
 
-    def tangent(self, variables: Variables, fixed: Known | None = None) -> Array:
+    def tangent(self, variables: Unknowns, fixed: Known | None = None) -> Array:
         """Derivative of the solver's vector along the gauge.
 
         Parameters
         ----------
-        variables : Variables
+        variables : Unknowns
             The unknowns.
         fixed : mapping of str to float, optional
             Values of parameters that are no unknowns, by symbol.
@@ -58,7 +58,8 @@ class Gauge:
             0 for what does not move, and throughout if a value that the gauge needs is not known.
         """
         symbols = [symbol_of(name) for name in variables.names]
-        known = {**(fixed or {}), **dict(zip(symbols, map(float, variables.values), strict=True))}
+        estimates = map(float, variables.estimates)
+        known = {**(fixed or {}), **dict(zip(symbols, estimates, strict=True))}
         slopes = np.zeros(variables.count)
         if not self.needs <= known.keys():
             return slopes
@@ -66,7 +67,7 @@ class Gauge:
             move = self.moves.get(symbol)
             if move is None:
                 continue
-            value = float(variables.values[k])
+            value = float(variables.estimates[k])
 
             def slope(step: float, move: Move = move, value: float = value) -> float:
                 return (move(value, step, known) - move(value, -step, known)) / (2.0 * step)

@@ -18,7 +18,7 @@ from swashplate.identification.null_directions import (
     faint_directions,
     null_directions,
 )
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class Pair(NamedTuple):
 class Identifiability:
     """Verdict on a fit's unknowns, before a fit or after."""
 
-    variables: Variables
+    variables: Unknowns
     sensitivity: Array
     """(K,) length of the change of all weighted residuals for 1 % of each unknown."""
     singular_values: Array
@@ -93,7 +93,7 @@ class Identifiability:
             )
         said += [each.sentence for each in (*self.null, *self.faint)]
         said += [
-            f"{name} = {self.variables.values[self.variables.index(name)]:.4g} stands at its "
+            f"{name} = {self.variables.estimates[self.variables.index(name)]:.4g} stands at its "
             f"{side} bound: no interval is given for it, and the others' hold with it held there."
             for name, side in self.at_bounds.items()
         ]
@@ -129,7 +129,7 @@ class Identifiability:
 
 def identifiability(
     derivatives: Array,
-    variables: Variables,
+    variables: Unknowns,
     *,
     covariance: Array | None = None,
     tolerance: float = TOLERANCE,
@@ -142,7 +142,7 @@ def identifiability(
     ----------
     derivatives : (m, K) array
         Derivatives of all weighted residuals by the solver's vector, or their triangular factor.
-    variables : Variables
+    variables : Unknowns
         The unknowns; those at a bound count as held.
     covariance : (K, K) array, optional
         Of the solver's vector, for the correlations; by default that of white noise.
@@ -203,7 +203,7 @@ def identifiability(
 
 
 def correlated_pairs(
-    space: Space, variables: Variables, covariance: Array | None, tolerance: float
+    space: Space, variables: Unknowns, covariance: Array | None, tolerance: float
 ) -> tuple[Pair, ...]:
     """Pairs of unknowns in `space` with a correlation beyond 0.95, the strongest first."""
     if covariance is None:

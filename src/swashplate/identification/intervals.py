@@ -108,7 +108,7 @@ def estimates(
         upper = variables.to_values(variables.vector + distances[True])
     made = []
     for k, name in enumerate(variables.names):
-        value = float(variables.values[k])
+        value = float(variables.estimates[k])
         below, above = bool(open_ended[False][k]), bool(open_ended[True][k])
         if variables.at_bound[k]:
             low = variables.at_bound[k] < 0

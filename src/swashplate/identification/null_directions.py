@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space, qr
 
 from swashplate.identification.gauges import Gauge, Known, symbol_of
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ class Space(NamedTuple):
 
 def null_directions(
     space: Space,
-    variables: Variables,
+    variables: Unknowns,
     gauges: Sequence[Gauge],
     fixed: Known,
     tolerance: float,
@@ -98,7 +98,7 @@ def null_directions(
     ----------
     space : Space
         Derivatives.
-    variables : Variables
+    variables : Unknowns
         All unknowns.
     gauges : sequence of Gauge
         Those to recognise.
@@ -130,7 +130,7 @@ def null_directions(
 
 def faint_directions(
     space: Space,
-    variables: Variables,
+    variables: Unknowns,
     gauges: Sequence[Gauge],
     fixed: Known,
     faint: float,
@@ -161,7 +161,7 @@ def _faintest(
     space: Space,
     sizes: Array,
     row: Array,
-    variables: Variables,
+    variables: Unknowns,
     gauges: Sequence[Gauge],
     fixed: Known,
     faint: float,
@@ -191,7 +191,7 @@ def _place_to_hold(
     null: Array,
     held: Sequence[int],
     space: Space,
-    variables: Variables,
+    variables: Unknowns,
 ) -> int | None:
     """The unknown that removes a gauge beside those held already; None if none does."""
     symbols = [symbol_of(variables.names[k]) for k in space.places]
@@ -211,7 +211,7 @@ def _direction(
     gauge: Gauge | None,
     place: int,
     space: Space,
-    variables: Variables,
+    variables: Unknowns,
 ) -> Direction:
     # a short column needs a large change for the same effect: judged by effect, not by size
     spoken = np.abs(vector) >= MENTIONED * np.abs(vector).max()

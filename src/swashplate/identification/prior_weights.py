@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.identification.covariance import Covariance
-from swashplate.identification.linearising import linearised_fit
+from swashplate.identification.linearised import linearised_fit
 from swashplate.identification.problem import Problem
 from swashplate.identification.uncertainty import uncertainty
 from swashplate.identification.unknowns import Unknowns

@@ -17,8 +17,7 @@ from swashplate.errors import DomainError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.bootstrap import Bootstrap, refit_bootstrap
-from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.drives import simulated_current
+from swashplate.identification.drive_model import DriveModel, simulated_current
 from swashplate.identification.fit import StageFit
 from swashplate.identification.held import minimiser
 from swashplate.identification.problem import Problem

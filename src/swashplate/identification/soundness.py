@@ -8,10 +8,10 @@ import numpy as np
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.errors import InputError
-from swashplate.identification.activation import simulated_run
 from swashplate.identification.contradictions import Finding as Finding
 from swashplate.identification.contradictions import contradictions
 from swashplate.identification.drive_model import SIGNALS
+from swashplate.identification.excitation import simulated_run
 from swashplate.identification.identifiability import identifiability
 from swashplate.identification.motion import Motion, motions
 from swashplate.identification.setup import Setup
@@ -24,7 +24,6 @@ from swashplate.identification.unmoved import (
     short_runs,
     still_sensors,
 )
-from swashplate.identification.variables import Variables
 from swashplate.parameters.parameter_set import ParameterSet
 
 NAMED = 8
@@ -220,9 +219,9 @@ def _rank(experiments: Sequence[Experiment], nominal: ParameterSet, setup: Setup
     return found
 
 
-def _variables(unknowns: Unknowns) -> Variables:
+def _variables(unknowns: Unknowns) -> Unknowns:
     """The unknowns where a fit begins, as the statistics see them; none counts as at a bound."""
-    return Variables.of(
+    return Unknowns.of(
         unknowns.names,
         [each.start for each in unknowns],
         scales=[each.scale for each in unknowns],

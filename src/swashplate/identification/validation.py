@@ -13,8 +13,7 @@ from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.speed import speed_of
 from swashplate.errors import InputError
 from swashplate.identification.assessment import RunQuality, compared
-from swashplate.identification.drive_model import SIGNALS, DriveModel
-from swashplate.identification.drives import current_record
+from swashplate.identification.drive_model import SIGNALS, DriveModel, current_record
 from swashplate.identification.error_tables import ErrorTable, error_table
 from swashplate.identification.exclusions import (
     SOURCE_RULES,
