@@ -241,7 +241,7 @@ def test_what_is_done_is_on_disk_and_is_not_done_again(problem: Problem, tmp_pat
         if done == 2:
             raise KeyboardInterrupt
 
-    first = solve_from(problem, starts, store=store, fingerprint="x", watch=stop)
+    first = solve_from(problem, starts, store=store, origin={"data": "x"}, watch=stop)
     assert [each.number for each in first] == [0, 1]
     assert len(list(store.glob("start-*.json"))) == 2
     seen: list[int] = []
@@ -249,7 +249,7 @@ def test_what_is_done_is_on_disk_and_is_not_done_again(problem: Problem, tmp_pat
         problem,
         starts,
         store=store,
-        fingerprint="x",
+        origin={"data": "x"},
         resume=True,
         watch=lambda result, done: seen.append(result.number),
     )
@@ -260,11 +260,11 @@ def test_what_is_done_is_on_disk_and_is_not_done_again(problem: Problem, tmp_pat
 
 def test_results_of_another_fit_are_not_resumed(problem: Problem, tmp_path: Path) -> None:
     starts = list(sobol_starts(problem, 2, seed=2))
-    solve_from(problem, starts, store=tmp_path, fingerprint="x")
+    solve_from(problem, starts, store=tmp_path, origin={"data": "x"})
     with pytest.raises(FileError, match="resume it, or remove the folder"):
-        solve_from(problem, starts, store=tmp_path, fingerprint="x")
-    with pytest.raises(FileError, match="belongs to another campaign"):
-        solve_from(problem, starts, store=tmp_path, fingerprint="y", resume=True)
+        solve_from(problem, starts, store=tmp_path, origin={"data": "x"})
+    with pytest.raises(FileError, match="its data differ"):
+        solve_from(problem, starts, store=tmp_path, origin={"data": "y"}, resume=True)
     (tmp_path / "start-00000.json").write_text("{", "utf-8")
     with pytest.raises(FileError, match="is no result of a start"):
-        solve_from(problem, starts, store=tmp_path, fingerprint="x", resume=True)
+        solve_from(problem, starts, store=tmp_path, origin={"data": "x"}, resume=True)

@@ -131,7 +131,12 @@ def fit(
         results: tuple[StartResult, ...] = ()
         if search is not None and search.starts > 0:
             results = _searched(stage, problem, search, tolerance, max_evaluations)
-            begin = np.array(min(results, key=lambda each: each.cost).vector)
+            best = min(results, key=lambda each: each.cost)
+            begin = np.array(best.vector)
+            if len(results) <= search.starts:
+                solution = _stopped(best, len(results), 1 + search.starts)
+                stages.append(StageFit(stage, problem, solution, parameters, results))
+                break
         solved = partial(
             solve,
             loss=loss,
@@ -210,7 +215,7 @@ def _searched(
         [problem.start, *sobol_starts(alone, search.starts, search.seed)],
         executor=search.executor,
         store=None if search.store is None else search.store / stage.name,
-        fingerprint=_fingerprint(stage, problem, search, tolerance, max_evaluations),
+        origin=_origin(stage, problem, tolerance, max_evaluations),
         resume=search.resume,
         tolerance=tolerance,
         max_evaluations=max_evaluations,
@@ -218,16 +223,13 @@ def _searched(
     )
 
 
-def _fingerprint(stage: Stage, problem: Problem, search: Search, *settings: object) -> str:
-    """Hash of all that the result of a start depends on."""
-    digest = blake2b(digest_size=16)
+def _origin(stage: Stage, problem: Problem, *settings: object) -> dict[str, str]:
+    """Fingerprints of all that the result of a start depends on."""
     model = problem.model
     assert isinstance(model, DriveModel)
     known = model.parameters
     forms = known.pressure_root, known.coulomb_sign, known.rate, sorted(known.options)
-    numbers = sorted(known.numbers.items())
-    words = (__version__, stage.model_dump_json(), search.seed, settings, numbers, forms)
-    digest.update(repr(words).encode())
+    digest = blake2b(digest_size=16)
     for experiment, weights in zip(problem.experiments, problem.weights, strict=True):
         arrays = [experiment.input.time, experiment.input.values]
         for name, weight in weights.items():
@@ -235,7 +237,31 @@ def _fingerprint(stage: Stage, problem: Problem, search: Search, *settings: obje
             arrays += [channel.time, channel.values, weight]
         for array in arrays:
             digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()
+    return {
+        "version of swashplate": __version__,
+        "stage of the set-up": _mark(stage.model_dump_json()),
+        "tolerances": _mark(settings),
+        "nominal values": _mark((sorted(known.numbers.items()), forms)),
+        "runs and their weights": digest.hexdigest(),
+    }
+
+
+def _mark(content: object) -> str:
+    return blake2b(repr(content).encode(), digest_size=8).hexdigest()
+
+
+def _stopped(best: StartResult, done: int, starts: int) -> Solution:
+    """The best of some starts as what an interrupted search found."""
+    return Solution(
+        np.array(best.vector),
+        best.cost,
+        best.start_cost,
+        best.evaluations,
+        False,
+        True,
+        f"interrupted after {done} of {starts} starts: the best of them",
+        best.seconds,
+    )
 
 
 def _named(watch: Callable[[str, Progress], None], name: str) -> Callable[[Progress], None]:

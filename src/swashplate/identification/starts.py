@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Annotated, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
 
-from swashplate.errors import DomainError, FileError, InputError
+from swashplate.documents import read_json
+from swashplate.errors import DomainError, FileError, InputError, SwashplateError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.solving import LEG, Evaluation, Objective, Solution, solve
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Cost = Annotated[float, Field(ge=0.0)]
+"""Half a sum of squares; infinite where the model does not hold."""
 
 REACH = 1e-9
 """What a start may lie beyond the increments' bounds by rounding."""
@@ -294,16 +298,25 @@ class StartResult:
 
     number: int
     """0 is the nominal start, others are Sobol points."""
-    start: tuple[float, ...]
+    start: tuple[Finite, ...]
     """The solver's vector at the start."""
-    vector: tuple[float, ...]
+    vector: tuple[Finite, ...]
     """And at the end."""
-    start_cost: float
-    cost: float
+    start_cost: Cost
+    cost: Cost
     evaluations: int
     converged: bool
     message: str
-    seconds: float
+    seconds: Finite
+
+
+class _StartFile(BaseModel):
+    """A result on disk, and what it depends on."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    origin: dict[str, str]
+    result: StartResult
 
 
 class _Task(NamedTuple):
@@ -342,7 +355,7 @@ def solve_from(
     *,
     executor: Executor | None = None,
     store: Path | None = None,
-    fingerprint: str = "",
+    origin: Mapping[str, str] | None = None,
     resume: bool = False,
     tolerance: float = 1e-10,
     max_evaluations: int = 300,
@@ -360,22 +373,24 @@ def solve_from(
         Where; here, one after another, by default.
     store : Path, optional
         Folder in which each result is written as it is ready.
-    fingerprint : str
-        Of problem and settings: results of another one are not resumed.
+    origin : mapping of str to str, optional
+        A fingerprint of each thing that a result depends on, by its name in words. Results of
+        another one are not resumed.
     resume : bool
         Take what `store` holds instead of computing it again.
     tolerance, max_evaluations :
         As of `solve`.
     watch : callable, optional
         Told of each result and how many there are by now. Ctrl-C ends the search; what was done
-        is returned, if there is anything.
+        is returned, fewer results than starts, if there is anything.
 
     Raises
     ------
     FileError
         If the store belongs to another problem, or is there already and `resume` is not said.
     """
-    done = _stored(store, fingerprint, resume) if store is not None else {}
+    origin = dict(origin or {})
+    done = _stored(store, origin, starts, resume) if store is not None else {}
     tasks = [
         _Task(number, tuple(float(x) for x in start), tolerance, max_evaluations)
         for number, start in enumerate(starts)
@@ -386,7 +401,7 @@ def solve_from(
         for _, result in running:
             done[result.number] = result
             if store is not None:
-                _keep(store, fingerprint, result)
+                _keep(store, origin, result)
             if watch is not None:
                 watch(result, len(done))
     except KeyboardInterrupt:
@@ -457,12 +472,14 @@ def _solved(objective: Objective, start: Array, task: _Task, most: int) -> Solut
     return replace(solution, vector=form.to_vector(solution.vector))
 
 
-def _keep(store: Path, fingerprint: str, result: StartResult) -> None:
-    content = {"fingerprint": fingerprint, **asdict(result)}
-    write_text(json.dumps(content, indent=1) + "\n", store / f"start-{result.number:05d}.json")
+def _keep(store: Path, origin: dict[str, str], result: StartResult) -> None:
+    content = _StartFile(origin=origin, result=result).model_dump_json(indent=1)
+    write_text(content + "\n", store / f"start-{result.number:05d}.json")
 
 
-def _stored(store: Path, fingerprint: str, resume: bool) -> dict[int, StartResult]:
+def _stored(
+    store: Path, origin: dict[str, str], starts: Sequence[Array], resume: bool
+) -> dict[int, StartResult]:
     """Results that a folder holds; the folder is made if there is none."""
     try:
         store.mkdir(parents=True, exist_ok=True)
@@ -475,15 +492,21 @@ def _stored(store: Path, fingerprint: str, resume: bool) -> dict[int, StartResul
                 f"{store} holds the starts of an earlier fit: resume it, or remove the folder."
             )
         try:
-            content = json.loads(path.read_text("utf-8"))
-            theirs = content.pop("fingerprint")
-            start, vector = (tuple(content.pop(key)) for key in ("start", "vector"))
-            result = StartResult(start=start, vector=vector, **content)
-        except (OSError, ValueError, KeyError, TypeError, AttributeError):
-            raise FileError(f"{path} is no result of a start; remove it.") from None
-        if theirs != fingerprint:
+            file = read_json(path, _StartFile)
+        except SwashplateError as error:
             raise FileError(
-                f"{path} belongs to another campaign, set-up or version; remove the folder {store}."
+                f"{str(error).rstrip('.')}: it is no result of a start, remove it."
+            ) from None
+        differing = [name for name, mark in origin.items() if file.origin.get(name) != mark]
+        result = file.result
+        if not differing and result.number < len(starts):
+            start = tuple(map(float, starts[result.number]))
+            if result.start != start or len(result.vector) != len(start):
+                differing = ["starts"]
+        if differing:
+            raise FileError(
+                f"{path} belongs to another fit: its {' and '.join(differing)} differ. Resume with "
+                f"what it began with, or remove the folder {store}."
             )
         done[result.number] = result
     return done

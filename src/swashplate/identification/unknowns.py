@@ -223,7 +223,7 @@ class Unknowns(Sequence[Unknown]):
         return iter(self.items)
 
     @property
-    def count(self) -> int:
+    def count(self) -> int:  # type: ignore[override]
         """K."""
         return len(self.items)
 
