@@ -6,8 +6,8 @@ from scipy.signal import lfilter
 from scipy.stats import t as student
 
 from swashplate.errors import InputError
-from swashplate.identification.covariance import Covariance
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
+from swashplate.identification.noise import Covariance
 from swashplate.identification.uncertainty import Uncertainty, uncertainty
 from swashplate.identification.unknowns import Unknowns
 

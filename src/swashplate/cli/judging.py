@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from swashplate.executors import Executor
     from swashplate.identification.assessment import Assessment, RunQuality
     from swashplate.identification.bootstrap import Bootstrap
+    from swashplate.identification.cross_validation import CrossValidation
     from swashplate.identification.fit import Fit
-    from swashplate.identification.fold_results import CrossValidation
     from swashplate.identification.setup import Setup
     from swashplate.identification.solving import Loss
     from swashplate.identification.storing import StageProfile
@@ -134,8 +134,8 @@ def judged_fit(
 ) -> Judged:
     """Assess a fit, predict the runs held back, and compute what else was asked for."""
     from swashplate.identification.assessment import assess
-    from swashplate.identification.folds import cross_validate
-    from swashplate.identification.refits import bootstraps_of
+    from swashplate.identification.bootstrap import bootstraps_of
+    from swashplate.identification.cross_validation import cross_validate
     from swashplate.identification.validation import predict
     from swashplate.identification.verdict import verdict
 
@@ -194,7 +194,7 @@ def _check(names: Sequence[str], assessments: Sequence[Assessment]) -> None:
 def _profiles(
     assessment: Assessment, wanted: Wanted, show: Callable[[str], None]
 ) -> list[StageProfile]:
-    from swashplate.identification.refits import profiles_of
+    from swashplate.identification.bootstrap import profiles_of
     from swashplate.identification.storing import StageProfile
 
     name = assessment.stage.stage.name

@@ -17,9 +17,9 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.equations.run import Start
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel, Forces, current_record, voltage_record
+from swashplate.identification.identifiability import NAMED as NAMED_OTHERS
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.linearised import LinearisedFit, linearised_fit
-from swashplate.identification.null_directions import NAMED as NAMED_OTHERS
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Free, GivenForces, Setup, Stage
 from swashplate.identification.staging import stage_problem

@@ -17,16 +17,15 @@ from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_text, validated
 from swashplate.errors import FileError, InputError
+from swashplate.identification.cross_validation import CrossValidation
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fit import Fit, StageFit, smooth
-from swashplate.identification.fold_results import CrossValidation
-from swashplate.identification.prior_weights import with_worths
-from swashplate.identification.profile_side import Ending, Point
-from swashplate.identification.profiles import Profile, Threshold
+from swashplate.identification.profile import Ending, Point, Profile, Threshold
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Solution
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.starts import StartResult
+from swashplate.identification.uncertainty import with_worths
 from swashplate.parameters.files import dump_set, read_set
 from swashplate.tables import write_text
 
