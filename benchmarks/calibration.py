@@ -39,8 +39,8 @@ def campaign(case, seed, axis):
     from swashplate.campaign import rig
     from swashplate.identification.assessment import assess
     from swashplate.identification.fit import fit
-    from swashplate.identification.known_truth import drawn, true_value
     from swashplate.identification.setup import load_setup
+    from swashplate.identification.staging import drawn, true_value
 
     setup, nominal = load_setup(axis), Drive.preset(axis)
     truth = drawn(nominal, setup, seed)

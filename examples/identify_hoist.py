@@ -19,8 +19,8 @@ from swashplate.campaign import rig
 from swashplate.identification.assessment import assess
 from swashplate.identification.excitation import outlook
 from swashplate.identification.fit import fit, smooth
-from swashplate.identification.known_truth import drawn, true_value
 from swashplate.identification.setup import load_setup
+from swashplate.identification.staging import drawn, true_value
 from swashplate.identification.validation import predict, with_speeds
 from swashplate.identification.verdict import verdict
 from swashplate.report.figures import plot_fit, save_figure

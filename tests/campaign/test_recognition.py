@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swashplate import InputError, maneuvers
-from swashplate.campaign import Recognised, recognise
-from swashplate.campaign.recognition import roundest
+from swashplate.campaign import Recognised, recognise, roundest
 from swashplate.logs import open_log
 from swashplate.maneuvers import Maneuver
 

@@ -9,8 +9,7 @@ import pytest
 from swashplate import Campaign, Channel, Drive, Experiment
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.drives import at_rate_of
+from swashplate.identification.drive_model import DriveModel, at_rate_of
 from swashplate.identification.fit import fit, smooth
 from swashplate.identification.setup import Free, Setup, Stage, load_setup, setup_names
 from swashplate.identification.staging import stage_problem

@@ -10,14 +10,20 @@ from swashplate import Drive, Experiment
 from swashplate.campaign.experiment import InputSignal
 from swashplate.identification.assessment import Assessment, RunQuality, compared
 from swashplate.identification.fit import StageFit
-from swashplate.identification.judgements import Statement, listed, percent
-from swashplate.identification.null_directions import Direction
+from swashplate.identification.identifiability import Direction
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage
 from swashplate.identification.solving import solve
 from swashplate.identification.starts import StartResult
 from swashplate.identification.unknowns import Unknown, Unknowns
-from swashplate.identification.verdict import Verdict, part_of_range, verdict
+from swashplate.identification.verdict import (
+    Statement,
+    Verdict,
+    listed,
+    part_of_range,
+    percent,
+    verdict,
+)
 
 TIME = np.linspace(0.0, 4.0, 81)
 WAVE = 10.0 * np.sin(2.0 * np.pi * TIME[:-1] / 4.0)

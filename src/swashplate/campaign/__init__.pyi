@@ -27,6 +27,7 @@ from .quality import spikes as spikes
 from .quality import unsigned_currents as unsigned_currents
 from .recognition import Recognised as Recognised
 from .recognition import recognise as recognise
+from .recognition import roundest as roundest
 from .schema import CHANNEL_KINDS as CHANNEL_KINDS
 from .schema import KINDS as KINDS
 from .schema import CampaignFile as CampaignFile

@@ -297,7 +297,10 @@ def _experiments(
                     f"after {entry.rolls_over_at}, may have gone round once more or less"
                 )
     if not signals:
-        raise InputError(f"{columns.log.path}: no channel has a sample; say role = 'ignore'.")
+        raise InputError(
+            f"{columns.log.path}: its channels have 0 samples that can be used; leave the run out "
+            'with role = "ignore".'
+        )
     edges = [-np.inf, *sorted(cuts), np.inf]
     for part, (begin, end) in enumerate(pairwise(edges)):
         piece = drive.within(begin, end)

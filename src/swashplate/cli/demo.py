@@ -41,8 +41,8 @@ def demo(
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
     from swashplate.identification.fit import fit
-    from swashplate.identification.known_truth import drawn
     from swashplate.identification.setup import load_setup
+    from swashplate.identification.staging import drawn
 
     setup = load_setup("hoist")
     nominal = Drive.preset("hoist")
@@ -80,7 +80,7 @@ def demo(
 def _drawn(found: Judged, truth: Drive, out: Path) -> str:
     """Draw a predicted run and the estimates beside the truth; a line that says so."""
     from swashplate.identification.drive_model import DriveModel
-    from swashplate.identification.known_truth import true_value
+    from swashplate.identification.staging import true_value
     from swashplate.identification.validation import with_speeds
     from swashplate.report.figures import plot_fit, save_figure
 
@@ -106,7 +106,7 @@ def _truth_beside_estimate(
 ) -> tuple[Table, int, int]:
     """The table of a stage, how many intervals hold the truth, and of how many."""
     from swashplate.identification.drive_model import DriveModel
-    from swashplate.identification.known_truth import true_value
+    from swashplate.identification.staging import true_value
 
     parts = {"card": "The control card", "pump": "Pump and motor"}
     name = assessment.stage.stage.name

@@ -19,7 +19,7 @@ from swashplate.cli.fit_output import (
 from swashplate.cli.inputs import parameters_of
 from swashplate.cli.judging import Wanted, judged_fit
 from swashplate.cli.terminal import Shown, long_work, note, say, show, side, waiting, working
-from swashplate.cli.validate import chosen_axis
+from swashplate.cli.validate import check_folder, chosen_axis
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
@@ -36,10 +36,11 @@ Examples:
   swashplate simulate fitted/drive.toml step:9
 """
 
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as of other programs."""
 FEWEST_DRAWS = 40
 """Of a bootstrap: one beyond each end of a 95 % interval."""
 
-Method = Literal["trf", "slsqp"]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
 Figures = Literal["svg", "pdf"]
 
@@ -100,9 +101,6 @@ def fit(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the starts that DIR holds already.")
     ] = False,
-    method: Annotated[
-        Method, typer.Option(help="Trust region on exact derivatives, or SQP by differences.")
-    ] = "trf",
     loss: Annotated[Loss, typer.Option(help="Robust losses forgive outliers.")] = "linear",
     report: Annotated[
         bool, typer.Option(help="Write report.html, one file that works offline.")
@@ -118,7 +116,8 @@ def fit(
     role 'validate', and says what the data can and cannot tell. Writes the drive
     as a parameter file that 'simulate' takes, the estimates with their intervals,
     and what 'report' needs to write the report again. Ctrl-C keeps the best so
-    far. The exit code is 1 if the result is not usable.
+    far, of several starts those that ended, and the exit code is 130. It is 1 if
+    the result is not usable.
     """
     from swashplate.campaign import Campaign
     from swashplate.executors import Dask, Processes
@@ -132,6 +131,7 @@ def fit(
             f"{bootstrap} draws do not reach the ends of a 95 % interval; take {FEWEST_DRAWS} or "
             "more, 1000 for smooth ones."
         )
+    check_folder(out)
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
         chosen = chosen_axis(campaign, axis)
@@ -151,11 +151,18 @@ def fit(
             )
 
         search = _search(starts, seed, executor, out, resume, shown) if starts else None
-        result = fitted(runs, nominal, plan, method=method, loss=loss, search=search, watch=watch)
+        result = fitted(runs, nominal, plan, loss=loss, search=search, watch=watch)
         if joint and len(plan.stages) > 1 and not result.interrupted:
             result = refined(result, runs, watch=watch)
     seconds = perf_counter() - begun
-    wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, method, loss)
+    if result.interrupted and starts:
+        last = result.stages[-1]
+        note(
+            f"Interrupted in the stage '{last.stage.name}': {last.solution.message}. The same "
+            "command with --resume goes on; nothing is written but the starts."
+        )
+        raise typer.Exit(INTERRUPTED)
+    wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, loss)
     found = judged_fit(campaign, chosen, runs, nominal, plan, result, wanted)
     lines = [*written(result, found.assessments, out, found.bootstraps), found.stored(out)]
     if report:
@@ -192,6 +199,7 @@ def fit(
         note(line)
     if result.interrupted:
         note("Interrupted: this is the best so far, not an optimum.")
+        raise typer.Exit(INTERRUPTED)
     if not found.verdict.usable:
         side.print(found.verdict.headline)
         raise typer.Exit(1)

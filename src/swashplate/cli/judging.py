@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from swashplate.executors import Executor
     from swashplate.identification.assessment import Assessment, RunQuality
     from swashplate.identification.bootstrap import Bootstrap
+    from swashplate.identification.cross_validation import CrossValidation
     from swashplate.identification.fit import Fit
-    from swashplate.identification.fit_file import StageProfile
-    from swashplate.identification.fold_results import CrossValidation
     from swashplate.identification.setup import Setup
-    from swashplate.identification.solving import Loss, Method
+    from swashplate.identification.solving import Loss
+    from swashplate.identification.storing import StageProfile
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -34,7 +34,6 @@ class Wanted:
     """Unknowns by name, or ``"all"``."""
     seed: int = 0
     executor: Executor | None = None
-    method: Method = "trf"
     loss: Loss = "linear"
 
 
@@ -134,8 +133,8 @@ def judged_fit(
 ) -> Judged:
     """Assess a fit, predict the runs held back, and compute what else was asked for."""
     from swashplate.identification.assessment import assess
-    from swashplate.identification.folds import cross_validate
-    from swashplate.identification.refits import bootstraps_of
+    from swashplate.identification.bootstrap import bootstraps_of
+    from swashplate.identification.cross_validation import cross_validate
     from swashplate.identification.validation import predict
     from swashplate.identification.verdict import verdict
 
@@ -154,7 +153,6 @@ def judged_fit(
                 folds=wanted.folds,
                 seed=wanted.seed,
                 executor=wanted.executor,
-                method=wanted.method,
                 loss=wanted.loss,
                 watch=lambda _, done: status.update(f"{done} of {wanted.folds} folds"),
             )
@@ -195,8 +193,8 @@ def _check(names: Sequence[str], assessments: Sequence[Assessment]) -> None:
 def _profiles(
     assessment: Assessment, wanted: Wanted, show: Callable[[str], None]
 ) -> list[StageProfile]:
-    from swashplate.identification.fit_file import StageProfile
-    from swashplate.identification.refits import profiles_of
+    from swashplate.identification.bootstrap import profiles_of
+    from swashplate.identification.storing import StageProfile
 
     name = assessment.stage.stage.name
     names = None

@@ -140,6 +140,17 @@ def made_folder(folder: Path) -> Path:
     return folder
 
 
+def check_folder(folder: Path) -> None:
+    """Make a folder and see to it that files can be written there, before long work."""
+    from tempfile import TemporaryFile
+
+    try:
+        with TemporaryFile(dir=made_folder(folder)):
+            pass
+    except OSError as error:
+        raise FileError(f"{folder} cannot be written to: {error.strerror or error}.") from None
+
+
 def _written(
     parameters: ParameterSet,
     campaign: Campaign,

@@ -11,8 +11,7 @@ if TYPE_CHECKING:
     import polars as pl
     from rich.table import Table
 
-    from swashplate.identification.assessment import RunQuality
-    from swashplate.identification.measures import Measures
+    from swashplate.identification.assessment import Measures, RunQuality
     from swashplate.identification.validation import ChannelErrors
 
 

@@ -1,7 +1,7 @@
 from .drive_model import DriveModel as DriveModel
-from .equation_model import OwnModel as OwnModel
-from .linearising import linearised_fit as linearised_fit
+from .linearised import linearised_fit as linearised_fit
 from .model import Linearised as Linearised
+from .model import OwnModel as OwnModel
 from .problem import Problem as Problem
 from .solving import Solution as Solution
 from .solving import solve as solve

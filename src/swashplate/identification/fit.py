@@ -14,15 +14,14 @@ from numpy.typing import NDArray
 from swashplate.__about__ import __version__
 from swashplate.campaign.experiment import Experiment
 from swashplate.executors import Executor, Serial
-from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.drives import at_rate_of
-from swashplate.identification.prior_weights import weighed
+from swashplate.identification.data_checks import check_sound, refuse_unsound
+from swashplate.identification.drive_model import DriveModel, at_rate_of
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Setup, Stage
-from swashplate.identification.solving import Loss, Method, Progress, Solution, solve
-from swashplate.identification.soundness import check_sound, refuse_unsound
+from swashplate.identification.solving import Loss, Progress, Solution, solve
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.starts import StartResult, sobol_starts, solve_from
+from swashplate.identification.uncertainty import weighed
 from swashplate.parameters.parameter_set import ParameterSet
 
 Array = NDArray[np.float64]
@@ -88,7 +87,6 @@ def fit(
     nominal: ParameterSet,
     setup: Setup,
     *,
-    method: Method = "trf",
     loss: Loss = "linear",
     tolerance: float = 1e-10,
     max_evaluations: int = 300,
@@ -107,7 +105,7 @@ def fit(
         card's filter one that holds at the rate of the runs.
     setup : Setup
         Stages and their free parameters.
-    method, loss, tolerance, max_evaluations :
+    loss, tolerance, max_evaluations :
         As of `solving.solve`, in each stage.
     threads : int, optional
         Threads over experiments; all cores by default. The result does not depend on it.
@@ -132,11 +130,15 @@ def fit(
         begin: Array | None = None
         results: tuple[StartResult, ...] = ()
         if search is not None and search.starts > 0:
-            results = _searched(stage, problem, search, method, tolerance, max_evaluations)
-            begin = np.array(min(results, key=lambda each: each.cost).vector)
+            results = _searched(stage, problem, search, tolerance, max_evaluations)
+            best = min(results, key=lambda each: each.cost)
+            begin = np.array(best.vector)
+            if len(results) <= search.starts:
+                solution = _stopped(best, len(results), 1 + search.starts)
+                stages.append(StageFit(stage, problem, solution, parameters, results))
+                break
         solved = partial(
             solve,
-            method=method,
             loss=loss,
             tolerance=tolerance,
             max_evaluations=max_evaluations,
@@ -202,7 +204,6 @@ def _searched(
     stage: Stage,
     problem: Problem,
     search: Search,
-    method: Method,
     tolerance: float,
     max_evaluations: int,
 ) -> tuple[StartResult, ...]:
@@ -214,25 +215,21 @@ def _searched(
         [problem.start, *sobol_starts(alone, search.starts, search.seed)],
         executor=search.executor,
         store=None if search.store is None else search.store / stage.name,
-        fingerprint=_fingerprint(stage, problem, search, method, tolerance, max_evaluations),
+        origin=_origin(stage, problem, tolerance, max_evaluations),
         resume=search.resume,
-        method=method,
         tolerance=tolerance,
         max_evaluations=max_evaluations,
         watch=None if watch is None else (lambda result, done: watch(stage.name, result, done)),
     )
 
 
-def _fingerprint(stage: Stage, problem: Problem, search: Search, *settings: object) -> str:
-    """Hash of all that the result of a start depends on."""
-    digest = blake2b(digest_size=16)
+def _origin(stage: Stage, problem: Problem, *settings: object) -> dict[str, str]:
+    """Fingerprints of all that the result of a start depends on."""
     model = problem.model
     assert isinstance(model, DriveModel)
     known = model.parameters
     forms = known.pressure_root, known.coulomb_sign, known.rate, sorted(known.options)
-    numbers = sorted(known.numbers.items())
-    words = (__version__, stage.model_dump_json(), search.seed, settings, numbers, forms)
-    digest.update(repr(words).encode())
+    digest = blake2b(digest_size=16)
     for experiment, weights in zip(problem.experiments, problem.weights, strict=True):
         arrays = [experiment.input.time, experiment.input.values]
         for name, weight in weights.items():
@@ -240,7 +237,31 @@ def _fingerprint(stage: Stage, problem: Problem, search: Search, *settings: obje
             arrays += [channel.time, channel.values, weight]
         for array in arrays:
             digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()
+    return {
+        "version of swashplate": __version__,
+        "stage of the set-up": _mark(stage.model_dump_json()),
+        "tolerances": _mark(settings),
+        "nominal values": _mark((sorted(known.numbers.items()), forms)),
+        "runs and their weights": digest.hexdigest(),
+    }
+
+
+def _mark(content: object) -> str:
+    return blake2b(repr(content).encode(), digest_size=8).hexdigest()
+
+
+def _stopped(best: StartResult, done: int, starts: int) -> Solution:
+    """The best of some starts as what an interrupted search found."""
+    return Solution(
+        np.array(best.vector),
+        best.cost,
+        best.start_cost,
+        best.evaluations,
+        False,
+        True,
+        f"interrupted after {done} of {starts} starts: the best of them",
+        best.seconds,
+    )
 
 
 def _named(watch: Callable[[str, Progress], None], name: str) -> Callable[[Progress], None]:

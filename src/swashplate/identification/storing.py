@@ -7,30 +7,148 @@ from dataclasses import dataclass
 from hashlib import blake2b
 from json import JSONDecodeError, loads
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict
 
 from swashplate.__about__ import __version__
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_text, validated
 from swashplate.errors import FileError, InputError
+from swashplate.identification.cross_validation import CrossValidation
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fit import Fit, StageFit, smooth
-from swashplate.identification.fit_file import (
-    FitFile,
-    StageProfile,
-    StoredSolution,
-    StoredStage,
-    profile_entry,
-    profile_of,
-)
-from swashplate.identification.fold_results import CrossValidation
-from swashplate.identification.prior_weights import with_worths
+from swashplate.identification.profile import Ending, Point, Profile, Threshold
+from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Solution
 from swashplate.identification.staging import stage_problem
+from swashplate.identification.starts import StartResult
+from swashplate.identification.uncertainty import with_worths
 from swashplate.parameters.files import dump_set, read_set
 from swashplate.tables import write_text
+
+Numbers = tuple[float, ...]
+
+
+class StageProfile(NamedTuple):
+    """A profile, and the stage whose unknown it is of."""
+
+    stage: str
+    profile: Profile
+
+
+class Entry(BaseModel):
+    """A table of the file; a key that it does not know is refused."""
+
+    model_config = ConfigDict(extra="forbid", ser_json_inf_nan="strings")
+
+
+class StoredSolution(Entry):
+    """As `solving.Solution`."""
+
+    vector: Numbers
+    cost: float
+    start_cost: float
+    evaluations: int
+    converged: bool
+    interrupted: bool
+    message: str
+    seconds: float
+
+
+class StoredStage(Entry):
+    """How a stage ended, and its starts."""
+
+    name: str
+    unknowns: tuple[str, ...]
+    solution: StoredSolution
+    starts: tuple[StartResult, ...]
+    worths: tuple[float, ...] = ()
+    """Of the priors, in the order of the unknowns."""
+
+
+class StoredPoint(Entry):
+    """As `profile_side.Point`."""
+
+    number: float
+    cost: float
+    vector: Numbers
+
+
+class StoredProfile(Entry):
+    """As `profiles.Profile`, with its stage."""
+
+    stage: str
+    index: int
+    cost: float
+    points: tuple[StoredPoint, ...]
+    threshold: Threshold
+    lower: float | None
+    upper: float | None
+    endings: tuple[Ending, Ending]
+    better: StoredPoint | None
+
+
+class FitFile(Entry):
+    """The whole file."""
+
+    format: int = 1
+    swashplate: str
+    axis: str
+    campaign: str
+    runs: dict[str, str]
+    """Name to fingerprint of each run that was fitted, in their order."""
+    nominal: str
+    """Parameter file of the drive that the fit began from."""
+    setup: Setup
+    stages: tuple[StoredStage, ...]
+    profiles: tuple[StoredProfile, ...]
+    folds: CrossValidation | None
+    notes: dict[str, str]
+
+
+def profile_entry(given: StageProfile) -> StoredProfile:
+    """A profile as it is stored."""
+    profile = given.profile
+    return StoredProfile(
+        stage=given.stage,
+        index=profile.index,
+        cost=profile.cost,
+        points=tuple(_point_entry(each) for each in profile.points),
+        threshold=profile.threshold,
+        lower=profile.lower,
+        upper=profile.upper,
+        endings=profile.endings,
+        better=None if profile.better is None else _point_entry(profile.better),
+    )
+
+
+def _point_entry(point: Point) -> StoredPoint:
+    vector = tuple(map(float, point.vector))
+    return StoredPoint(number=point.number, cost=point.cost, vector=vector)
+
+
+def profile_of(entry: StoredProfile) -> StageProfile:
+    """A stored profile."""
+    return StageProfile(
+        entry.stage,
+        Profile(
+            entry.index,
+            entry.cost,
+            tuple(_point(each) for each in entry.points),
+            entry.threshold,
+            entry.lower,
+            entry.upper,
+            entry.endings,
+            None if entry.better is None else _point(entry.better),
+        ),
+    )
+
+
+def _point(entry: StoredPoint) -> Point:
+    return Point(entry.number, entry.cost, np.array(entry.vector))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fit import Fit, StageFit
-from swashplate.identification.gauges import GAUGES
-from swashplate.identification.intervals import Estimate, estimates
+from swashplate.identification.identifiability import GAUGES
+from swashplate.identification.uncertainty import Estimate, estimates
 from swashplate.identification.unknowns import Unknown
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.parameters.parameter_set import ParameterSet
@@ -93,7 +93,10 @@ def parameter_table(assessment: Assessment, truth: ParameterSet | None = None) -
         # the verdict says why there are no intervals
         quoted = white = [None] * len(stage.problem.unknowns)
     values = stage.values
-    at_bounds = stage.problem.unknowns.at_bounds(stage.solution.vector)
+    point = stage.problem.unknowns.at(stage.solution.vector)
+    sides = {-1: "lower", 1: "upper"}
+    ends = zip(point.names, point.at_bound, strict=True)
+    at_bounds = {name: sides.get(int(k)) for name, k in ends}
     rows, own = list[ParameterRow](), list[ParameterRow]()
     for name, unknown, estimate, narrow in zip(
         stage.problem.unknowns.names, stage.problem.unknowns, quoted, white, strict=True

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from swashplate.errors import InputError
-from swashplate.identification.assessment import Assessment, RunQuality
-from swashplate.identification.judgements import Statement
-from swashplate.identification.measures import Measures
-from swashplate.identification.named_tones import distinct
-from swashplate.identification.tones import Tone
+from swashplate.identification.assessment import Assessment, Measures, RunQuality
+from swashplate.identification.spectral_lines import Tone, distinct
 from swashplate.identification.validation import pooled
-from swashplate.identification.verdict import Verdict
+from swashplate.identification.verdict import Statement, Verdict
 from swashplate.report.display_units import display_unit
 from swashplate.report.fit_page.numbers import count, plain
 from swashplate.report.fit_page.runs import ShownRun, conditions

@@ -1,4 +1,4 @@
-"""What is left in residuals: their own correlation, and their correlation with the input."""
+"""Lack of fit: what is left in residuals that noise does not explain."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from swashplate.errors import InputError
-from swashplate.identification.autocorrelation import (
+from swashplate.identification.noise import (
     LONGEST,
     Grid,
     correlation_length,
@@ -18,6 +18,7 @@ from swashplate.identification.autocorrelation import (
 )
 
 Array = NDArray[np.float64]
+
 
 LONGEST_SHOWN = 2.0
 """Largest lag of the curves. [s]"""
