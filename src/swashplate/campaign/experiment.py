@@ -155,6 +155,11 @@ class Experiment:
             return self.stated_maneuver
         return self.recognised.name if self.recognised is not None else "free"
 
+    @property
+    def begins(self) -> Literal["rest", "steady"]:
+        """State of what a fit does not estimate: cut out of a motion, a card is settled."""
+        return "steady" if self.start in ("steady", "estimated") else "rest"
+
     @cached_property
     def duration(self) -> float:
         """From the first sample of the input to the last. [s]"""

@@ -63,7 +63,7 @@ def demo(
         found = judged_fit(campaign, "hoist", runs, start, setup, result, Wanted(seed=seed))
         shown = [_truth_beside_estimate(each, nominal, truth) for each in found.assessments]
         begin("writing the report")
-        lines = [*written(result, found.assessments, out), found.stored(out)]
+        lines = [*written(result, found.assessments, campaign, out), found.stored(out)]
         lines.append(found.reported(out, truth.parameters))
         lines.append(_drawn(found, truth, out))
     note(f"Campaign:  {path}")

@@ -164,7 +164,10 @@ def fit(
         raise typer.Exit(INTERRUPTED)
     wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, loss)
     found = judged_fit(campaign, chosen, runs, nominal, plan, result, wanted)
-    lines = [*written(result, found.assessments, out, found.bootstraps), found.stored(out)]
+    lines = [
+        *written(result, found.assessments, campaign, out, found.bootstraps),
+        found.stored(out),
+    ]
     if report:
         lines.append(found.reported(out))
     if figures is not None:

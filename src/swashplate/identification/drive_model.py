@@ -15,7 +15,6 @@ from swashplate.campaign.ammeter import signed_by_command
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.equations.observation import ObservedRecord
 from swashplate.equations.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
-from swashplate.equations.run import Start
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.model import EquationModel
 from swashplate.parameters.definitions import COLUMNS, REFINEMENTS
@@ -56,9 +55,8 @@ def current_record(experiment: Experiment) -> Record:
 def simulated_current(experiment: Experiment, parameters: ParameterSet) -> Record:
     """The signed current that a card makes of an experiment's command."""
     record = voltage_record(experiment)
-    start: Start = "steady" if experiment.start == "steady" else "rest"
     # refinements begin behind the card
-    run = simulate_drive(parameters.plain, record, start)
+    run = simulate_drive(parameters.plain, record, experiment.begins)
     return Record(run.fine("current"), record.start, record.rate, record.substeps)
 
 
@@ -96,7 +94,10 @@ def _record(experiment: Experiment, what: str) -> Record:
     rate = even_rate(time)
     if rate is not None and rate >= SLOWEST:
         own = record_of(values, rate, what=what, interpolation=interpolation)
-        return Record(own.values, float(time[0]), own.rate, own.substeps)
+        # the march joins the points of its grid by straight lines: of a command that is held, each
+        # stands for the step after it
+        held = 0.5 * own.step if interpolation == "previous" else 0.0
+        return Record(own.values, float(time[0]) + held, own.rate, own.substeps)
     return record_of(values, SOURCE_RATE, what=what, time=time, interpolation=interpolation)
 
 

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
-from swashplate.equations.run import Start
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel, Forces, current_record, voltage_record
 from swashplate.identification.identifiability import NAMED as NAMED_OTHERS
@@ -54,14 +53,14 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
     DomainError
         If the model does not hold under it.
     """
-    start: Start = "steady" if experiment.start == "steady" else "rest"
+    begins = experiment.begins
     try:
         if experiment.input.kind == "current":
             return simulate_pump(
-                parameters, current_record(experiment), start, experiment.start_pressure
+                parameters, current_record(experiment), begins, experiment.start_pressure
             )
         return simulate_drive(
-            parameters, voltage_record(experiment), start, experiment.start_pressure
+            parameters, voltage_record(experiment), begins, experiment.start_pressure
         )
     except InputError as error:
         raise InputError(f"{experiment.input.source}: {error}") from None

@@ -19,7 +19,6 @@ from swashplate.equations.march import output_of
 from swashplate.equations.observation import Observation, ObservedRecord
 from swashplate.equations.observation import Own as EngineOwn
 from swashplate.equations.record import Record, even_rate, gridded
-from swashplate.equations.run import Start
 from swashplate.errors import DomainError, InputError
 from swashplate.simulation.residuals import Ready
 
@@ -366,9 +365,8 @@ class EquationModel(ABC):
                     unknown=tuple(unknown),
                 )
             )
-        start: Start = "steady" if experiment.start == "steady" else "rest"
-        by, record, others = self.driven(experiment)
-        return ObservedRecord(record, observations, by, start, others)
+            by, record, others = self.driven(experiment)
+        return ObservedRecord(record, observations, by, experiment.begins, others)
 
 
 def _shifts(

@@ -42,6 +42,10 @@ Status = Literal[
 ]
 
 
+USELESS = 1e3
+"""Factor beyond which the interval of a positive unknown is not worth printing. [1]"""
+
+
 class Estimate(NamedTuple):
     """One unknown with what is known of its error."""
 
@@ -124,6 +128,9 @@ def estimates(
     with np.errstate(invalid="ignore"):
         lower = variables.to_values(variables.vector - distances[False])
         upper = variables.to_values(variables.vector + distances[True])
+    # of a positive unknown known to no better than a factor of a thousand nothing is known
+    reached = np.maximum(distances[False], distances[True])
+    vast = variables.logarithmic & np.isfinite(reached) & (reached > np.log(USELESS))
     made = []
     for k, name in enumerate(variables.names):
         value = float(variables.estimates[k])
@@ -132,7 +139,7 @@ def estimates(
             low = variables.at_bound[k] < 0
             side: Status = "at its lower bound" if low else "at its upper bound"
             made.append(Estimate(name, value, side, None, None, None, None))
-        elif not covariance.determined[k] or (below and above):
+        elif not covariance.determined[k] or (below and above) or vast[k]:
             made.append(Estimate(name, value, "undetermined", None, None, None, None))
         else:
             freedom = float(covariance.degrees_of_freedom[k])

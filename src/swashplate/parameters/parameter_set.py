@@ -21,7 +21,7 @@ from swashplate.parameters.rules import check_bounds, check_options, check_rules
 PressureRoot = Literal["published", "symmetric"]
 CoulombSign = Literal["smooth", "literal"]
 CardSwitch = Literal["sampled", "split"]
-Status = Literal["fitted", "assumed", "approximate", "inactive", "user"]
+Status = Literal["fitted", "fixed", "assumed", "approximate", "inactive", "user"]
 
 
 class Pair(NamedTuple):
