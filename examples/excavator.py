@@ -28,12 +28,13 @@ NOISE = 0.003  # what one unit of residual is [m]
 RATE = 150.0  # steps a second, some eight a sample [Hz]
 STROKE = 0.04  # half the stroke that a cylinder uses, roughly [m]
 MIDDLE = {"boom": 0.088, "stick": 0.080, "bucket": 0.060}  # of that stroke [m]
+QUICK = 1e6 / 4.8  # Z8 of the drive "neutral" for a lag of 1 s
 LINE = (
     Unknown("V_dz_plus", 1.0, 0.0, 2.0, "%"),
     Unknown("V_dz_minus", 1.0, 0.0, 2.0, "%"),
     Unknown("G1_plus", 0.02, 0.002, 0.5, "m/s/%", log=True),
     Unknown("G1_minus", 0.02, 0.002, 0.5, "m/s/%", log=True),
-    Unknown("Z8", 15.0, 2.0, 200.0, "1/s", log=True),
+    Unknown("Z8", 15.0 * QUICK, 2.0 * QUICK, 200.0 * QUICK, "sqrt(Pa)/(m s)", log=True),
     Unknown("tau", 0.08, 0.0, 0.3, "s"),
 )
 # Dead zones of 0.6 to 1.5 % duty and delays near 0.1 s stand in the description of the data; the
@@ -104,7 +105,8 @@ def since_anchor(channel: Channel, rows: np.ndarray) -> np.ndarray:
 def errors(tests: Campaign, left_out: Experiment) -> Iterator[np.ndarray]:
     """Errors [m] of the straight line and the valve in a trial that they were not fitted to."""
     others = tuple(e for e in tests.select(axis=left_out.axis) if e is not left_out)
-    line = DriveModel(Drive.preset("neutral").parameters)
+    # of the drive "neutral" an ampere is 2/3 Z10, here 1 m/s: its gains are speeds for a per cent
+    line = DriveModel(Drive.preset("neutral").replace(Z10=1.5).parameters)
     given, begin = Stroke(MIDDLE[left_out.axis]), {"position": "position"}
     own = OwnModel(valve, rate=RATE, given=given, begin=begin)
     for model, unknowns, starts in ((line, Unknowns(LINE), 2), (own, Unknowns(tuple(VALVE)), 1)):

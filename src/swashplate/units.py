@@ -28,7 +28,7 @@ def _written_out(unit: str) -> str:
 
 
 def _folded(unit: str) -> str:
-    plain = unit.lower().translate(str.maketrans({"⁻": "-", "−": "-", "¹": "1", "^": "", " ": ""}))
+    plain = unit.lower().translate(str.maketrans("⁻−¹", "--1", "^ "))
     return plain.replace(".", "").replace("(-1)", "-1")
 
 

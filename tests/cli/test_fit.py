@@ -1,4 +1,5 @@
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -52,6 +53,15 @@ def test_a_campaign_becomes_a_drive(done: Words, campaign: Path, tmp_path: Path)
     fitted = Drive.from_toml(tmp_path / "fitted" / "drive.toml")
     assert fitted["Z16"].value == pytest.approx((1.3e-4, 1.3e-4), rel=2e-3)
     assert fitted["J"].value == pytest.approx((0.26, 0.31), rel=2e-3)
+    # what is fitted says so, with campaign, date and interval; what is fixed, where it is from
+    parameters = fitted.parameters
+    assert (parameters["Z16"].status, parameters["Z9"].status) == ("fitted", "fixed")
+    assert re.fullmatch(
+        r"campaign\.toml, \d\d \w+ \d{4}; 95 %: plus \S+ to \S+; minus \S+ to \S+",
+        parameters["Z16"].source,
+    )
+    assert parameters["Z9"].source.startswith("hoist: ")
+    assert parameters.title.startswith("Virtual tests")
     assert "speed at the end" in done("simulate", "fitted/drive.toml", "step:4")
     header, *rows = (tmp_path / "fitted" / "estimates.csv").read_text("utf-8").splitlines()
     assert header.startswith("stage,unknown,unit,nominal,estimate")

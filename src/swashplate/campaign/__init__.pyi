@@ -19,6 +19,10 @@ from .experiment import Encoder as Encoder
 from .experiment import Experiment as Experiment
 from .experiment import InputSignal as InputSignal
 from .experiment import Source as Source
+from .guess import Guess as Guess
+from .guess import fit_configuration as fit_configuration
+from .guess import guess_drive as guess_drive
+from .guess import guessed_set as guessed_set
 from .quality import Quality as Quality
 from .quality import beyond_the_card as beyond_the_card
 from .quality import campaign_findings as campaign_findings

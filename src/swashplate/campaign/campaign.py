@@ -527,16 +527,15 @@ def _stamps(clock: schema.Clock, main: schema.Clock, columns: _Columns, size: in
     begin, of_main = _clock(main, columns) if main.column is not None else (numbers, factor)
     if of_main * begin[0] < SINCE_1970:
         return factor * numbers + clock.offset
-    if main.column == clock.column:
-        # the difference first: a float64 keeps a thousandth of a millisecond of such a stamp
-        return factor * (numbers - begin[0]) + clock.offset
-    return factor * numbers - of_main * begin[0] + clock.offset
+    # the difference first: a float64 keeps a thousandth of a millisecond of such a stamp
+    since: Array = numbers - begin[0] * of_main / factor
+    return factor * since + clock.offset
 
 
 def _clock(clock: schema.Clock, columns: _Columns) -> tuple[Array, float]:
     """Numbers of a column of time, and the size of their unit [s]."""
     assert clock.column is not None  # the schema sees to a column or a rate
-    column = columns.found[clock.column]
+    column, numbers = columns.found[clock.column], columns.values[clock.column]
     unit = clock.unit or unit_of(column, clock.column, "s")
     factor = to_si(1.0, unit, "s", f"{columns.log.path}: column '{column.name}' (the time)")
-    return columns.values[clock.column], factor
+    return numbers, factor

@@ -274,7 +274,7 @@ def _has_sign(current: Array) -> bool:
 def signed(currents: Sequence[Array]) -> bool:
     """Whether a current of several runs has a sign: it goes to a quarter of minus its peak."""
     finite = [each[np.isfinite(each)] for each in currents if np.isfinite(each).any()]
-    ends = np.array([np.quantile(each, (0.002, 0.998)) for each in finite] or [(0.0, 0.0)])
+    ends = np.array([[*np.quantile(each, (0.002, 0.998))] for each in finite] or [[0.0, 0.0]])
     noise = max((_noise(each) for each in finite), default=0.0)
     return bool(-ends[:, 0].min() > max(0.25 * ends[:, 1].max(), SURE * noise))
 

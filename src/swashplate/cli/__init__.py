@@ -23,6 +23,7 @@ from swashplate.cli import (
     excite,
     fit,
     full_order,
+    guess,
     limits,
     linearize,
     parameters,
@@ -133,6 +134,7 @@ app.command("show", epilog=parameters.SHOW_EXAMPLES, rich_help_panel="Simulate")
 )
 app.command("rig", epilog=rig.EXAMPLES, rich_help_panel="Test")(rig.rig)
 app.add_typer(campaign.app, name="campaign", rich_help_panel="Test")
+app.command("guess", epilog=guess.EXAMPLES, rich_help_panel="Identify")(guess.guess)
 app.command("excitation", epilog=excite.EXAMPLES, rich_help_panel="Identify")(excite.excitation)
 app.command("fit", epilog=fit.EXAMPLES, rich_help_panel="Identify")(fit.fit)
 app.command("validate", epilog=validate.EXAMPLES, rich_help_panel="Identify")(validate.validate)
