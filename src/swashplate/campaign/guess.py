@@ -39,6 +39,8 @@ FEWEST = 40
 """Mean speeds that tell anything."""
 SEEN = 1.02
 """A limit without which the squared error grows by less than this is not seen in the logs. [1]"""
+NEXT_TO_NOTHING = 1e-4
+"""Nor is one by less than this share of all that moves. [1]"""
 ONE_WAY = 0.05
 """A way that gets less than this share of the command of the other is not exercised. [1]"""
 ANGLE = 0.2
@@ -322,7 +324,7 @@ def _searched(runs: Sequence[_Run], size: Array, scale: float) -> _Numbers:
         without[index] = 30.0
         rough = residuals(without, limited=True) / 0.05
         loss = 0.05**2 * float(np.sum(np.sqrt(1.0 + rough**2) - 1.0))
-        if loss < SEEN * cost:
+        if loss < SEEN * cost + NEXT_TO_NOTHING * float(np.sum((speeds / scale) ** 2)):
             whole = without
     made = numbers_of(whole, limited=True)
     return replace(

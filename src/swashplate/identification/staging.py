@@ -103,7 +103,7 @@ def setup_of(campaign: Campaign, axis: str, name: str | None = None) -> Setup:
     except ParameterError:
         raise InputError(
             f"There is no packaged set-up for the drive '{drive}': give one of your own, a .toml "
-            "file with stages and free parameters."
+            "file with stages and free parameters; 'swashplate guess' reads one off the logs."
         ) from None
 
 

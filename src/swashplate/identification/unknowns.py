@@ -59,9 +59,10 @@ class Unknown:
                 "the lower one first, are needed."
             )
         if not self.low <= self.start <= self.high:
+            hint = "" if isfinite(self.start) else ", as 'swashplate guess' reads one off the logs"
             raise ParameterError(
                 f"{self.name} begins at {self.start:g}, outside its bounds {self.low:g} and "
-                f"{self.high:g}."
+                f"{self.high:g}; give the drive that the fit begins from another value{hint}."
             )
         if self.log and self.low <= 0.0:
             raise ParameterError(
