@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -141,14 +142,18 @@ def made_folder(folder: Path) -> Path:
 
 
 def check_folder(folder: Path) -> None:
-    """Make a folder and see to it that files can be written there, before long work."""
-    from tempfile import TemporaryFile
+    """See to it, before long work, that a folder can be made and written to; nothing is made yet.
 
-    try:
-        with TemporaryFile(dir=made_folder(folder)):
-            pass
-    except OSError as error:
-        raise FileError(f"{folder} cannot be written to: {error.strerror or error}.") from None
+    Raises
+    ------
+    FileError
+        If it cannot.
+    """
+    there = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
+    if not there.is_dir():
+        raise FileError(f"{folder} cannot be made: {there} is no folder.")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise FileError(f"{folder} cannot be written to: {there} is read-only or another user's.")
 
 
 def _written(
