@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from swashplate.cli.arguments import AxisName, CampaignPath
-from swashplate.cli.inputs import parameters_of
+from swashplate.cli.arguments import AxisName, CampaignPath, OwnModel
+from swashplate.cli.inputs import model_parameters_of, parameters_of
 from swashplate.cli.terminal import note, say, show, side, working
 from swashplate.cli.validation_tables import (
     MEASURES,
@@ -26,8 +26,8 @@ from swashplate.errors import FileError, InputError
 if TYPE_CHECKING:
     from swashplate.campaign.campaign import Campaign
     from swashplate.identification.assessment import RunQuality
+    from swashplate.identification.staging import Parameters
     from swashplate.identification.verdict import Verdict
-    from swashplate.parameters.parameter_set import ParameterSet
 
 EXAMPLES = """\
 Examples:
@@ -50,6 +50,7 @@ def validate(
     ],
     path: CampaignPath = Path("campaign.toml"),
     axis: AxisName = None,
+    model: OwnModel = None,
     role: Annotated[
         Role, typer.Option(help="Runs that were held back, those to fit, or both.")
     ] = "validate",
@@ -80,7 +81,7 @@ def validate(
     if figures is not None and out is None:
         raise InputError("--figures needs a folder to write them to: give --out DIR.")
     with working(f"Reading {path}"):
-        parameters = parameters_of(drive)
+        parameters: Parameters | None = None if model else parameters_of(drive)
         campaign = Campaign.from_toml(path)
         chosen = chosen_axis(campaign, axis)
         wanted = ("fit", "validate") if role == "all" else (role,)
@@ -91,6 +92,9 @@ def validate(
             "another one is asked for with --role."
         )
     with working("Predicting"):
+        if parameters is None:
+            assert model is not None
+            parameters = model_parameters_of(drive, model, runs)
         predicted = predict(parameters, runs)
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
@@ -157,7 +161,7 @@ def check_folder(folder: Path) -> None:
 
 
 def _written(
-    parameters: ParameterSet,
+    parameters: Parameters,
     campaign: Campaign,
     predicted: Sequence[RunQuality],
     judged: Verdict,
