@@ -38,7 +38,7 @@ def campaign(case, seed, axis):
     from swashplate import Campaign, Drive
     from swashplate.campaign import rig
     from swashplate.identification.assessment import assess
-    from swashplate.identification.fit import fit
+    from swashplate.identification.fitting import fit
     from swashplate.identification.setup import load_setup
     from swashplate.identification.staging import drawn, true_value
 
@@ -56,7 +56,7 @@ def campaign(case, seed, axis):
         read = Campaign.from_toml(rig.write(tests, Path(folder) / "virtual"))
         runs = read.select(role="fit")
     rows = []
-    for each in assess(fit(runs, nominal.parameters, setup, threads=1).stages):
+    for each in assess(fit(nominal.parameters, runs, setup, threads=1).stages):
         problem = each.stage.problem
         for unknown, estimate in zip(problem.unknowns, each.uncertainty.estimates, strict=True):
             true = true_value(unknown, problem.model, truth.parameters)

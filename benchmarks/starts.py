@@ -15,7 +15,7 @@ from statistics import median
 from swashplate import Campaign
 from swashplate.campaign import rig
 from swashplate.executors import Processes
-from swashplate.identification.fit import fit, smooth
+from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import load_setup
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.starts import sobol_starts, solve_from
@@ -44,7 +44,7 @@ def main() -> None:
     name = wanted.setup or wanted.axis
     setup = load_setup(name)
     nominal = smooth(campaign.drive(wanted.axis).parameters)
-    staged = fit(runs, nominal, setup)
+    staged = fit(nominal, runs, setup)
     print(
         "| set-up | stage | unknowns | solver | reach the best | within twice | evaluations | s |"
     )

@@ -68,8 +68,8 @@ def validated(content: Any, model: type[Model], origin: str) -> Model:
         raise ParameterError(f"{origin}: {_sentence(found[0], model, found)}.") from None
 
 
-def read_json(path: str | Path, model: type[Model]) -> Model:
-    """A JSON file checked against a schema: a number is no text, and a text no number.
+def read_json(path: str | Path, model: type[Model], *, strict: bool = True) -> Model:
+    """A JSON file checked against a schema; strictly, a text is no number, not even `"12"`.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def read_json(path: str | Path, model: type[Model]) -> Model:
 
     text = read_text(path)
     try:
-        return model.model_validate_json(text, strict=True)
+        return model.model_validate_json(text, strict=strict)
     except ValidationError as error:
         found = error.errors()
         if found[0]["type"] == "json_invalid":

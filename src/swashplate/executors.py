@@ -18,6 +18,9 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 Shared = TypeVar("Shared")
 
+LOOK = 2.0
+"""How often a client looks whether its cluster is still there, while nothing ends. [s]"""
+
 
 class Executor(Protocol):
     """Runs one function over many items; all give the same results, in any order."""
@@ -185,29 +188,35 @@ class Dask:
         if find_spec("distributed") is None:
             raise InputError("A cluster needs Dask: install swashplate with its extra 'dask'.")
         from concurrent.futures import CancelledError
+        from queue import Empty, Queue
 
-        from distributed import Client, as_completed
+        from distributed import Client, Future
 
         try:
             client = Client(self.address, timeout=10, set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(f"No Dask scheduler answers at {self.address}: {error}.") from None
-        done = 0
+        ended: Queue[Future] = Queue()
         with client:
             try:
                 sent = client.scatter(shared, broadcast=True, hash=False)
-                futures = {
-                    client.submit(function, sent, item, pure=False, retries=self.retries): k
-                    for k, item in enumerate(items)
-                }
-                finished = as_completed(list(futures), loop=client.loop, with_results=True)
-                for future, result in finished:
-                    yield futures.pop(future), result
-                    done += 1
+                waiting = {}
+                for k, item in enumerate(items):
+                    future = client.submit(function, sent, item, pure=False, retries=self.retries)
+                    waiting[future.key] = k, future
+                    future.add_done_callback(ended.put)
+                while waiting:
+                    try:
+                        future = ended.get(timeout=LOOK)
+                    except Empty:
+                        if client.status in ("running", "connecting"):
+                            continue
+                        raise ConnectionError from None
+                    yield waiting.pop(future.key)[0], future.result()
             except (OSError, CancelledError) as error:
                 raise InputError(
-                    f"The Dask scheduler at {self.address} was lost after {done} of {len(items)} "
-                    f"pieces of work ({error or type(error).__name__}); start it again, and resume."
+                    f"The Dask scheduler at {self.address} was lost "
+                    f"({type(error).__name__}): start it and this again."
                 ) from None
 
 

@@ -6,7 +6,7 @@ import pytest
 from swashplate import Drive, maneuvers
 from swashplate.identification.drive_model import Forces
 from swashplate.identification.excitation import acting, activation, need_of
-from swashplate.identification.fit import smooth
+from swashplate.identification.fitting import smooth
 from swashplate.identification.unknowns import Unknown
 
 HOIST = Drive(smooth(Drive.preset("hoist").parameters))

@@ -25,7 +25,7 @@ from swashplate.identification.experiment_design import (
     judge_sensors,
     measurable,
 )
-from swashplate.identification.fit import fit, smooth
+from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import Free, GivenPrior, Setup, Stage, load_setup
 from swashplate.identification.unknowns import Unknowns
 
@@ -182,7 +182,7 @@ def test_what_is_known_is_what_a_fit_of_the_same_tests_knows(hoist_tests: Campai
     """Coloured residuals and free zeros of the encoder: neither makes the errors another story."""
     setup = load_setup("hoist")
     runs = hoist_tests.select(role="fit")
-    found = fit(runs, Drive.preset("hoist").parameters, setup)
+    found = fit(Drive.preset("hoist").parameters, runs, setup)
     known = bench(found.parameters, setup, runs, fitted=True)
     now = np.sqrt(np.diag(np.linalg.inv(known.present.T @ known.present)))
     errors = {}

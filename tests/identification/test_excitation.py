@@ -10,7 +10,7 @@ import pytest
 from swashplate import Channel, Drive, Experiment, maneuvers
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.identification.excitation import Outlook, excitation, outlook
-from swashplate.identification.fit import smooth
+from swashplate.identification.fitting import smooth
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.setup import Free, GivenForces, Stage
 from swashplate.identification.unknowns import Unknowns

@@ -9,7 +9,7 @@ from swashplate import Drive
 from swashplate.campaign import rig
 from swashplate.campaign.campaign import Campaign
 from swashplate.identification.assessment import assess
-from swashplate.identification.fit import Fit, fit
+from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.noise import Covariance
 from swashplate.identification.setup import load_setup
 from swashplate.identification.solving import solve
@@ -27,7 +27,7 @@ def staged(tmp_path_factory: pytest.TempPathFactory) -> tuple[Campaign, Fit]:
     virtual = rig.run("hoist", {name: tests[name] for name in names}, seed=3, perturb=0.05)
     campaign = Campaign.from_toml(rig.write(virtual, tmp_path_factory.mktemp("t") / "virtual"))
     return campaign, fit(
-        campaign.experiments, Drive.preset("hoist").parameters, load_setup("hoist")
+        Drive.preset("hoist").parameters, campaign.experiments, load_setup("hoist")
     )
 
 

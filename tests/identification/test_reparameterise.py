@@ -14,7 +14,7 @@ from swashplate.identification.excitation import (
     propose,
     proposed_setup,
 )
-from swashplate.identification.fit import smooth
+from swashplate.identification.fitting import smooth
 from swashplate.identification.setup import Free, GivenForces, Setup, Stage, load_setup, setup_text
 
 HOIST = Drive(smooth(Drive.preset("hoist").parameters))

@@ -1,5 +1,6 @@
 """Problems, solvers and starts on a model whose optimum is known."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -265,6 +266,41 @@ def test_results_of_another_fit_are_not_resumed(problem: Problem, tmp_path: Path
         solve_from(problem, starts, store=tmp_path, origin={"data": "x"})
     with pytest.raises(FileError, match="its data differ"):
         solve_from(problem, starts, store=tmp_path, origin={"data": "y"}, resume=True)
-    (tmp_path / "start-00000.json").write_text("{", "utf-8")
-    with pytest.raises(FileError, match="is no result of a start"):
+
+
+POISON = {
+    "cut": (lambda text: text[:40], "not JSON"),
+    "empty": (lambda text: "", "not JSON"),
+    "nested": (lambda text: "[" * 100_000, "not JSON: recursion limit"),
+    "text for a number": (lambda text: re.sub(r'"cost": [^,]+', '"cost": "low"', text), "cost"),
+    "no number": (lambda text: re.sub(r'"cost": [^,]+', '"cost": NaN', text), "cost"),
+    "text for a vector": (
+        lambda text: re.sub(r'"vector": \[[^]]+\]', '"vector": "abc"', text),
+        "vector",
+    ),
+    "nested vector": (
+        lambda text: re.sub(r'"vector": \[[^]]+\]', '"vector": [[1.0, 2.0]]', text),
+        "vector",
+    ),
+    "wrong length": (
+        lambda text: re.sub(r'"vector": \[[^]]+\]', '"vector": [1.0]', text),
+        "starts differ",
+    ),
+    "other start": (
+        lambda text: re.sub(r'"start": \[[^]]+\]', '"start": [0.0, 1.0]', text),
+        "starts differ",
+    ),
+    "a key more": (lambda text: text.replace('"cost"', '"more": 1, "cost"'), "more"),
+    "no object": (lambda text: "[1]", "no result of a start"),
+}
+
+
+@pytest.mark.parametrize(("poison", "sentence"), POISON.values(), ids=POISON)
+def test_a_damaged_start_is_refused(problem: Problem, tmp_path: Path, poison, sentence) -> None:
+    starts = list(sobol_starts(problem, 1, seed=2))
+    solve_from(problem, starts, store=tmp_path, origin={"data": "x"})
+    path = tmp_path / "start-00000.json"
+    path.write_text(poison(path.read_text("utf-8")), "utf-8")
+    with pytest.raises(FileError, match=f"start-00000.json.*{sentence}") as caught:
         solve_from(problem, starts, store=tmp_path, origin={"data": "x"}, resume=True)
+    assert len(str(caught.value)) < 500

@@ -172,7 +172,7 @@ def _bench(
 ) -> Bench:
     from swashplate.campaign import Campaign
     from swashplate.identification.experiment_design import bench
-    from swashplate.identification.fit import smooth
+    from swashplate.identification.fitting import smooth
     from swashplate.identification.setup import load_setup
     from swashplate.identification.staging import setup_of
 

@@ -40,7 +40,7 @@ def demo(
     """
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
-    from swashplate.identification.fit import fit
+    from swashplate.identification.fitting import fit
     from swashplate.identification.setup import load_setup
     from swashplate.identification.staging import drawn
 
@@ -57,7 +57,7 @@ def demo(
         begun = perf_counter()
         runs = campaign.select(role="fit")
         start = campaign.drive("hoist").parameters
-        result = fit(runs, start, setup)
+        result = fit(start, runs, setup)
         seconds = perf_counter() - begun
         begin("judging what the data tell")
         found = judged_fit(campaign, "hoist", runs, start, setup, result, Wanted(seed=seed))

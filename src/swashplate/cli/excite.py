@@ -89,7 +89,7 @@ def excitation(
     from swashplate.campaign import Campaign
     from swashplate.identification.data_checks import check_sound, refuse_unsound
     from swashplate.identification.excitation import outlook, propose, proposed_setup
-    from swashplate.identification.fit import smooth
+    from swashplate.identification.fitting import smooth
     from swashplate.identification.setup import setup_text
     from swashplate.identification.staging import setup_of
     from swashplate.tables import write_text

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from swashplate.cli.arguments import AxisName, CampaignPath
+from swashplate.cli.arguments import AxisName, CampaignPath, OwnModel
 from swashplate.cli.fit_output import (
     estimates_table,
     folds_table,
@@ -23,8 +23,9 @@ from swashplate.cli.validate import check_folder, chosen_axis
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
-    from swashplate.identification.fit import Search
+    from swashplate.identification.fitting import Search
     from swashplate.identification.solving import Progress
+    from swashplate.identification.staging import Parameters
     from swashplate.identification.starts import StartResult
 
 EXAMPLES = """\
@@ -33,6 +34,7 @@ Examples:
   swashplate fit virtual/campaign.toml --out fitted
   swashplate fit harbour/campaign.toml --setup mine.toml --starts 50 --seed 1
   swashplate fit harbour/campaign.toml --folds 5 --bootstrap 1000 --profile Z16_plus
+  swashplate fit valve/campaign.toml --model valve.py
   swashplate simulate fitted/drive.toml step:9
 """
 
@@ -60,6 +62,7 @@ def fit(
             show_default=False,
         ),
     ] = None,
+    model: OwnModel = None,
     joint: Annotated[
         bool,
         typer.Option("--joint", help="After the stages all unknowns at once, through the chain."),
@@ -110,7 +113,7 @@ def fit(
         typer.Option(help="Figures for print as well, in DIR/figures.", show_default=False),
     ] = None,
 ) -> None:
-    """Identify a drive from its tests.
+    """Identify a drive, or a model of your own, from its tests.
 
     Fits the runs with the role 'fit', stage after stage, predicts those with the
     role 'validate', and says what the data can and cannot tell. Writes the drive
@@ -121,8 +124,9 @@ def fit(
     """
     from swashplate.campaign import Campaign
     from swashplate.executors import Dask, Processes
-    from swashplate.identification.fit import fit as fitted
-    from swashplate.identification.fit import refined
+    from swashplate.identification.fitting import fit as fitted
+    from swashplate.identification.fitting import refined
+    from swashplate.identification.own_model import ModelSetup
     from swashplate.identification.solving import longest_left
     from swashplate.identification.staging import setup_of
 
@@ -132,14 +136,22 @@ def fit(
             "more, 1000 for smooth ones."
         )
     check_folder(out)
+    if model is not None and (setup is not None or begin is not None or joint):
+        raise InputError(f"{model} says what is free and where it begins: leave out the others.")
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
         chosen = chosen_axis(campaign, axis)
-        plan = setup_of(campaign, chosen, setup)
-        nominal = parameters_of(begin) if begin is not None else campaign.drive(chosen).parameters
         runs = campaign.select(axis=chosen, role="fit")
         if not runs:
             raise InputError(f"{path}: no run of the axis '{chosen}' has the role 'fit'.")
+        nominal: Parameters
+        if model is not None:
+            nominal = ModelSetup.from_file(model).nominal(runs)
+            plan = nominal.setup.setup
+        else:
+            plan = setup_of(campaign, chosen, setup)
+            drive = campaign.drive(chosen) if begin is None else None
+            nominal = parameters_of(begin or "") if drive is None else drive.parameters
     executor = Dask(dask) if dask is not None else Processes(jobs or None)
     begun = perf_counter()
     with long_work("Fitting") as shown:
@@ -151,7 +163,7 @@ def fit(
             )
 
         search = _search(starts, seed, executor, out, resume, shown) if starts else None
-        result = fitted(runs, nominal, plan, loss=loss, search=search, watch=watch)
+        result = fitted(nominal, runs, plan, loss=loss, search=search, watch=watch)
         if joint and len(plan.stages) > 1 and not result.interrupted:
             result = refined(result, runs, watch=watch)
     seconds = perf_counter() - begun
@@ -213,7 +225,7 @@ def _search(
     starts: int, seed: int, executor: object, out: Path, resume: bool, shown: Shown
 ) -> Search:
     from swashplate.executors import Dask, Processes
-    from swashplate.identification.fit import Search
+    from swashplate.identification.fitting import Search
     from swashplate.identification.starts import time_left
 
     assert isinstance(executor, Processes | Dask)

@@ -16,9 +16,10 @@ if TYPE_CHECKING:
     from swashplate.identification.assessment import Assessment, RunQuality
     from swashplate.identification.bootstrap import Bootstrap
     from swashplate.identification.cross_validation import CrossValidation
-    from swashplate.identification.fit import Fit
+    from swashplate.identification.fitting import Fit
     from swashplate.identification.setup import Setup
     from swashplate.identification.solving import Loss
+    from swashplate.identification.staging import Parameters
     from swashplate.identification.storing import StageProfile
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
@@ -126,7 +127,7 @@ def judged_fit(
     campaign: Campaign,
     axis: str,
     runs: Sequence[Experiment],
-    nominal: ParameterSet,
+    nominal: Parameters,
     plan: Setup,
     result: Fit,
     wanted: Wanted,

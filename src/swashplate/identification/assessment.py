@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import InputError
-from swashplate.identification.fit import StageFit
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.lack_of_fit import ResidualTest, residual_test
 from swashplate.identification.linearised import LinearisedFit, linearised_fit

@@ -16,7 +16,7 @@ from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.drive_model import DriveModel, simulated_current
-from swashplate.identification.fit import StageFit
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.linearised import LinearisedFit
 from swashplate.identification.noise import (
     Grid,

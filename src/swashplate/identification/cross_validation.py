@@ -14,12 +14,11 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Measures, RunQuality
-from swashplate.identification.fit import Fit, fit, smooth
+from swashplate.identification.fitting import Fit, fit, smooth
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Loss
-from swashplate.identification.staging import stage_problem
+from swashplate.identification.staging import Parameters, stage_problem
 from swashplate.identification.validation import predict, with_speeds
-from swashplate.parameters.parameter_set import ParameterSet
 
 Array = NDArray[np.float64]
 
@@ -198,7 +197,7 @@ class _Task:
     """What the fits of all folds share."""
 
     experiments: tuple[Experiment, ...]
-    nominal: ParameterSet
+    nominal: Parameters
     setup: Setup
     loss: Loss
     tolerance: float
@@ -213,7 +212,7 @@ class _Item(NamedTuple):
 
 def cross_validate(
     experiments: Sequence[Experiment],
-    nominal: ParameterSet,
+    nominal: Parameters,
     setup: Setup,
     *,
     folds: int = 5,
@@ -230,7 +229,7 @@ def cross_validate(
     ----------
     experiments : sequence of Experiment
         The runs of the fit.
-    nominal : ParameterSet
+    nominal : ParameterSet or ModelParameters
         Where each fit begins: not at the fit to all runs, which has seen those that are held out.
     setup : Setup
         Stages and free parameters.
@@ -331,8 +330,8 @@ def _fold(task: _Task, item: _Item) -> Fold:
     names = tuple(each.name for each in held)
     try:
         result = fit(
-            others,
             task.nominal,
+            others,
             task.setup,
             loss=task.loss,
             tolerance=task.tolerance,

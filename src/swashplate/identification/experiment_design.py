@@ -16,7 +16,7 @@ from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Sou
 from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import CURRENTS, SIGNALS, Part
+from swashplate.identification.drive_model import CURRENTS, SIGNALS
 from swashplate.identification.linearised import (
     TOLERANCE,
     LinearisedFit,
@@ -100,7 +100,7 @@ def assumed_sensors(drive: Drive, kinds: Sequence[ChannelKind]) -> tuple[Sensor,
     return tuple(made)
 
 
-def measurable(part: Part, kinds: Sequence[ChannelKind]) -> tuple[ChannelKind, ...]:
+def measurable(part: str, kinds: Sequence[ChannelKind]) -> tuple[ChannelKind, ...]:
     """Kinds of sensor that tell of a part of the drive."""
     return tuple(
         kind for kind in kinds if part == "chain" or (kind in CURRENTS) == (part == "card")

@@ -82,7 +82,10 @@ class Stage(Entry):
     """One fit: a part of the drive against its channels."""
 
     name: str
-    part: Literal["card", "pump", "chain"]
+    part: Literal["card", "pump", "chain", "model"] = Field(
+        description="What is simulated: the control card, pump and motor, the whole chain; 'model' "
+        "is for models of one's own, given by --model."
+    )
     current: Literal["simulated", "measured"] = Field(
         "simulated",
         description="What drives the pump alone: the fitted card's current, or what was measured: "

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import DomainError
+from swashplate.identification.unknowns import Vector
 
 Array = NDArray[np.float64]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
@@ -102,7 +103,7 @@ def longest_left(progress: Progress) -> float | None:
 class Solution:
     """The optimum that a solver reached."""
 
-    vector: Array
+    vector: Vector
     cost: float
     """Half the weighted sum of squares; with a robust loss, of the loss."""
     start_cost: float

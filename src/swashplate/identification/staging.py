@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.campaign import applying, inside
 from swashplate.campaign.campaign import Campaign
@@ -21,6 +22,7 @@ from swashplate.identification.drive_model import (
     measured_current,
     simulated_current,
 )
+from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
@@ -64,6 +66,9 @@ def weighted(experiment: Experiment, stage: Stage) -> Experiment:
     return replace(experiment, channels=channels)
 
 
+Array = NDArray[np.float64]
+Parameters = ParameterSet | ModelParameters
+"""The numbers of what is fitted: a drive, or a model of one's own."""
 LARGEST_START_PRESSURE = 4e6
 """Bound of a free pressure at the start where the set-up gives none. [Pa]"""
 
@@ -109,18 +114,18 @@ def setup_of(campaign: Campaign, axis: str, name: str | None = None) -> Setup:
 
 def stage_problem(
     stage: Stage,
-    parameters: ParameterSet,
+    parameters: Parameters,
     experiments: Sequence[Experiment],
     *,
     threads: int | None = None,
-) -> DriveProblem:
+) -> Problem:
     """The problem of a stage.
 
     Parameters
     ----------
     stage : Stage
         What is free and what is fitted.
-    parameters : ParameterSet
+    parameters : ParameterSet or ModelParameters
         Nominal values, those of earlier stages already found.
     experiments : sequence of Experiment
         The runs to fit.
@@ -135,6 +140,10 @@ def stage_problem(
     ParameterError
         If a free parameter is unknown or its bounds are wrong.
     """
+    if isinstance(parameters, ModelParameters):
+        return parameters.setup.problem(experiments, threads=threads or available_cores())
+    if stage.part == "model":
+        raise InputError("part = 'model' needs a model of your own, not a drive.")
     channels = _channels(stage, experiments)
     runs = tuple(each for each in experiments if any(name in each.channels for name in channels))
     check_weights(stage, runs, channels)
@@ -166,6 +175,22 @@ def stage_problem(
     )
 
 
+def with_estimates(parameters: Parameters, problem: Problem, vector: Array) -> Parameters:
+    """The parameters with what a stage found, at a point of its problem.
+
+    Raises
+    ------
+    DomainError
+        If a value breaks a rule.
+    """
+    found = problem.unknowns.targets(vector, "")
+    if isinstance(parameters, ModelParameters):
+        numbers = {**parameters.numbers, **found}
+        return ModelParameters(parameters.setup, numbers, problem.scales)
+    assert isinstance(problem.model, DriveModel)
+    return problem.model.parameters_at(found)
+
+
 def _channels(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, ...]:
     """Names of the channels that a stage fits."""
     kinds = stage.channels or tuple(
@@ -181,9 +206,12 @@ def _channels(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, ...
     )
     if not names:
         had = ", ".join(dict.fromkeys(c.kind for e in experiments for c in e.channels.values()))
+        hint = ""
+        if stage.part == "card":
+            hint = "; without a current, let 'swashplate guess' write start and set-up"
         raise InputError(
             f"The stage '{stage.name}' fits {', '.join(kinds)}, but the runs to fit have "
-            f"{had or 'no channel'}."
+            f"{had or 'no channel'}{hint}."
         )
     return tuple(names)
 

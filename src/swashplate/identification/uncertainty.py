@@ -28,7 +28,7 @@ from swashplate.identification.spectral_lines import Tone, separated, tone_sente
 from swashplate.identification.unknowns import Unknowns
 
 if TYPE_CHECKING:
-    from swashplate.identification.fit import StageFit
+    from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
 
@@ -212,7 +212,9 @@ def slopes_by_earlier(
     ]
     if not simulated:
         return None
-    chain = DriveModel(stage.parameters, "chain")
+    chain = DriveModel(
+        model.parameters_at(stage.problem.unknowns.targets(stage.solution.vector, "")), "chain"
+    )
     unknowns, vector = earlier.problem.unknowns, earlier.solution.vector
     names = [name for each in unknowns if each.run is None for name in each.targets]
     products = np.zeros((linearised.rank, len(unknowns)))

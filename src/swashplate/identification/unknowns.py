@@ -6,13 +6,26 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import exp, isfinite, log, sqrt
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import PlainSerializer, PlainValidator
 
 from swashplate.errors import InputError, ParameterError
 
 Array = NDArray[np.float64]
+
+
+def _numbers(content: object) -> Array:
+    made = np.asarray(content)
+    if made.ndim != 1 or made.dtype.kind not in "fi" or not np.isfinite(made).all():
+        raise ValueError("it must be a list of finite numbers")
+    return made.astype(np.float64)
+
+
+Vector = Annotated[Array, PlainValidator(_numbers), PlainSerializer(np.ndarray.tolist)]
+"""The numbers that a solver moves, (K,); in a file a list."""
 AT_BOUND = 1e-6
 """Part of the reach between the bounds within which a number is at one of them."""
 

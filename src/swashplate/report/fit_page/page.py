@@ -10,7 +10,7 @@ from swashplate.campaign import Campaign
 from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment, RunQuality, assess
 from swashplate.identification.cross_validation import CrossValidation
-from swashplate.identification.fit import Fit, StageFit
+from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.starts import StartResult
 from swashplate.identification.storing import StageProfile as StageProfile
 from swashplate.identification.verdict import Verdict, starts_of, verdict

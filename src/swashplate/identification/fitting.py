@@ -1,29 +1,38 @@
-"""The fit of a drive to a campaign: stage after stage, each from what the ones before found."""
+"""The fit of a drive, stage after stage, or of a model of one's own."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from hashlib import blake2b
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.__about__ import __version__
+from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
+from swashplate.drive import Drive
+from swashplate.equations import Model as Equations
+from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.data_checks import check_sound, refuse_unsound
 from swashplate.identification.drive_model import DriveModel, at_rate_of
+from swashplate.identification.model import Model
+from swashplate.identification.own_model import ModelParameters, ModelSetup, Range
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Setup, Stage
 from swashplate.identification.solving import Loss, Progress, Solution, solve
-from swashplate.identification.staging import stage_problem
+from swashplate.identification.staging import Parameters, stage_problem, with_estimates
 from swashplate.identification.starts import StartResult, sobol_starts, solve_from
 from swashplate.identification.uncertainty import weighed
+from swashplate.identification.unknowns import Unknown
 from swashplate.parameters.parameter_set import ParameterSet
 
+P = TypeVar("P", bound=Parameters)
 Array = NDArray[np.float64]
 
 
@@ -50,8 +59,8 @@ class StageFit:
     stage: Stage
     problem: Problem
     solution: Solution
-    parameters: ParameterSet
-    """The drive with what was found."""
+    parameters: Parameters
+    """The drive, or the model of one's own, with what was found."""
     starts: tuple[StartResult, ...] = ()
     """How each start ended, where there was more than one."""
 
@@ -63,18 +72,31 @@ class StageFit:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fitted drive and how it came about."""
+    """A fitted drive, or model of one's own, and how it came about."""
 
     setup: Setup
-    nominal: ParameterSet
+    nominal: Parameters
     stages: tuple[StageFit, ...]
     doubts: tuple[str, ...] = ()
     """What the runs lack, in sentences, where they could be fitted all the same."""
 
     @property
-    def parameters(self) -> ParameterSet:
-        """The fitted drive's parameters."""
+    def parameters(self) -> Parameters:
+        """The fitted parameters."""
         return self.stages[-1].parameters
+
+    @property
+    def drive(self) -> Drive:
+        """The fitted drive.
+
+        Raises
+        ------
+        InputError
+            If a model of one's own was fitted.
+        """
+        if isinstance(self.parameters, ModelParameters):
+            raise InputError(f"{self.parameters.name} is a model of your own, no drive.")
+        return Drive(self.parameters)
 
     @property
     def interrupted(self) -> bool:
@@ -83,10 +105,13 @@ class Fit:
 
 
 def fit(
-    experiments: Sequence[Experiment],
-    nominal: ParameterSet,
-    setup: Setup,
+    model: Drive | Parameters | ModelSetup | Model | Equations,
+    tests: Campaign | Sequence[Experiment],
+    free: Setup | Mapping[str, Range | Unknown] | None = None,
     *,
+    channels: Sequence[str] = (),
+    noise: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float] | None = None,
     loss: Loss = "linear",
     tolerance: float = 1e-10,
     max_evaluations: int = 300,
@@ -94,37 +119,69 @@ def fit(
     search: Search | None = None,
     watch: Callable[[str, Progress], None] | None = None,
 ) -> Fit:
-    """Fit a drive to experiments.
+    """Fit of a drive, or of a model of one's own, to tests.
 
     Parameters
     ----------
-    experiments : sequence of Experiment
-        The runs to fit.
-    nominal : ParameterSet
-        Where to begin, and what stays fixed. The decay's switch is split, see `smooth`, and the
-        card's filter one that holds at the rate of the runs.
-    setup : Setup
-        Stages and their free parameters.
+    model : Drive, ParameterSet, Model or ModelSetup
+        A drive: where to begin, and what stays fixed. The decay's switch is split, see `smooth`,
+        and the card's filter one that holds at the rate of the runs. Or a model of one's own: of
+        equations, an `OwnModel` of them, any object with `simulate`, or a `ModelSetup`.
+    tests : Campaign or sequence of Experiment
+        The runs to fit; of a campaign those with the role ``"fit"``.
+    free : Setup or mapping of str to (low, nominal, high) or Unknown
+        Of a drive its stages and free parameters; of a model of one's own what is to be found,
+        see `ModelSetup`.
+    channels, noise, fixed : optional
+        Of a model of one's own, as of `ModelSetup`.
     loss, tolerance, max_evaluations :
         As of `solving.solve`, in each stage.
     threads : int, optional
         Threads over experiments; all cores by default. The result does not depend on it.
     search : Search, optional
-        More starts than the nominal one; the best is refined.
+        More starts than the nominal one; the best is refined. Ctrl-C during them ends the whole
+        fit, with the best start of that stage as its last result.
     watch : callable, optional
         Told the stage's name and each of its iterations.
 
     Raises
     ------
     InputError, ParameterError
-        If campaign and set-up do not fit each other, or no fit of these runs can mean anything
-        (`soundness`).
+        If tests, model and what is free do not fit each other, or no fit of these runs can mean
+        anything.
     DomainError
         If the model does not hold at the nominal values.
+
+    Examples
+    --------
+    >>> fit(Drive.preset("hoist"), campaign, load_setup("hoist"))
+    >>> fit(valve, campaign, {"lag": (0.005, 0.06, 0.5), "gain": (0.1, 1.0, 10.0)})
     """
-    doubts = refuse_unsound(check_sound(experiments, smooth(nominal), setup))
-    nominal, changed = at_rate_of(experiments, nominal)
-    parameters, stages, doubts = smooth(nominal), [], (*doubts, *changed)
+    experiments = tests.select(role="fit") if isinstance(tests, Campaign) else tuple(tests)
+    if not experiments:
+        raise InputError("There is no run to fit.")
+    nominal = model.parameters if isinstance(model, Drive) else model
+    doubts: tuple[str, ...] = ()
+    if isinstance(nominal, ParameterSet):
+        if not isinstance(free, Setup):
+            raise InputError(
+                "A drive needs a Setup, such as load_setup('hoist'), for what is free."
+            )
+        setup = free
+        doubts = refuse_unsound(check_sound(experiments, smooth(nominal), setup))
+        nominal, changed = at_rate_of(experiments, nominal)
+        doubts = (*doubts, *changed)
+    elif not isinstance(nominal, ModelParameters):
+        own = nominal
+        if not isinstance(own, ModelSetup):
+            entries = free if isinstance(free, Mapping) else {}
+            named = tuple(channels), dict(noise or {}), dict(fixed or {})
+            own = ModelSetup(own, entries, "", *named)
+        nominal = own.nominal(experiments)
+        setup = own.setup
+    else:
+        setup = nominal.setup.setup
+    parameters, stages = smooth(nominal), []
     for stage in setup.stages:
         problem = stage_problem(stage, parameters, experiments, threads=threads)
         begin: Array | None = None
@@ -142,31 +199,21 @@ def fit(
             loss=loss,
             tolerance=tolerance,
             max_evaluations=max_evaluations,
-            watch=None if watch is None else _named(watch, stage.name),
+            watch=None if watch is None else partial(watch, stage.name),
         )
         solution = solved(problem, begin)
         if any(each.prior is not None for each in problem.unknowns) and not solution.interrupted:
             # what the residuals are worth is known only now
             problem = weighed(problem, solution.vector)
             solution = solved(problem, solution.vector)
-        model = problem.model
-        assert isinstance(model, DriveModel)
-        parameters = model.parameters_at(problem.unknowns.targets(solution.vector, ""))
+        parameters = with_estimates(parameters, problem, solution.vector)
         stages.append(StageFit(stage, problem, solution, parameters, results))
         if solution.interrupted:
             break
     return Fit(setup, nominal, tuple(stages), doubts)
 
 
-def refined(
-    staged: Fit,
-    experiments: Sequence[Experiment],
-    *,
-    tolerance: float = 1e-10,
-    max_evaluations: int = 100,
-    threads: int | None = None,
-    watch: Callable[[str, Progress], None] | None = None,
-) -> Fit:
+def refined(staged: Fit, experiments: Sequence[Experiment], **settings: Any) -> Fit:
     """All unknowns of a staged fit at once through the whole chain, from where the stages ended.
 
     A staged fit takes each stage's result for granted in the next one, so that its intervals leave
@@ -177,27 +224,23 @@ def refined(
     ----------
     staged : Fit
         Of more than one stage.
-    experiments, tolerance, max_evaluations, threads, watch :
-        As of `fit`.
+    experiments :
+        The runs.
+    **settings :
+        As of `fit`: tolerance, max_evaluations, threads, watch.
     """
-    return fit(
-        experiments,
-        staged.parameters,
-        staged.setup.joint(),
-        tolerance=tolerance,
-        max_evaluations=max_evaluations,
-        threads=threads,
-        watch=watch,
-    )
+    return fit(staged.parameters, experiments, staged.setup.joint(), **settings)
 
 
-def smooth(parameters: ParameterSet) -> ParameterSet:
+def smooth(parameters: P) -> P:
     """The set with the decay's switch split within the step.
 
     Sampled, as published, it makes the current jump by up to 0.7 mA as any of the card's parameters
     varies, and a fit ends where it was caught (docs/decisions/0008).
     """
-    return replace(parameters, card_switch="split")
+    if isinstance(parameters, ParameterSet):
+        return replace(parameters, card_switch="split")
+    return parameters  # a model of one's own has no card
 
 
 def _searched(
@@ -225,10 +268,11 @@ def _searched(
 
 def _origin(stage: Stage, problem: Problem, *settings: object) -> dict[str, str]:
     """Fingerprints of all that the result of a start depends on."""
-    model = problem.model
-    assert isinstance(model, DriveModel)
-    known = model.parameters
-    forms = known.pressure_root, known.coulomb_sign, known.rate, sorted(known.options)
+    known: object = (problem.start.tolist(), sorted(problem.fixed.items()))
+    if isinstance(problem.model, DriveModel):
+        drive = problem.model.parameters
+        forms = drive.pressure_root, drive.coulomb_sign, drive.rate, sorted(drive.options)
+        known = sorted(drive.numbers.items()), forms
     digest = blake2b(digest_size=16)
     for experiment, weights in zip(problem.experiments, problem.weights, strict=True):
         arrays = [experiment.input.time, experiment.input.values]
@@ -241,7 +285,7 @@ def _origin(stage: Stage, problem: Problem, *settings: object) -> dict[str, str]
         "version of swashplate": __version__,
         "stage of the set-up": _mark(stage.model_dump_json()),
         "tolerances": _mark(settings),
-        "nominal values": _mark((sorted(known.numbers.items()), forms)),
+        "nominal values": _mark(known),
         "runs and their weights": digest.hexdigest(),
     }
 
@@ -262,7 +306,3 @@ def _stopped(best: StartResult, done: int, starts: int) -> Solution:
         f"interrupted after {done} of {starts} starts: the best of them",
         best.seconds,
     )
-
-
-def _named(watch: Callable[[str, Progress], None], name: str) -> Callable[[Progress], None]:
-    return lambda progress: watch(name, progress)
