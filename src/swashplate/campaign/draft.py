@@ -432,17 +432,17 @@ def _signal(guessed: Guess, look: _Look, counts_per_turn: float | None) -> list[
 
 
 class _Draft:
-    """A run's lines, its role, and the kind and direction of its manoeuvre."""
+    """A run's lines, its role, and kind and direction, and the size, of its manoeuvre."""
 
-    def __init__(self, lines: list[str], stratum: str, *, testable: bool) -> None:
-        self.lines, self.stratum = lines, stratum
+    def __init__(self, lines: list[str], stratum: str, peak: float, *, testable: bool) -> None:
+        self.lines, self.stratum, self.peak = lines, stratum, peak
         self.role, self.why = ("fit", "") if testable else ("ignore", "    # it has no input")
 
 
 def _run(look: _Look, axes: Mapping[str, list[Guess]], folder: Path) -> _Draft:
     path, root = look.log.path.resolve(), folder.resolve()
     file = path.relative_to(root) if path.is_relative_to(root) else path
-    seen, stratum = _seen(look, axes)
+    seen, stratum, peak = _seen(look, axes)
     lines = ["[[runs]]", f"file = {_string(file.as_posix())}    # {seen}"]
     names = {column.name for column in look.log.columns}
     tested = []
@@ -467,21 +467,21 @@ def _run(look: _Look, axes: Mapping[str, list[Guess]], folder: Path) -> _Draft:
             without += missing
     if tested and len(tested) < len(axes):
         lines.append(f"only = [{', '.join(_string(axis) for axis in tested)}]")
-    return _Draft([*lines, *without], stratum, testable=bool(tested))
+    return _Draft([*lines, *without], stratum, peak, testable=bool(tested))
 
 
-def _seen(look: _Look, axes: Mapping[str, list[Guess]]) -> tuple[str, str]:
-    """Length, rate and manoeuvres of a run for a comment; kind and direction of the first one."""
+def _seen(look: _Look, axes: Mapping[str, list[Guess]]) -> tuple[str, str, float]:
+    """Length, rate and manoeuvres of a run for a comment; their kind, direction and size."""
     time = None if look.time is None else look.values.get(look.time.column.name)
     if look.time is None or time is None or time.size < 2:
-        return f"{len(next(iter(look.values.values()), []))} samples", ""
+        return f"{len(next(iter(look.values.values()), []))} samples", "", 0.0
     factor = _seconds(look.time.unit or "s")
     seen = [f"{time.size} samples"]
     if factor is None or not np.all(np.diff(time) > 0.0):
-        return seen[0], ""
+        return seen[0], "", 0.0
     time = factor * (time - time[0])
     seen.append(f"{np.ptp(time):.4g} s at {1.0 / np.median(np.diff(time)):.4g} Hz")
-    strata = []
+    strata, peak = [], 0.0
     for guesses in axes.values():
         for drive in [each for each in guesses if each.role == "input"][:1]:
             values = look.values.get(drive.column.name)
@@ -497,7 +497,8 @@ def _seen(look: _Look, axes: Mapping[str, list[Guess]]) -> tuple[str, str]:
             low, high = -float(away.min()), float(away.max())
             both = min(low, high) > 0.25 * max(low, high)
             strata.append(f"{found.kind} {'both' if both else 'up' if high > low else 'down'}")
-    return ", ".join(seen), ", ".join(strata)
+            peak = max(peak, low, high)
+    return ", ".join(seen), ", ".join(strata), peak
 
 
 def _mark_unreadable(lines: list[str], runs: list[_Draft], looks: Sequence[_Look]) -> None:
@@ -517,14 +518,15 @@ def _mark_unreadable(lines: list[str], runs: list[_Draft], looks: Sequence[_Look
 
 
 def _hold_back(runs: list[_Draft]) -> None:
-    """Hold one run back for validation, of which the others have kind and direction as well."""
+    """Hold one run back for validation, of which the others have kind, direction and size."""
     fitted = [each for each in runs if each.role == "fit"]
-    if len(fitted) < MANY:
-        return
-    strata = [each.stratum for each in fitted]
-    chosen = max(reversed(fitted), key=lambda each: strata.count(each.stratum))
-    if strata.count(chosen.stratum) > 1:
-        chosen.role = "validate"
+    largest: dict[str, _Draft] = {}
+    for each in fitted:
+        if each.peak > largest.setdefault(each.stratum, each).peak:
+            largest[each.stratum] = each
+    others = [each for each in fitted if each is not largest[each.stratum]]
+    if len(fitted) >= MANY and others:
+        others[-1].role = "validate"
 
 
 def _key(name: str) -> str:

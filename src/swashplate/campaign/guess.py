@@ -381,7 +381,7 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     said = {
         symbol: replace(each, source=source, status="approximate")
         if symbol in changed
-        else replace(each, source="neutral: a scale that a speed does not tell")
+        else replace(each, source="made up: no speed tells it")
         for symbol, each in made.parameters.items()
     }
     return replace(
