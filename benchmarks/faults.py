@@ -3,9 +3,10 @@
     .venv/bin/python benchmarks/faults.py [--campaigns 20] [--sound 100] [--axes hoist slew]
 
 Each campaign draws a drive about the published one, as `benchmarks/calibration.py` does, puts one
-fault into the machine, its instruments or its logs, is written to files, checked, fitted, judged and
-validated by the calls that `swashplate campaign check`, `fit` and `validate` make. The true error is
-that of the fitted drive on manoeuvres that no campaign has, against the machine that was simulated.
+fault into the machine, its instruments or its logs, is written to files, checked, fitted, judged
+and validated by the calls that `swashplate campaign check`, `fit` and `validate` make. The true
+error is that of the fitted drive on manoeuvres that no campaign has, against the machine that was
+simulated.
 """
 
 import argparse
@@ -198,3 +199,170 @@ def true_error(found, machine, axis):
         error = Drive(found).simulate(command, RATE).shaft_speed - true
         worst = max(worst, float(np.sqrt(np.mean(error**2)) / np.ptp(true)))
     return 100.0 * worst
+
+
+HIDDEN = {
+    "encoder reads 3 % too much": "scale of counts",
+    "ammeter reads 3 % too much": "scale of current",
+    "command's stamps 20 ms late": "time stamps of the command",
+}
+"""Faults of instruments, and how `lack_of_fit` calls them."""
+FIELDS = (
+    "fault",
+    "axis",
+    "seed",
+    "check",
+    "grade",
+    "code",
+    "ratio",
+    "cause",
+    "error",
+    "worst",
+    "class",
+    "validate",
+)
+
+
+def campaign(name, axis, seed):
+    """One row: what check, fit and validate say of a campaign, and how wrong the fit is."""
+    from swashplate import Campaign, Drive
+    from swashplate.campaign import rig
+    from swashplate.errors import SwashplateError
+    from swashplate.identification.assessment import assess
+    from swashplate.identification.data_checks import check_runs
+    from swashplate.identification.fit import fit, smooth
+    from swashplate.identification.known_truth import true_value
+    from swashplate.identification.lack_of_fit import lack_of_fit
+    from swashplate.identification.setup import load_setup
+    from swashplate.identification.validation import predict
+    from swashplate.identification.verdict import verdict
+
+    fault, nominal = FAULTS[name], Drive.preset(axis)
+    tests, machine = simulated_campaign(fault, axis, seed)
+    with tempfile.TemporaryDirectory() as folder:
+        read = Campaign.from_toml(rig.write(tests, Path(folder) / "virtual"))
+        runs, held = read.select(role="fit"), read.select(role="validate")
+    try:
+        found = len(check_runs(runs, smooth(nominal.parameters)))
+        result = fit(runs, nominal.parameters, load_setup(axis), threads=1)
+    except SwashplateError as error:
+        return (name, axis, seed, "refused", "Not usable", 2, "", str(error), "", "", "B", "")
+    assessments, drive = assess(result.stages), result.parameters
+    predicted = predict(drive, held)
+    judged = verdict(assessments, predicted, planned=[s.name for s in result.setup.stages])
+    misfit = lack_of_fit(assessments)
+    worst = 0.0
+    for each in assessments:
+        problem = each.stage.problem
+        for unknown, estimate in zip(problem.unknowns, each.uncertainty.estimates, strict=True):
+            true = true_value(unknown, problem.model, machine.parameters)
+            if true is not None and estimate.lower is not None and estimate.upper is not None:
+                half = 0.5 * (estimate.upper - estimate.lower)
+                worst = max(worst, abs(true - estimate.value) / half)
+    error = true_error(drive, machine, axis)
+    known = misfit.fault(HIDDEN.get(name, ""))
+    fixed = any(symbol in misfit.units for symbol in fault.scaled or ())
+    if fixed or (known is not None and known.hidden and known.outside < 0.01):
+        kind = "A"
+    else:
+        kind = "B" if error > 3.0 or worst > 3.0 else "C"
+    ratio = max(misfit.ratios.values(), default="")
+    cause = misfit.causes[0].name if misfit.causes and ratio > 1.2 else ""
+    code = 0 if judged.usable else 1
+    validated = verdict((), predicted).headline.split(":")[0][:12]
+    return (
+        name, axis, seed, f"{found} findings" if found else "-", judged.grade, code, ratio, cause,
+        error, worst, kind, validated,
+    )  # fmt: skip
+
+
+def most(rows, field):
+    """The commonest entry of a column, and its share where it is not alone."""
+    values = [row[field] for row in rows]
+    common = max(set(values), key=values.count)
+    share = values.count(common) / len(values)
+    return f"{common or '-'}{'' if share == 1.0 else f' ({share:.0%})'}"
+
+
+def report(rows):
+    """A row for each fault and axis."""
+    heads = (
+        "fault", "axis", "campaigns", "class", "check", "verdict of fit", "exit code",
+        "residual / known error", "likely cause named", "validate", "error on new, %",
+        "worst value, half widths",
+    )  # fmt: skip
+    print(f"| {' | '.join(heads)} |")
+    print("|---|---|--:|---|---|---|---|--:|---|---|--:|--:|")
+    for name in FAULTS:
+        for axis in NEW:
+            some = [row for row in rows if row["fault"] == name and row["axis"] == axis]
+            if not some:
+                continue
+            numbers = []
+            for field in ("ratio", "error", "worst"):
+                known = [float(row[field]) for row in some if row[field]]
+                numbers.append(f"{median(known):.3g}" if known else "-")
+            cells = (
+                name, axis, f"{len(some)}", most(some, "class"), most(some, "check"),
+                most(some, "grade"), most(some, "code"), numbers[0], most(some, "cause"),
+                most(some, "validate"), numbers[1], numbers[2],
+            )  # fmt: skip
+            print(f"| {' | '.join(cells)} |")
+    sound = [row for row in rows if row["fault"] == "none"]
+    if sound:
+        false = [row for row in sound if row["grade"] != "Usable"]
+        wrong = [row for row in false if float(row["error"]) > 0.05]
+        print(
+            f"\nFalse alarms: {len(false)} of {len(sound)} sound campaigns, in {len(wrong)} of "
+            "them the search ended in another optimum (error on new manoeuvres above 0.05 %)."
+        )
+
+
+def main():
+    """Run what is missing in the file, write it, print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--axes", nargs="+", default=["hoist", "slew"])
+    parser.add_argument("--campaigns", type=int, default=50, help="of each fault")
+    parser.add_argument("--sound", type=int, default=1000, help="without a fault, on each axis")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=Path("benchmarks/build/faults.csv"))
+    wanted = parser.parse_args()
+    wanted.out.parent.mkdir(parents=True, exist_ok=True)
+    kept = read(wanted.out)
+    done = {(row["fault"], row["axis"], int(row["seed"])) for row in kept}
+    todo = [
+        (name, axis, seed)
+        for seed in range(max(wanted.campaigns, wanted.sound))
+        for axis in wanted.axes
+        for name in FAULTS
+        if seed < (wanted.sound if name == "none" else wanted.campaigns)
+        and (name, axis, seed) not in done
+    ]
+    begun = time.perf_counter()
+    with (
+        wanted.out.open("a", newline="") as stream,
+        ProcessPoolExecutor(wanted.jobs, mp_context=get_context("spawn")) as pool,
+    ):
+        writer = csv.writer(stream)
+        if not kept:
+            writer.writerow(FIELDS)
+        futures = [pool.submit(campaign, *each) for each in todo]
+        for number, future in enumerate(as_completed(futures), 1):
+            writer.writerow(future.result())
+            stream.flush()
+            left = (time.perf_counter() - begun) / number * (len(todo) - number)
+            print(f"\r{number} of {len(todo)}, {left:.0f} s left ", end="", file=sys.stderr)
+    print(file=sys.stderr)
+    report(read(wanted.out))
+
+
+def read(path):
+    """Rows that were written before."""
+    if not path.exists():
+        return []
+    with path.open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+if __name__ == "__main__":
+    main()
