@@ -18,8 +18,9 @@ from swashplate.cli.fit_output import (
 )
 from swashplate.cli.inputs import parameters_of
 from swashplate.cli.judging import Wanted, judged_fit
-from swashplate.cli.terminal import Shown, long_work, note, say, show, side, waiting, working
+from swashplate.cli.terminal import Shown, long_work, note, say, show, waiting, working
 from swashplate.cli.validate import check_folder, chosen_axis
+from swashplate.cli.validation_tables import shown_verdict
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
@@ -105,6 +106,10 @@ def fit(
         bool, typer.Option("--resume", help="Go on with the starts that DIR holds already.")
     ] = False,
     loss: Annotated[Loss, typer.Option(help="Robust losses forgive outliers.")] = "linear",
+    require: Annotated[
+        float,
+        typer.Option(help="Largest error of held-out runs, in % of their range.", min=0.0),
+    ] = 10.0,
     report: Annotated[
         bool, typer.Option(help="Write report.html, one file that works offline.")
     ] = True,
@@ -174,7 +179,7 @@ def fit(
             "command with --resume goes on; nothing is written but the starts."
         )
         raise typer.Exit(INTERRUPTED)
-    wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, loss)
+    wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, loss, require / 100.0)
     found = judged_fit(campaign, chosen, runs, nominal, plan, result, wanted)
     lines = [
         *written(result, found.assessments, campaign, out, found.bootstraps),
@@ -215,10 +220,7 @@ def fit(
     if result.interrupted:
         note("Interrupted: this is the best so far, not an optimum.")
         raise typer.Exit(INTERRUPTED)
-    if not found.verdict.usable:
-        side.print(found.verdict.headline)
-        raise typer.Exit(1)
-    say(found.verdict.headline)
+    shown_verdict(found.verdict)
 
 
 def _search(

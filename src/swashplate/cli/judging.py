@@ -36,6 +36,8 @@ class Wanted:
     seed: int = 0
     executor: Executor | None = None
     loss: Loss = "linear"
+    required: float = 0.1
+    """Largest error of held-out runs over their range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +146,7 @@ def judged_fit(
         _check(wanted.profiles, assessments)
         predicted = predict(result.parameters, campaign.select(axis=axis, role="validate"))
         planned = [each.name for each in result.setup.stages]
-        judged = verdict(assessments, predicted, planned=planned)
+        judged = verdict(assessments, predicted, planned=planned, required=wanted.required)
         folds = None
         if wanted.folds:
             folds = cross_validate(

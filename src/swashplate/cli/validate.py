@@ -11,7 +11,7 @@ import typer
 
 from swashplate.cli.arguments import AxisName, CampaignPath, OwnModel
 from swashplate.cli.inputs import model_parameters_of, parameters_of
-from swashplate.cli.terminal import note, say, show, side, working
+from swashplate.cli.terminal import note, say, show, working
 from swashplate.cli.validation_tables import (
     MEASURES,
     RESIDUALS,
@@ -20,6 +20,7 @@ from swashplate.cli.validation_tables import (
     measures_table,
     quality_tables,
     residual_table,
+    shown_verdict,
 )
 from swashplate.errors import FileError, InputError
 
@@ -58,6 +59,9 @@ def validate(
         Path | None,
         typer.Option(help="Folder for report.html and measures.csv.", metavar="DIR"),
     ] = None,
+    require: Annotated[
+        float, typer.Option(help="Largest error, in % of a channel's range.", min=0.0)
+    ] = 10.0,
     figures: Annotated[
         Figures | None,
         typer.Option(help="Figures for print as well, in DIR/figures.", show_default=False),
@@ -98,7 +102,7 @@ def validate(
         predicted = predict(parameters, runs)
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
-        judged = verdict((), predicted)
+        judged = verdict((), predicted, required=require / 100.0)
         qualities = with_speeds(predicted)
         errors = channel_errors(qualities, source_rules(parameters.name))
     lines = []
@@ -118,10 +122,7 @@ def validate(
         say(f"- {words}")
     for line in lines:
         note(line)
-    if not judged.usable:
-        side.print(judged.headline)
-        raise typer.Exit(1)
-    say(judged.headline)
+    shown_verdict(judged)
 
 
 def chosen_axis(campaign: Campaign, axis: str | None) -> str:

@@ -471,6 +471,21 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
     return found
 
 
+def contradicting_runs(
+    experiments: Sequence[Experiment], parameters: ParameterSet
+) -> list[Finding]:
+    """Runs whose sign or scale contradicts the others, beside a drive that was fitted to all.
+
+    Raises
+    ------
+    InputError, DomainError
+        As `check_runs`.
+    """
+    simulations = {each.name: simulated_run(each, parameters) for each in experiments}
+    found = contradictions(motions(experiments, simulations))
+    return [each for each in found if each.run is not None]
+
+
 def refuse_unsound(findings: Sequence[Finding]) -> tuple[str, ...]:
     """Sentences of what is only a warning.
 

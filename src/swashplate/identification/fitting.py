@@ -69,6 +69,19 @@ class StageFit:
         """The unknowns by name, in their units."""
         return self.problem.unknowns.values(self.solution.vector)
 
+    @property
+    def drive(self) -> Drive:
+        """The drive with what was found.
+
+        Raises
+        ------
+        InputError
+            If it is a model of one's own.
+        """
+        if isinstance(self.parameters, ModelParameters):
+            raise InputError(f"{self.parameters.name} is a model of your own, no drive.")
+        return Drive(self.parameters)
+
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -87,16 +100,8 @@ class Fit:
 
     @property
     def drive(self) -> Drive:
-        """The fitted drive.
-
-        Raises
-        ------
-        InputError
-            If a model of one's own was fitted.
-        """
-        if isinstance(self.parameters, ModelParameters):
-            raise InputError(f"{self.parameters.name} is a model of your own, no drive.")
-        return Drive(self.parameters)
+        """The fitted drive; refused where a model of one's own was fitted."""
+        return self.stages[-1].drive
 
     @property
     def interrupted(self) -> bool:

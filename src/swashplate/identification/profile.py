@@ -385,8 +385,9 @@ SHALLOW = 0.25
 """Part of the linearised rise of the cost below which an interval's end is looked for anew."""
 MOST_POINTS = 8
 """Most points of the profile on such a side."""
-TRIES = 20
-"""Evaluations of a fit without a limit: one that is not needed is let go of in ten."""
+TRIES, LOOK = 20, 4
+"""Evaluations of a fit without a limit, and after how many it is seen whether it gets there: one
+that is not needed is let go of in ten."""
 
 
 class CheckedEnd(NamedTuple):
@@ -410,6 +411,8 @@ def checked_ends(
     limits: Collection[int] = (),
 ) -> tuple[CheckedEnd, ...]:
     """Sides on which the cost does not rise as the linearised fit says, and how it does.
+
+    Unknowns of single runs, such as a free zero, are passed over: residuals are linear in them.
 
     Parameters
     ----------
@@ -440,7 +443,8 @@ def checked_ends(
     low, high = problem.bounds
     cost = problem.cost(vector)
     found = []
-    for index in np.flatnonzero(reach > 0.0):
+    machine = np.array([each.run is None for each in problem.unknowns])
+    for index in np.flatnonzero((reach > 0.0) & machine):
         direction = inverse[index] / inverse[index, index]
         rise = 0.5 * reach[index] ** 2 / inverse[index, index]
         if index in limits and _unneeded(problem, vector, int(index), cost + rise):
@@ -473,13 +477,26 @@ def checked_ends(
 
 
 def _unneeded(problem: Problem, vector: Array, index: int, allowed: float) -> bool:
-    """Whether a fit with a limit out of the way is as good."""
+    """Whether a fit with a limit out of the way is as good.
+
+    It is followed for a few evaluations at a time, and given up where the cost falls so slowly
+    that the tries left would not reach what is allowed.
+    """
     start = vector.copy()
     start[index] = problem.bounds[1][index]
+    minimise = minimiser(problem, tolerance=1e-6, max_evaluations=LOOK)
     try:
-        cost, _ = minimiser(problem, tolerance=1e-6, max_evaluations=TRIES)(
-            index, float(start[index]), start
-        )
+        before = problem.cost(start)
     except DomainError:
         return False
-    return cost < allowed
+    for tried in range(LOOK, TRIES + 1, LOOK):
+        try:
+            cost, start = minimise(index, float(start[index]), start)
+        except DomainError:
+            return False
+        if cost < allowed:
+            return True
+        if (before - cost) * (TRIES - tried) / LOOK < cost - allowed:
+            return False
+        before = cost
+    return False

@@ -13,6 +13,7 @@ from markupsafe import Markup
 
 from swashplate.campaign import Campaign
 from swashplate.identification.lack_of_fit import ResidualTest
+from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.staging import Parameters
 from swashplate.identification.validation import source_rules
 from swashplate.report.fit_page.error_sections import error_sections
@@ -62,6 +63,7 @@ def shared_content(
         "virtual": campaign.virtual,
         "campaign": campaign,
         "drive": drive,
+        "own_model": isinstance(drive, ModelParameters),
         "runs": [
             (run, stacks[stack_of(run)], [quality_row(run, each) for each in run.channels])
             for run in runs

@@ -49,6 +49,17 @@ def statements(
             for words in uncertainty_sentences(each)
         ]
         made.append(Statement("Errors", "plain", tuple(said)))
+    if judged.criteria:
+        lines = (
+            f"{'Met' if each.passed else 'NOT MET'}: {each.name}: {each.value} "
+            f"(limit {each.limit}; {each.reason})."
+            for each in judged.criteria
+        )
+        made.append(Statement("Acceptance criteria", "plain", tuple(lines)))
+    if judged.validity:
+        made.append(Statement("Range of validity", "plain", (judged.validity,)))
+    if judged.assumed:
+        made.append(Statement("Assumed, cannot be checked", "plain", judged.assumed))
     if findings:
         text = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
         made.append(Statement("Data", "look", (text,)))
