@@ -197,13 +197,8 @@ def time_table() -> list[str]:
 
     long_time = np.arange(3600 * RATE + 1) * PERIOD
     readings = np.floor(20000.0 * np.sin(0.1 * long_time)) % 2**16
-    time = long_time[:110605]
-    sensitivities = np.random.default_rng(0).normal(size=(time.size, 17))
     runs = {
         "one hour at 512 Hz: roll-overs, interpolation, source's filters": hour,
-        "110,605 samples, 17 sensitivities: matched filters": lambda: matched_speed(
-            time, sensitivities
-        ),
     }
     lines = [f"Measured on: {table.machine()}.", "", "| what | median |", "|---|--:|"]
     for what, run in runs.items():

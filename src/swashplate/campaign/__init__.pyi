@@ -1,7 +1,6 @@
 from . import rig as rig
 from .ammeter import SignedCurrent as SignedCurrent
 from .ammeter import ZeroCrossings as ZeroCrossings
-from .ammeter import rectified_current as rectified_current
 from .ammeter import signed_by_command as signed_by_command
 from .ammeter import zero_crossings as zero_crossings
 from .campaign import Campaign as Campaign
@@ -49,9 +48,7 @@ from .speed import savitzky_golay_speed as savitzky_golay_speed
 from .speed import speed_from_angle as speed_from_angle
 from .speed import speed_from_counts as speed_from_counts
 from .speed import speed_of as speed_of
-from .stamps import even_period as even_period
 from .stamps import increasing as increasing
-from .stamps import samples as samples
 from .stamps import signal as signal
 from .stamps import stamp_statistics as stamp_statistics
 from .stamps import stamps_of as stamps_of

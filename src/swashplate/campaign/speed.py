@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from swashplate.campaign.encoder import interpolate_counts, interpolated, radians_per_count
 from swashplate.campaign.experiment import Channel
-from swashplate.campaign.stamps import Array, Stamps, even_period, samples, signal, stamps_of
+from swashplate.campaign.stamps import Array, Stamps, signal, stamps_of
 from swashplate.equations.cache import kernel
 from swashplate.errors import InputError
 from swashplate.maneuvers.checks import positive, whole
@@ -95,22 +95,17 @@ def speed_from_counts(
     gear_ratio: float = 1.0,
     sign: Literal[1, -1] = 1,
     form: Form = "source",
-    low_pass: float = LOW_PASS,
-    differentiator: float = DIFFERENTIATOR,
-    start_speed: float = 0.0,
 ) -> Array:
     """Speed of a shaft from encoder counts: interpolation, low pass, band-limited differentiator.
 
     Parameters
     ----------
-    time : array_like, shape (n,)
-        Stamps. [s]
+    time, form :
+        As in `speed_from_angle`.
     counts : array_like, shape (n,)
         Position without roll-overs (`encoder.unwrap_counts`). [count]
     counts_per_turn, gear_ratio, sign :
         Scale of the encoder, as in `encoder.radians_per_count`.
-    form, low_pass, differentiator, start_speed :
-        The filters, as in `speed_from_angle`.
 
     Returns
     -------
@@ -125,43 +120,31 @@ def speed_from_counts(
     stamps = stamps_of(time)
     position = interpolated(stamps.time, signal("counts", counts, stamps.time.size))
     position *= radians_per_count(counts_per_turn, gear_ratio, sign)
-    return _speed(stamps, position, form, low_pass, differentiator, start_speed)
+    return speed_from_angle(stamps.time, position, form=form)
 
 
-def speed_from_angle(
-    time: ArrayLike,
-    angle: ArrayLike,
-    *,
-    form: Form = "source",
-    low_pass: float = LOW_PASS,
-    differentiator: float = DIFFERENTIATOR,
-    start_speed: ArrayLike = 0.0,
-) -> Array:
+def speed_from_angle(time: ArrayLike, angle: ArrayLike, *, form: Form = "source") -> Array:
     """Speed from angles (or any positions): low pass, then band-limited differentiator.
 
     Parameters
     ----------
     time : array_like, shape (n,)
         Stamps. The explicit form needs them even. [s]
-    angle : array_like, shape (n,) or (n, k)
-        Position, its staircase interpolated; columns are filtered side by side. [rad]
+    angle : array_like, shape (n,)
+        Position, its staircase interpolated; at rest before the first row. [rad]
     form : {"source", "exact"}
         How the filters are made discrete.
-    low_pass, differentiator : float
-        Cut-offs a and b. [rad/s]
-    start_speed : float or array_like, shape (k,)
-        Speed at and long before the first row, 0 at rest. [rad/s]
 
     Returns
     -------
-    array, shape of `angle`
-        Speed, delayed by `path_delay`; `start_speed` in the first row. [rad/s]
+    array, shape (n,)
+        Speed, delayed by `path_delay`; 0 in the first row. [rad/s]
 
     Raises
     ------
     InputError
-        If a number is not finite, the stamps do not increase, a cut-off is not positive, or the
-        explicit form cannot be used with these stamps.
+        If a number is not finite, the stamps do not increase, or the explicit form cannot be used
+        with these stamps.
 
     Notes
     -----
@@ -173,33 +156,13 @@ def speed_from_angle(
     bh/(1 - exp(-bh)), 20 % too much at 512 Hz.
     """
     stamps = stamps_of(time)
-    position = samples("angle", angle, stamps.time.size)
-    return _speed(stamps, position, form, low_pass, differentiator, start_speed)
-
-
-def _speed(
-    stamps: Stamps,
-    position: Array,
-    form: Form,
-    low_pass: float,
-    differentiator: float,
-    start_speed: ArrayLike,
-) -> Array:
-    intervals = intervals_of(stamps)
-    recursion = recursion_of(stamps, form, low_pass, differentiator)
-    start = _start(start_speed, position)
-    return filtered_by(position, Taps(-1.0 / intervals, 1.0 / intervals), recursion, start)
+    position = signal("angle", angle, stamps.time.size)
+    intervals, recursion = _recursion(stamps, form)
+    return _filtered(np.diff(position) / intervals, recursion)
 
 
 def matched_speed(
-    time: ArrayLike,
-    speed: ArrayLike,
-    *,
-    form: Form = "source",
-    low_pass: float = LOW_PASS,
-    differentiator: float = DIFFERENTIATOR,
-    start_speed: ArrayLike = 0.0,
-    aligned: bool = True,
+    time: ArrayLike, speed: ArrayLike, *, form: Form = "source", aligned: bool = True
 ) -> Array:
     """Simulated speed as the measured path would show it, to be compared with that.
 
@@ -207,18 +170,17 @@ def matched_speed(
     ----------
     time : array_like, shape (n,)
         Stamps. [s]
-    speed : array_like, shape (n,) or (n, k)
-        Simulated speed, or its k derivatives by the parameters: the filter is linear and treats
-        every column alike. [rad/s]
-    form, low_pass, differentiator, start_speed :
-        As of the measured path. Of derivatives, `start_speed` is the derivative at the start.
+    speed : array_like, shape (n,)
+        Simulated speed, from rest. [rad/s]
+    form :
+        As of the measured path.
     aligned : bool
         Without it, the source's own filters, whose output comes half a sample later than the
         measured path's.
 
     Returns
     -------
-    array, shape of `speed`
+    array, shape (n,)
         Speed, delayed by `path_delay`, and by half a sample more if not aligned. [rad/s]
 
     Raises
@@ -234,27 +196,19 @@ def matched_speed(
     frequency, and the amplitudes to x/tan x with x = π·frequency/rate: 0.1 % at 10 Hz and 512 Hz.
     """
     stamps = stamps_of(time)
-    values = samples("speed", speed, stamps.time.size)
-    recursion = recursion_of(stamps, form, low_pass, differentiator)
-    share = 0.5 if aligned else 0.0
-    right = np.full(stamps.time.size - 1, share)
-    return filtered_by(values, Taps(1.0 - right, right), recursion, _start(start_speed, values))
+    values = signal("speed", speed, stamps.time.size)
+    _, recursion = _recursion(stamps, form)
+    return _filtered(0.5 * (values[:-1] + values[1:]) if aligned else values[:-1], recursion)
 
 
-def path_delay(
-    period: float,
-    *,
-    form: Form = "source",
-    low_pass: float = LOW_PASS,
-    differentiator: float = DIFFERENTIATOR,
-) -> float:
+def path_delay(period: float, *, form: Form = "source") -> float:
     """Delay of a slow change of speed on its way through the measured path [s].
 
     Parameters
     ----------
     period : float
         Sample period h. [s]
-    form, low_pass, differentiator :
+    form :
         As in `speed_from_angle`.
 
     Returns
@@ -266,13 +220,11 @@ def path_delay(
     Raises
     ------
     InputError
-        If a number is not positive, or the explicit form cannot be used.
+        If the period is not positive, or the explicit form cannot be used.
     """
     h = positive("period", period)
-    stamps = Stamps(np.array([0.0, h]), h)
-    first, second, from_state, _ = (
-        float(each[0]) for each in recursion_of(stamps, form, low_pass, differentiator)
-    )
+    _, recursion = _recursion(Stamps(np.array([0.0, h]), h), form)
+    first, second, from_state, _ = (float(each[0]) for each in recursion)
     # mean age of what the output is made of, in samples: half a sample of the mean, what x adds
     # where it is used, and what each recursion keeps
     through_state = from_state / (1.0 - second) * (1.0 + first / (1.0 - first))
@@ -288,7 +240,7 @@ def savitzky_golay_speed(
     ----------
     time : array_like, shape (n,)
         Evenly spaced stamps. [s]
-    angle : array_like, shape (n,) or (n, k)
+    angle : array_like, shape (n,)
         Position; of an encoder, interpolated (`encoder.interpolate_counts`). [rad]
     window : float
         Length of the fit; the nearest odd number of samples is taken. [s]
@@ -297,7 +249,7 @@ def savitzky_golay_speed(
 
     Returns
     -------
-    array, shape of `angle`
+    array, shape (n,)
         Speed, not delayed: half of each window lies in the future. Within half a window of either
         end it is the slope of the polynomial through the first or last window, and noisier. [rad/s]
 
@@ -309,9 +261,13 @@ def savitzky_golay_speed(
     """
     from scipy.signal import savgol_filter
 
-    period = even_period(time, "The Savitzky-Golay filter")
-    stamps = np.asarray(time, dtype=float)
-    position = samples("angle", angle, stamps.size)
+    stamps, period = stamps_of(time)
+    if period is None:
+        raise InputError(
+            "The Savitzky-Golay filter needs evenly spaced stamps; take the exact filters, or "
+            "resample the record first."
+        )
+    position = signal("angle", angle, stamps.size)
     length = positive("window", window)
     count = 2 * round(0.5 * (length / period - 1.0)) + 1
     degree = whole("order", order)
@@ -322,34 +278,11 @@ def savitzky_golay_speed(
             f"window must hold more than {degree} samples for order {degree} and at most the "
             f"record's {stamps.size}, but {length:g} s hold {max(count, 0)}."
         )
-    slope = savgol_filter(position, count, degree, deriv=1, delta=period, axis=0, mode="interp")
+    slope = savgol_filter(position, count, degree, deriv=1, delta=period, mode="interp")
     return np.asarray(slope, dtype=np.float64)
 
 
 # --- the two low passes ---------------------------------------------------------------------------
-
-
-def _start(start_speed: ArrayLike, values: Array) -> Array:
-    columns = values.size // values.shape[0]
-    try:
-        start = np.broadcast_to(np.asarray(start_speed, dtype=float), (columns,)).copy()
-    except (TypeError, ValueError):
-        raise InputError(
-            f"start_speed must be one number or {columns}, one a column, not {start_speed!r}."
-        ) from None
-    if not np.isfinite(start).all():
-        raise InputError(f"start_speed must be finite, not {start_speed!r}.")
-    return start
-
-
-class Taps(NamedTuple):
-    """What drives an interval: ``left`` times the sample before it, ``right`` times the one after.
-
-    Both have shape (n - 1,), one element an interval.
-    """
-
-    left: Array
-    right: Array
 
 
 class Recursion(NamedTuple):
@@ -366,70 +299,36 @@ class Recursion(NamedTuple):
 
 
 @kernel
-def march_low_passes(
-    values: Array, taps: Taps, recursion: Recursion, start: Array, filtered: Array
-) -> None:
-    """March the two low passes over all rows; the columns are independent of each other.
-
-    Parameters
-    ----------
-    values : (n, k) array
-        Samples.
-    taps, recursion : Taps, Recursion
-        What drives the low passes, and they themselves.
-    start : (k,) array
-        State of both low passes at the first row.
-    filtered : (n, k) array
-        Output: the second low pass, `start` in the first row.
-    """
-    rows, columns = values.shape
-    state = start.copy()
-    for j in range(columns):
-        filtered[0, j] = start[j]
-    for n in range(1, rows):
-        left, right = taps.left[n - 1], taps.right[n - 1]
-        kept_first, kept_second = recursion.kept_first[n - 1], recursion.kept_second[n - 1]
-        from_state, from_drive = recursion.from_state[n - 1], recursion.from_drive[n - 1]
-        for j in range(columns):
-            drive = left * values[n - 1, j] + right * values[n, j]
-            filtered[n, j] = (
-                kept_second * filtered[n - 1, j] + from_state * state[j] + from_drive * drive
-            )
-            state[j] = kept_first * state[j] + (1.0 - kept_first) * drive
+def march_low_passes(drive: Array, recursion: Recursion, filtered: Array) -> None:
+    """March the two low passes from rest: `drive` (n - 1,) by the interval, `filtered` (n,)."""
+    state = 0.0
+    filtered[0] = 0.0
+    for n in range(drive.size):
+        filtered[n + 1] = (
+            recursion.kept_second[n] * filtered[n]
+            + recursion.from_state[n] * state
+            + recursion.from_drive[n] * drive[n]
+        )
+        state = recursion.kept_first[n] * state + (1.0 - recursion.kept_first[n]) * drive[n]
 
 
-def filtered_by(values: Array, taps: Taps, recursion: Recursion, start: Array) -> Array:
-    """Run the low passes over samples of shape (n,) or (n, k) from a state of shape (k,)."""
-    columns = values.reshape(values.shape[0], -1)
-    filtered = np.empty_like(columns)
-    march_low_passes(columns, taps, recursion, start, filtered)
-    return filtered.reshape(values.shape)
+def _filtered(drive: Array, recursion: Recursion) -> Array:
+    filtered = np.empty(drive.size + 1)
+    march_low_passes(np.ascontiguousarray(drive), recursion, filtered)
+    return filtered
 
 
-def intervals_of(stamps: Stamps) -> Array:
-    """Length of each interval [s]."""
-    if stamps.period is None:
-        return np.diff(stamps.time)
-    return np.full(stamps.time.size - 1, stamps.period)
-
-
-def recursion_of(stamps: Stamps, form: Form, low_pass: float, differentiator: float) -> Recursion:
-    """Coefficients of low passes with cut-offs a and b [rad/s].
-
-    Raises
-    ------
-    InputError
-        If a cut-off is not positive, or the explicit form does not fit the stamps.
-    """
-    a, b = positive("low_pass", low_pass), positive("differentiator", differentiator)
-    intervals = intervals_of(stamps)
+def _recursion(stamps: Stamps, form: Form) -> tuple[Array, Recursion]:
+    """Intervals [s], and coefficients of low passes with the cut-offs a and b over them."""
+    a, b = LOW_PASS, DIFFERENTIATOR
+    intervals = np.diff(stamps.time)
+    if stamps.period is not None:
+        intervals = np.full(stamps.time.size - 1, stamps.period)
     if form == "exact":
         first, second = np.exp(-a * intervals), np.exp(-b * intervals)
-        # what x at the start of an interval leaves in y at its end; also for a = b, and for gaps
-        apart = abs(b - a) * intervals
-        ratio = np.divide(-np.expm1(-apart), apart, out=np.ones_like(apart), where=apart > 0.0)
-        from_state = b * intervals * np.exp(-min(a, b) * intervals) * ratio
-        return Recursion(first, second, from_state, 1.0 - second - from_state)
+        # what x at the start of an interval leaves in y at its end
+        from_state = b / (b - a) * (first - second)
+        return intervals, Recursion(first, second, from_state, 1.0 - second - from_state)
     if form != "source":
         raise InputError(f"form must be 'source' or 'exact', not {form!r}.")
     if stamps.period is None:
@@ -437,12 +336,10 @@ def recursion_of(stamps: Stamps, form: Form, low_pass: float, differentiator: fl
             "The source's form of the filters needs evenly spaced stamps; take form 'exact', or "
             "resample the record first."
         )
-    fastest = max(a, b)
-    if fastest * stamps.period >= 2.0:
+    if b * stamps.period >= 2.0:
         raise InputError(
             f"The source's form of the filters is unstable at {1.0 / stamps.period:.4g} Hz, as at "
-            f"every rate up to {0.5 * fastest:.4g} Hz; take form 'exact'."
+            f"every rate up to {0.5 * b:.4g} Hz; take form 'exact'."
         )
-    return Recursion(
-        1.0 - a * intervals, 1.0 - b * intervals, b * intervals, np.zeros_like(intervals)
-    )
+    keep = 1.0 - a * intervals, 1.0 - b * intervals
+    return intervals, Recursion(*keep, b * intervals, np.zeros_like(intervals))

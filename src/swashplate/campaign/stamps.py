@@ -133,42 +133,15 @@ def stamp_statistics(time: ArrayLike, *, gap: float = 1.5) -> StampStatistics:
     )
 
 
-def even_period(time: ArrayLike, what: str) -> float:
-    """Sample period of even stamps [s].
-
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        Stamps, two or more. [s]
-    what : str
-        Who needs them even, for the error's sentence.
-
-    Raises
-    ------
-    InputError
-        If they are uneven, or as `increasing`.
-    """
-    period = stamps_of(time).period
-    if period is None:
-        steps = np.diff(np.asarray(time, dtype=float))
-        at = int(np.argmax(np.abs(steps - np.median(steps)))) + 1
-        raise InputError(
-            f"{what} needs evenly spaced stamps, but row {at} (the first is 0) comes "
-            f"{steps[at - 1]:.6g} s after the one before it, where {np.median(steps):.6g} s is "
-            "usual; resample the record first."
-        )
-    return period
-
-
-def samples(name: str, values: ArrayLike, rows: int) -> Array:
-    """Values of a record as an array of one row a stamp, all finite; not copied if they are one.
+def signal(name: str, values: ArrayLike, rows: int) -> Array:
+    """Samples of a signal, one a stamp, all finite; not copied if they are an array already.
 
     Parameters
     ----------
     name : str
         What they are, for the error's sentence.
-    values : array_like, shape (rows,) or (rows, k)
-        One or more signals side by side.
+    values : array_like, shape (rows,)
+        The samples.
     rows : int
         Number of stamps.
 
@@ -181,23 +154,14 @@ def samples(name: str, values: ArrayLike, rows: int) -> Array:
         numbers = np.ascontiguousarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError(f"{name} must be numbers, not {values!r}.") from None
-    if numbers.ndim not in (1, 2) or numbers.shape[0] != rows or numbers.size == 0:
+    if numbers.shape != (rows,):
         raise InputError(
-            f"{name} must have one row for each of the {rows} stamps, not the shape "
-            f"{numbers.shape}."
+            f"{name} must be one signal with one row for each of the {rows} stamps, not of the "
+            f"shape {numbers.shape}."
         )
-    if not np.isfinite(numbers).all():
-        at = tuple(int(index) for index in np.argwhere(~np.isfinite(numbers))[0])
-        column = f" of column {at[1]}" if len(at) == 2 else ""
+    wrong = np.flatnonzero(~np.isfinite(numbers))
+    if wrong.size:
         raise InputError(
-            f"{name} must be finite, but row {at[0]}{column} (the first is 0) is {numbers[at]}."
+            f"{name} must be finite, but row {wrong[0]} (the first is 0) is {numbers[wrong[0]]}."
         )
-    return numbers
-
-
-def signal(name: str, values: ArrayLike, rows: int) -> Array:
-    """As `samples`, for one signal alone: shape (rows,)."""
-    numbers = samples(name, values, rows)
-    if numbers.ndim != 1:
-        raise InputError(f"{name} must be one signal, not {numbers.shape[1]} side by side.")
     return numbers

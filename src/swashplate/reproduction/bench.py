@@ -51,7 +51,7 @@ class Bench:
                 instruments=tools,
             )
             with TemporaryDirectory() as folder:
-                self._kept[key] = made, Campaign.from_toml(rig.write(made, folder, "parquet"))
+                self._kept[key] = made, Campaign.from_toml(rig.write(made, folder))
         return self._kept[key]
 
     def run(self, axis: str, test: str) -> Experiment:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.analysis.levers import pulled
-from swashplate.campaign import matched_speed, rectified_current
+from swashplate.campaign import matched_speed
 from swashplate.drive import Drive
 from swashplate.maneuvers import source_tests
 from swashplate.reproduction.catalogue import Shown
@@ -66,7 +66,7 @@ def current_figure(shown: Shown) -> Figure:
     """Figures 4.3 to 4.16: the sum of both channels' currents."""
     (test,) = shown.tests
     run = simulated(shown.axis, test)
-    total = rectified_current(run.current_positive, run.current_negative)
+    total = run.current_positive + run.current_negative
     errata = (2, 3, *((7,) if shown.axis == "slew" else ()), *((5,) if "sine" in test else ()))
     return Figure(
         shown.number,
