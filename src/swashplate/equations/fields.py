@@ -9,11 +9,7 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-
-def is_named_tuple(kind: object) -> bool:
-    """Whether a type is a named tuple's."""
-    return isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
-
+from swashplate.equations.syntax import is_named_tuple
 
 _known: dict[Any, tuple[str, ...]] = {}
 

@@ -9,7 +9,6 @@ each other (`recur` kernels: strongly connected components), each behind those t
 
 from __future__ import annotations
 
-import ast
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,11 +16,9 @@ from graphlib import TopologicalSorter
 from typing import Any, NamedTuple
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.derivatives import derive
-from swashplate.equations.derived import Derived
-from swashplate.equations.equation import equation_of_text
-from swashplate.equations.expressions import Node
-from swashplate.equations.lowering import generating
+from swashplate.equations.adjoints import Derivatives, Derived, derived_function
+from swashplate.equations.code import Code, generating, leaves
+from swashplate.equations.expressions import Node, text
 from swashplate.equations.march import (
     PartCode,
     Sampler,
@@ -36,10 +33,10 @@ from swashplate.equations.march import (
 )
 from swashplate.equations.model import Model, Source, arguments_of
 from swashplate.equations.pieces import PIECE, Planned, piece
-from swashplate.equations.program import leaves
+from swashplate.equations.reading import read
 from swashplate.equations.rows import STRIDE
 from swashplate.equations.run import module
-from swashplate.equations.scalars import Code, text
+from swashplate.equations.writing import Writer, lines_of
 from swashplate.errors import InputError
 
 WORD = re.compile(r"\b[A-Za-z_]\w*")
@@ -302,17 +299,17 @@ class _Builder:
             found[part.source(source)] = By("signal", source.signal, source.part)
         return found
 
-    def _derived(self, part: PartCode, name: str, results: Mapping[str, Node]) -> Derived | None:
-        """Some results of a part with their derivatives, as a function of the scalars it reads."""
-        nodes = list(results.values())
-        known = self._by(part)
-        read = part.code.reads(nodes)
-        arguments = sorted(each for each in read if each in known or self._plain(part, each))
-        active = [each for each in arguments if each in known]
+    def _derivatives(
+        self, part: PartCode, results: Mapping[str, Node]
+    ) -> tuple[Derivatives, dict[tuple[str, By], Node]] | None:
+        """Some results of a part with their derivatives, None if they depend on nothing."""
+        nodes, known, order = [*results.values()], self._by(part), [*results]
+        active = sorted(part.code.reads(nodes) & known.keys())
         if not active:
             return None
-        function = scalar_function(name, arguments, part.code.lines(nodes), nodes, part.code.names)
-        return derive(function, tuple(active))
+        found = Derivatives(part.code, nodes, active)
+        keys = [(order[out], known[active[inp]]) for out, inp in found.entries]
+        return found, dict(zip(keys, found.partials, strict=True))
 
     def _plain(self, part: PartCode, name: str) -> bool:
         """Whether a name comes from outside, without being differentiated by."""
@@ -347,33 +344,25 @@ class _Builder:
 
     # -- what flows ----------------------------------------------------------------------------
 
-    def _flows(self, part: PartCode) -> dict[str, dict[By, str]]:
-        """Partial derivatives of a part's states, as texts; its aliases are found on the way."""
+    def _flows(self, part: PartCode) -> dict[str, list[By]]:
+        """What a part's states are derived by; its aliases are found on the way."""
         graph = PartGraph(part.part)
         self.graphs.append(graph)
         graph.delays = {tap.number: tap.tap.delay for tap in part.taps if tap.tap.delay}
         results = self._results(part)
-        derived = self._derived(part, f"{part.own.name}_advance", results)
-        if derived is None:
+        found = self._derivatives(part, results)
+        if found is None:
             return {}
-        partials = self._partials(part, results, derived)
         states = [each for each in results if each.startswith("state.")]
         for signal in [each for each in results if each.startswith("signals.")]:
             for state in states:
                 if results[signal] is results[state]:
                     graph.aliases[signal.removeprefix("signals.")] = state.removeprefix("state.")
-        return {each: partials[each] for each in states if partials[each]}
-
-    def _partials(
-        self, part: PartCode, results: Mapping[str, Node], derived: Derived
-    ) -> dict[str, dict[By, str]]:
-        known, texts = self._by(part), returned(derived)
-        order = list(results)
-        found: dict[str, dict[By, str]] = {each: {} for each in order}
-        for k, (out, inp) in enumerate(derived.entries):
-            said = " | ".join(each[len(derived.outputs) + k] for each in texts)
-            found[order[out]][known[derived.inputs[inp]]] = said
-        return found
+        flows: dict[str, list[By]] = {}
+        for out, by in found[1]:
+            if out in states:
+                flows.setdefault(out, []).append(by)
+        return {each: flows[each] for each in states if each in flows}
 
     def _keep(self, graph: PartGraph, part: PartCode) -> None:
         """Numbers of a part that the march leaves: states, inputs as they come, known signals."""
@@ -417,7 +406,7 @@ class _Builder:
             return
         nodes = [part.signal(signal) for signal in late]
         ahead, rows = self._arguments(part, part.code.reads(nodes))
-        inner = [*rows, *part.code.lines(nodes)]
+        inner = [*rows, *lines_of(part.code, nodes)]
         for signal, node in zip(late, nodes, strict=True):
             self.values[part.part, signal] = self._new_row()
             inner.append(f"{_place(self.values[part.part, signal], 'm')} = {text(node)}")
@@ -428,9 +417,7 @@ class _Builder:
             {},
         )
 
-    def _part(
-        self, graph: PartGraph, part: PartCode, partials: Mapping[str, Mapping[By, str]]
-    ) -> None:
+    def _part(self, graph: PartGraph, part: PartCode, partials: Mapping[str, Sequence[By]]) -> None:
         results, own = self._results(part), part.own.name
         signals = {
             each: node
@@ -503,9 +490,10 @@ class _Builder:
         active = tuple(each for each in arguments if each in known)
         if not nodes or not active:
             return None
-        function = scalar_function(name, arguments, code.lines(nodes), nodes, code.names)
         by = {each: known[each] for each in active}
-        return Local(tuple(results), tuple(arguments), by, derive(function, active))
+        named = [(each, each) for each in active]
+        derived = derived_function(name, f"{name}.", arguments, code, [*results.items()], named)
+        return Local(tuple(results), tuple(arguments), by, derived)
 
     def _constants(self, part: PartCode) -> Local | None:
         results = {name: ex.name(name) for name in self._constant_names(part)}
@@ -554,15 +542,19 @@ class _Builder:
                 continue
             link = self.model.links[place.path]
             assert link.equation is not None
-            derived = derive(link.equation, arguments_of(link.equation))
-            numbers = literals(derived)
-            if len(numbers) < len(derived.entries):
+            arguments = arguments_of(link.equation)
+            code = Code(arguments, ruled=True)
+            made = read(code, link.equation, {each: ex.name(each) for each in arguments})
+            assert isinstance(made, Node)
+            derived = Derivatives(code, [made], arguments)
+            if any(each.op != "number" for each in derived.partials):
                 raise InputError(
                     f"Model {self.model.name}: the link {link.name} must be a sum of signals with "
                     "constant factors; put anything else into a part's sample."
                 )
             found[link.name] = {
-                derived.inputs[inp]: numbers[k] for k, (_, inp) in enumerate(derived.entries)
+                arguments[inp]: float(each.value)
+                for (_, inp), each in zip(derived.entries, derived.partials, strict=True)
             }
         return found
 
@@ -572,108 +564,44 @@ class _Builder:
         self, graph: PartGraph, part: PartCode, name: str, results: Mapping[str, Node]
     ) -> int:
         """Piece that writes partial derivatives at known states into rows of the block."""
-        derived = self._derived(part, f"{name}_part", results)
-        if derived is None:
+        found = self._derivatives(part, results)
+        if found is None:
             return -1
-        known, order, literal = self._by(part), list(results), literals(derived)
-        arguments, body, returns = straight(derived)
-        stores = []
-        for k, (out, inp) in enumerate(derived.entries):
-            key = (order[out], known[derived.inputs[inp]])
-            if k in literal:
-                graph.entries[key] = Entry(-1, literal[k])
-                continue
-            row = self._new_row()
-            graph.entries[key] = Entry(row)
-            stores.append(f"{_place(row, 'm')} = {returns[len(derived.outputs) + k]}")
-        if not stores:
+        derivatives, partials = found
+        rows = {}
+        for key, partial in partials.items():
+            if partial.op == "number":
+                graph.entries[key] = Entry(-1, float(partial.value))
+            else:
+                rows[key] = self._new_row()
+                graph.entries[key] = Entry(rows[key])
+        if not rows:
             return -1
-        ahead, rows = self._arguments(part, arguments)
-        called = {each.name: each.compiled for each in derived.callees}
+        taken, wanted = {*part.code.taken}, [partials[key] for key in rows]
+        writer = Writer(taken, derivatives.items, wanted, derivatives.hints)
+        ahead, loads = self._arguments(part, writer.needed)
+        # what only one side of a choice makes would carry its value from one sample to the next, as
+        # far as a compiler can know, and the loop would not become vector instructions
+        begun = [f"{name} = {value}" for name, value in writer.inner.items()]
+        stores = [
+            f"{_place(row, 'm')} = {made}"
+            for row, made in zip(rows.values(), writer.texts, strict=True)
+        ]
         return self._piece(
             f"fill_{name}",
             "Partial derivatives at known states.",
-            [*ahead, "for m in range(count):", *indented([*rows, *body, *stores])],
-            {**called, **derived.names},
+            [
+                *ahead,
+                "for m in range(count):",
+                *indented([*loads, *begun, *writer.lines, *stores]),
+            ],
+            writer.functions,
         )
 
 
 def _place(row: int, at: str) -> str:
     """Text of a number in a row of the block."""
     return f"flat[{row * STRIDE} + {at}]"
-
-
-def scalar_function(
-    name: str,
-    arguments: Sequence[str],
-    lines: Sequence[str],
-    results: Sequence[Node],
-    names: Mapping[str, Any],
-) -> Any:
-    """An equation of scalars from straight code."""
-    returned_type = ", ".join("float" for _ in results)
-    returned_type = f"tuple[{returned_type}]" if len(results) != 1 else "float"
-    made = ", ".join(text(node) for node in results)
-    body = [*lines, f"return {made}" if len(results) == 1 else f"return ({made},)"]
-    head = f"def {name}({', '.join(f'{each}: float' for each in arguments)}) -> {returned_type}:"
-    return equation_of_text("\n".join([head, *indented(body), ""]), name, dict(names))
-
-
-def straight(derived: Derived) -> tuple[list[str], list[str], list[str]]:
-    """Names of a derived function's arguments, lines of its body, and texts of what it returns."""
-    tree = ast.parse(derived.source).body[0]
-    assert isinstance(tree, ast.FunctionDef)
-    *body, last = tree.body[1:]
-    assert isinstance(last, ast.Return)
-    assert not any(isinstance(each, ast.Return) for node in body for each in ast.walk(node))
-    lines = [*begun(body), *(line for node in body for line in ast.unparse(node).splitlines())]
-    value = last.value
-    elements = value.elts if isinstance(value, ast.Tuple) else [value]
-    return [each.arg for each in tree.args.args], lines, [ast.unparse(e) for e in elements if e]
-
-
-def begun(body: Sequence[ast.stmt]) -> list[str]:
-    """Lines that give a number to names which only one branch of an `if` makes.
-
-    In a loop such a name would carry its value from one sample to the next, as far as a compiler
-    can know, and the loop would not become vector instructions.
-    """
-    first: dict[str, str] = {}
-    for node in body:
-        if not isinstance(node, ast.If):
-            continue
-        for each in ast.walk(node):
-            if isinstance(each, ast.Assign) and isinstance(each.targets[0], ast.Name):
-                truth = isinstance(each.value, ast.Compare | ast.BoolOp)
-                first.setdefault(each.targets[0].id, "False" if truth else "0.0")
-            elif isinstance(each, ast.Assign) and isinstance(each.targets[0], ast.Tuple):
-                names = [e.id for e in each.targets[0].elts if isinstance(e, ast.Name)]
-                first |= {name: "0.0" for name in names if name not in first}
-    return [f"{name} = {value}" for name, value in first.items()]
-
-
-def literals(derived: Derived) -> dict[int, float]:
-    """Partial derivatives that are the same number wherever the function returns."""
-    found, texts = {}, returned(derived)
-    for k in range(len(derived.entries)):
-        values = {each[len(derived.outputs) + k] for each in texts}
-        if len(values) == 1:
-            try:
-                found[k] = float(ast.literal_eval(values.pop()))
-            except (ValueError, SyntaxError):
-                continue
-    return found
-
-
-def returned(derived: Derived) -> list[list[str]]:
-    """Texts of what a generated function returns, for each of its returns."""
-    found = []
-    for node in ast.walk(ast.parse(derived.source)):
-        if isinstance(node, ast.Return) and node.value is not None:
-            value = node.value
-            elements = value.elts if isinstance(value, ast.Tuple) else [value]
-            found.append([ast.unparse(each) for each in elements])
-    return found
 
 
 def _weakly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> list[list[str]]:

@@ -9,13 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.equations.code import generating, leaves
 from swashplate.equations.fields import floats_of, value_at
 from swashplate.equations.graph import By, Entry, Graph, Group, PartGraph, graph_of
-from swashplate.equations.lowering import generating
 from swashplate.equations.model import Model, Source
 from swashplate.equations.observation import ObservedRecord, Own
 from swashplate.equations.pieces import addresses, pointers
-from swashplate.equations.program import leaves
 from swashplate.equations.rows import (
     ABREAST,
     BLOCK,

@@ -31,7 +31,8 @@ from importlib import import_module
 from types import FunctionType
 from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 
-from swashplate.equations.fields import floats_of, is_named_tuple
+from swashplate.equations.fields import floats_of
+from swashplate.equations.syntax import is_named_tuple, plain
 from swashplate.equations.windows import Window
 from swashplate.errors import InputError
 
@@ -352,12 +353,8 @@ def place(tap: Tap, delay: float, h: float) -> Place:
     return Place(whole, end - whole, 1.0 / h if samples >= tap.ahead else 0.0)
 
 
-def plain(equation: Equation) -> Equation:
-    """The Python function behind a compiled one."""
-    return getattr(equation, "py_func", equation)
-
-
 def arguments_of(equation: Equation) -> tuple[str, ...]:
     """Names of an equation's arguments."""
     code = plain(equation).__code__
-    return code.co_varnames[: code.co_argcount]
+    names: tuple[str, ...] = code.co_varnames[: code.co_argcount]
+    return names

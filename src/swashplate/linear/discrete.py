@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.equations.adjoints import Derived
 from swashplate.equations.derivatives import derive
-from swashplate.equations.derived import Derived
 from swashplate.equations.fields import floats_of, value_at
 from swashplate.equations.march import HOLDS, taps_of
 from swashplate.equations.model import Link, Model, arguments_of

@@ -17,8 +17,8 @@ from typing import NamedTuple
 from swashplate.equations.definition import OFF, Flag
 from swashplate.equations.equation import equation
 from swashplate.equations.library import clipped
+from swashplate.equations.loops import repeated, root
 from swashplate.equations.model import Model, join
-from swashplate.equations.primitives import repeated, root
 from swashplate.models.drive import card, current_sum, signed_current, source
 from swashplate.models.machine import (
     Machine,

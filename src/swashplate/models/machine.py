@@ -16,7 +16,7 @@ from typing import Annotated, NamedTuple
 from swashplate.equations.definition import MINUS, Definition, Flag
 from swashplate.equations.equation import equation
 from swashplate.equations.library import clipped
-from swashplate.equations.primitives import root
+from swashplate.equations.loops import root
 from swashplate.models.pump import flow_head, head_root
 
 ATMOSPHERE = 101325.0

@@ -23,7 +23,7 @@ from swashplate.equations.definition import MINUS, OFF, Definition, Flag
 from swashplate.equations.derivatives import declared
 from swashplate.equations.equation import equation
 from swashplate.equations.library import arctangent, small_arctangent
-from swashplate.equations.primitives import root
+from swashplate.equations.loops import root
 from swashplate.models.refinements import (
     accelerating_leakage,
     damping_factor,

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.lowering import generating
+from swashplate.equations.code import generating
 from swashplate.equations.march import Sampler, Stored
 from swashplate.equations.model import Model
 from swashplate.equations.record import Record
