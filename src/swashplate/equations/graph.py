@@ -207,15 +207,18 @@ class _Builder:
         """Row of each number by its name in the code."""
         self.rows = 0
         self.graphs: list[PartGraph] = []
+        self.found: list[tuple[Derivatives, dict[tuple[str, By], Node]]] = []
+        """What was differentiated of each part, and its partial derivatives."""
         self.values: dict[tuple[int, str], int] = {}
 
     def build(self) -> Graph:
-        flows = [self._flows(part) for part in self.parts]
+        for part in self.parts:
+            self._begin(part)
         # part by part, so that the pieces of the first ones are the same whatever follows
-        for graph, part, partials in zip(self.graphs, self.parts, flows, strict=True):
+        for graph, part in zip(self.graphs, self.parts, strict=True):
             self._keep(graph, part)
             self._values(graph, part)
-            self._part(graph, part, partials)
+            self._part(graph, part)
         for place, _ in self.observed:
             if place.kind == "link":
                 self._row_for(place)
@@ -299,18 +302,6 @@ class _Builder:
             found[part.source(source)] = By("signal", source.signal, source.part)
         return found
 
-    def _derivatives(
-        self, part: PartCode, results: Mapping[str, Node]
-    ) -> tuple[Derivatives, dict[tuple[str, By], Node]] | None:
-        """Some results of a part with their derivatives, None if they depend on nothing."""
-        nodes, known, order = [*results.values()], self._by(part), [*results]
-        active = sorted(part.code.reads(nodes) & known.keys())
-        if not active:
-            return None
-        found = Derivatives(part.code, nodes, active)
-        keys = [(order[out], known[active[inp]]) for out, inp in found.entries]
-        return found, dict(zip(keys, found.partials, strict=True))
-
     def _plain(self, part: PartCode, name: str) -> bool:
         """Whether a name comes from outside, without being differentiated by."""
         samples = {each for tap in part.taps for each in part.tap_samples(tap)}
@@ -344,25 +335,22 @@ class _Builder:
 
     # -- what flows ----------------------------------------------------------------------------
 
-    def _flows(self, part: PartCode) -> dict[str, list[By]]:
-        """What a part's states are derived by; its aliases are found on the way."""
+    def _begin(self, part: PartCode) -> None:
+        """Differentiate what is needed of a part, and find its aliases."""
         graph = PartGraph(part.part)
         self.graphs.append(graph)
         graph.delays = {tap.number: tap.tap.delay for tap in part.taps if tap.tap.delay}
-        results = self._results(part)
-        found = self._derivatives(part, results)
-        if found is None:
-            return {}
+        results, known = self._results(part), self._by(part)
+        nodes, order = [*results.values()], [*results]
+        active = sorted(part.code.reads(nodes) & known.keys())
+        found = Derivatives(part.code, nodes, active)
+        keys = [(order[out], known[active[inp]]) for out, inp in found.entries]
+        self.found.append((found, dict(zip(keys, found.partials, strict=True))))
         states = [each for each in results if each.startswith("state.")]
         for signal in [each for each in results if each.startswith("signals.")]:
             for state in states:
                 if results[signal] is results[state]:
                     graph.aliases[signal.removeprefix("signals.")] = state.removeprefix("state.")
-        flows: dict[str, list[By]] = {}
-        for out, by in found[1]:
-            if out in states:
-                flows.setdefault(out, []).append(by)
-        return {each: flows[each] for each in states if each in flows}
 
     def _keep(self, graph: PartGraph, part: PartCode) -> None:
         """Numbers of a part that the march leaves: states, inputs as they come, known signals."""
@@ -417,25 +405,32 @@ class _Builder:
             {},
         )
 
-    def _part(self, graph: PartGraph, part: PartCode, partials: Mapping[str, Sequence[By]]) -> None:
-        results, own = self._results(part), part.own.name
-        signals = {
-            each: node
-            for each, node in results.items()
+    def _part(self, graph: PartGraph, part: PartCode) -> None:
+        own = part.own.name
+        derivatives, partials = self.found[self.graphs.index(graph)]
+
+        def fill(name: str, outs: Iterable[str]) -> int:
+            wanted = {*outs}
+            some = {key: node for key, node in partials.items() if key[0] in wanted}
+            return self._fill(graph, part, name, derivatives, some)
+
+        signals = [
+            each
+            for each in self._results(part)
             if each.startswith("signals.") and each.removeprefix("signals.") not in graph.aliases
-        }
+        ]
         # derivatives are carried through sub-steps once, for states and signals
         together = part.code.repeats
         if signals and not together:
-            graph.signal_piece = self._fill(graph, part, f"{own}_signals", signals)
-        states = list(partials)
+            graph.signal_piece = fill(f"{own}_signals", signals)
+        states = list(dict.fromkeys(out for out, _ in partials if out.startswith("state.")))
         flows = {
-            out: {f"state.{by.path}" for by in each if by.kind == "state"} & {*states}
-            for out, each in partials.items()
+            out: {f"state.{by.path}" for each, by in partials if each == out and by.kind == "state"}
+            & {*states}
+            for out in states
         }
         if together:
-            every = {each: results[each] for each in states}
-            filled = self._fill(graph, part, own, every | signals)
+            filled = fill(own, [*states, *signals])
         at_sample = {
             by.path
             for out, by in graph.entries
@@ -446,7 +441,7 @@ class _Builder:
         for c, outs in enumerate([states] if together else _weakly_connected(states, flows)):
             name = f"{own}_{c}" if len(outs) < len(states) else own
             if not together:
-                filled = self._fill(graph, part, name, {each: results[each] for each in outs})
+                filled = fill(name, outs)
             groups = []
             for members in _strongly_connected(outs, flows):
                 bare = tuple(each.removeprefix("state.") for each in members)
@@ -561,13 +556,14 @@ class _Builder:
     # -- pieces --------------------------------------------------------------------------------
 
     def _fill(
-        self, graph: PartGraph, part: PartCode, name: str, results: Mapping[str, Node]
+        self,
+        graph: PartGraph,
+        part: PartCode,
+        name: str,
+        derivatives: Derivatives,
+        partials: Mapping[tuple[str, By], Node],
     ) -> int:
         """Piece that writes partial derivatives at known states into rows of the block."""
-        found = self._derivatives(part, results)
-        if found is None:
-            return -1
-        derivatives, partials = found
         rows = {}
         for key, partial in partials.items():
             if partial.op == "number":

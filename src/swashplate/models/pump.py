@@ -920,9 +920,15 @@ def pump_rates(
     return PumpState(
         pressure=rising,
         plate_pressure=plate,
+        magnetising_current=0.0,
+        spool=0.0,
         deflection=released,
         torque=charging,
         speed=accelerating,
+        flow_speed=0.0,
+        load_torque=0.0,
+        shaft_angle=0.0,
+        begun=0.0,
     )
 
 
