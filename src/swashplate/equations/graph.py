@@ -10,14 +10,14 @@ each other (`recur` kernels: strongly connected components), each behind those t
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import TopologicalSorter
 from typing import Any, NamedTuple
 
 from swashplate.equations import expressions as ex
 from swashplate.equations.adjoints import Derivatives, Derived, derived_function
-from swashplate.equations.code import Code, generating, leaves
+from swashplate.equations.code import Code, Let, generating, leaves
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.march import (
     PartCode,
@@ -95,7 +95,7 @@ class PartGraph:
     """Piece that computes signals which the march does not leave, -1 for none."""
     aliases: dict[str, str] = field(default_factory=dict)
     """Signals that are a state behind the sample, as far as derivatives go."""
-    constants: list[tuple[str, str]] = field(default_factory=list)
+    constants: set[tuple[str, str]] = field(default_factory=set)
     """Constant and parameter that it depends on."""
     delays: dict[int, str] = field(default_factory=dict)
     """Path of the delay of each tap."""
@@ -103,41 +103,24 @@ class PartGraph:
     """State and parameter that it depends on at the start."""
 
 
-Slopes = dict[str, dict[By, float]]
-"""Derivatives of results by what they depend on."""
+class Starting(NamedTuple):
+    """What is known of a part at the start, with its derivatives, as a function of scalars.
 
+    Results are the constants that a sample reads (``k``), the states (``state``), and the signals
+    that other parts need (``signal``).
+    """
 
-@dataclass(eq=False)
-class Local:
-    """A scalar function with its derivatives, for one evaluation in plain Python."""
-
-    results: tuple[str, ...]
+    results: tuple[tuple[str, str], ...]
+    """Kind and name of each."""
     arguments: tuple[str, ...]
-    by: Mapping[str, By]
+    by: tuple[By, ...]
+    """What each input of `derived` is: a parameter, or a signal of a part before."""
     derived: Derived
 
-    def at(
-        self, values: Mapping[str, float]
-    ) -> tuple[dict[str, float], dict[str, dict[By, float]]]:
-        """Results, and their derivatives, for values of the arguments."""
-        found = self.derived.python(*(values[name] for name in self.arguments))
-        slopes: Slopes = {name: {} for name in self.results}
-        partials = found[len(self.results) :]
-        for (out, inp), partial in zip(self.derived.entries, partials, strict=True):
-            slopes[self.results[out]][self.by[self.derived.inputs[inp]]] = partial
-        return dict(zip(self.results, found, strict=False)), slopes
-
-
-class Locals(NamedTuple):
-    """What is differentiated once at the start, of a part."""
-
-    names: Mapping[str, By]
-    """What a name in the part's code stands for."""
-    constants: Local | None
-    rest: Local | None
-    settled: Local | None
-    sources: Local | None
-    """Signals that others need, by state, parameters and constants."""
+    def entries(self) -> Iterator[tuple[tuple[str, str], By]]:
+        """Results, each with what it is differentiated by."""
+        for out, inp in self.derived.entries:
+            yield self.results[out], self.by[inp]
 
 
 @dataclass(eq=False)
@@ -157,7 +140,8 @@ class Graph:
     """Row of each signal that the march does not leave, by part and path."""
     sources: list[Source]
     """Signals that other parts or observed links need."""
-    locals: list[Locals]
+    starts: list[dict[str, Starting]]
+    """What is known of each part where it starts at rest and, if it can, settled."""
     codes: list[PartCode]
     """The parts' code."""
     signals: tuple[str, ...]
@@ -207,6 +191,7 @@ class _Builder:
         """Row of each number by its name in the code."""
         self.rows = 0
         self.graphs: list[PartGraph] = []
+        self.starts: list[dict[str, Starting]] = []
         self.found: list[tuple[Derivatives, dict[tuple[str, By], Node]]] = []
         """What was differentiated of each part, and its partial derivatives."""
         self.values: dict[tuple[int, str], int] = {}
@@ -233,7 +218,7 @@ class _Builder:
             self.observed,
             self.values,
             list(self.sampler.sources),
-            [self._locals(part) for part in self.parts],
+            self.starts,
             self.parts,
             self.signals,
             (march, *self.pieces),
@@ -459,75 +444,42 @@ class _Builder:
                 )
                 groups.append(Group(bare, after, stored))
             graph.components.append(Component(filled, groups, together))
-        constants = self._constants(part)
-        if constants is not None:
-            graph.constants = [
-                (constants.results[out], constants.by[constants.derived.inputs[inp]].path)
-                for out, inp in constants.derived.entries
-            ]
-        for local in (self._start(part, rest_of(part)), self._settled(part)):
-            if local is not None:
-                graph.started |= {
-                    (local.results[out], local.by[local.derived.inputs[inp]].path)
-                    for out, inp in local.derived.entries
-                    if local.by[local.derived.inputs[inp]].kind == "p"
-                }
+        starts = {"rest": self._starting(part, rest_of(part))}
+        settled = settled_of(part)
+        if settled is not None:
+            starts["steady"] = self._starting(part, settled)
+        self.starts.append(starts)
+        for each in starts.values():
+            for (kind, name), by in each.entries():
+                if kind == "k":
+                    graph.constants.add((name, by.path))
+                elif kind == "state" and by.kind == "p":
+                    graph.started.add((name, by.path))
 
-    def _local(
-        self, part: PartCode, name: str, code: Code, results: Mapping[str, Node]
-    ) -> Local | None:
-        """Some results with their derivatives, None where they depend on nothing."""
-        nodes, known = list(results.values()), self._by(part)
-        if code is part.prologue:  # what it makes is not what it takes
-            known = {each: by for each, by in known.items() if by.kind == "p"}
-        read = code.reads(nodes)
-        arguments = sorted(each for each in read if each in known or self._plain(part, each))
-        active = tuple(each for each in arguments if each in known)
-        if not nodes or not active:
-            return None
-        by = {each: known[each] for each in active}
-        named = [(each, each) for each in active]
-        derived = derived_function(name, f"{name}.", arguments, code, [*results.items()], named)
-        return Local(tuple(results), tuple(arguments), by, derived)
-
-    def _constants(self, part: PartCode) -> Local | None:
-        results = {name: ex.name(name) for name in self._constant_names(part)}
-        return self._local(part, f"{part.own.name}_constants", part.prologue, results)
-
-    def _constant_names(self, part: PartCode) -> list[str]:
-        """Constants that the part's sample or its start reads."""
-        names = dict.fromkeys(self.sampler.constants(part))
-        if "k" in part.known:
-            every = {each for _, node in leaves(part.known["k"]) for each in node.reads}
-            own = {*part.parameters}
-            for start in (rest_of(part), settled_of(part)):
-                if start is not None:
-                    nodes = [node for _, node in leaves(start.value)]
-                    read = start.code.reads(nodes)
-                    names |= dict.fromkeys(sorted((every & read) - own))
-        return list(names)
-
-    def _start(self, part: PartCode, start: Start | None) -> Local | None:
-        if start is None:
-            return None
-        found = dict(leaves(start.value))
-        results = {path: found[path] for path in self._states(part)}
-        return self._local(part, f"{part.own.name}_start", start.code, results)
-
-    def _settled(self, part: PartCode) -> Local | None:
-        return self._start(part, settled_of(part))
-
-    def _locals(self, part: PartCode) -> Locals:
-        sources = {
-            s.signal: part.signal(s.signal) for s in self.sampler.sources if s.part == part.part
+    def _starting(self, part: PartCode, start: Start) -> Starting:
+        """Constants, states and signals of a part at the start, with their derivatives."""
+        begins, states = dict(leaves(start.value)), dict(leaves(part.state))
+        code = Code(part.code.taken, ruled=True)
+        code.items = [*part.prologue.items, *start.code.items]
+        code.items += [Let(states[path].value, node) for path, node in begins.items()]
+        code.items += part.code.items
+        results = {("k", name): ex.name(name) for name in self.sampler.constants(part)}
+        results |= {("state", path): begins[path] for path in self._states(part)}
+        results |= {
+            ("signal", s.signal): part.signal(s.signal)
+            for s in self.sampler.sources
+            if s.part == part.part
         }
-        return Locals(
-            self._by(part),
-            self._constants(part),
-            self._start(part, rest_of(part)),
-            self._settled(part),
-            self._local(part, f"{part.own.name}_sources", part.code, sources),
-        )
+        known = {name: by for name, by in self._by(part).items() if by.kind in ("p", "signal")}
+        read = code.reads(results.values())
+        arguments = sorted(each for each in read if each in known or self._plain(part, each))
+        active = [each for each in arguments if each in known]
+        named = [(f"{kind} {name}", node) for (kind, name), node in results.items()]
+        name = f"{part.own.name}_start"
+        says = f"Constants, states and signals of {part.own.name} at the start."
+        by = [(each, each) for each in active]
+        derived = derived_function(name, says, arguments, code, named, by, chained=True)
+        return Starting((*results,), (*arguments,), tuple(known[a] for a in active), derived)
 
     def _links(self) -> dict[str, dict[str, float]]:
         """Partial derivatives of observed links: numbers, or refused."""

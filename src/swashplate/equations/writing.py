@@ -299,7 +299,7 @@ def function_text(
     writer = Writer({*code.taken, *FUNCTIONS, name}, given, results, hints)
     inner = [f"    {line}" for line in writer.lines]
     end = "," if len(results) == 1 and items is not None else ""
-    back = f"    return {', '.join(writer.texts)}{end}"
+    back = f"    return {', '.join(writer.texts) or '()'}{end}"
     if len(back) > WIDTH:
         back = "\n".join(listed("return (", writer.texts, ")", "    "))
     return "\n".join(
