@@ -284,7 +284,9 @@ def stepped(s: State, force: float, b: Body, h: float) -> State:
 def coupled(p: Pair, b: Body, h: float) -> Pair:
     pull = b.spring.stiffness * (p.right.position - p.left.position)
     left = stepped(p.left, pull, b, h)
-    return Pair(left, stepped(p.right, -pull, Body(b.mass, Spring(b.spring.stiffness, 0.25), 0.5), h))
+    return Pair(
+        left, stepped(p.right, -pull, Body(b.mass, Spring(b.spring.stiffness, 0.25), 0.5), h)
+    )
 
 
 @equation

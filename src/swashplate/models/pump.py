@@ -19,9 +19,9 @@ option that is off leaves nothing of them.
 from math import asin, atan, inf, pi, sin, sqrt, tan
 from typing import Annotated, NamedTuple
 
-from swashplate.equations.definition import MINUS, OFF, Definition, Flag
 from swashplate.equations.derivatives import declared
 from swashplate.equations.equation import equation
+from swashplate.equations.fields import MINUS, OFF, Definition, Flag
 from swashplate.equations.library import arctangent, small_arctangent
 from swashplate.equations.loops import root
 from swashplate.models.refinements import (

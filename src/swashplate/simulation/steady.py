@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from swashplate.equations import expressions as ex
 from swashplate.equations.code import Code, Tuple, generating, leaves
 from swashplate.equations.expressions import text
-from swashplate.equations.march import Sampler, function_source, indented, value_of
-from swashplate.equations.run import Instance, called, module
+from swashplate.equations.marching.march import Sampler, function_source, indented, value_of
+from swashplate.equations.marching.run import Instance, called, module
 from swashplate.equations.writing import lines_of
 from swashplate.models.card import channel_level
 from swashplate.models.drive import drive

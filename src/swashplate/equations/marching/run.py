@@ -15,10 +15,9 @@ from swashplate.equations.cache import generated, kernel
 from swashplate.equations.code import compiled_names, generating
 from swashplate.equations.equation import inlined, interpreted
 from swashplate.equations.fields import floats_of, made, numbers_of, value_at
-from swashplate.equations.march import Stored, march_source, observe_source, taps_of
-from swashplate.equations.model import Link, Model, Place, arguments_of, place
+from swashplate.equations.marching.march import Stored, march_source, observe_source, taps_of
+from swashplate.equations.model import Link, Model, Place, Window, arguments_of, place
 from swashplate.equations.syntax import plain
-from swashplate.equations.windows import Window
 from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ from swashplate.equations import expressions as ex
 from swashplate.equations.adjoints import Derivatives, Derived, derived_function
 from swashplate.equations.code import Code, Let, generating, leaves
 from swashplate.equations.expressions import Node, text
-from swashplate.equations.march import (
+from swashplate.equations.marching.march import (
     PartCode,
     Sampler,
     Start,
@@ -31,11 +31,11 @@ from swashplate.equations.march import (
     rest_of,
     settled_of,
 )
+from swashplate.equations.marching.pieces import PIECE, Planned, piece
+from swashplate.equations.marching.rows import STRIDE
+from swashplate.equations.marching.run import module
 from swashplate.equations.model import Model, Source, arguments_of
-from swashplate.equations.pieces import PIECE, Planned, piece
 from swashplate.equations.reading import read
-from swashplate.equations.rows import STRIDE
-from swashplate.equations.run import module
 from swashplate.equations.writing import Writer, lines_of
 from swashplate.errors import InputError
 

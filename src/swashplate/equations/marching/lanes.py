@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 from swashplate.equations import expressions as ex
 from swashplate.equations.code import generating, leaves
 from swashplate.equations.expressions import Node, text
-from swashplate.equations.march import (
+from swashplate.equations.marching.march import (
     Sampler,
     function_source,
     indented,
     output_of,
     rest_of,
 )
+from swashplate.equations.marching.run import module
+from swashplate.equations.marching.straight import CALLED, Statement, Straight
+from swashplate.equations.marching.triangle import aligned
 from swashplate.equations.model import Model
-from swashplate.equations.run import module
-from swashplate.equations.straight import CALLED, Statement, Straight
-from swashplate.equations.triangle import aligned
 from swashplate.equations.writing import lines_of
 
 Array = NDArray[np.float64]

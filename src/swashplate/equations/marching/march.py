@@ -25,11 +25,21 @@ from swashplate.equations.code import Code, Flag, Tuple, Value, fixed, leaves, r
 from swashplate.equations.equation import inlined
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.fields import floats_of
-from swashplate.equations.model import Equation, Link, Model, Source, Tap, arguments_of
-from swashplate.equations.pieces import PIECE
+from swashplate.equations.marching.pieces import PIECE
+from swashplate.equations.model import (
+    Equation,
+    Link,
+    Model,
+    Source,
+    Tap,
+    Window,
+    arguments_of,
+    linear,
+    mean_over_sample,
+    previous,
+)
 from swashplate.equations.reading import read
 from swashplate.equations.syntax import plain
-from swashplate.equations.windows import Window, linear, mean_over_sample, previous
 from swashplate.equations.writing import lines_of
 from swashplate.errors import InputError
 

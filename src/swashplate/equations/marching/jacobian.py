@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code import generating, leaves
 from swashplate.equations.fields import floats_of, value_at
-from swashplate.equations.graph import By, Entry, Graph, Group, PartGraph, graph_of
-from swashplate.equations.model import Model, Source
-from swashplate.equations.observation import ObservedRecord, Own
-from swashplate.equations.pieces import addresses, pointers
-from swashplate.equations.rows import (
+from swashplate.equations.marching.graph import By, Entry, Graph, Group, PartGraph, graph_of
+from swashplate.equations.marching.observation import ObservedRecord, Own
+from swashplate.equations.marching.pieces import addresses, pointers
+from swashplate.equations.marching.rows import (
     ABREAST,
     BLOCK,
     CALL,
@@ -30,8 +29,9 @@ from swashplate.equations.rows import (
     march_observed,
     room_for,
 )
-from swashplate.equations.run import Instance, Places, Start, check_domain
-from swashplate.equations.triangle import ROWS, aligned, upright
+from swashplate.equations.marching.run import Instance, Places, Start, check_domain
+from swashplate.equations.marching.triangle import ROWS, aligned, upright
+from swashplate.equations.model import Model, Source
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]
