@@ -190,8 +190,11 @@ class PartCode:
         given = {name: known[name] for name in arguments_of(equation) if name in known}
         if "options" in arguments_of(equation):
             given["options"] = fixed(self.options) or Flag("unknown", "options")
-        made = read(code, equation, given)
-        return code.named(made, plain(equation).__name__ if isinstance(made, Node) else "")
+        made, name = read(code, equation, given), plain(equation).__name__
+        known = {*code.taken}
+        made = code.named(made, name if isinstance(made, Node) else "")
+        code.origins |= dict.fromkeys(code.taken - known, name)
+        return made
 
     def _input(self, name: str) -> Value:
         """An input as a name, a window of names, or what a hold makes of one."""
@@ -511,7 +514,7 @@ class Sampler:
         """Lines that keep the worst margin."""
         if part.margin is None:
             return []
-        return [f"worst = min(worst, {text(part.margin)})"]
+        return [f"worst = {text(lower(ex.name('worst'), part.margin))}"]
 
     def load(self, part: PartCode, array: str = "states") -> list[str]:
         """Lines that take a part's state out of a flat array."""
@@ -537,6 +540,12 @@ class Sampler:
         left = ", ".join(names[path].value for path in self.carried[part.part])
         right = ", ".join(text(following[path]) for path in self.carried[part.part])
         return [f"{left} = {right}"]
+
+
+def lower(one: Node, two: Node) -> Node:
+    """The lower of two margins; not a number once one of them was none."""
+    test = ex.make("or", ex.make("<=", one, two), ex.make("!=", one, one))
+    return ex.choose(test, one, two)
 
 
 def indented(lines: Iterable[str], depth: int = 1) -> list[str]:
@@ -579,7 +588,7 @@ def march_piece_source(
     lines = [
         "last = first + count",
         *_marching(sampler, stored, lambda row: rows[stored[row]]),
-        "met[0] = min(met[0], worst)",
+        "met[0] = worst if worst < met[0] or worst != worst else met[0]",
     ]
     says = f"March {model.name} over a block of its inputs."
     return function_source(f"march({PIECE})", says, lines, "@piece"), sampler.names
