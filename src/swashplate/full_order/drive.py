@@ -397,4 +397,4 @@ class FullOrderDrive:
         else:
             feed = Feed(records["current"], held, step)
             states = solve(feed, case, started.states[1].motion, tolerance)
-        return FullOrderSimulation(self.physical.name, method, record, case, states)
+        return FullOrderSimulation(self.physical.name, record, method, case, states)
