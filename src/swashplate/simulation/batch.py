@@ -19,6 +19,7 @@ from swashplate.equations.fields import floats_of
 from swashplate.equations.lanes import LANES, march_lanes
 from swashplate.equations.library import TAN_22_5
 from swashplate.equations.march import output_of
+from swashplate.equations.observation import Observation
 from swashplate.equations.record import Record
 from swashplate.equations.run import outside
 from swashplate.equations.use import records_of
@@ -440,36 +441,18 @@ def _shared(
         raise InputError(
             "Outputs are written to files, costs are not: leave out one of to and cost."
         )
-    compared = _comparison(cost, record.time.size, record)
+    compared = _comparison(cost, record)
     folder = None if to is None else Path(to)
     return _Sets(model, numbers, record, records, output, *compared, cost is None, folder)
 
 
-def _comparison(cost: SquaredError | None, samples: int, record: Record) -> tuple[Array, Array]:
+def _comparison(cost: SquaredError | None, record: Record) -> tuple[Array, Array]:
     """Measured values and weights on the march's grid, zero weight between the samples."""
     # zeros that nobody writes to take no memory
     measured, weight = np.zeros(record.values.size), np.zeros(record.values.size)
-    if cost is None:
-        return measured, weight
-    given = np.asarray(cost.measured, dtype=np.float64)
-    if given.shape != (samples,):
-        raise InputError(f"The record has {samples} samples, but {given.size} were measured.")
-    try:
-        weights = np.broadcast_to(np.asarray(cost.weight, dtype=np.float64), (samples,))
-    except ValueError:
-        raise InputError(f"The weight must be one number or {samples}.") from None
-    bad = ~np.isfinite(weights) | (weights < 0.0) | ((weights > 0.0) & ~np.isfinite(given))
-    if bad.any():
-        raise InputError(
-            f"Measured value or weight is not finite, or the weight negative, at sample "
-            f"{int(np.argmax(bad))}; give weight 0 to samples that are not to count."
-        )
-    counted = np.where(weights > 0.0, given, 0.0) if (weights == 0.0).any() else given
-    if record.substeps == 1:
-        # the kernels are compiled for arrays that can be written to
-        return np.require(counted, requirements=["C", "W"]), np.require(
-            weights, requirements=["C", "W"]
-        )
-    measured[:: record.substeps] = counted
-    weight[:: record.substeps] = weights
+    if cost is not None:
+        seen = Observation(cost.output, record.time, cost.measured, cost.weight)
+        weights = np.asarray(seen.weight)
+        measured[:: record.substeps] = np.where(weights > 0.0, seen.values, 0.0)
+        weight[:: record.substeps] = weights
     return measured, weight
