@@ -81,7 +81,7 @@ def test_completing_keeps_leakages() -> None:
     with pytest.raises(ParameterError, match="Z11 makes motor_leakage 5e-06 .* but Z12 makes"):
         from_lumped(drive.parameters, **{**load, "load_inertia": 100.0})
     with pytest.raises(ParameterError, match="Z12 is 0.03, but without load_inertia"):
-        from_lumped(drive.parameters, load_torque=2e3)
+        from_lumped(drive.parameters, load_torque=2e3, load_inertia=0.0)
 
 
 def test_completing_with_inertias_in_place_of_frequencies() -> None:

@@ -19,9 +19,8 @@ from swashplate.equations.observation import Observation, ObservedRecord
 from swashplate.equations.record import SOURCE_RATE, Interpolation, Record, record_of
 from swashplate.equations.run import Instance, Part, Start, check_start, marched
 from swashplate.errors import DomainError, InputError
-from swashplate.full_order.completion import chosen_over, from_lumped, load_choices, nearest_set
 from swashplate.full_order.modes import Modes, modes_of, state_matrix
-from swashplate.full_order.physical_set import PhysicalSet
+from swashplate.full_order.physical_set import PhysicalSet, from_lumped
 from swashplate.full_order.result import FullOrderSimulation
 from swashplate.full_order.stiff import Case, Feed, solve
 from swashplate.models import full_order as model
@@ -111,7 +110,7 @@ class FullOrderDrive:
             where nothing is chosen; by default that of the drive's name, or else ``"hoist"``.
         **chosen : float or (float, float)
             Values in SI, e.g. ``oil_volume=1e-4``, by the names that
-            `swashplate.full_order.completion.from_lumped` takes.
+            `swashplate.full_order.physical_set.from_lumped` takes.
 
         Returns
         -------
@@ -127,10 +126,8 @@ class FullOrderDrive:
             If the drive has refinements, which the full-order model does not know.
         """
         drive.parameters.refuse_refinements("Full-order drives")
-        assumed = load_choices(nearest_set(drive.name) if like is None else like)
-        entries = chosen_over(assumed, chosen)
         title = drive.parameters.title
-        return cls(drive, from_lumped(drive.parameters, title=title, entries=entries))
+        return cls(drive, from_lumped(drive.parameters, like, title=title, entries=chosen))
 
     def replace(self, **changes: Change) -> FullOrderDrive:
         """With other physical values in SI, e.g. ``replace(load_torque=2e3)``."""
