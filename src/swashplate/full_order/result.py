@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel
-from swashplate.full_order.stiff import Case
+from swashplate.full_order.continuous import Case
 from swashplate.models.full_order import Motion, PlantSignals, plant_signals
 from swashplate.simulation.result import Signal, Signals
 
