@@ -2,7 +2,6 @@
 
 from swashplate.linear.discrete import linearize
 from swashplate.linear.drive import OUTPUTS, linearize_drive, slowest_lag
-from swashplate.linear.export import LINEAR_MODEL, UNITS, pade_polynomials
 from swashplate.linear.frequency_response import (
     FEWEST_STEPS,
     SLOWEST_CYCLE,
@@ -12,7 +11,14 @@ from swashplate.linear.frequency_response import (
     sweep,
 )
 from swashplate.linear.margins import LoopMargins, loop_margins
-from swashplate.linear.model import Coulomb, LinearDrive, LinearModel
+from swashplate.linear.model import (
+    LINEAR_MODEL,
+    UNITS,
+    Coulomb,
+    LinearDrive,
+    LinearModel,
+    pade_polynomials,
+)
 from swashplate.linear.operating_point import DeadZoneError, Input, OperatingPoint
 
 __all__ = [

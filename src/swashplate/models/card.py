@@ -569,6 +569,21 @@ def card_step(
 
 
 @equation
+def channel_rates(state: Filter, command: float, p: Channel, options: CardOptions) -> Filter:
+    """Rates of I* and of its rate, which is `before` here, in continuous time."""
+    steady = steady_current(command, 1.0, p)
+    faster = current_acceleration(state.now, state.before, steady, p, options.literal)
+    return Filter(state.before, faster, 0.0)
+
+
+@equation
+def card_rates(state: CardState, voltage: float, p: Card, options: CardOptions) -> CardState:
+    """Rates of the card's state under the delayed command, while no rate limit acts. [1/s]"""
+    plus = channel_rates(state.plus, voltage, p.plus, options)
+    return CardState(plus, channel_rates(state.minus, -voltage, p.minus, options))
+
+
+@equation
 def channel_settled(level: float, options: CardOptions) -> Filter:
     """State of a channel that has settled at a current. [A]"""
     return Filter(level, level if options.exact is None else 0.0, level)

@@ -1,5 +1,6 @@
 """The drive: card and pump in series, and the pump alone behind a given current."""
 
+from dataclasses import replace
 from math import sqrt
 from typing import NamedTuple
 
@@ -10,12 +11,15 @@ from swashplate.models.card import (
     CardInputs,
     CardOptions,
     CardState,
+    Filter,
     card_constants,
     card_limits,
+    card_rates,
     card_rest,
     card_sample,
     card_settled,
     card_step,
+    channel_level,
 )
 from swashplate.models.pump import (
     Pump,
@@ -25,6 +29,7 @@ from swashplate.models.pump import (
     pump_constants,
     pump_domain,
     pump_limits,
+    pump_rates,
     pump_rest,
     pump_sample,
     pump_settled,
@@ -144,3 +149,33 @@ pump_drive = join(
     integrals={"shaft_position": "shaft_speed"},
 )
 """Pump and motor behind a signed current."""
+
+
+@equation
+def flowing_currents(state: CardState) -> Currents:
+    """Currents of a card while no rate limit acts."""
+    return Currents(state.plus.now - state.minus.now, state.plus.now, state.minus.now)
+
+
+@equation
+def flowing_rest(voltage: float, p: Card) -> CardState:
+    """State of a card in continuous time under a constant command. [V]"""
+    plus, minus = channel_level(voltage, p.plus), channel_level(-voltage, p.minus)
+    return CardState(Filter(plus, 0.0, plus), Filter(minus, 0.0, minus))
+
+
+flowing_card = Model(
+    "card",
+    parameters=Card,
+    state=CardState,
+    step=card_rates,
+    sample=flowing_currents,
+    settled=flowing_rest,
+    options=CardOptions,
+)
+flowing_pump = replace(pump, step=pump_rates, parts=())
+flowing_drive, flowing_pump_drive = (
+    join(name, before, flowing_pump, links={"current_sum": current_sum})
+    for name, before in (("drive", flowing_card), ("pump_drive", source))
+)
+"""Both in continuous time: rates in place of the step, and no delay."""
