@@ -111,13 +111,7 @@ class FrequencyResponse:
         return phase
 
     def at(self, frequency: float) -> FrequencyResponse:
-        """The part at one of the frequencies. [Hz]
-
-        Raises
-        ------
-        InputError
-            If it is none of them; nothing is interpolated.
-        """
+        """The part at one of the frequencies [Hz]; another is refused, nothing is interpolated."""
         k = int(np.argmin(np.abs(self.frequencies - frequency)))
         nearest = float(self.frequencies[k])
         if not abs(nearest - frequency) <= 1e-9 * nearest:
@@ -154,13 +148,7 @@ class FrequencyResponse:
         return table.with_columns(pl.col("phase").fill_nan(None))
 
     def write(self, path: str | Path) -> None:
-        """Write the table of `to_polars` as CSV or Parquet, by the path's ending.
-
-        Raises
-        ------
-        FileError
-            For another ending or a place that cannot be written.
-        """
+        """Write the table of `to_polars` as CSV or Parquet, by the path's ending."""
         from swashplate.tables import write_table
 
         write_table(self.to_polars(), path)

@@ -133,20 +133,10 @@ class LinearModel:
         return float(self.gains[0])
 
     def response(self, frequency: ArrayLike, input: str | None = None) -> ComplexArray:
-        """Frequency response of the outputs, with the exact delay.
+        """Frequency response of the outputs to an input, the first by default, with its delay.
 
-        Parameters
-        ----------
-        frequency : float or (f,) array_like
-            At or above 0, of a sampled model at or below 1/(2 h). [Hz]
-        input : str, optional
-            By default the first.
-
-        Returns
-        -------
-        (m,) or (m, f) complex array
-            Amplitude and phase of each output: G e^(-jω delay) with G = C (p - A)⁻¹ B + D, p being
-            jω or, sampled, e^(jωh).
+        At frequencies from 0 on, of a sampled model up to 1/(2 h) [Hz]: (m,) or (m, f) complex G
+        e^(-jω delay) with G = C (p - A)⁻¹ B + D, p being jω or, sampled, e^(jωh).
         """
         f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
         h = self.sample_time
@@ -213,12 +203,9 @@ class LinearModel:
     def margins(self, controller: Controller) -> LoopMargins:
         """Margins of the loop u = K (r - y) closed over the first output.
 
-        Parameters
-        ----------
-        controller : float or callable
-            A proportional gain K, e.g. in V/(rad/s), or a controller's frequency response: a
-            function of frequencies [Hz] that returns complex numbers. It must not be unstable by
-            itself; one that integrates is fine.
+        The controller is a proportional gain K, e.g. in V/(rad/s), or its frequency response: a
+        function of frequencies [Hz] that returns complex numbers. It must not be unstable by
+        itself; one that integrates is fine.
 
         Raises
         ------
@@ -311,13 +298,7 @@ class LinearModel:
         form: Literal["state_space", "transfer_function"] = "state_space",
         pade: int | None = None,
     ) -> Any:
-        """The model as python-control's StateSpace or TransferFunction; `pade` as in `to_scipy`.
-
-        Raises
-        ------
-        InputError
-            If python-control is not installed.
-        """
+        """The model as python-control's StateSpace or TransferFunction; `pade` as in `to_scipy`."""
         if form not in ("state_space", "transfer_function"):
             raise InputError(f"form is '{form}'; it is 'state_space' or 'transfer_function'.")
         matrices, states = self._with_delay(pade)
@@ -368,13 +349,7 @@ class LinearModel:
         }
 
     def write(self, path: str | Path) -> None:
-        """Write matrices, names, units, delay and operating point as .toml or .json, in SI.
-
-        Raises
-        ------
-        FileError
-            For another ending or a place that cannot be written.
-        """
+        """Write matrices, names, units, delay and operating point as .toml or .json, in SI."""
         if ending(path, LINEAR_MODEL) == ".json":
             from json import dumps as dump_json
 
@@ -409,13 +384,9 @@ class LinearDrive(LinearModel):
         """Time constant of the pump's lag, from current to swash angle. [s]
 
         At rest without plussing τ = (1 + Z6)/(Z1 Z3 Z5 Z8 √(Z9/2)); Kruse (2001), eqs. 6.72-6.74
-        with errata 4 and 23. Of a sampled model that of the lag with the same pole. Where friction
-        or damping give it more poles than one, that of the slowest.
-
-        Raises
-        ------
-        DomainError
-            If a sampled model's lag is shorter than its step.
+        with errata 4 and 23. Of a sampled model that of the lag with the same pole; one that is
+        shorter than its step is refused in a `DomainError`. Where friction or damping give it more
+        poles than one, that of the slowest.
         """
         slowest = self._poles(PLATE_STATES)[0]
         if self.sample_time is None:
@@ -429,19 +400,11 @@ class LinearDrive(LinearModel):
         return -self.sample_time / log(pole)
 
     def discrete(self, sample_time: float, interpolation: Interpolation = "linear") -> LinearDrive:
-        """The model at a sample time, with the recurrences of the march.
+        """The model at a sample time of 10 µs to 0.1 s, with the recurrences of the march. [s]
 
-        Parameters
-        ----------
-        sample_time : float
-            10 µs to 0.1 s; above 1/512 s the march's own sub-steps are taken. [s]
-        interpolation : {"linear", "previous"}
-            What the input is between samples: a straight line or held, as in `Drive.simulate`.
-
-        Returns
-        -------
-        LinearDrive
-            Agrees with a small motion of `Drive.simulate` or `Drive.stepper` sample for sample.
+        Between samples the input is a straight line or held, as in `Drive.simulate`; above 1/512 s
+        the march's own sub-steps are taken. Agrees with a small motion of `Drive.simulate` or
+        `Drive.stepper` sample for sample.
         """
         from swashplate.linear.drive import sampled
 

@@ -66,12 +66,7 @@ class OperatingPoint:
 class DeadZoneError(DomainError):
     """A point in a dead zone, where the gain is 0, and where there is a model instead.
 
-    Parameters
-    ----------
-    where : str
-        The point and its dead zone. Kept with what follows from it.
-    instead : str
-        What to linearise at: ``"linearise at +0.2064 V or more"``.
+    `where` names the point and its dead zone, `instead` what to linearise at.
     """
 
     def __init__(self, where: str, instead: str) -> None:
@@ -87,16 +82,9 @@ def operating_point(
     current: float | None = None,
     speed: float | None = None,
 ) -> OperatingPoint:
-    """Steady state at which small motions of an input have an answer.
+    """Steady state at which small motions of an input, one of `INPUTS`, have an answer.
 
-    Parameters
-    ----------
-    parameters : ParameterSet
-        The drive.
-    input : str
-        What moves, one of `INPUTS`.
-    voltage, current, speed : float
-        One of them. [V, A, rad/s]
+    Given by one of voltage [V], current [A] and speed [rad/s].
 
     Raises
     ------

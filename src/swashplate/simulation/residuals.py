@@ -61,10 +61,8 @@ class Ready(NamedTuple):
 
     instance: Instance
     own: EngineOwn
-    paths: Sequence[str] = ()
-    """Columns of derivatives."""
-    moved: Sequence[bool] | None = None
-    """Whether the record may depend on a column at all."""
+    paths: Sequence[str] = ()  # Columns of derivatives.
+    moved: Sequence[bool] | None = None  # Whether the record may depend on a column at all.
 
 
 def residuals(
