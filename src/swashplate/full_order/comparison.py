@@ -217,10 +217,7 @@ def convergence(
 
 
 def validity(
-    full: FullOrderDrive,
-    rate: float = SOURCE_RATE,
-    *,
-    begin: Callable[[str], object] | None = None,
+    full: FullOrderDrive, rate: float = SOURCE_RATE, *, begin: Callable[[str], object] | None = None
 ) -> polars.DataFrame:
     """For which of `TABLE_MANEUVERS` the one-state model is within 1 % and 0.1 %, for one drive.
 

@@ -420,13 +420,7 @@ def taken_over(target: float, previous: float, I_t1: float, lim1: float, h: floa
 
 @equation
 def limited_current(
-    target: float,
-    previous: float,
-    steady: float,
-    p: Channel,
-    decay: float,
-    h: float,
-    split: Flag,
+    target: float, previous: float, steady: float, p: Channel, decay: float, h: float, split: Flag
 ) -> float:
     """Channel output: the filter's state `target` behind rate limits and the final decay. [A]
 
@@ -500,12 +494,7 @@ def channel_sample(
 
 @equation
 def card_sample(
-    state: CardState,
-    inputs: CardInputs,
-    p: Card,
-    k: CardConstants,
-    h: float,
-    options: CardOptions,
+    state: CardState, inputs: CardInputs, p: Card, k: CardConstants, h: float, options: CardOptions
 ) -> CardSignals:
     """Currents of the card at a sample."""
     plus = channel_sample(state.plus, inputs, 1.0, p.plus, k.plus, h, options)

@@ -134,11 +134,7 @@ def current_step(state: SourceState) -> SourceState:
 
 
 source = Model(
-    "source",
-    parameters=Source,
-    state=SourceState,
-    step=current_step,
-    sample=current_sample,
+    "source", parameters=Source, state=SourceState, step=current_step, sample=current_sample
 )
 
 pump_drive = join(

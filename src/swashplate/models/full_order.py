@@ -175,12 +175,7 @@ class Span(NamedTuple):
 
 @equation
 def substep(
-    state: Motion,
-    number: float,
-    span: Span,
-    p: Plant,
-    k: PlantConstants,
-    options: PlantOptions,
+    state: Motion, number: float, span: Span, p: Plant, k: PlantConstants, options: PlantOptions
 ) -> Motion:
     """The five states a sub-step later, see the module's text; sub-steps are counted from 0."""
     m, h, before = p.machine, span.step, state.piston_pressure

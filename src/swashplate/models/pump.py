@@ -255,10 +255,7 @@ def _effective_current(current: float, Z17: float) -> tuple[float, float]:
     # an edge of the dead zone belongs to it; without one, zero belongs to the positive side
     above = current > Z17 or (current == 0.0 and Z17 == 0.0)
     below = current < -Z17
-    return (
-        1.0 if above or below else 0.0,
-        -1.0 if above else (1.0 if below else 0.0),
-    )
+    return (1.0 if above or below else 0.0, -1.0 if above else (1.0 if below else 0.0))
 
 
 @equation
@@ -385,13 +382,7 @@ def _head_root(head: float) -> float:
 
 @equation
 def pressure_rate(
-    pressure: float,
-    opening: float,
-    Z6: float,
-    Z7: float,
-    Z8: float,
-    Z9: float,
-    symmetric: Flag,
+    pressure: float, opening: float, Z6: float, Z7: float, Z8: float, Z9: float, symmetric: Flag
 ) -> float:
     """Rate of the stroking pressure δP under the opening x_eff [m]. [Pa/s]
 
@@ -588,12 +579,7 @@ def pump_constants(p: Pump, h: float, options: PumpOptions) -> PumpConstants:
 
 @equation
 def pump_sample(
-    state: PumpState,
-    inputs: PumpInputs,
-    p: Pump,
-    k: PumpConstants,
-    h: float,
-    options: PumpOptions,
+    state: PumpState, inputs: PumpInputs, p: Pump, k: PumpConstants, h: float, options: PumpOptions
 ) -> PumpSignals:
     """Everything that is known of the pump at a sample.
 

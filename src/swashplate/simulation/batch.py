@@ -29,13 +29,7 @@ from swashplate.models.drive import drive, pump_drive
 from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import broken_rules
-from swashplate.simulation.instance import (
-    PATHS,
-    SIDES,
-    card_options,
-    pump_options,
-    step_limit,
-)
+from swashplate.simulation.instance import PATHS, SIDES, card_options, pump_options, step_limit
 from swashplate.tables import write_whole
 
 Array = NDArray[np.float64]
