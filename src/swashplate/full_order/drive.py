@@ -76,6 +76,8 @@ def path_of(name: str) -> str:
 class FullOrderDrive:
     """A drive whose spool and swash plate have mass. Immutable.
 
+    One with refinements, which the five states do not know, is refused in an `InputError`.
+
     Examples
     --------
     >>> hoist = FullOrderDrive.preset("hoist")
@@ -87,6 +89,9 @@ class FullOrderDrive:
     """Card and solenoids, and the form of the valve's root."""
     physical: PhysicalSet
     """Everything behind the solenoids."""
+
+    def __post_init__(self) -> None:
+        self.drive.parameters.refuse_refinements("Full-order drives")
 
     @classmethod
     def preset(cls, name: str) -> FullOrderDrive:
@@ -112,10 +117,7 @@ class FullOrderDrive:
         ------
         ParameterError
             For an unknown name, or if lumps contradict each other or a choice.
-        InputError
-            If the drive has refinements, which the full-order model does not know.
         """
-        drive.parameters.refuse_refinements("Full-order drives")
         title = drive.parameters.title
         return cls(drive, from_lumped(drive.parameters, like, title=title, entries=chosen))
 

@@ -13,10 +13,10 @@ from swashplate.equations.equation import interpreted
 from swashplate.equations.run import Instance, called
 from swashplate.errors import DomainError, InputError
 from swashplate.models.card import Card, channel_level
-from swashplate.models.drive import overpowered
 from swashplate.models.pump import (
     Pump,
     moment_sine,
+    overpowered,
     pump_sample,
     pump_settled,
     settled_speed,

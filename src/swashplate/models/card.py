@@ -21,6 +21,7 @@ from swashplate.equations.definition import OFF, Definition, Flag
 from swashplate.equations.derivatives import declared
 from swashplate.equations.equation import equation
 from swashplate.equations.library import faded, interpolated, soft_threshold
+from swashplate.equations.model import Model, Tap
 from swashplate.equations.windows import Window
 
 COULOMB_WIDTH = 0.01
@@ -146,6 +147,14 @@ class CardOptions(NamedTuple):
     split: Flag = OFF
     """lim1 and the decay take over within a step, where the current passes I_t1 and I_t2."""
     exact: Flag = OFF  # The filter's differential equation, in place of the recursion for 512 Hz.
+
+
+class Currents(NamedTuple):
+    """A signed current as the channels of a card would have it. [A]"""
+
+    current: float
+    current_positive: float
+    current_negative: float
 
 
 class CardLimits(NamedTuple):
@@ -612,3 +621,48 @@ def card_limits(
             signals.current_negative, signals.filtered_negative, state.minus.out, p.minus.I_t2
         )
     )
+
+
+@equation
+def flowing_currents(state: CardState) -> Currents:
+    """Currents of a card while no rate limit acts."""
+    return Currents(state.plus.now - state.minus.now, state.plus.now, state.minus.now)
+
+
+@equation
+def flowing_rest(voltage: float, p: Card) -> CardState:
+    """State of a card in continuous time under a constant command. [V]"""
+    plus, minus = channel_level(voltage, p.plus), channel_level(-voltage, p.minus)
+    return CardState(Filter(plus, 0.0, plus), Filter(minus, 0.0, minus))
+
+
+# --- the models -----------------------------------------------------------------------------------
+
+card = Model(
+    "card",
+    parameters=Card,
+    state=CardState,
+    step=card_step,
+    sample=card_sample,
+    constants=card_constants,
+    rest=card_rest,
+    settled=card_settled,
+    inputs=CardInputs,
+    taps={
+        "at": Tap("voltage", delay="tau", width=3),
+        "span": Tap("voltage", delay="tau", ahead=0.5, width=3),
+    },
+    options=CardOptions,
+    limits=card_limits,
+)
+
+flowing_card = Model(
+    "card",
+    parameters=Card,
+    state=CardState,
+    step=card_rates,
+    sample=flowing_currents,
+    settled=flowing_rest,
+    options=CardOptions,
+)
+"""The card in continuous time: rates in place of the step, and no delay."""

@@ -19,7 +19,8 @@ from swashplate.equations.equation import equation
 from swashplate.equations.library import clipped
 from swashplate.equations.model import Model, join
 from swashplate.equations.primitives import repeated, root
-from swashplate.models.drive import card, current_sum, signed_current, source
+from swashplate.models.card import card
+from swashplate.models.drive import current_sum, signed_current, source
 from swashplate.models.machine import (
     Machine,
     balanced_spool,

@@ -23,6 +23,7 @@ from swashplate.equations.definition import MINUS, OFF, Definition, Flag
 from swashplate.equations.derivatives import declared
 from swashplate.equations.equation import equation
 from swashplate.equations.library import arctangent, small_arctangent
+from swashplate.equations.model import Model
 from swashplate.equations.primitives import root
 from swashplate.models.refinements import (
     accelerating_leakage,
@@ -885,3 +886,32 @@ def pump_domain(signals: PumpSignals, inputs: PumpInputs, p: Pump, k: PumpConsta
     """1 - sin²φ, above 0 within the model: at 0 the solenoid overpowers the feedback spring."""
     a = moment_sine(signals.solenoid_force, p)
     return 1.0 - a * a
+
+
+def overpowered(margin: float, cause: str) -> str:
+    """What has happened where sin²φ is not below 1, for a sentence."""
+    return (
+        f"Z5·F/√Z4 reaches {sqrt(1.0 - margin):.4g} under this {cause}, but must stay below 1, "
+        "where the solenoid overpowers the feedback spring; check Z19 to Z22, Z4, Z5 and the "
+        f"{cause}'s size."
+    )
+
+
+pump = Model(
+    "pump",
+    parameters=Pump,
+    state=PumpState,
+    step=pump_step,
+    sample=pump_sample,
+    constants=pump_constants,
+    rest=pump_rest,
+    settled=pump_settled,
+    inputs=PumpInputs,
+    defaults={"pump_speed": "pump_speed", "load_torque": "load_torque", "supply_pressure": "Z9"},
+    options=PumpOptions,
+    limits=pump_limits,
+    domain=pump_domain,
+    integrals={"shaft_position": "shaft_speed"},
+    free_start={"pressure": ("pressure", "plate_pressure")},
+    outside=overpowered,
+)
