@@ -205,24 +205,6 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
             "Z18": n["plussing"],
         }
 
-    def check_lumps(self, parameters: ParameterSet, tolerance: float = AGREES) -> None:
-        """Refuse to stand for a drive with other lumps.
-
-        Raises
-        ------
-        ParameterError
-            For the first lump that differs by more than the tolerance, taken at the drive's Z6.
-        """
-        for symbol, lump in self.to_lumped(parameters.numbers["Z6"]).items():
-            values = lump if isinstance(lump, tuple) else (lump,)
-            for column, value in zip(parameters[symbol].definition.columns, values, strict=False):
-                wanted = parameters.numbers[column]
-                if value != wanted and not abs(value - wanted) <= tolerance * abs(wanted):
-                    raise ParameterError(
-                        f"{self.name}: its quantities make {column} = {value:.9g}, but "
-                        f"{parameters.name} has {wanted:.9g} {parameters[symbol].unit}."
-                    )
-
     def __repr__(self) -> str:
         return f"PhysicalSet({self.name!r}, {len(self)} quantities)"
 
