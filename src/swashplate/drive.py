@@ -300,15 +300,9 @@ class Drive:
             record = _record(voltage, rate, interpolation=interpolation)
         else:
             record = record_of(current, rate, what="current", interpolation=interpolation)
+        by_voltage = current is None
         return simulate_drives(
-            self.parameters,
-            changes,
-            record,
-            by_voltage=current is None,
-            cost=cost,
-            output=output,
-            to=to,
-            executor=executor,
+            self.parameters, changes, record, by_voltage, cost, output, to, executor
         )
 
     def stepper(
@@ -381,15 +375,7 @@ class Drive:
         """
         from swashplate.linear import linearize_drive
 
-        return linearize_drive(
-            self.parameters,
-            voltage=at,
-            current=current,
-            speed=speed,
-            input=input,
-            outputs=outputs,
-            coulomb=coulomb,
-        )
+        return linearize_drive(self.parameters, at, current, speed, input, outputs, coulomb)
 
     def frequency_response(
         self,
@@ -435,16 +421,7 @@ class Drive:
         """
         from swashplate.linear import sweep
 
-        return sweep(
-            self.parameters,
-            frequencies,
-            amplitudes,
-            bias=bias,
-            input=input,
-            output=output,
-            rate=rate,
-            tolerance=tolerance,
-        )
+        return sweep(self.parameters, frequencies, amplitudes, bias, input, output, rate, tolerance)
 
     @overload
     def steady_speed(self, voltage: float) -> float: ...

@@ -52,7 +52,6 @@ FORCE = {"Z17": 0.0, "Z19_plus": 1.0, "Z19_minus": 1.0} | dict.fromkeys(
 
 def linearize_drive(
     parameters: ParameterSet,
-    *,
     voltage: float | None = None,
     current: float | None = None,
     speed: float | None = None,

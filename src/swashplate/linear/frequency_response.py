@@ -160,7 +160,6 @@ def sweep(
     parameters: ParameterSet,
     frequencies: ArrayLike,
     amplitudes: ArrayLike,
-    *,
     bias: float = 0.0,
     input: SweptInput = "voltage",
     output: SweptOutput = "shaft_speed",

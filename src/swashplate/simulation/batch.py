@@ -330,7 +330,6 @@ def simulate_drives(
     parameters: ParameterSet,
     changes: Mapping[str, ArrayLike],
     record: Record,
-    *,
     by_voltage: bool,
     cost: SquaredError | None,
     output: str,
