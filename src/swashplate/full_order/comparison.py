@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -23,6 +22,7 @@ from swashplate.equations.run import Start
 from swashplate.full_order.drive import FullOrderDrive, Method
 from swashplate.full_order.result import FullOrderSimulation
 from swashplate.simulation.result import read_only
+from swashplate.tables import Tabular
 
 if TYPE_CHECKING:
     import polars
@@ -109,7 +109,7 @@ class Lag(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Tabular):
     """Both models over one command, driven by the same current."""
 
     full: FullOrderSimulation
@@ -156,12 +156,6 @@ class Comparison:
         if self.voltage is not None:
             made.insert_column(1, pl.Series("voltage", self.voltage))
         return made
-
-    def write(self, path: str | Path) -> None:
-        """Write the table of `to_polars` as CSV or Parquet, by the path's ending."""
-        from swashplate.tables import write_table
-
-        write_table(self.to_polars(), path)
 
 
 def compare(

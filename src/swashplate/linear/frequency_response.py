@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import ceil
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -23,6 +22,7 @@ from swashplate.models.pump import Pump
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import check_filter_stability, instance_of
+from swashplate.tables import Tabular
 
 if TYPE_CHECKING:
     import polars
@@ -54,7 +54,7 @@ STILL = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyResponse:
+class FrequencyResponse(Tabular):
     """First harmonic of the answer to bias + amplitude · sin(2π f t), once it repeats itself.
 
     A row for each amplitude, a column for each frequency.
@@ -145,12 +145,6 @@ class FrequencyResponse:
             }
         )
         return table.with_columns(pl.col("phase").fill_nan(None))
-
-    def write(self, path: str | Path) -> None:
-        """Write the table of `to_polars` as CSV or Parquet, by the path's ending."""
-        from swashplate.tables import write_table
-
-        write_table(self.to_polars(), path)
 
 
 # --- sweep ----------------------------------------------------------------------------------------

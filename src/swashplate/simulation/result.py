@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntFlag
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -16,6 +16,7 @@ from swashplate.equations.march import Stored
 from swashplate.equations.record import Record
 from swashplate.equations.run import Instance, observe_kernel
 from swashplate.models.pump import Pump
+from swashplate.tables import Tabular
 
 if TYPE_CHECKING:
     import polars
@@ -84,7 +85,7 @@ class Signal:
 
 
 @dataclass(frozen=True, eq=False)
-class Signals:
+class Signals(Tabular):
     """Signals over one record, read-only arrays of the record's length, all SI."""
 
     name: str
@@ -92,9 +93,9 @@ class Signals:
     record: Record
     """The input on the march's grid."""
 
+    @abstractmethod
     def fine(self, signal: str) -> Array:
         """A signal on the march's grid, `substeps` points a sample."""
-        raise NotImplementedError
 
     def sampled(self, fine: NDArray[T]) -> NDArray[T]:
         """Samples of the record out of the march's grid."""
@@ -111,24 +112,6 @@ class Signals:
         angle = np.zeros_like(speed)
         np.cumsum(0.5 * self.record.step * (speed[:-1] + speed[1:]), out=angle[1:])
         return angle
-
-    def to_polars(self) -> polars.DataFrame:
-        """Table of time and all signals."""
-        raise NotImplementedError
-
-    def write(self, path: str | Path) -> None:
-        """Write the table of `to_polars` as CSV or Parquet, by the path's ending.
-
-        The file appears whole or not at all: it is written beside and renamed.
-
-        Raises
-        ------
-        FileError
-            For another ending, or a folder that cannot be written.
-        """
-        from swashplate.tables import write_table
-
-        write_table(self.to_polars(), path)
 
 
 @dataclass(frozen=True, eq=False)
