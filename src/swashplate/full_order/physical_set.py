@@ -278,7 +278,7 @@ def quantity_of(name: str) -> Declared:
     raise ParameterError(f"A physical set has no quantity '{name}'{choice}.")
 
 
-def value_of(quantity: Declared, change: Change) -> Value:
+def value_of(quantity: Declared, change: float | tuple[float, ...]) -> Value:
     """A value in the form that the quantity has: one number or a pair."""
     name, several = quantity.symbol, len(quantity.fields) > 1
     try:
@@ -593,12 +593,9 @@ def dump_set(physical: PhysicalSet) -> str:
     entries = table()
     for name, each in physical.items():
         entry = inline_table()
-        pair = isinstance(each.value, Pair)
-        entry.append("value", list(each.values) if pair else each.value)
-        entry.append("unit", each.unit)
-        if each.source:
-            entry.append("source", each.source)
-        entry.append("status", each.status)
+        value = list(each.values) if isinstance(each.value, Pair) else each.value
+        source = {"source": each.source} if each.source else {}
+        entry.update({"value": value, "unit": each.unit, **source, "status": each.status})
         entries.add(name, entry)
     text.add("physical", entries)
     return dumps(text)
@@ -611,19 +608,16 @@ def si_value(quantity: Declared, number: float, unit: str) -> float:
 
 
 def _entries(contents: PhysicalFile) -> dict[str, PhysicalValue]:
-    completed = contents.lumps is not None
-    return {name: _value(name, entry, completed) for name, entry in contents.physical.items()}
+    known = quantity_of if contents.lumps is None else chosen_quantity
+    return {name: _value(known(name), entry) for name, entry in contents.physical.items()}
 
 
-def _value(name: str, entry: Entry, completed: bool) -> PhysicalValue:
+def _value(quantity: Declared, entry: Entry) -> PhysicalValue:
     """One entry of a file, in SI."""
-    quantity = chosen_quantity(name) if completed else quantity_of(name)
-    several = len(quantity.fields) > 1
     if entry.bounds is not None:
-        raise ParameterError(f"{name} has bounds; leave them out, a fit is given its own.")
+        raise ParameterError(
+            f"{quantity.symbol} has bounds; leave them out, a fit is given its own."
+        )
     given = entry.value if isinstance(entry.value, list) else [entry.value]
-    if len(given) == 2 and not several:
-        raise ParameterError(f"{name} has one value, not a plus and a minus one.")
-    numbers = [si_value(quantity, number, entry.unit) for number in given]
-    value = Pair(numbers[0], numbers[-1]) if several else numbers[0]
-    return PhysicalValue(quantity, value, entry.source, entry.status)
+    numbers = tuple(si_value(quantity, number, entry.unit) for number in given)
+    return PhysicalValue(quantity, value_of(quantity, numbers), entry.source, entry.status)

@@ -254,7 +254,7 @@ class _Chain:
             slopes[tuple(np.transpose(derived.entries))] = values[len(derived.outputs) :]
         # the place of a window does not move
         moving = [k for k, path in enumerate(derived.inputs) if path in rows]
-        into = np.array([rows[derived.inputs[k]] for k in moving])
+        into = np.array([rows[derived.inputs[k]] for k in moving]).reshape(-1, self.size)
         return dict(zip(derived.outputs, slopes[:, moving] @ into, strict=True))
 
     def link(self, link: Link) -> Array:
