@@ -22,13 +22,17 @@ from swashplate.linear.operating_point import (
     OperatingPoint,
     beyond_dead_zone,
     operating_point,
-    without_ripple,
 )
 from swashplate.models.card import COULOMB_WIDTH, Card
 from swashplate.models.drive import flowing_drive, flowing_pump_drive
 from swashplate.models.pump import PumpState
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.simulation.instance import card_of, check_filter_stability, instance_of
+from swashplate.simulation.instance import (
+    card_of,
+    check_filter_stability,
+    instance_of,
+    without_ripple,
+)
 
 Array = NDArray[np.float64]
 

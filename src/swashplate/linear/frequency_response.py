@@ -17,11 +17,10 @@ from swashplate.equations.record import FASTEST, SOURCE_RATE
 from swashplate.equations.run import marched
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.drive import slowest_lag
-from swashplate.linear.operating_point import without_ripple
 from swashplate.models.pump import Pump
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.instance import check_filter_stability, instance_of
+from swashplate.simulation.instance import check_filter_stability, instance_of, without_ripple
 from swashplate.tables import Tabular
 
 if TYPE_CHECKING:

@@ -19,12 +19,11 @@ from swashplate.models.pump import (
     overpowered,
     pump_sample,
     pump_settled,
-    settled_speed,
     solenoid_force,
 )
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.instance import card_of, instance_of
+from swashplate.simulation.instance import card_of, instance_of, without_ripple
 from swashplate.simulation.steady import pump_arguments, steady_states
 
 Array = NDArray[np.float64]
@@ -110,7 +109,7 @@ def operating_point(
         )
     if speed is not None:
         voltage = _voltage_of(parameters, speed)
-    instance = instance_of(parameters, False)
+    instance = without_ripple(instance_of(parameters, False))
     pump: Pump = instance.parts[1].p
     sides: list[str] = []
     if voltage is not None:
@@ -148,7 +147,7 @@ def operating_point(
         known["state"].pressure,
         opening,
         signals.swash_angle,
-        called(settled_speed, known),
+        signals.shaft_speed,
         tuple(sides),
     )
 
@@ -158,13 +157,6 @@ def beyond_dead_zone(voltage: float, card: Card) -> float:
     if voltage >= 0.0:
         return max(voltage, nextafter(card.plus.V_dz, np.inf))
     return min(voltage, -nextafter(card.minus.V_dz, np.inf))
-
-
-def without_ripple(instance: Instance) -> Instance:
-    """The drive at the mean of a turn: the cam ring's ripple does not change it."""
-    card, pump = instance.parts
-    smooth = pump._replace(options=pump.options._replace(ripple=None))
-    return Instance(instance.model, (card, smooth), instance.name)
 
 
 def _level(voltage: float, card: Card) -> float:

@@ -833,27 +833,13 @@ def settled_pressure(inputs: PumpInputs, p: Pump, k: PumpConstants, options: Pum
 
 @equation
 def pump_settled(inputs: PumpInputs, p: Pump, k: PumpConstants, options: PumpOptions) -> PumpState:
-    """State that a pump settles at: the middle of what friction and hysteresis leave open."""
-    pressure = settled_pressure(inputs, p, k, options)
-    return standing(pressure, inputs.current, inputs.load_torque, options)
+    """State that a pump settles at: the middle of what friction and hysteresis leave open.
 
-
-@equation
-def settled_speed(inputs: PumpInputs, p: Pump, k: PumpConstants, options: PumpOptions) -> float:
-    """Speed that the drive settles at under constant inputs, the mean of a turn. [rad/s]
-
-    The cam ring's ripple does not change the mean, and a line at rest bears the load.
+    The sample there has the speed that the drive settles at; the cam ring's ripple, which does not
+    change the mean of a turn, must be off.
     """
     pressure = settled_pressure(inputs, p, k, options)
-    tangent = swash_tangent(pressure, p)
-    angle = swash_angle(tangent, p, options.steep)
-    force = solenoid_force(inputs.current, solenoids_of(p))
-    rising = pressure_gain(pressure, force, inputs.supply_pressure, p, options)
-    rate = plate_rate(pressure, rising, p, k)
-    flow = flow_speed(angle, tangent, rate, inputs, p, k, options)
-    if options.line is None:
-        return flow
-    return flow - static_leakage(p.motor_leakage, inputs.load_torque)
+    return standing(pressure, inputs.current, inputs.load_torque, options)
 
 
 @equation

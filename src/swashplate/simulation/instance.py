@@ -86,6 +86,13 @@ def instance_of(parameters: ParameterSet, by_voltage: bool) -> Instance:
     return Instance(pump_drive, (Part(CurrentSource()), pump), parameters.name)
 
 
+def without_ripple(instance: Instance) -> Instance:
+    """The drive at the mean of a turn: the cam ring's ripple does not change it."""
+    card, pump = instance.parts
+    smooth = pump._replace(options=pump.options._replace(ripple=None))
+    return Instance(instance.model, (card, smooth), instance.name)
+
+
 def step_limit(zeta: ArrayLike, exact: bool) -> NDArray[np.float64]:
     """Largest ωh, itself excluded, that the card's filter bears, for each ζ.
 
