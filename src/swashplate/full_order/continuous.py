@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel
+from swashplate.equations.code import generating
 from swashplate.equations.derivatives import derive
 from swashplate.equations.equation import inlined
-from swashplate.equations.lowering import generating
-from swashplate.equations.run import module
+from swashplate.equations.marching.run import module
 from swashplate.errors import DomainError
 from swashplate.models.full_order import (
     Motion,

@@ -19,8 +19,8 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict
 
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.equations.definition import Declared, Definition, Flag, declared_by
 from swashplate.equations.equation import interpreted
+from swashplate.equations.fields import Declared, Definition, Flag, declared_by
 from swashplate.errors import InputError, ParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine

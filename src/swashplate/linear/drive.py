@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.record import Interpolation, least_substeps
-from swashplate.equations.run import Instance, Started
+from swashplate.equations.marching.record import Interpolation, least_substeps
+from swashplate.equations.marching.run import Instance, Started
 from swashplate.errors import InputError
 from swashplate.linear.discrete import Recurrence, recurrence
 from swashplate.linear.model import Coulomb, LinearDrive, Matrices, with_line

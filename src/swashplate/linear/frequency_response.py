@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.march import output_of
-from swashplate.equations.record import FASTEST, SOURCE_RATE
-from swashplate.equations.run import marched
+from swashplate.equations.marching.march import output_of
+from swashplate.equations.marching.record import FASTEST, SOURCE_RATE
+from swashplate.equations.marching.run import marched
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.drive import slowest_lag
 from swashplate.models.pump import Pump
