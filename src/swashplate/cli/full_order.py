@@ -123,7 +123,7 @@ def full_order(
     given = physical_values(physical or ())
     with working("Completing the physical values"):
         from swashplate.full_order import FullOrderDrive
-        from swashplate.full_order.completion import nearest_set
+        from swashplate.full_order.physical_set import nearest_set
 
         chosen = drive_of(drive, values or (), factors or ())
         axis = nearest_set(chosen.name) if like is None else like

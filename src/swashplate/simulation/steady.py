@@ -21,8 +21,8 @@ from swashplate.models.pump import (
     PumpInputs,
     PumpState,
     pump_constants,
+    pump_sample,
     pump_settled,
-    settled_speed,
 )
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.instance import instance_of
@@ -45,19 +45,21 @@ def _kernel(options: tuple[Any, ...]) -> Callable[..., None]:
     )
     current = ex.make("-", plus, minus)  # type: ignore[arg-type]
     given = (current, *(value_of(pump.p, name) for name in ("pump_speed", "load_torque", "Z9")))
-    speed = pump.call(code, settled_speed, {**pump.known, "inputs": Tuple(PumpInputs, given)})
+    known = {**pump.known, "inputs": Tuple(PumpInputs, given)}
+    known["state"] = pump.call(code, pump_settled, known)
+    speed = value_of(pump.call(code, pump_sample, known), "shaft_speed")
     results = [current, speed]
     sampler.ends = [[ex.name(node.value) for _, node in leaves(part.p)] for part in sampler.parts]
-    read = code.reads(results)  # type: ignore[arg-type]
+    read = code.reads(results)
     for part in sampler.parts:
         sampler.ends[part.part] = [ex.name(name) for name in sorted(read)]
     lines = [
         *sampler.ahead(),
         "for n in range(voltage.size):",
         "    volts = voltage[n]",
-        *indented(lines_of(code, results)),  # type: ignore[arg-type]
+        *indented(lines_of(code, results)),
         f"    current[n] = {text(current)}",
-        f"    speed[n] = {text(speed)}",  # type: ignore[arg-type]
+        f"    speed[n] = {text(speed)}",
     ]
     source = function_source(
         "settled(voltage, params, given, h, current, speed)",
@@ -70,8 +72,11 @@ def _kernel(options: tuple[Any, ...]) -> Callable[..., None]:
 def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Array]:
     """Signed current [A] and speed [rad/s] that each of many constant voltages settles at."""
     instance = instance_of(parameters, True)
+    card, pump = instance.options
     current, speed = np.empty(voltage.size), np.empty(voltage.size)
-    _kernel(instance.options)(voltage, instance.params, instance.given, 1.0, current, speed)
+    _kernel((card, pump._replace(ripple=None)))(
+        voltage, instance.params, instance.given, 1.0, current, speed
+    )
     return current, speed
 
 
