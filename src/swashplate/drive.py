@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.record import SOURCE_RATE, Interpolation, Record, record_of
-from swashplate.equations.run import Start
+from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, Record, record_of
+from swashplate.equations.marching.run import Start
 from swashplate.errors import InputError
 from swashplate.parameters.files import dump_set, load_preset, load_set
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet

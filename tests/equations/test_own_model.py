@@ -9,9 +9,9 @@ import pytest
 
 from swashplate import DomainError, InputError
 from swashplate.equations import Model, Tap, equation, instance_of, join, sensitivities, simulate
-from swashplate.equations.jacobian import residuals
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.record import Record
+from swashplate.equations.marching.jacobian import residuals
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import Record
 from swashplate.errors import EquationError
 from swashplate.models.drive import pump_drive
 from swashplate.simulation.batch import simulate_many

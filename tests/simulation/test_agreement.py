@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, Serial, SquaredError, Threads, maneuvers
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.record import record_of
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import record_of
 from swashplate.simulation.residuals import jacobian, residuals
 
 VARIANTS = {

@@ -7,7 +7,7 @@ import pytest
 from numba import config, njit
 
 from swashplate import Drive, InputError, ParameterError, SquaredError
-from swashplate.equations.lanes import lanes_of
+from swashplate.equations.marching.lanes import lanes_of
 from swashplate.models.drive import pump_drive
 from swashplate.models.pump import PumpOptions
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from swashplate import InputError
-from swashplate.equations.observation import Observation, ObservedRecord, Own
-from swashplate.equations.record import Record, record_of
+from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
+from swashplate.equations.marching.record import Record, record_of
 
 pytestmark = pytest.mark.traced
 

@@ -149,7 +149,7 @@ def _say_table(
     rate: float,
     out: Path | None,
 ) -> None:
-    from swashplate.equations.record import least_substeps
+    from swashplate.equations.marching.record import least_substeps
     from swashplate.full_order.comparison import TABLE_MANEUVERS, validity
 
     least_substeps(rate)  # a rate out of range is refused before anything is sampled

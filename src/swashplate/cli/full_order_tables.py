@@ -129,7 +129,7 @@ def run_table(found: Comparison) -> Table:
 
 def usual_rate(rate: float) -> float:
     """Steps a second of the reduced model's march at a rate of samples. [Hz]"""
-    from swashplate.equations.record import least_substeps
+    from swashplate.equations.marching.record import least_substeps
 
     return rate * least_substeps(rate)
 

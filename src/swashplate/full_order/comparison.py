@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate import maneuvers
-from swashplate.equations.record import SOURCE_RATE, least_substeps
-from swashplate.equations.run import Start
+from swashplate.equations.marching.record import SOURCE_RATE, least_substeps
+from swashplate.equations.marching.run import Start
 from swashplate.full_order.drive import FullOrderDrive, Method
 from swashplate.full_order.result import FullOrderSimulation
 from swashplate.simulation.result import read_only

@@ -12,7 +12,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict
 
 from swashplate.documents import parse_toml, validated
-from swashplate.equations.definition import Declared
+from swashplate.equations.fields import Declared
 from swashplate.errors import InputError, ParameterError
 from swashplate.full_order.physical_set import (
     AGREES,

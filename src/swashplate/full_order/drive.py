@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.drive import Drive
 from swashplate.equations.equation import interpreted
-from swashplate.equations.jacobian import jacobian
-from swashplate.equations.march import Stored
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.record import SOURCE_RATE, Interpolation, Record, record_of
-from swashplate.equations.run import Instance, Part, Start, check_start, marched
+from swashplate.equations.marching.jacobian import jacobian
+from swashplate.equations.marching.march import Stored
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, Record, record_of
+from swashplate.equations.marching.run import Instance, Part, Start, check_start, marched
 from swashplate.errors import DomainError, InputError
 from swashplate.full_order.completion import chosen_over, from_lumped, load_choices, nearest_set
 from swashplate.full_order.modes import Modes, modes_of, state_matrix

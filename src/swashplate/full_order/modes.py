@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.equations.code import generating
 from swashplate.equations.derivatives import derive
-from swashplate.equations.lowering import generating
-from swashplate.equations.run import module
+from swashplate.equations.marching.run import module
 from swashplate.models.full_order import Motion, PlantOptions, free_rates
 from swashplate.models.machine import Machine
 

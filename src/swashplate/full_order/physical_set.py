@@ -12,8 +12,8 @@ from math import inf, isnan, sqrt, tan
 from pathlib import Path
 from types import MappingProxyType
 
-from swashplate.equations.definition import Declared, Definition, Flag, declared_by
 from swashplate.equations.equation import interpreted
+from swashplate.equations.fields import Declared, Definition, Flag, declared_by
 from swashplate.errors import ParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine

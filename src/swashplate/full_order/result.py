@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel
-from swashplate.equations.record import Record
+from swashplate.equations.marching.record import Record
 from swashplate.full_order.stiff import Case
 from swashplate.models.full_order import Motion, PlantSignals, plant_signals
 from swashplate.simulation.result import read_only

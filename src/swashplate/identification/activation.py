@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
-from swashplate.equations.run import Start
+from swashplate.equations.marching.run import Start
 from swashplate.errors import InputError
 from swashplate.identification.drives import current_record, voltage_record
 from swashplate.identification.forces import Forces

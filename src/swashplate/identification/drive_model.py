@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.kinds import ChannelKind
-from swashplate.equations.observation import ObservedRecord
-from swashplate.equations.record import Record
+from swashplate.equations.marching.observation import ObservedRecord
+from swashplate.equations.marching.record import Record
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.drives import voltage_record
 from swashplate.identification.equation_model import EquationModel

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from swashplate.campaign.experiment import Experiment
-from swashplate.equations.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
-from swashplate.equations.run import Start
+from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
+from swashplate.equations.marching.run import Start
 from swashplate.errors import InputError
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.instance import at_every_rate

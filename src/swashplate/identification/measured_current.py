@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.ammeter import signed_by_command
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
-from swashplate.equations.record import Record
+from swashplate.equations.marching.record import Record
 from swashplate.errors import InputError
 from swashplate.identification.drives import current_record
 

@@ -9,13 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.equations.adjoints import Derived
 from swashplate.equations.derivatives import derive
-from swashplate.equations.derived import Derived
 from swashplate.equations.fields import floats_of, value_at
-from swashplate.equations.march import HOLDS, taps_of
-from swashplate.equations.model import Link, Model, arguments_of
-from swashplate.equations.run import Instance, Started, called, outside
-from swashplate.equations.windows import Window
+from swashplate.equations.marching.march import HOLDS, taps_of
+from swashplate.equations.marching.run import Instance, Started, called, outside
+from swashplate.equations.model import Link, Model, Window, arguments_of
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.model import LinearModel
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.derivatives import derive
+from swashplate.equations.marching.record import Interpolation, least_substeps
+from swashplate.equations.marching.run import Instance, Started
 from swashplate.equations.model import join
-from swashplate.equations.record import Interpolation, least_substeps
-from swashplate.equations.run import Instance, Started
 from swashplate.errors import InputError
 from swashplate.linear.discrete import Recurrence, recurrence
 from swashplate.linear.export import Matrices, with_line

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.record import FASTEST, SOURCE_RATE, Record
-from swashplate.equations.run import marched
+from swashplate.equations.marching.record import FASTEST, SOURCE_RATE, Record
+from swashplate.equations.marching.run import marched
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.drive import slowest_lag
 from swashplate.linear.operating_point import without_ripple

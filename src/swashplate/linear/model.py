@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.record import Interpolation
+from swashplate.equations.marching.record import Interpolation
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.margins import LoopMargins, bandwidth, largest_gain, loop_margins
 from swashplate.linear.operating_point import OperatingPoint

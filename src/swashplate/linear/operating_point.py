@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.equation import interpreted
-from swashplate.equations.run import Instance, called
+from swashplate.equations.marching.run import Instance, called
 from swashplate.errors import DomainError, InputError
 from swashplate.models.card import Card, channel_level
 from swashplate.models.drive import overpowered

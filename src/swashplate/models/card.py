@@ -17,11 +17,11 @@ and C mean the same at every rate.
 from math import cos, exp, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from swashplate.equations.definition import OFF, Definition, Flag
 from swashplate.equations.derivatives import declared
 from swashplate.equations.equation import equation
+from swashplate.equations.fields import OFF, Definition, Flag
 from swashplate.equations.library import faded, interpolated, soft_threshold
-from swashplate.equations.windows import Window
+from swashplate.equations.model import Window
 
 COULOMB_WIDTH = 0.01
 """Rate of current below which the smooth Coulomb sign is proportional to it. [A/s]"""

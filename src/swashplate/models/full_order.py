@@ -14,11 +14,11 @@ below 2. Limits are projections: what is beyond a stop is put back on it and sto
 from math import atan, tan
 from typing import NamedTuple
 
-from swashplate.equations.definition import OFF, Flag
 from swashplate.equations.equation import equation
+from swashplate.equations.fields import OFF, Flag
 from swashplate.equations.library import clipped
+from swashplate.equations.loops import repeated, root
 from swashplate.equations.model import Model, join
-from swashplate.equations.primitives import repeated, root
 from swashplate.models.drive import card, current_sum, signed_current, source
 from swashplate.models.machine import (
     Machine,

@@ -19,11 +19,11 @@ option that is off leaves nothing of them.
 from math import asin, atan, inf, pi, sin, sqrt, tan
 from typing import Annotated, NamedTuple
 
-from swashplate.equations.definition import MINUS, OFF, Definition, Flag
 from swashplate.equations.derivatives import declared
 from swashplate.equations.equation import equation
+from swashplate.equations.fields import MINUS, OFF, Definition, Flag
 from swashplate.equations.library import arctangent, small_arctangent
-from swashplate.equations.primitives import root
+from swashplate.equations.loops import root
 from swashplate.models.refinements import (
     accelerating_leakage,
     damping_factor,
@@ -920,9 +920,15 @@ def pump_rates(
     return PumpState(
         pressure=rising,
         plate_pressure=plate,
+        magnetising_current=0.0,
+        spool=0.0,
         deflection=released,
         torque=charging,
         speed=accelerating,
+        flow_speed=0.0,
+        load_torque=0.0,
+        shaft_angle=0.0,
+        begun=0.0,
     )
 
 

@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations import Model, instance_of, parameter_paths
 from swashplate.equations.fields import floats_of
-from swashplate.equations.lanes import LANES, march_lanes
 from swashplate.equations.library import TAN_22_5
-from swashplate.equations.march import output_of
-from swashplate.equations.record import Record
-from swashplate.equations.run import outside
-from swashplate.equations.use import records_of
+from swashplate.equations.marching.lanes import LANES, march_lanes
+from swashplate.equations.marching.march import output_of
+from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.run import outside
+from swashplate.equations.marching.use import records_of
 from swashplate.errors import FileError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.models.pump import PumpOptions

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.fields import floats_of
 from swashplate.equations.library import TAN_22_5
+from swashplate.equations.marching.run import Instance, Part
 from swashplate.equations.model import Model
-from swashplate.equations.run import Instance, Part
 from swashplate.errors import InputError
 from swashplate.models.card import Card, CardOptions, Channel
 from swashplate.models.drive import Source as CurrentSource

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import jacobian as engine
-from swashplate.equations.jacobian import Jacobian as Jacobian
-from swashplate.equations.jacobian import Triangle as Triangle
-from swashplate.equations.observation import ObservedRecord
-from swashplate.equations.observation import Own as EngineOwn
-from swashplate.equations.rows import BLOCK
-from swashplate.equations.run import Instance
+from swashplate.equations.marching import jacobian as engine
+from swashplate.equations.marching.jacobian import Jacobian as Jacobian
+from swashplate.equations.marching.jacobian import Triangle as Triangle
+from swashplate.equations.marching.observation import ObservedRecord
+from swashplate.equations.marching.observation import Own as EngineOwn
+from swashplate.equations.marching.rows import BLOCK
+from swashplate.equations.marching.run import Instance
 from swashplate.errors import InputError
 from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.march import Stored
-from swashplate.equations.record import Record
-from swashplate.equations.run import Instance, observe_kernel
+from swashplate.equations.marching.march import Stored
+from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.run import Instance, observe_kernel
 from swashplate.models.pump import Pump
 
 if TYPE_CHECKING:

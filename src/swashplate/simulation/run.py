@@ -8,11 +8,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.lowering import generating
-from swashplate.equations.march import Sampler, Stored
+from swashplate.equations.code import generating
+from swashplate.equations.marching.march import Sampler, Stored
+from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.run import Instance, Start, Started, check_start, marched
 from swashplate.equations.model import Model
-from swashplate.equations.record import Record
-from swashplate.equations.run import Instance, Start, Started, check_start, marched
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.record import Record
-from swashplate.equations.run import Start
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.run import Start
 from swashplate.errors import InputError
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.lowering import generating
-from swashplate.equations.march import Sampler, function_source, indented, value_of
-from swashplate.equations.program import Tuple, leaves
-from swashplate.equations.run import Instance, called, module
-from swashplate.equations.scalars import Code, text
+from swashplate.equations.code import Code, Tuple, generating, leaves
+from swashplate.equations.expressions import text
+from swashplate.equations.marching.march import Sampler, function_source, indented, value_of
+from swashplate.equations.marching.run import Instance, called, module
+from swashplate.equations.writing import lines_of
 from swashplate.models.card import channel_level
 from swashplate.models.drive import drive
 from swashplate.models.pump import (
@@ -35,8 +35,7 @@ def _kernel(options: tuple[Any, ...]) -> Callable[..., None]:
     """The compiled map from constant voltages to currents and speeds."""
     sampler = Sampler(drive, ("voltage",), options, [])
     card, pump = sampler.parts
-    code = Code()
-    code.taken = pump.code.taken
+    code = Code(pump.code.taken)
     volts = ex.name("volts")
     plus = card.call(code, channel_level, {"voltage": volts, "p": card.p.items[0]})  # type: ignore[union-attr]
     minus = card.call(
@@ -56,7 +55,7 @@ def _kernel(options: tuple[Any, ...]) -> Callable[..., None]:
         *sampler.ahead(),
         "for n in range(voltage.size):",
         "    volts = voltage[n]",
-        *indented(code.lines(results)),  # type: ignore[arg-type]
+        *indented(lines_of(code, results)),  # type: ignore[arg-type]
         f"    current[n] = {text(current)}",
         f"    speed[n] = {text(speed)}",  # type: ignore[arg-type]
     ]

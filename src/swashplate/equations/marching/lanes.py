@@ -16,21 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.expressions import Node
-from swashplate.equations.lowering import generating
-from swashplate.equations.march import (
+from swashplate.equations.code import generating, leaves
+from swashplate.equations.expressions import Node, text
+from swashplate.equations.marching.march import (
     Sampler,
     function_source,
     indented,
     output_of,
     rest_of,
 )
+from swashplate.equations.marching.run import module
+from swashplate.equations.marching.straight import CALLED, Statement, Straight
+from swashplate.equations.marching.triangle import aligned
 from swashplate.equations.model import Model
-from swashplate.equations.program import leaves
-from swashplate.equations.run import module
-from swashplate.equations.scalars import text
-from swashplate.equations.straight import CALLED, Statement, Straight
-from swashplate.equations.triangle import aligned
+from swashplate.equations.writing import lines_of
 
 Array = NDArray[np.float64]
 
@@ -182,11 +181,11 @@ def prepared(
         rest = rest_of(part)
         state, nodes = dict(leaves(part.state)), dict(leaves(rest.value))
         at_rest = {state[path].value: nodes[path] for path in sampler.carried[part.part]}
-        lines += rest.code.lines(at_rest.values())
+        lines += lines_of(rest.code, at_rest.values())
         lines += [f"{rows.text(name)} = {text(node)}" for name, node in at_rest.items()]
         reads = {*sampler.constants(part), *rest.code.reads(at_rest.values())}
         needed = [ex.name(name) for name in reads]
-        lines[:0] = part.prologue.lines(needed)
+        lines[:0] = lines_of(part.prologue, needed)
         used |= part.prologue.reads(needed)
     return [*rows.loads(used & known), *lines]
 
