@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from swashplate.identification.autocorrelation import (
+from swashplate.identification.linearised import LinearisedFit, LinearisedRun
+from swashplate.identification.noise import (
     NoiseColour,
     correlation_length,
     flat_top,
@@ -14,7 +15,6 @@ from swashplate.identification.autocorrelation import (
     noise_colours,
     pair_sums,
 )
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.variables import Variables
 
 

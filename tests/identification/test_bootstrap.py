@@ -5,10 +5,9 @@ import pytest
 from scipy.signal import lfilter
 
 from swashplate.errors import InputError
-from swashplate.identification.bootstrap import Bootstrap, refit_bootstrap
-from swashplate.identification.coloured_noise import coloured_noise_covariance
+from swashplate.identification.bootstrap import Bootstrap, Resampling, refit_bootstrap
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
-from swashplate.identification.resampling import Resampling
+from swashplate.identification.noise import coloured_noise_covariance
 from swashplate.identification.variables import Variables
 
 N, RUNS = 2048, 4

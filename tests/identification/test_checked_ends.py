@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from swashplate import Experiment
-from swashplate.identification.checked_ends import checked_ends
-from swashplate.identification.held import minimiser
-from swashplate.identification.intervals import estimates, reach
 from swashplate.identification.linearising import linearised_fit
 from swashplate.identification.problem import Problem
+from swashplate.identification.profile import checked_ends, minimiser
 from swashplate.identification.solving import solve
-from swashplate.identification.uncertainty import uncertainty
+from swashplate.identification.uncertainty import estimates, reach, uncertainty
 from swashplate.identification.unknowns import Unknown, Unknowns
 
 TIME = np.linspace(0.0, 4.0, 81)

@@ -5,10 +5,13 @@ import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
-from swashplate.identification.autocorrelation import NoiseColour
-from swashplate.identification.coloured_noise import coloured_noise_covariance, noise_model
-from swashplate.identification.covariance import white_noise_covariance
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
+from swashplate.identification.noise import (
+    NoiseColour,
+    coloured_noise_covariance,
+    noise_model,
+    white_noise_covariance,
+)
 from swashplate.identification.variables import Variables
 
 N = 3000

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from swashplate.errors import InputError
-from swashplate.identification.covariance import spectrum, white_noise_covariance
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
+from swashplate.identification.noise import spectrum, white_noise_covariance
 from swashplate.identification.variables import Variables
 
 RNG = np.random.default_rng(3)

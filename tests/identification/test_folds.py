@@ -14,15 +14,16 @@ from hypothesis import strategies as st
 from swashplate import Campaign, Channel, Drive, Experiment, InputError, maneuvers
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.identification.fit import fit
-from swashplate.identification.fold_results import (
+from swashplate.identification.assessment import Measures
+from swashplate.identification.cross_validation import (
     CrossValidation,
     Fold,
     FoldEstimate,
     HeldRun,
+    cross_validate,
+    deal,
 )
-from swashplate.identification.folds import cross_validate, deal
-from swashplate.identification.measures import Measures
+from swashplate.identification.fit import fit
 from swashplate.identification.setup import Setup
 from swashplate.identification.validation import pooled, predict
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.identification.gauges import GAUGES, Gauge, symbol_of
+from swashplate.identification.identifiability import GAUGES, Gauge, symbol_of
 from swashplate.identification.variables import Variables
 
 BY_NAME = {gauge.name: gauge for gauge in GAUGES}

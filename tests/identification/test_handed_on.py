@@ -9,12 +9,12 @@ from swashplate import Drive
 from swashplate.campaign import rig
 from swashplate.campaign.campaign import Campaign
 from swashplate.identification.assessment import assess
-from swashplate.identification.covariance import Covariance
 from swashplate.identification.fit import Fit, fit
-from swashplate.identification.handed_on import Handed, slopes_by_earlier, with_handed
+from swashplate.identification.noise import Covariance
 from swashplate.identification.setup import load_setup
 from swashplate.identification.solving import solve
 from swashplate.identification.staging import stage_problem
+from swashplate.identification.uncertainty import Handed, slopes_by_earlier, with_handed
 from swashplate.identification.variables import Variables
 from swashplate.maneuvers import source_tests
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from swashplate.errors import InputError
-from swashplate.identification.covariance import Covariance
-from swashplate.identification.intervals import Estimate, estimates
+from swashplate.identification.noise import Covariance
+from swashplate.identification.uncertainty import Estimate, estimates
 from swashplate.identification.variables import Variables
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from swashplate.identification.gauges import GAUGES
-from swashplate.identification.null_directions import (
+from swashplate.identification.identifiability import (
+    GAUGES,
     Direction,
     Space,
     faint_directions,

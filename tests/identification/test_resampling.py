@@ -5,9 +5,9 @@ import pytest
 from scipy.signal import lfilter
 
 from swashplate.errors import InputError
-from swashplate.identification.autocorrelation import NoiseColour
+from swashplate.identification.bootstrap import Resampling, politis_white_length
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
-from swashplate.identification.resampling import Resampling, politis_white_length
+from swashplate.identification.noise import NoiseColour
 from swashplate.identification.variables import Variables
 
 N = 4000

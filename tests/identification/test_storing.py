@@ -9,13 +9,11 @@ import pytest
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError, maneuvers
 from swashplate.campaign import rig
-from swashplate.identification.assessment import assess
+from swashplate.identification.assessment import Measures, assess
+from swashplate.identification.cross_validation import CrossValidation, Fold, FoldEstimate, HeldRun
 from swashplate.identification.fit import Fit, fit
 from swashplate.identification.fit_file import StageProfile
-from swashplate.identification.fold_results import CrossValidation, Fold, FoldEstimate, HeldRun
-from swashplate.identification.measures import Measures
-from swashplate.identification.profile_side import Point
-from swashplate.identification.profiles import Profile, Threshold
+from swashplate.identification.profile import Point, Profile, Threshold
 from swashplate.identification.setup import Setup
 from swashplate.identification.starts import StartResult
 from swashplate.identification.storing import fingerprint, load_fit, save_fit

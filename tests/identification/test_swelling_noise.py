@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from swashplate.identification.covariance import Covariance
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
-from swashplate.identification.swelling_noise import swelling_noise_covariance
+from swashplate.identification.noise import Covariance, swelling_noise_covariance
 from swashplate.identification.variables import Variables
 
 RUNS, N = 6, 5120

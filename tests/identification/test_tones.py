@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
-from swashplate.identification.tones import separated
+from swashplate.identification.spectral_lines import separated
 from swashplate.identification.uncertainty import uncertainty
 from swashplate.identification.variables import Variables
 

@@ -14,14 +14,12 @@ import pytest
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
 from swashplate.campaign import rig
-from swashplate.identification.assessment import assess, run_qualities
+from swashplate.identification.assessment import Measures, assess, run_qualities
+from swashplate.identification.cross_validation import CrossValidation, Fold, FoldEstimate, HeldRun
 from swashplate.identification.fit import Fit, fit
-from swashplate.identification.fold_results import CrossValidation, Fold, FoldEstimate, HeldRun
-from swashplate.identification.measures import Measures
-from swashplate.identification.named_tones import distinct
-from swashplate.identification.profile_side import Point
-from swashplate.identification.profiles import Profile, Threshold
+from swashplate.identification.profile import Point, Profile, Threshold
 from swashplate.identification.setup import Setup
+from swashplate.identification.spectral_lines import distinct
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.starts import StartResult
 from swashplate.identification.validation import predict

@@ -87,10 +87,10 @@ def excitation(
     can move together unseen. Proposes a set-up in which all is determined.
     """
     from swashplate.campaign.campaign import Campaign
+    from swashplate.identification.data_checks import check_sound, refuse_unsound
     from swashplate.identification.excitation import outlook
     from swashplate.identification.fit import smooth
     from swashplate.identification.reparameterise import propose, proposed_setup, setup_text
-    from swashplate.identification.soundness import check_sound, refuse_unsound
     from swashplate.identification.staging import setup_of
     from swashplate.tables import write_text
 

@@ -18,8 +18,9 @@ from swashplate.cli.fit_output import (
 )
 from swashplate.cli.inputs import parameters_of
 from swashplate.cli.judging import Wanted, judged_fit
-from swashplate.cli.terminal import Shown, long_work, note, say, show, side, waiting, working
+from swashplate.cli.terminal import Shown, long_work, note, say, show, waiting, working
 from swashplate.cli.validate import chosen_axis
+from swashplate.cli.validation_tables import shown_verdict
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
@@ -104,6 +105,10 @@ def fit(
         Method, typer.Option(help="Trust region on exact derivatives, or SQP by differences.")
     ] = "trf",
     loss: Annotated[Loss, typer.Option(help="Robust losses forgive outliers.")] = "linear",
+    require: Annotated[
+        float,
+        typer.Option(help="Largest error of held-out runs, in % of their range.", min=0.0),
+    ] = 10.0,
     report: Annotated[
         bool, typer.Option(help="Write report.html, one file that works offline.")
     ] = True,
@@ -155,7 +160,9 @@ def fit(
         if joint and len(plan.stages) > 1 and not result.interrupted:
             result = refined(result, runs, watch=watch)
     seconds = perf_counter() - begun
-    wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, method, loss)
+    wanted = Wanted(
+        folds, bootstrap, tuple(profile or ()), seed, executor, method, loss, require / 100.0
+    )
     found = judged_fit(campaign, chosen, runs, nominal, plan, result, wanted)
     lines = [*written(result, found.assessments, out, found.bootstraps), found.stored(out)]
     if report:
@@ -189,10 +196,7 @@ def fit(
         note(line)
     if result.interrupted:
         note("Interrupted: this is the best so far, not an optimum.")
-    if not found.verdict.usable:
-        side.print(found.verdict.headline)
-        raise typer.Exit(1)
-    say(found.verdict.headline)
+    shown_verdict(found.verdict)
 
 
 def _search(

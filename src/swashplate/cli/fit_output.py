@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
     from swashplate.identification.assessment import Assessment, RunQuality
     from swashplate.identification.bootstrap import Bootstrap
+    from swashplate.identification.cross_validation import CrossValidation
     from swashplate.identification.fit import Fit
-    from swashplate.identification.fold_results import CrossValidation
-    from swashplate.identification.intervals import Estimate
+    from swashplate.identification.uncertainty import Estimate
 
 
 def estimates_table(

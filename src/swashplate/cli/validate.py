@@ -10,7 +10,7 @@ import typer
 
 from swashplate.cli.arguments import AxisName, CampaignPath
 from swashplate.cli.inputs import parameters_of
-from swashplate.cli.terminal import note, say, show, side, working
+from swashplate.cli.terminal import note, say, show, working
 from swashplate.cli.validation_tables import (
     MEASURES,
     RESIDUALS,
@@ -19,6 +19,7 @@ from swashplate.cli.validation_tables import (
     measures_table,
     quality_tables,
     residual_table,
+    shown_verdict,
 )
 from swashplate.errors import FileError, InputError
 
@@ -56,6 +57,9 @@ def validate(
         Path | None,
         typer.Option(help="Folder for report.html and measures.csv.", metavar="DIR"),
     ] = None,
+    require: Annotated[
+        float, typer.Option(help="Largest error, in % of a channel's range.", min=0.0)
+    ] = 10.0,
     figures: Annotated[
         Figures | None,
         typer.Option(help="Figures for print as well, in DIR/figures.", show_default=False),
@@ -93,7 +97,7 @@ def validate(
         predicted = predict(parameters, runs)
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
-        judged = verdict((), predicted)
+        judged = verdict((), predicted, required=require / 100.0)
         qualities = with_speeds(predicted)
         errors = channel_errors(qualities, source_rules(parameters.name))
     lines = []
@@ -113,10 +117,7 @@ def validate(
         say(f"- {words}")
     for line in lines:
         note(line)
-    if not judged.usable:
-        side.print(judged.headline)
-        raise typer.Exit(1)
-    say(judged.headline)
+    shown_verdict(judged)
 
 
 def chosen_axis(campaign: Campaign, axis: str | None) -> str:

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from swashplate.__about__ import __version__
 from swashplate.campaign.experiment import Experiment
 from swashplate.executors import Executor, Serial
+from swashplate.identification.data_checks import check_sound, refuse_unsound
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.drives import at_rate_of
-from swashplate.identification.prior_weights import weighed
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Setup, Stage
 from swashplate.identification.solving import Loss, Method, Progress, Solution, solve
-from swashplate.identification.soundness import check_sound, refuse_unsound
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.starts import StartResult, sobol_starts, solve_from
+from swashplate.identification.uncertainty import weighed
 from swashplate.parameters.parameter_set import ParameterSet
 
 Array = NDArray[np.float64]

@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from swashplate.identification.fold_results import CrossValidation
-from swashplate.identification.profile_side import Ending, Point
-from swashplate.identification.profiles import Profile, Threshold
+from swashplate.identification.cross_validation import CrossValidation
+from swashplate.identification.profile import Ending, Point, Profile, Threshold
 from swashplate.identification.setup import Setup
 from swashplate.identification.starts import StartResult
 

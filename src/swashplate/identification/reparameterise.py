@@ -12,7 +12,7 @@ import numpy as np
 from swashplate.errors import InputError
 from swashplate.identification.excitation import Outlook
 from swashplate.identification.forces import Forces
-from swashplate.identification.null_directions import NAMED
+from swashplate.identification.identifiability import NAMED
 from swashplate.identification.setup import Free, GivenForces, Setup, Stage
 from swashplate.parameters.definitions import CATALOGUE
 

@@ -15,6 +15,7 @@ from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_text, validated
 from swashplate.errors import FileError, InputError
+from swashplate.identification.cross_validation import CrossValidation
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fit import Fit, StageFit, smooth
 from swashplate.identification.fit_file import (
@@ -25,10 +26,9 @@ from swashplate.identification.fit_file import (
     profile_entry,
     profile_of,
 )
-from swashplate.identification.fold_results import CrossValidation
-from swashplate.identification.prior_weights import with_worths
 from swashplate.identification.solving import Solution
 from swashplate.identification.staging import stage_problem
+from swashplate.identification.uncertainty import with_worths
 from swashplate.parameters.files import dump_set, read_set
 from swashplate.tables import write_text
 

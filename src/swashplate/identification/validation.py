@@ -12,19 +12,25 @@ from numpy.typing import NDArray
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.speed import speed_of
 from swashplate.errors import InputError
-from swashplate.identification.assessment import RunQuality, compared
+from swashplate.identification.assessment import (
+    Measures,
+    RunQuality,
+    compared,
+    measures,
+    pooled_measures,
+)
 from swashplate.identification.drive_model import SIGNALS, DriveModel
 from swashplate.identification.drives import current_record
-from swashplate.identification.error_tables import ErrorTable, error_table
-from swashplate.identification.exclusions import (
+from swashplate.identification.error_tables import (
     SOURCE_RULES,
     ComparedRun,
+    ErrorTable,
     Kind,
     Quantity,
     Rule,
     WholeKind,
+    error_table,
 )
-from swashplate.identification.measures import Measures, measures, pooled_measures
 from swashplate.parameters.parameter_set import ParameterSet
 
 Array = NDArray[np.float64]

@@ -11,8 +11,7 @@ from typing import Any, Literal
 from swashplate.campaign.experiment import Experiment
 from swashplate.drive import Drive
 from swashplate.identification.assessment import RunQuality
-from swashplate.identification.error_tables import LargestError, sine_error
-from swashplate.identification.exclusions import SOURCE_RULES
+from swashplate.identification.error_tables import SOURCE_RULES, LargestError, sine_error
 from swashplate.identification.fit import fit
 from swashplate.identification.known_truth import drawn
 from swashplate.identification.setup import load_setup

@@ -9,8 +9,8 @@ from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fit import Fit, StageFit
-from swashplate.identification.gauges import GAUGES
-from swashplate.identification.intervals import Estimate, estimates
+from swashplate.identification.identifiability import GAUGES
+from swashplate.identification.uncertainty import Estimate, estimates
 from swashplate.identification.unknowns import Unknown
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.parameters.parameter_set import ParameterSet
