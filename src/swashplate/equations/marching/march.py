@@ -191,9 +191,9 @@ class PartCode:
         if "options" in arguments_of(equation):
             given["options"] = fixed(self.options) or Flag("unknown", "options")
         made, name = read(code, equation, given), plain(equation).__name__
-        known = {*code.taken}
+        before = {*code.taken}
         made = code.named(made, name if isinstance(made, Node) else "")
-        code.origins |= dict.fromkeys(code.taken - known, name)
+        code.origins |= dict.fromkeys(code.taken - before, name)
         return made
 
     def _input(self, name: str) -> Value:
