@@ -640,9 +640,8 @@ def _march(
     met = np.array([np.inf])
     room = room_for(layout.rows, layout.constant, layout.states, len(columns), plan)
     arrays = arrays_of(instance, marched, started, places, states, met, room.flat)
-    size = marched[0].size
-    pieces = addresses(graph.pieces, layout.pieces)
-    march_observed(pieces, arrays, size, block, h, tangent, program, plan, sink, room)
+    pieces, grid = addresses(graph.pieces, layout.pieces), (marched[0].size, block, h)
+    march_observed(pieces, arrays, grid, tangent, program, plan, sink, room)
     check_domain(instance, states, float(met[0]), observed.driven_by)
 
 
