@@ -12,10 +12,10 @@ from table import Row, duration, times
 from timing import Timing, cores_used, in_turns, one_core
 
 from swashplate import Drive, Serial, SquaredError, maneuvers
-from swashplate.equations.march import Stored
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.record import record_of
-from swashplate.equations.run import march_kernel
+from swashplate.equations.marching.march import Stored
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import record_of
+from swashplate.equations.marching.run import march_kernel
 from swashplate.simulation.instance import instance_of
 from swashplate.simulation.residuals import jacobian
 from swashplate.simulation.sensitivities import PUMP_COLUMNS

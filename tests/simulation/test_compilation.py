@@ -13,7 +13,7 @@ import swashplate
 SCRIPT = """
 import numpy as np
 from swashplate import Drive
-from swashplate.equations.run import march_kernel
+from swashplate.equations.marching.run import march_kernel
 run = Drive.preset("hoist").simulate_current(np.full(60, 0.5))
 print(run.shaft_speed[-1])
 march = march_kernel(run.instance.model, (run.driven_by,), run.instance.options, run.kept)

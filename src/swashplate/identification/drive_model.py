@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from swashplate.campaign.ammeter import signed_by_command
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.kinds import ChannelKind
-from swashplate.equations.observation import ObservedRecord
-from swashplate.equations.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
-from swashplate.equations.run import Start
+from swashplate.equations.marching.observation import ObservedRecord
+from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
+from swashplate.equations.marching.run import Start
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.model import EquationModel
 from swashplate.parameters.definitions import COLUMNS, REFINEMENTS

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
-from swashplate.equations.run import Start
+from swashplate.equations.marching.run import Start
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel, Forces, current_record, voltage_record
 from swashplate.identification.identifiability import NAMED as NAMED_OTHERS

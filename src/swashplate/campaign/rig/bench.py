@@ -14,7 +14,7 @@ from swashplate.campaign.kinds import CHANNEL_KINDS, ChannelKind
 from swashplate.campaign.rig.instruments import SEVERITIES, Instruments, Severity
 from swashplate.campaign.rig.readings import logged, put_out, stream
 from swashplate.drive import Drive
-from swashplate.equations.record import SOURCE_RATE
+from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import InputError, ParameterError
 from swashplate.maneuvers import Maneuver, source_tests
 from swashplate.maneuvers.checks import positive, whole

@@ -20,8 +20,8 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import on_disk
+from swashplate.equations.code import GENERATING
 from swashplate.equations.equation import known
-from swashplate.equations.lowering import GENERATING
 from swashplate.equations.syntax import plain
 
 PIECE = "count, first, h, records, before, whole, fraction, params, given, states, met, flat"

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import generated, kernel
+from swashplate.equations.code import compiled_names, generating
 from swashplate.equations.equation import inlined, interpreted
 from swashplate.equations.fields import floats_of, made, numbers_of, value_at
-from swashplate.equations.lowering import generating
-from swashplate.equations.march import Stored, march_source, observe_source, taps_of
-from swashplate.equations.model import Link, Model, Place, arguments_of, place, plain
-from swashplate.equations.windows import Window
+from swashplate.equations.marching.march import Stored, march_source, observe_source, taps_of
+from swashplate.equations.model import Link, Model, Place, Window, arguments_of, place
+from swashplate.equations.syntax import plain
 from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
@@ -264,7 +264,8 @@ def linked(link: Link, states: Sequence[Any], found: Sequence[Mapping[str, Any]]
 def module(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
     """A generated module with what every one of them needs."""
     mathematics = {k: v for k, v in vars(math).items() if not k.startswith("_")}
-    return generated(name, text, {**mathematics, "kernel": kernel, "inlined": inlined, **names})
+    used = compiled_names(names)
+    return generated(name, text, {**mathematics, "kernel": kernel, "inlined": inlined, **used})
 
 
 @generating

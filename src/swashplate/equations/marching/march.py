@@ -21,14 +21,26 @@ from functools import cached_property
 from typing import Any, NamedTuple, get_type_hints
 
 from swashplate.equations import expressions as ex
+from swashplate.equations.code import Code, Flag, Tuple, Value, fixed, leaves, rebuilt
 from swashplate.equations.equation import inlined
-from swashplate.equations.expressions import Node
+from swashplate.equations.expressions import Node, text
 from swashplate.equations.fields import floats_of
-from swashplate.equations.model import Equation, Link, Model, Source, Tap, arguments_of, plain
-from swashplate.equations.pieces import PIECE
-from swashplate.equations.program import Flag, Tuple, Value, leaves, rebuilt
-from swashplate.equations.scalars import Code, text
-from swashplate.equations.windows import Window, linear, mean_over_sample, previous
+from swashplate.equations.marching.pieces import PIECE
+from swashplate.equations.model import (
+    Equation,
+    Link,
+    Model,
+    Source,
+    Tap,
+    Window,
+    arguments_of,
+    linear,
+    mean_over_sample,
+    previous,
+)
+from swashplate.equations.reading import read
+from swashplate.equations.syntax import plain
+from swashplate.equations.writing import lines_of
 from swashplate.errors import InputError
 
 HOLDS: dict[str, Equation] = {
@@ -116,10 +128,8 @@ class PartCode:
     ) -> None:
         self.model, self.part, self.own = model, part, model.parts[part]
         self.records, self.options = tuple(signals), options
-        self.prologue, self.code = Code(ruled=ruled), Code(ruled=ruled)
-        if taken is not None:
-            self.prologue.taken = taken
-        self.code.taken = self.prologue.taken
+        self.prologue = Code(set() if taken is None else taken, ruled=ruled)
+        self.code = Code(self.prologue.taken, ruled=ruled)
         self.prefix = f"{self.own.name}_" if len(model.parts) > 1 else ""
         self.code.taken.add("h")
         self.taps = [each for each in taps_of(model, signals) if each.part == part]
@@ -177,19 +187,14 @@ class PartCode:
 
     def call(self, code: Code, equation: Equation, known: Mapping[str, Value]) -> Value:
         """Append a call of one of the part's equations, of what is known by argument."""
-        names = arguments_of(equation)
-        given = {name: known[name] for name in names if name in known}
-        options: dict[str, Any] = {}
-        if "options" in names:
-            options["options"] = self.options
-            given["options"] = Flag(None)
-        lengths = {}
-        for each in self.own.input_types:
-            if self.own.tap(each).width:
-                for start in (each, f"inputs.{each}"):
-                    lengths[f"{start}.s"] = self.own.tap(each).width
-        lengths["window.s"] = 3 if plain(equation) is plain(mean_over_sample) else 2
-        return code.called(equation, given, options, lengths)
+        given = {name: known[name] for name in arguments_of(equation) if name in known}
+        if "options" in arguments_of(equation):
+            given["options"] = fixed(self.options) or Flag("unknown", "options")
+        made, name = read(code, equation, given), plain(equation).__name__
+        before = {*code.taken}
+        made = code.named(made, name if isinstance(made, Node) else "")
+        code.origins |= dict.fromkeys(code.taken - before, name)
+        return made
 
     def _input(self, name: str) -> Value:
         """An input as a name, a window of names, or what a hold makes of one."""
@@ -217,7 +222,7 @@ class PartCode:
         sources = {each.signal: ex.name(self.source(each)) for each in link.sources}
         if link.equation is None:
             return next(iter(sources.values()))
-        made = self.code.called(link.equation, sources)
+        made = self.code.named(read(self.code, link.equation, sources), link.name)
         assert isinstance(made, Node)
         return made
 
@@ -415,7 +420,7 @@ class Sampler:
                 for path, node in leaves(names):
                     if node.value in outside:
                         lines.append(f"{node.value} = {array}[{prefix.index((part.part, path))}]")
-            lines += part.prologue.lines(wanted)
+            lines += lines_of(part.prologue, wanted)
         return lines
 
     def constants(self, part: PartCode) -> list[str]:
@@ -459,7 +464,7 @@ class Sampler:
 
     def body(self, part: PartCode) -> list[str]:
         """Lines of a part's sample, and of the signals that other parts need of it."""
-        lines = part.code.lines(self.ends[part.part])
+        lines = lines_of(part.code, self.ends[part.part])
         for source, node in self.sources.items():
             if source.part == part.part:
                 lines.append(f"{part.source(source)} = {text(node)}")
@@ -489,20 +494,19 @@ class Sampler:
             if each.part == part.part:
                 code, made = self.observed(part, each)
                 target = into(row) if into else f"out[{row}, {at}]"
-                lines += [*code.lines([made]), f"{target} = {text(made)}"]
+                lines += [*lines_of(code, [made]), f"{target} = {text(made)}"]
             row += 1
         return lines
 
     def observed(self, part: PartCode, stored: Stored) -> tuple[Code, Node]:
         """A number that is kept, and the code that makes it of what is known at its part's end."""
-        code = Code()
-        code.taken = part.code.taken
+        code = Code(part.code.taken)
         if stored.kind != "link":
             return code, part.node(stored)
         link = self.model.links[stored.path]
         sources: dict[str, Value] = {s.signal: ex.name(part.source(s)) for s in link.sources}
         assert link.equation is not None
-        made = code.called(link.equation, sources)
+        made = code.named(read(code, link.equation, sources), link.name)
         assert isinstance(made, Node)
         return code, made
 
@@ -510,7 +514,7 @@ class Sampler:
         """Lines that keep the worst margin."""
         if part.margin is None:
             return []
-        return [f"worst = min(worst, {text(part.margin)})"]
+        return [f"worst = {text(lower(ex.name('worst'), part.margin))}"]
 
     def load(self, part: PartCode, array: str = "states") -> list[str]:
         """Lines that take a part's state out of a flat array."""
@@ -536,6 +540,12 @@ class Sampler:
         left = ", ".join(names[path].value for path in self.carried[part.part])
         right = ", ".join(text(following[path]) for path in self.carried[part.part])
         return [f"{left} = {right}"]
+
+
+def lower(one: Node, two: Node) -> Node:
+    """The lower of two margins; not a number once one of them was none."""
+    test = ex.make("or", ex.make("<=", one, two), ex.make("!=", one, one))
+    return ex.choose(test, one, two)
 
 
 def indented(lines: Iterable[str], depth: int = 1) -> list[str]:
@@ -578,7 +588,7 @@ def march_piece_source(
     lines = [
         "last = first + count",
         *_marching(sampler, stored, lambda row: rows[stored[row]]),
-        "met[0] = min(met[0], worst)",
+        "met[0] = worst if worst < met[0] or worst != worst else met[0]",
     ]
     says = f"March {model.name} over a block of its inputs."
     return function_source(f"march({PIECE})", says, lines, "@piece"), sampler.names
@@ -685,8 +695,7 @@ class Start(NamedTuple):
 
 def rest_of(part: PartCode) -> Start:
     """State at rest: every signal is zero, or what its default parameter is."""
-    code = Code(ruled=part.code.ruled)
-    code.taken = part.code.taken
+    code = Code(part.code.taken, ruled=part.code.ruled)
     own = part.own
     if own.rest is None:
         defaults = own.state._field_defaults
@@ -714,8 +723,7 @@ def settled_of(part: PartCode) -> Start | None:
     """Steady state under the inputs as they come, None where the part has no equation for it."""
     if part.own.settled is None:
         return None
-    code = Code(ruled=part.code.ruled)
-    code.taken = part.code.taken
+    code = Code(part.code.taken, ruled=part.code.ruled)
     code.items = list(part.entry)
     return Start(code, part.call(code, part.own.settled, part.known))
 
@@ -751,7 +759,7 @@ def observe_source(
             name = own.source(Source(each.part, each.path))
         if name in read:
             inner.append(f"{name} = kept[{row}, m]")
-    inner += own.code.lines(sampler.ends[part])
+    inner += lines_of(own.code, sampler.ends[part])
     inner += sampler.stored(own, wanted, "m")
     lines += indented(inner)
     head = "observe(params, given, h, kept, out, flags)"

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel, subroutine
-from swashplate.equations.pieces import call
-from swashplate.equations.triangle import EIGHTH, absorb, aligned, aligned_room
+from swashplate.equations.marching.pieces import call
+from swashplate.equations.marching.triangle import EIGHTH, absorb, aligned, aligned_room
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
