@@ -20,7 +20,7 @@ from swashplate.identification.data_checks import (
     refuse_unsound,
     time_constant,
 )
-from swashplate.identification.fit import smooth
+from swashplate.identification.fitting import smooth
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
 
 NOMINAL = smooth(Drive.preset("hoist").parameters)

@@ -9,7 +9,7 @@ import pytest
 from swashplate import Drive, Experiment
 from swashplate.campaign.experiment import InputSignal
 from swashplate.identification.assessment import Assessment, RunQuality, compared
-from swashplate.identification.fit import StageFit
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.identifiability import Direction
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage

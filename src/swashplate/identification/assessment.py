@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import InputError
-from swashplate.identification.fit import StageFit
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.lack_of_fit import ResidualTest, residual_test
-from swashplate.identification.linearised import LinearisedFit
-from swashplate.identification.linearising import linearised_fit
+from swashplate.identification.linearised import LinearisedFit, linearised_fit
 from swashplate.identification.problem import Problem
 from swashplate.identification.profile import checked_ends
 from swashplate.identification.uncertainty import (

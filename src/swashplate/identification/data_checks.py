@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.identification.activation import simulated_run
 from swashplate.identification.drive_model import SIGNALS
+from swashplate.identification.excitation import simulated_run
 from swashplate.identification.identifiability import identifiability
 from swashplate.identification.motion import Motion, motions, rms
 from swashplate.identification.setup import Setup
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.unknowns import Unknowns
-from swashplate.identification.variables import Variables
 from swashplate.parameters.parameter_set import ParameterSet
 
 Array = NDArray[np.float64]
@@ -585,9 +584,9 @@ def _rank(experiments: Sequence[Experiment], nominal: ParameterSet, setup: Setup
     return found
 
 
-def _variables(unknowns: Unknowns) -> Variables:
+def _variables(unknowns: Unknowns) -> Unknowns:
     """The unknowns where a fit begins, as the statistics see them; none counts as at a bound."""
-    return Variables.of(
+    return Unknowns.of(
         unknowns.names,
         [each.start for each in unknowns],
         scales=[each.scale for each in unknowns],
