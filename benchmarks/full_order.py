@@ -15,9 +15,9 @@ import polars as pl
 from numpy.typing import NDArray
 
 from swashplate import maneuvers
-from swashplate.equations.jacobian import jacobian, residuals
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.record import record_of
+from swashplate.equations.marching.jacobian import jacobian, residuals
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import record_of
 from swashplate.full_order import FullOrderDrive, convergence
 from swashplate.full_order import validity as validity_of
 

@@ -22,8 +22,8 @@ import swashplate.models
 from swashplate import Drive, PhysicalSet
 from swashplate.equations import derive
 from swashplate.equations.equation import interpreted, is_function
+from swashplate.equations.model import Window
 from swashplate.equations.syntax import plain
-from swashplate.equations.windows import Window
 from swashplate.models import card, full_order, machine, pump
 
 POINTS, FEWER = 100, 30
@@ -487,6 +487,6 @@ def test_partials_are_those_of_differences(name: str) -> None:
 
 def test_no_equation_is_missed() -> None:
     """Those that the models name, and the library's, are among what was found."""
-    for package in ("card", "pump", "refinements", "machine", "full_order", "library", "windows"):
+    for package in ("card", "pump", "refinements", "machine", "full_order", "library", "model"):
         assert any(name.startswith(f"{package}.") for name in EQUATIONS), package
     assert len(EQUATIONS) > 100

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 import pytest
 
-from swashplate.equations.definition import MINUS, Definition, declared_by
+from swashplate.equations.fields import MINUS, Definition, declared_by
 
 
 class Way(NamedTuple):

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, FullOrderDrive, InputError
-from swashplate.equations.jacobian import jacobian, residuals
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.record import record_of
+from swashplate.equations.marching.jacobian import jacobian, residuals
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import record_of
 from swashplate.full_order.drive import path_of
 from swashplate.models.full_order import Substeps
 from swashplate.models.machine import Machine

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate import Drive
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.record import record_of
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import record_of
 from swashplate.simulation.residuals import Own, jacobian, residuals, triangle
 
 Array = NDArray[np.float64]

@@ -54,7 +54,7 @@ def test_undetermined_there_is_none_either() -> None:
     assert found[1].status == "estimated"
 
 
-def test_an_interval_beyond_a_thousandfold_is_none() -> None:
+def test_an_interval_beyond_a_hundredfold_is_none() -> None:
     """A standard error of 4 of the logarithm: its 95 % interval spans a factor of 2540 each way."""
     base = covariance()
     vast = np.diag([base.matrix[0, 0], 4.0**2])

@@ -60,8 +60,8 @@ def failed(found: Verdict) -> set[str]:
     return {each.name for each in found.criteria if not each.passed}
 
 
-MISFIT = "lack of fit: residuals of counts over their known error"
-DRIFT = "drift of counts over the campaign"
+MISFIT = "lack of fit of counts"
+DRIFT = "drift of counts"
 
 
 def test_a_sound_campaign_passes_every_criterion(sound) -> None:
@@ -117,7 +117,7 @@ def test_a_drift_is_named_and_rules_out_the_use(tmp_path: Path) -> None:
     assert found.grade == "Not usable"
     assert {MISFIT, DRIFT} <= failed(found)
     # 8 % over five runs, of which the fourth of five is held out
-    assert lack_of_fit(assessments).causes[0].name == DRIFT
+    assert lack_of_fit(assessments).causes[0].name.startswith(DRIFT)
     assert lack_of_fit(assessments).causes[0].size == pytest.approx(6.0, abs=2.0)
 
 
@@ -127,7 +127,7 @@ def test_a_clipped_ammeter_is_found_with_the_limits_to_state(tmp_path: Path) -> 
 
     assessments, found = fitted(tmp_path, logs=clip)
     assert found.grade == "Not usable"
-    assert "channels at an end of their instrument" in failed(found)
+    assert "clipped channels" in failed(found)
     said = lack_of_fit(assessments).clipped
     assert len(said) == 1
     assert "'current' stands at exactly 0.2 A" in said[0]

@@ -9,9 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from swashplate import Channel, Drive, Experiment, InputError, maneuvers
-from swashplate.campaign import rig
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.campaign import Campaign, InputSignal, Source, rig
 from swashplate.cli import app
 from swashplate.identification.data_checks import (
     Finding,

@@ -160,3 +160,27 @@ def test_one_sample_is_refused() -> None:
     run = LinearisedRun("a", "speed", np.zeros(1), np.ones(1), np.ones((1, 1)))
     with pytest.raises(InputError, match="1 sample for 1 unknown leave nothing"):
         uncertainty(LinearisedFit.of([run], Unknowns.of(["p"], [1.0])))
+
+
+def test_an_estimate_at_its_bound_is_released_in_its_partners_intervals() -> None:
+    # only the sum of both is known well; their difference a hundred times less
+    generator = np.random.default_rng(3)
+    time = np.arange(400) / 100.0
+    jacobian = np.column_stack([np.ones(400), 1.0 + 0.01 * np.sin(time)])
+    run = LinearisedRun("run", "y", time, generator.normal(0.0, 1.0, 400), jacobian)
+
+    def half(at_bound: list[int]) -> float:
+        names = Unknowns.of(["a", "b"], [1.0, 1.0], at_bound=at_bound)
+        found = uncertainty(LinearisedFit.of([run], names)).estimates
+        assert (found[0].status == "at its upper bound") == bool(at_bound[0])
+        assert found[1].lower is not None
+        assert found[1].upper is not None
+        return found[1].upper - found[1].lower
+
+    assert half([1, 0]) == pytest.approx(half([0, 0]))
+    alone = LinearisedRun("run", "y", time, run.residual, jacobian[:, 1:])
+    one = uncertainty(LinearisedFit.of([alone], Unknowns.of(["b"], [1.0]))).estimates[0]
+    assert one.lower is not None
+    assert one.upper is not None
+    # conditioned on the bound it would be far narrower
+    assert half([1, 0]) > 10.0 * (one.upper - one.lower)

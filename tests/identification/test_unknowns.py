@@ -137,3 +137,15 @@ def test_an_unknown_is_found_by_name() -> None:
     assert variables.index("b") == 1
     with pytest.raises(InputError, match="no unknown c; there are a, b"):
         variables.index("c")
+
+
+def test_released_unknowns_stay_where_they_are() -> None:
+    made = Unknowns.of(
+        "abc", [2.0, -3.0, 1.0], logarithmic=[True, False, False], at_bound=[-1, 1, 0]
+    )
+    free = made.released
+    assert made.at_bound.tolist() == [-1, 1, 0]
+    assert free.at_bound.tolist() == [0, 0, 0]
+    np.testing.assert_array_equal(free.vector, made.vector)
+    np.testing.assert_array_equal(free.scales, made.scales)
+    np.testing.assert_allclose(free.estimates, [2.0, -3.0, 1.0])

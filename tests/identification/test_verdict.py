@@ -93,10 +93,10 @@ def test_a_drive_that_hardly_simulates_is_not_usable(
 
 def test_one_run_that_contradicts_the_others_is_named(quality: Make) -> None:
     runs = [quality(WAVE + 0.1 * SWAP, f"run {k}") for k in range(20)]
-    assert criterion(verdict((), runs), "predicted runs worse than their mean").passed
+    assert criterion(verdict((), runs), "predicted runs worse than mean").passed
     found = verdict((), [*runs, quality(-WAVE, "turned")])
     assert not found.usable
-    failed = criterion(found, "predicted runs worse than their mean")
+    failed = criterion(found, "predicted runs worse than mean")
     assert failed.value == "1"
     assert "mean in turned: it contradicts the other runs" in failed.failure
     assert statement(found, "Agreement").weight == "bad"
@@ -157,7 +157,7 @@ def test_a_fit_that_carries_over_is_usable(experiment, measured, stage) -> None:
 def test_what_is_required_decides(quality: Make) -> None:
     found = verdict((), [quality(WAVE + 0.24 * SWAP)], required=0.01)
     assert found.headline == "Not usable: predicts y to 1.2 % of its range only."
-    assert criterion(found, "error of the runs predicted, over their range").limit == "1 %"
+    assert criterion(found, "error / range, runs predicted").limit == "1 %"
 
 
 def test_a_fit_without_runs_held_out_says_so(stage) -> None:

@@ -9,9 +9,9 @@ import pytest
 
 from swashplate import DomainError, Drive, InputError
 from swashplate.equations.equation import equation
-from swashplate.equations.march import Stored
+from swashplate.equations.marching.march import Stored
+from swashplate.equations.marching.run import Instance, Part, marched
 from swashplate.equations.model import Model, Tap, join
-from swashplate.equations.run import Instance, Part, marched
 from swashplate.linear import linearize
 from swashplate.simulation.instance import instance_of
 

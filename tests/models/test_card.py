@@ -14,7 +14,7 @@ from scipy.optimize import brentq, least_squares
 
 from swashplate import Drive
 from swashplate.equations.library import interpolated
-from swashplate.equations.windows import Window
+from swashplate.equations.model import Window
 from swashplate.models import card
 from swashplate.models.card import Channel, ChannelConstants, Filter
 from swashplate.simulation.instance import step_limit

@@ -7,9 +7,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from swashplate import Drive
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.record import record_of
-from swashplate.equations.triangle import combine
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import record_of
+from swashplate.equations.marching.triangle import combine
 from swashplate.maneuvers import source_tests
 from swashplate.simulation.residuals import triangle
 from swashplate.simulation.sensitivities import ALL_COLUMNS, PUMP_COLUMNS

@@ -9,9 +9,9 @@ import pytest
 
 from swashplate import Campaign, DomainError, FullOrderDrive, ParameterError
 from swashplate.campaign.experiment import Experiment
-from swashplate.equations.jacobian import jacobian
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.record import record_of
+from swashplate.equations.marching.jacobian import jacobian
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import record_of
 from swashplate.full_order.drive import path_of
 from swashplate.identification.linearised import linearised_fit
 from swashplate.identification.model import Linearised

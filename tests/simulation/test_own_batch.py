@@ -177,7 +177,7 @@ REFUSED = {
     "cost": ({"cost": SquaredError(COMMAND)}, "valve has no signal 'shaft_speed'"),
     "measured": (
         {"cost": SquaredError([1.0], output="position")},
-        "400 samples, but 1 were measured",
+        "400 stamps for 1 values",
     ),
     "given": ({"given": None}, "its given must be a Stroke, not None"),
     "input": ({"inputs": {"voltage": COMMAND}}, "valve has no input 'voltage'; it has command"),

@@ -12,9 +12,9 @@ import pytest
 from scipy.signal import lfilter
 
 from swashplate import DomainError, Drive, InputError, Limit, ParameterError, maneuvers
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.record import record_of
-from swashplate.equations.triangle import combine
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import record_of
+from swashplate.equations.marching.triangle import combine
 from swashplate.simulation.residuals import OBSERVABLE, Own, jacobian, residuals, triangle
 from swashplate.simulation.run import simulate_drive
 from swashplate.simulation.sensitivities import ALL_COLUMNS, PUMP_COLUMNS

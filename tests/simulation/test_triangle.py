@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swashplate import InputError
-from swashplate.equations.triangle import ROWS, combine
+from swashplate.equations.marching.triangle import ROWS, combine
 
 pytestmark = pytest.mark.traced
 

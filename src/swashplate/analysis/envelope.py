@@ -18,7 +18,7 @@ from swashplate.analysis.acceleration import (
 )
 from swashplate.analysis.steady_edges import dead_zone, saturation
 from swashplate.drive import Drive
-from swashplate.equations.record import SOURCE_RATE
+from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.parameters.rules import FULL_VOLTAGE
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from swashplate.analysis.levers import pulled
 from swashplate.analysis.removals import REMOVALS, Removal
 from swashplate.analysis.tracking import tracking_error
 from swashplate.drive import Drive
-from swashplate.equations.record import SOURCE_RATE, Interpolation
-from swashplate.equations.run import Start
+from swashplate.equations.marching.record import SOURCE_RATE, Interpolation
+from swashplate.equations.marching.run import Start
 from swashplate.errors import DomainError, SwashplateError
 from swashplate.parameters.parameter_set import Change
 from swashplate.simulation.result import Limit, Simulation

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from swashplate.analysis.outcomes import Outcome, outcome_matrix
 from swashplate.analysis.trial import Trial
 from swashplate.drive import Drive
-from swashplate.equations.lanes import LANES
+from swashplate.equations.marching.lanes import LANES
 from swashplate.executors import Serial, available_cores
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.analysis.compensation import inverse_map
 from swashplate.analysis.inverse import InverseMap
 from swashplate.drive import Drive
-from swashplate.equations.record import SOURCE_RATE
+from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:

@@ -58,7 +58,7 @@ def compare(
     the voltage first changes.
     """
     from swashplate.cli.measures import rms_difference_deg_s
-    from swashplate.equations.record import least_substeps
+    from swashplate.equations.marching.record import least_substeps
 
     check_outputs((out, TABLE), (plot, FIGURE))
     least_substeps(rate)  # a rate out of range is refused before anything is sampled

@@ -193,7 +193,7 @@ class Options(NamedTuple):
 
 def simulated(drive: Drive, command: str, options: Options) -> tuple[str, Simulation]:
     """Name of a command, a manoeuvre or a file, and the drive's simulation over it."""
-    from swashplate.equations.record import least_substeps
+    from swashplate.equations.marching.record import least_substeps
 
     least_substeps(options.rate)  # a rate out of range is refused before anything is sampled
     if _is_file(command, drive):

@@ -1,48 +1,9 @@
-"""How an equation becomes code: checked, compiled, differentiated and kept.
+"""How an equation becomes code, and a machine of equations a model.
 
 An equation is written once, as a value; this package knows nothing of drives.
 """
 
-from swashplate.equations.cache import generated, kernel
-from swashplate.equations.definition import Definition
-from swashplate.equations.derivatives import declared, derive
-from swashplate.equations.derived import Derived
-from swashplate.equations.discretise import discretised
-from swashplate.equations.equation import closure, closure_hash, equation, inlined, source
-from swashplate.equations.jacobian import state_paths
-from swashplate.equations.library import soft_threshold
-from swashplate.equations.model import Model, Tap, join
-from swashplate.equations.primitives import interpolate, repeated, root
-from swashplate.equations.replacement import replaced
-from swashplate.equations.use import Run, instance_of, parameter_paths, sensitivities, simulate
-from swashplate.equations.windows import Window
+import lazy_loader
 
-__all__ = [
-    "Definition",
-    "Derived",
-    "Model",
-    "Run",
-    "Tap",
-    "Window",
-    "closure",
-    "closure_hash",
-    "declared",
-    "derive",
-    "discretised",
-    "equation",
-    "generated",
-    "inlined",
-    "instance_of",
-    "interpolate",
-    "join",
-    "kernel",
-    "parameter_paths",
-    "repeated",
-    "replaced",
-    "root",
-    "sensitivities",
-    "simulate",
-    "soft_threshold",
-    "source",
-    "state_paths",
-]
+# names are imported when they are first used: a model needs equations, and most callers no more
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 
 from swashplate.equations.equation import equation_of_text
-from swashplate.equations.fields import is_named_tuple
-from swashplate.equations.model import Equation, arguments_of, plain
+from swashplate.equations.model import Equation, arguments_of
+from swashplate.equations.syntax import is_named_tuple, plain
 from swashplate.errors import InputError
 
 Method = Literal["euler", "heun", "midpoint", "rk4"]

@@ -13,10 +13,9 @@ from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar
 
-from numba import config, njit
+from numba import njit
 
-from swashplate.equations.rewriting import rewritten
-from swashplate.equations.syntax import enter, is_named_tuple, parsed, plain, resolved
+from swashplate.equations.syntax import is_named_tuple, parsed, plain, resolved
 from swashplate.errors import EquationError
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -58,12 +57,8 @@ def equation(function: F) -> F:
     EquationError
         If there is anything else in it, or its source cannot be read.
     """
-    checked = parsed(function)
-    if config.DISABLE_JIT:  # type: ignore[attr-defined]
-        return inlined(function)
-    compiled: Any = inlined(rewritten(checked))
-    enter(checked, compiled)
-    return compiled  # type: ignore[no-any-return]
+    parsed(function)
+    return inlined(function)
 
 
 def module_of(function: FunctionType) -> str:

@@ -6,13 +6,28 @@ are structural, and vanish.
 """
 
 from collections.abc import Callable
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 ARITHMETIC = ("+", "-", "*", "/", "**", "neg")
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 LOGIC = ("and", "or", "not")
-LEAVES = ("number", "name", "constant")
+LEAVES = ("number", "name")
+CALLED = (
+    "sqrt",
+    "exp",
+    "log",
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "atan2",
+    "hypot",
+    "floor",
+)
+"""Operations that are functions of `math`."""
 CHEAP = {*LEAVES, *COMPARISONS, *LOGIC, "+", "-", "*", "neg", "min", "max", "abs", "if"}
 """Operations that can be done for nothing on any numbers: no error, no call of a library."""
 
@@ -27,10 +42,10 @@ class Node:
     Attributes
     ----------
     op : str
-        Operation; "number", "name" or "constant" (of a module) for a leaf.
+        Operation; "number" or "name" for a leaf.
     args : tuple of Node
     value : object
-        Of a number itself, of a name its text, of a constant its name and number.
+        Of a number itself, of a name its text, of a power its exponent.
     kind : str
         "float", "int" or "bool".
     reads : frozenset of str
@@ -71,7 +86,7 @@ class Node:
         return self._same
 
     def __repr__(self) -> str:
-        return render(self, lambda node: None)
+        return text(self)
 
 
 _known: dict[tuple[Any, ...], Node] = {}
@@ -94,7 +109,7 @@ def _kind(op: str, args: tuple[Node, ...]) -> str:
 
 def make(op: str, *args: Node, value: Any = None, kind: str | None = None) -> Node:
     """The expression of an operation and its operands."""
-    text = repr(value) if op in ("number", "constant") else value
+    text = repr(value) if op == "number" else value
     key = (op, args, text, kind)
     node = _known.get(key)
     if node is None:
@@ -111,12 +126,6 @@ def number(value: float) -> Node:
 def name(text: str, kind: str = "float") -> Node:
     """A variable, or a field of an argument as `p.Z8`."""
     return make("name", value=text, kind=kind)
-
-
-def constant(text: str, value: float) -> Node:
-    """A number that a module gives a name."""
-    kind = {bool: "bool", int: "int"}.get(type(value), "float")
-    return make("constant", value=(text, value), kind=kind)
 
 
 ZERO, ONE = number(0.0), number(1.0)
@@ -241,15 +250,13 @@ def masked(guards: "tuple[tuple[Node, bool], ...]", a: Node) -> Node:
 
 def finite_inverse(a: Node) -> Node:
     """1/a for a ≥ 0, and 0 in place of infinity."""
-    infinite = make("constant", value=("inf", float("inf")), kind="float")
-    return inverse(choose(make(">", a, ZERO), a, infinite))
+    return inverse(choose(make(">", a, ZERO), a, number(inf)))
 
 
 def positive(a: Node, definition: Callable[[str], Node | None], strict: bool = True) -> bool:
     """Whether an expression is certainly above zero (or not below it, unless strict)."""
-    if a.op in ("number", "constant"):
-        value = a.value if a.op == "number" else a.value[1]
-        return bool(value > 0.0 if strict else value >= 0.0)
+    if a.op == "number":
+        return bool(a.value > 0.0 if strict else a.value >= 0.0)
     if a.op == "name":
         meaning = definition(a.value)
         return meaning is not None and positive(meaning, definition, strict)
@@ -270,14 +277,14 @@ def positive(a: Node, definition: Callable[[str], Node | None], strict: bool = T
 # --- text -----------------------------------------------------------------------------------------
 
 
-def literal(value: Any) -> str:
-    """A number as Python writes it."""
-    return repr(value)
-
-
 def render(node: Node, known: Callable[[Node], str | None]) -> str:
     """An expression as Python writes it, with the names that parts of it have."""
     return _render(node, known)[0]
+
+
+def text(node: Node) -> str:
+    """An expression as Python writes it."""
+    return render(node, lambda each: None)
 
 
 def _render(node: Node, known: Callable[[Node], str | None]) -> tuple[str, int]:
@@ -286,12 +293,10 @@ def _render(node: Node, known: Callable[[Node], str | None]) -> tuple[str, int]:
         return given, ATOM
     op, args = node.op, node.args
     if op == "number":
-        text = literal(node.value)
+        text = repr(node.value)
         return text, _PRECEDENCE["neg"] if text.startswith("-") else ATOM
     if op == "name":
         return node.value, ATOM
-    if op == "constant":
-        return node.value[0], ATOM
 
     def part(a: Node, level: int) -> str:
         text, own = _render(a, known)
@@ -307,7 +312,7 @@ def _render(node: Node, known: Callable[[Node], str | None]) -> tuple[str, int]:
     if op == "neg":
         return f"-{part(args[0], level + 1)}", level
     if op == "**":
-        return f"{part(args[0], level + 1)}**{literal(node.value)}", level
+        return f"{part(args[0], level + 1)}**{node.value!r}", level
     if op in COMPARISONS:
         return f"{part(args[0], level + 1)} {op} {part(args[1], level + 1)}", level
     if op in ("+", "-", "*", "/"):

@@ -1,18 +1,143 @@
-"""Nested named tuples of floats as flat lists of dotted paths, and back."""
+"""Named tuples of a model: what their fields declare, and their numbers as flat lists.
+
+A parameter is defined once, on the field that holds its value:
+``omega: Annotated[float, Definition("natural frequency", "rad/s", above=0.0)]``.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
 from functools import cache
+from math import inf
 from operator import attrgetter
-from typing import Any, get_type_hints
+from typing import Any, Final, NamedTuple, get_type_hints
 
 import numpy as np
 
+from swashplate.equations.syntax import is_named_tuple
 
-def is_named_tuple(kind: object) -> bool:
-    """Whether a type is a named tuple's."""
-    return isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
+Flag = bool | None
+"""An option: None is off, True is on. In compiled code they are two types, and the branch that is
+not taken disappears."""
+OFF: Final = None
+ON: Final = True
+
+
+@dataclass(frozen=True)
+class Definition:
+    """What a parameter is, whatever its value."""
+
+    name: str
+    """What it is, in words."""
+    unit: str
+    """SI unit of the value."""
+    lower: float = -inf
+    """Lowest value, allowed itself unless `above` says so."""
+    upper: float = inf
+    """Bound that the value must stay below."""
+    above: float | None = None
+    """Lower bound that the value must exceed; `lower` is then the same number."""
+    can_be_off: bool = False
+    """Infinity is allowed and switches the limit off."""
+    default: float | None = None
+    """What it is where a set does not give it; None: every set must."""
+    switch: str = ""
+    """Option of the model that it belongs to, and that is off where it is zero."""
+    least: float | None = None
+    """Lowest value that an estimate may take where `lower` itself would switch the term off."""
+    symmetry: Mapping[str, float] = field(default_factory=dict, hash=False)
+    """Power with which it scales along each symmetry of the model, by the symmetry's name."""
+    needs: str = ""
+    """What must happen in a test for it to matter."""
+    stands_for: str = ""
+    """Quantities of the machine that it stands for."""
+    source: str = ""
+    """Number of the source's equation."""
+
+    def __post_init__(self) -> None:
+        if self.above is not None:
+            object.__setattr__(self, "lower", self.above)
+
+    @property
+    def range(self) -> str:
+        """The allowed range as words, e.g. ``above 0``."""
+        low = ""
+        if self.lower != -inf:
+            low = f"{'at least' if self.above is None else 'above'} {self.lower:g}"
+        high = "" if self.upper == inf else f"below {self.upper:g}"
+        words = " and ".join(part for part in (low, high) if part) or "any finite number"
+        return words + (", or inf for none" if self.can_be_off else "")
+
+
+class Direction(Enum):
+    """Marks the other direction of a parameter with two values."""
+
+    MINUS = "minus"
+
+
+MINUS = Direction.MINUS
+"""On a field ``Z16_minus``: the definition stands on ``Z16_plus``."""
+
+
+class Declared(NamedTuple):
+    """A parameter as a model's named tuple declares it."""
+
+    symbol: str
+    definition: Definition
+    fields: tuple[str, ...]
+    """Dotted names of its values: one, or those of both directions, plus first."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of its values by themselves: ``Z1``, or ``Z16_plus`` and ``Z16_minus``."""
+        if len(self.fields) == 1:
+            return (self.symbol,)
+        return (f"{self.symbol}_plus", f"{self.symbol}_minus")
+
+
+def declared_by(parameters: type) -> Iterator[Declared]:
+    """Parameters that a named tuple declares, in its order.
+
+    Parameters
+    ----------
+    parameters : type
+        A class of named tuples. Two fields ``plus`` and ``minus`` of one other such class hold both
+        directions of what that declares; so do two fields ``Z16_plus``, with the definition, and
+        ``Z16_minus``, marked `MINUS`. A field without a definition is its own name.
+    """
+    fields: tuple[str, ...] = parameters._fields  # type: ignore[attr-defined]
+    hints = get_type_hints(parameters, include_extras=True)
+    both = hints.get("plus") if hints.get("plus") is hints.get("minus") else None
+    for name in fields:
+        hint = hints[name]
+        if hasattr(hint, "_fields"):
+            directed = name in ("plus", "minus") and both is not None
+            if not directed:
+                yield from (_within(each, (name,)) for each in declared_by(hint))
+            elif name == "plus":
+                yield from (_within(each, ("plus", "minus")) for each in declared_by(hint))
+            continue
+        definition: Any = next(iter(getattr(hint, "__metadata__", ())), Definition(name, ""))
+        if definition is MINUS:
+            continue
+        symbol = name.removesuffix("_plus")
+        minus = f"{symbol}_minus"
+        if symbol != name and MINUS in getattr(hints.get(minus), "__metadata__", ()):
+            yield Declared(symbol, definition, (name, minus))
+        else:
+            yield Declared(name, definition, (name,))
+
+
+def _within(inner: Declared, prefixes: tuple[str, ...]) -> Declared:
+    """The same parameter seen from the tuple around its own."""
+    return inner._replace(
+        fields=tuple(f"{prefix}.{each}" for prefix in prefixes for each in inner.fields)
+    )
+
+
+# --- numbers by dotted paths ----------------------------------------------------------------------
 
 
 _known: dict[Any, tuple[str, ...]] = {}

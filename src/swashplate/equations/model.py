@@ -31,8 +31,9 @@ from importlib import import_module
 from types import FunctionType
 from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 
-from swashplate.equations.fields import floats_of, is_named_tuple
-from swashplate.equations.windows import Window
+from swashplate.equations.equation import equation
+from swashplate.equations.fields import floats_of
+from swashplate.equations.syntax import is_named_tuple, plain
 from swashplate.errors import InputError
 
 Equation = Callable[..., Any]
@@ -40,6 +41,43 @@ Hold = Literal["linear", "previous", "mean"]
 
 ARGUMENTS = ("state", "signals", "inputs", "p", "k", "h", "options", "given")
 """Names that mean what the table above says; any other argument is an input."""
+
+
+# --- windows: the samples of an input that an equation sees ---------------------------------------
+
+
+class Window(NamedTuple):
+    """Neighbouring samples of an input, seen from between two of them."""
+
+    s: tuple[float, ...]
+    """Samples, newest first."""
+    f: float
+    """How far the instant looked at lies behind the newest, in samples, 0 to 1."""
+
+
+@equation
+def linear(window: Window) -> float:
+    """Signal at the instant looked at, straight between samples."""
+    return window.s[0] + window.f * (window.s[1] - window.s[0])
+
+
+@equation
+def previous(window: Window) -> float:
+    """Last sample at or before the instant looked at."""
+    return window.s[1] if window.f > 0.0 else window.s[0]
+
+
+@equation
+def mean_over_sample(window: Window) -> float:
+    """Mean over the sample interval before the instant looked at, straight between samples."""
+    f = window.f
+    newest, middle, oldest = window.s[0], window.s[1], window.s[2]
+    last = newest + f * (middle - newest)
+    first = middle + f * (oldest - middle)
+    return (1.0 - f) * (0.5 * (last + middle)) + f * (0.5 * (middle + first))
+
+
+# --- models ---------------------------------------------------------------------------------------
 
 
 class Tap(NamedTuple):
@@ -160,8 +198,8 @@ class Model:
         if self.inputs is not None:
             return dict(get_type_hints(self.inputs))
         found: dict[str, type[Any]] = {}
-        for equation in self._equations:
-            for name in arguments_of(equation):
+        for each in self._equations:
+            for name in arguments_of(each):
                 if name not in ARGUMENTS:
                     tap = self.taps.get(name)
                     found[name] = Window if tap is not None and tap.width else float
@@ -238,11 +276,11 @@ class Model:
             if not isinstance(plain(made), FunctionType) and not (made is None and word != "step"):
                 raise InputError(f"Model {self.name}: {word} must be an equation, not {made!r}.")
         known = set(self.input_types)
-        for equation in self._equations:
-            for name in arguments_of(equation):
+        for each in self._equations:
+            for name in arguments_of(each):
                 if name not in ARGUMENTS and name not in known:
                     raise InputError(
-                        f"Model {self.name}: {plain(equation).__name__} asks for '{name}', which "
+                        f"Model {self.name}: {plain(each).__name__} asks for '{name}', which "
                         f"is none of {', '.join((*ARGUMENTS, *known))}."
                     )
         for name, tap in self.taps.items():
@@ -352,12 +390,8 @@ def place(tap: Tap, delay: float, h: float) -> Place:
     return Place(whole, end - whole, 1.0 / h if samples >= tap.ahead else 0.0)
 
 
-def plain(equation: Equation) -> Equation:
-    """The Python function behind a compiled one."""
-    return getattr(equation, "py_func", equation)
-
-
 def arguments_of(equation: Equation) -> tuple[str, ...]:
     """Names of an equation's arguments."""
     code = plain(equation).__code__
-    return code.co_varnames[: code.co_argcount]
+    names: tuple[str, ...] = code.co_varnames[: code.co_argcount]
+    return names

@@ -14,9 +14,8 @@ from types import CellType, FunctionType
 from typing import Any, get_type_hints
 
 from swashplate.equations.equation import closure, equation, equation_of_text, is_function
-from swashplate.equations.fields import is_named_tuple
-from swashplate.equations.model import Equation, Model, arguments_of, join, plain
-from swashplate.equations.syntax import parsed
+from swashplate.equations.model import Equation, Model, arguments_of, join
+from swashplate.equations.syntax import is_named_tuple, plain
 from swashplate.errors import InputError
 
 
@@ -143,7 +142,7 @@ def _called_like(old: Equation, new: Equation, part: str, kind: type[Any]) -> Eq
 def _rebuilt(function: Any, old: Equation, made: dict[Any, Any], names: Mapping[str, Any]) -> Any:
     """A function that leads to the old equation, leading to the new one."""
     if plain(function) not in made:
-        f: Any = parsed(function).function  # as it was written, before defaults were put in
+        f: Any = plain(function)
         space = {**f.__globals__, **{k: v for k, v in names.items() if k in f.__globals__}}
         for name, each in f.__globals__.items():
             if name in f.__code__.co_names and is_function(each) and _reaches(each, old):

@@ -14,7 +14,7 @@ import os
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
-from types import BuiltinFunctionType, FunctionType
+from types import FunctionType
 from typing import Any, NoReturn
 from weakref import WeakKeyDictionary
 
@@ -38,7 +38,7 @@ COMPARISONS = {
     ast.NotEq: "!=",
 }
 
-INSTEAD_OF_STATEMENT: dict[type[ast.AST], tuple[str, str]] = {
+INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.While: ("a while loop", "write `for i in range(4):` with a literal number of steps"),
     ast.Try: ("try", "test the arguments with if"),
     ast.With: ("with", "an equation only computes"),
@@ -55,8 +55,6 @@ INSTEAD_OF_STATEMENT: dict[type[ast.AST], tuple[str, str]] = {
     ast.Break: ("break", "use if within the loop"),
     ast.Continue: ("continue", "use if within the loop"),
     ast.Match: ("match", "use if and elif"),
-}
-INSTEAD_OF_EXPRESSION: dict[type[ast.AST], tuple[str, str]] = {
     ast.Lambda: ("lambda", "write an equation of its own"),
     ast.ListComp: ("a comprehension", "write the terms out, or a loop over a literal range"),
     ast.SetComp: ("a comprehension", "write the terms out, or a loop over a literal range"),
@@ -72,6 +70,7 @@ INSTEAD_OF_EXPRESSION: dict[type[ast.AST], tuple[str, str]] = {
     ast.Await: ("await", "call the equation"),
     ast.Starred: ("an argument or element with *", "write the elements out"),
 }
+"""What to write in place of statements and expressions that an equation may not use."""
 INSTEAD_OF_OPERATOR: dict[type[ast.AST], tuple[str, str]] = {
     ast.FloorDiv: ("//", "write floor(a / b)"),
     ast.Mod: ("%", "write a - b * floor(a / b)"),
@@ -93,6 +92,24 @@ INSTEAD_OF_BUILTIN = {
     "pow": "write ** with a whole number, or exp(b * log(a))",
     "range": "write it in a for statement only",
 }
+
+
+PLAIN = (ast.Name, ast.Attribute, ast.IfExp, ast.BoolOp, ast.Tuple, ast.If, ast.Pass)
+"""Nodes that need no check of their own."""
+CHECKS: dict[type[ast.AST], str] = {
+    ast.Assign: "assign",
+    ast.AnnAssign: "annassign",
+    ast.AugAssign: "augassign",
+    ast.Return: "returned",
+    ast.For: "loop",
+    ast.BinOp: "binop",
+    ast.UnaryOp: "unaryop",
+    ast.Constant: "constant",
+    ast.Subscript: "subscript",
+    ast.Compare: "compare",
+    ast.Call: "call",
+}
+"""Methods of `_Check` that look at a node."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +177,6 @@ def is_named_tuple(thing: Any) -> bool:
 
 
 _parsed: "WeakKeyDictionary[FunctionType, Parsed]" = WeakKeyDictionary()
-_called: "WeakKeyDictionary[FunctionType, Any]" = WeakKeyDictionary()
 _files: dict[str, tuple[list[str], dict[int, ast.FunctionDef]]] = {}
 """Functions by the line that they begin in, of files last read."""
 
@@ -194,17 +210,6 @@ def _functions(file: str, module: dict[str, Any]) -> dict[int, ast.FunctionDef]:
     return found
 
 
-def called(function: FunctionType) -> Any:
-    """What others call where they mean a plain function: its compiled form, where there is one."""
-    return _called.get(function, function)
-
-
-def enter(source: Parsed, compiled: Any) -> None:
-    """Have the compiled form of an equation known by its source."""
-    _called[source.function] = compiled
-    _parsed[plain(compiled)] = source
-
-
 def parsed(function: Any, typed: bool = True) -> Parsed:
     """Source of an equation, compiled or plain, checked once.
 
@@ -216,8 +221,6 @@ def parsed(function: Any, typed: bool = True) -> Parsed:
     f = plain(function)
     if not isinstance(f, FunctionType):
         raise EquationError(f"{function!r} is not a function that can be an equation.")
-    if function is not f:
-        _called[f] = function
     known = _parsed.get(f)
     if known is None:
         file = f.__code__.co_filename
@@ -248,10 +251,11 @@ class _Check:
     """Goes once through the tree of an equation and refuses what does not belong there."""
 
     def __init__(self, source: Parsed) -> None:
-        self.source = source
-        self.refuse = source.refuse
+        self.source, self.refuse = source, source.refuse
         self.local = set(source.function.__code__.co_varnames)
-        self.loops: list[str] = []
+        loops = [each for each in ast.walk(source.node) if isinstance(each, ast.For)]
+        self.counters = {each.target.id for each in loops if isinstance(each.target, ast.Name)}
+        self.ranges = {each.iter for each in loops}
 
     def all(self, typed: bool) -> None:
         node, a = self.source.node, self.source.node.args
@@ -264,77 +268,57 @@ class _Check:
                     f"{argument.arg} without a type",
                     f"write `{argument.arg}: float`, or the named tuple that it is",
                 )
-        body = node.body
-        if self.text(body[0]):
-            body = body[1:]
-        self.statements(body)
-        if not self.returns(body):
+        body = node.body[1:] if ast.get_docstring(node, clean=False) is not None else node.body
+        for statement in body:
+            for each in ast.walk(statement):  # what stands outside comes before what is in it
+                self.node(each)
+        if not _returns(body):
             self.refuse(node, "an end without return", "return a value on every way")
 
-    @staticmethod
-    def text(statement: ast.stmt) -> bool:
-        """Whether a statement is a docstring."""
-        return (
-            isinstance(statement, ast.Expr)
-            and isinstance(statement.value, ast.Constant)
-            and isinstance(statement.value.value, str)
-        )
+    def node(self, node: ast.AST) -> None:
+        kind = type(node)
+        if kind in INSTEAD:
+            self.refuse(node, *INSTEAD[kind])
+        check = getattr(self, CHECKS.get(kind, ""), None)
+        if check is not None:
+            check(node)
+        elif isinstance(node, ast.expr) and kind not in PLAIN:
+            self.refuse(node, "this expression", "use arithmetic")
+        elif isinstance(node, ast.stmt) and kind not in PLAIN:
+            self.refuse(node, "a statement that does nothing to the result", "leave it out")
 
-    def returns(self, body: list[ast.stmt]) -> bool:
-        """Whether every way through the statements ends in a return."""
-        for each in body:
-            if isinstance(each, ast.Return):
-                return True
-            if isinstance(each, ast.If) and self.returns(each.body) and self.returns(each.orelse):
-                return True
-        return False
+    # -- statements --------------------------------------------------------------------------------
 
-    def statements(self, body: list[ast.stmt]) -> None:
-        for each in body:
-            kind = type(each)
-            if kind is ast.Assign:
-                for target in each.targets:  # type: ignore[attr-defined]
-                    self.target(target)
-                self.expression(each.value)  # type: ignore[attr-defined]
-            elif isinstance(each, ast.AnnAssign | ast.AugAssign):
-                if each.value is None or not isinstance(each.target, ast.Name):
-                    self.refuse(each, "a declaration", "assign a value to a name")
-                if isinstance(each, ast.AugAssign):
-                    self.operator(each.op, each)
-                    if isinstance(each.op, ast.Pow):
-                        self.power(each.value)
-                self.expression(each.value)
-            elif isinstance(each, ast.If):
-                self.expression(each.test)
-                self.statements(each.body)
-                self.statements(each.orelse)
-            elif isinstance(each, ast.Return):
-                if each.value is None:
-                    self.refuse(each, "a return of nothing", "return a value")
-                self.expression(each.value)
-            elif isinstance(each, ast.For):
-                self.loop(each)
-            elif not isinstance(each, ast.Pass):
-                what, instead = INSTEAD_OF_STATEMENT.get(
-                    kind, ("a statement that does nothing to the result", "leave it out")
+    def assign(self, node: ast.Assign) -> None:
+        pending = list(node.targets)
+        while pending:
+            target = pending.pop()
+            if isinstance(target, ast.Tuple):
+                pending += target.elts
+            elif isinstance(target, ast.Attribute):
+                self.refuse(
+                    target,
+                    "an assignment to a field",
+                    "named tuples do not change; make a new one, as in State(t.a, b)",
                 )
-                self.refuse(each, what, instead)
+            elif not isinstance(target, ast.Name):
+                self.refuse(target, "an assignment to an element", "assign to a name")
 
-    def target(self, target: ast.expr) -> None:
-        if isinstance(target, ast.Tuple):
-            for each in target.elts:
-                self.target(each)
-        elif isinstance(target, ast.Attribute):
-            self.refuse(
-                target,
-                "an assignment to a field",
-                "named tuples do not change; use `t._replace(field=value)`",
-            )
-        elif not isinstance(target, ast.Name):
-            self.refuse(target, "an assignment to an element", "assign to a name")
+    def annassign(self, node: ast.AnnAssign) -> None:
+        if node.value is None or not isinstance(node.target, ast.Name):
+            self.refuse(node, "a declaration", "assign a value to a name")
 
-    def loop(self, each: ast.For) -> None:
-        call = each.iter
+    def augassign(self, node: ast.AugAssign) -> None:
+        if not isinstance(node.target, ast.Name):
+            self.refuse(node, "a declaration", "assign a value to a name")
+        self.operator(node.op, node, node.value)
+
+    def returned(self, node: ast.Return) -> None:
+        if node.value is None:
+            self.refuse(node, "a return of nothing", "return a value")
+
+    def loop(self, node: ast.For) -> None:
+        call = node.iter
         literal = (
             isinstance(call, ast.Call)
             and isinstance(call.func, ast.Name)
@@ -342,133 +326,88 @@ class _Check:
             and not call.keywords
             and all(_whole(a) is not None for a in call.args)
         )
-        if not literal or not isinstance(each.target, ast.Name) or each.orelse:
+        if not literal or not isinstance(node.target, ast.Name) or node.orelse:
             self.refuse(
-                each,
+                node,
                 "a loop over anything but a literal range",
                 "write `for i in range(4):`, which is unrolled",
             )
-        self.loops.append(each.target.id)
-        self.statements(each.body)
-        self.loops.pop()
 
-    def operator(self, op: ast.AST, node: ast.AST) -> None:
+    # -- expressions -------------------------------------------------------------------------------
+
+    def operator(self, op: ast.AST, node: ast.AST, right: ast.expr) -> None:
         if type(op) not in ARITHMETIC:
             what, instead = INSTEAD_OF_OPERATOR.get(type(op), ("this operator", "use + - * /"))
             self.refuse(node, what, instead)
-
-    def power(self, exponent: ast.expr) -> None:
-        if _whole(exponent) is None:
+        if isinstance(op, ast.Pow) and _whole(right) is None:
             self.refuse(
-                exponent,
+                right,
                 "a power with anything but a whole number",
                 "write sqrt(a), or exp(b * log(a))",
             )
 
-    def expression(self, node: ast.expr) -> None:
-        kind = type(node)
-        if kind is ast.Name:
-            return
-        if isinstance(node, ast.Constant):
-            if not (node.value is None or isinstance(node.value, bool | int | float)):
-                self.refuse(
-                    node,
-                    "a string" if isinstance(node.value, str) else f"{node.value!r}",
-                    "an equation knows real numbers only; use options for choices",
-                )
-        elif isinstance(node, ast.BinOp):
-            self.operator(node.op, node)
-            if isinstance(node.op, ast.Pow):
-                self.power(node.right)
-            self.expression(node.left)
-            self.expression(node.right)
-        elif kind is ast.Attribute:
-            self.expression(node.value)  # type: ignore[attr-defined]
-        elif isinstance(node, ast.Call):
-            self.call(node)
-        elif isinstance(node, ast.UnaryOp):
-            if isinstance(node.op, ast.Invert):
-                self.refuse(node, *INSTEAD_OF_OPERATOR[ast.Invert])
-            self.expression(node.operand)
-        elif isinstance(node, ast.Compare):
-            self.comparison(node)
-        elif isinstance(node, ast.BoolOp):
-            for each in node.values:
-                self.expression(each)
-        elif isinstance(node, ast.IfExp):
-            self.expression(node.test)
-            self.expression(node.body)
-            self.expression(node.orelse)
-        elif isinstance(node, ast.Tuple):
-            for each in node.elts:
-                self.expression(each)
-        elif isinstance(node, ast.Subscript):
-            index = node.slice
-            in_loop = isinstance(index, ast.Name) and index.id in self.loops
-            if _whole(index) is None and not in_loop and not self.of_loop(index):
-                self.refuse(
-                    node, "an index that is no whole number", "write the number, as in s[0]"
-                )
-            self.expression(node.value)
-        else:
-            what, instead = INSTEAD_OF_EXPRESSION.get(kind, ("this expression", "use arithmetic"))
-            self.refuse(node, what, instead)
+    def binop(self, node: ast.BinOp) -> None:
+        self.operator(node.op, node, node.right)
 
-    def of_loop(self, index: ast.expr) -> bool:
+    def unaryop(self, node: ast.UnaryOp) -> None:
+        if isinstance(node.op, ast.Invert):
+            self.refuse(node, *INSTEAD_OF_OPERATOR[ast.Invert])
+
+    def constant(self, node: ast.Constant) -> None:
+        if not (node.value is None or isinstance(node.value, bool | int | float)):
+            what = "a string" if isinstance(node.value, str) else f"{node.value!r}"
+            self.refuse(node, what, "an equation knows real numbers only; use options for choices")
+
+    def subscript(self, node: ast.Subscript) -> None:
+        if not self.is_index(node.slice):
+            self.refuse(node, "an index that is no whole number", "write the number, as in s[0]")
+
+    def is_index(self, index: ast.expr) -> bool:
         """Whether an index is arithmetic of whole numbers and counters of loops."""
         if isinstance(index, ast.BinOp):
-            return (
-                type(index.op) in (ast.Add, ast.Sub, ast.Mult)
-                and self.of_loop(index.left)
-                and self.of_loop(index.right)
-            )
-        return _whole(index) is not None or (isinstance(index, ast.Name) and index.id in self.loops)
+            known = type(index.op) in (ast.Add, ast.Sub, ast.Mult)
+            return known and self.is_index(index.left) and self.is_index(index.right)
+        counter = isinstance(index, ast.Name) and index.id in self.counters
+        return counter or _whole(index) is not None
 
-    def comparison(self, node: ast.Compare) -> None:
-        terms = [node.left, *node.comparators]
+    def compare(self, node: ast.Compare) -> None:
         for op, right in zip(node.ops, node.comparators, strict=True):
             if isinstance(op, ast.Is | ast.IsNot):
                 if not (isinstance(right, ast.Constant) and right.value is None):
                     self.refuse(node, "`is` with anything but None", "write `==`")
-                terms.remove(right)
             elif type(op) not in COMPARISONS:
                 self.refuse(node, "`in`", "compare with == and or")
-        for each in terms:
-            self.expression(each)
 
     def call(self, node: ast.Call) -> None:
         function = node.func
-        if isinstance(function, ast.Name):
-            name = function.id
-            if name in self.local:
-                self.refuse(node, f"a call of the argument {name}", "call equations by their names")
-            try:
-                found = self.source.resolve(name)
-            except NameError:
-                found = None  # defined further down, or missing: seen when it is wanted
-            if found is not None:
-                self.callee(node, name, found)
-        elif isinstance(function, ast.Attribute):
-            self.expression(function.value)
-            if isinstance(function.value, ast.Name) and function.value.id not in self.local:
-                try:
-                    found = getattr(self.source.resolve(function.value.id), function.attr, None)
-                except NameError:
-                    found = None
-                if found is not None:
-                    self.callee(node, f"{function.value.id}.{function.attr}", found)
-            elif function.attr != "_replace":
-                self.refuse(
-                    node, f"the method {function.attr}", "call equations; of methods, _replace"
-                )
-        else:
+        if node in self.ranges:
+            return
+        if any(each.arg is None for each in node.keywords):
+            self.refuse(node, "an argument with **", "write the arguments out")
+        if not isinstance(function, ast.Name | ast.Attribute):
             self.refuse(node, "a call of an expression", "call equations by their names")
-        for each in node.args:
-            self.expression(each)
-        for keyword in node.keywords:
-            if keyword.arg is None:
-                self.refuse(node, "an argument with **", "write the arguments out")
-            self.expression(keyword.value)
+        base = function if isinstance(function, ast.Name) else function.value
+        outside = isinstance(base, ast.Name) and base.id not in self.local
+        if isinstance(function, ast.Name) and not outside:
+            self.refuse(
+                node, f"a call of the argument {function.id}", "call equations by their names"
+            )
+        if not outside:
+            assert isinstance(function, ast.Attribute)
+            self.refuse(
+                node,
+                f"the method {function.attr}",
+                "call equations; a named tuple is made anew, as in State(t.a, b)",
+            )
+        assert isinstance(base, ast.Name)
+        try:
+            found = self.source.resolve(base.id)
+            if isinstance(function, ast.Attribute):
+                found = getattr(found, function.attr, None)
+        except NameError:
+            return  # defined further down, or missing: seen when it is wanted
+        if found is not None:
+            self.callee(node, ast.unparse(function), found)
 
     def callee(self, node: ast.Call, name: str, found: Any) -> None:
         """Refuse what certainly is no equation; a name may still be given to one later."""
@@ -482,8 +421,17 @@ class _Check:
         if getattr(math, short, None) is not None:
             known = ", ".join(MATH.values())
             self.refuse(node, f"a call of {name}", f"of math an equation may call {known}")
-        if isinstance(found, BuiltinFunctionType | type) or callable(found):
+        if callable(found):
             self.refuse(node, f"a call of {name}", "call equations and functions of math only")
+
+
+def _returns(body: list[ast.stmt]) -> bool:
+    """Whether every way through some statements ends in a return."""
+    return any(
+        isinstance(each, ast.Return)
+        or (isinstance(each, ast.If) and _returns(each.body) and _returns(each.orelse))
+        for each in body
+    )
 
 
 def _whole(node: ast.expr) -> int | None:

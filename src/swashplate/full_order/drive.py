@@ -6,24 +6,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, floor
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.drive import Drive
 from swashplate.equations.equation import interpreted
-from swashplate.equations.jacobian import jacobian
-from swashplate.equations.march import Stored
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.record import SOURCE_RATE, Interpolation, Record, record_of
-from swashplate.equations.run import Instance, Part, Start, check_start, marched
+from swashplate.equations.marching.jacobian import jacobian
+from swashplate.equations.marching.march import Stored
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, Record, record_of
+from swashplate.equations.marching.run import Instance, Part, Start, check_start, marched
 from swashplate.errors import DomainError, InputError
-from swashplate.full_order.completion import chosen_over, from_lumped, load_choices, nearest_set
-from swashplate.full_order.modes import Modes, modes_of, state_matrix
-from swashplate.full_order.physical_set import PhysicalSet
+from swashplate.full_order.continuous import Case, Feed, Modes, modes_of, solve, state_matrix
+from swashplate.full_order.physical_set import PhysicalSet, from_lumped
 from swashplate.full_order.result import FullOrderSimulation
-from swashplate.full_order.stiff import Case, Feed, solve
 from swashplate.models import full_order as model
 from swashplate.models.drive import Source
 from swashplate.models.machine import Machine, fastest_rate
@@ -47,17 +45,21 @@ MOST_SUBSTEPS = 20_000
 """Sub-steps a sample, beyond which the solver is the better way."""
 LOOSEST = 1e-3
 """Largest relative tolerance."""
+
+
+class Integration(TypedDict, total=False):
+    """How a run is integrated, see `FullOrderDrive.simulate_current`."""
+
+    method: Method
+    substeps: int | None
+    tolerance: float
+
+
 STATES = tuple(Stored(1, "signals", name) for name in model.Motion._fields)
 
 
 def path_of(name: str) -> str:
-    """Path in the model of a quantity, or of a parameter of card or solenoids, by its column.
-
-    Raises
-    ------
-    InputError
-        If there is none of that name.
-    """
+    """Path in the model of a quantity, or of a parameter of card or solenoids, by its column."""
     if name in Machine._fields:
         return f"plant.machine.{name}"
     if name in Solenoids._fields:
@@ -74,6 +76,8 @@ def path_of(name: str) -> str:
 class FullOrderDrive:
     """A drive whose spool and swash plate have mass. Immutable.
 
+    One with refinements, which the five states do not know, is refused in an `InputError`.
+
     Examples
     --------
     >>> hoist = FullOrderDrive.preset("hoist")
@@ -85,6 +89,9 @@ class FullOrderDrive:
     """Card and solenoids, and the form of the valve's root."""
     physical: PhysicalSet
     """Everything behind the solenoids."""
+
+    def __post_init__(self) -> None:
+        self.drive.parameters.refuse_refinements("Full-order drives")
 
     @classmethod
     def preset(cls, name: str) -> FullOrderDrive:
@@ -102,35 +109,17 @@ class FullOrderDrive:
     def from_drive(cls, drive: Drive, like: str | None = None, **chosen: Change) -> FullOrderDrive:
         """A full-order drive for any parameters, a fitted set's for example.
 
-        Parameters
-        ----------
-        drive : Drive
-            Card, solenoids and the lumps that the machine shall have, Z6 apart.
-        like : str, optional
-            ``"hoist"``, ``"slew"`` or ``"luff"``: the packaged set whose assumed values count
-            where nothing is chosen; by default that of the drive's name, or else ``"hoist"``.
-        **chosen : float or (float, float)
-            Values in SI, e.g. ``oil_volume=1e-4``, by the names that
-            `swashplate.full_order.completion.from_lumped` takes.
-
-        Returns
-        -------
-        FullOrderDrive
-            Its physical set is completed from lumps and choices; what is chosen here is marked as
-            the user's, all the rest as assumed.
+        The drive gives card, solenoids and the lumps that the machine shall have, Z6 apart; the
+        physical set is completed from them and what is chosen in SI, e.g. ``oil_volume=1e-4``, as
+        `swashplate.full_order.from_lumped` says.
 
         Raises
         ------
         ParameterError
             For an unknown name, or if lumps contradict each other or a choice.
-        InputError
-            If the drive has refinements, which the full-order model does not know.
         """
-        drive.parameters.refuse_refinements("Full-order drives")
-        assumed = load_choices(nearest_set(drive.name) if like is None else like)
-        entries = chosen_over(assumed, chosen)
         title = drive.parameters.title
-        return cls(drive, from_lumped(drive.parameters, title=title, entries=entries))
+        return cls(drive, from_lumped(drive.parameters, like, title=title, entries=chosen))
 
     def replace(self, **changes: Change) -> FullOrderDrive:
         """With other physical values in SI, e.g. ``replace(load_torque=2e3)``."""
@@ -166,16 +155,7 @@ class FullOrderDrive:
     ) -> Instance:
         """The model with numbers, for the engine: behind a voltage, or without a card a current.
 
-        Parameters
-        ----------
-        step : float
-            Distance of the samples. [s]
-        substeps : int, optional
-            As in `simulate_current`.
-        card : bool, optional
-            False for `swashplate.models.full_order.full_machine`.
-        held : bool, optional
-            As in `options`.
+        At a distance of the samples [s]; `substeps` as in `simulate_current`, `held` in `options`.
         """
         behind = self._machine(self.substeps(step, substeps), held)
         if not card:
@@ -191,14 +171,9 @@ class FullOrderDrive:
         return Instance(model.full_machine, (Part(Source()), plant), self.physical.name)
 
     def substeps(self, step: float, wanted: int | None = None) -> int:
-        """Sub-steps that a step of the record takes.
+        """Sub-steps that a step [s] of the record takes.
 
-        Parameters
-        ----------
-        step : float
-            Step of the record. [s]
-        wanted : int, optional
-            By default 8, or so many that the fastest mode takes six a turn.
+        By default 8, or so many that the fastest mode takes six a turn.
 
         Raises
         ------
@@ -230,61 +205,42 @@ class FullOrderDrive:
         voltage: ArrayLike,
         rate: float = SOURCE_RATE,
         *,
-        method: Method = "march",
         time: ArrayLike | None = None,
         interpolation: Interpolation | None = None,
         start: Start = "rest",
         clip: bool = False,
-        substeps: int | None = None,
-        tolerance: float = 1e-6,
+        **how: Unpack[Integration],
     ) -> FullOrderSimulation:
         """Simulate card and machine over a command [V]; arguments as `Drive.simulate`.
 
         The card's current at its own steps drives the machine, a straight line between them.
-
-        Parameters
-        ----------
-        method, substeps, tolerance :
-            As in `simulate_current`.
+        `method`, `substeps` and `tolerance` as in `simulate_current`.
         """
         run = self.drive.simulate(
             voltage, rate, time=time, interpolation=interpolation, start=start, clip=clip
         )
-        return self.follow(run, method=method, start=start, substeps=substeps, tolerance=tolerance)
+        return self.follow(run, start=start, **how)
 
     def follow(
-        self,
-        run: Simulation,
-        *,
-        method: Method = "march",
-        start: Start = "rest",
-        substeps: int | None = None,
-        tolerance: float = 1e-6,
+        self, run: Simulation, *, start: Start = "rest", **how: Unpack[Integration]
     ) -> FullOrderSimulation:
         """Simulate the machine over the current of a run that there is.
 
-        Parameters
-        ----------
-        run : Simulation
-            By voltage or by current; its current at the march's own steps counts, a straight line
-            between them.
-        method, start, substeps, tolerance :
-            As in `simulate_current`.
+        The run is by voltage or by current; its current at the march's own steps counts, a
+        straight line between them. Other arguments as in `simulate_current`.
         """
         record = Record(run.fine("current"), run.record.start, run.record.rate, run.record.substeps)
-        return self._integrate(record, False, method, start, substeps, tolerance)
+        return self._integrate(record, False, start, **how)
 
     def simulate_current(
         self,
         current: ArrayLike,
         rate: float = SOURCE_RATE,
         *,
-        method: Method = "march",
         time: ArrayLike | None = None,
         interpolation: Interpolation | None = None,
         start: Start = "rest",
-        substeps: int | None = None,
-        tolerance: float = 1e-6,
+        **how: Unpack[Integration],
     ) -> FullOrderSimulation:
         """Simulate the machine over a signed current.
 
@@ -301,12 +257,7 @@ class FullOrderDrive:
             Sub-steps of the march a sample, at least 512 samples a second; by default 8, or so
             many that the fastest mode takes six steps a turn.
         tolerance : float
-            Relative tolerance of the solver.
-
-        Returns
-        -------
-        FullOrderSimulation
-            The five states and all that follows from them.
+            Relative tolerance of the solver, by default 1e-6.
 
         Raises
         ------
@@ -316,18 +267,10 @@ class FullOrderDrive:
             If the solver gives up or the machine is too stiff for the march.
         """
         record = record_of(current, rate, what="current", time=time, interpolation=interpolation)
-        return self._integrate(
-            record, interpolation == "previous", method, start, substeps, tolerance
-        )
+        return self._integrate(record, interpolation == "previous", start, **how)
 
     def modes(self, current: float = 0.0) -> Modes:
-        """Natural modes about the equilibrium under a constant signed current. [A]
-
-        Raises
-        ------
-        InputError
-            If the current is no finite number.
-        """
+        """Natural modes about the equilibrium under a constant signed current. [A]"""
         if not np.isfinite(current):
             raise InputError(f"The current is {current}, but must be a finite number of amperes.")
         first = {"current": float(current)}
@@ -374,10 +317,10 @@ class FullOrderDrive:
         self,
         record: Record,
         held: bool,
-        method: Method,
         start: Start,
-        substeps: int | None,
-        tolerance: float,
+        method: Method = "march",
+        substeps: int | None = None,
+        tolerance: float = 1e-6,
     ) -> FullOrderSimulation:
         check_start(start)
         if method not in ("march", "radau"):
@@ -397,4 +340,4 @@ class FullOrderDrive:
         else:
             feed = Feed(records["current"], held, step)
             states = solve(feed, case, started.states[1].motion, tolerance)
-        return FullOrderSimulation(self.physical.name, method, record, case, states)
+        return FullOrderSimulation(self.physical.name, record, method, case, states)

@@ -23,6 +23,7 @@ from swashplate.identification.uncertainty import (
     Uncertainty,
     prior_sentences,
     reach,
+    released,
     slopes_by_earlier,
     uncertainty,
 )
@@ -190,9 +191,14 @@ class Assessment:
             for name, value in self.stage.parameters.numbers.items()
             if name not in problem.unknowns.names
         }
+        try:
+            covariance = self.uncertainty.quoted.matrix
+        except InputError:  # too few samples to tell the noise from
+            covariance = None
         return identifiability(
             self.linearised.triangle,
             self.linearised.variables,
+            covariance=covariance,
             tolerance=self.linearised.tolerance,
             fixed=fixed,
         )
@@ -216,7 +222,8 @@ class Assessment:
             for number, unknown in enumerate(self.stage.problem.unknowns)
             if unknown.targets[0].startswith(LIMITS)
         ]
-        ends = checked_ends(self.stage.problem, self._vector, self.linearised, half, limits)
+        fit = released(self.linearised)
+        ends = checked_ends(self.stage.problem, self._vector, fit, half, limits)
         return replace(found, ends=ends)
 
     @cached_property

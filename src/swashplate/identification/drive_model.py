@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.ammeter import signed_by_command
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
-from swashplate.equations.observation import ObservedRecord
-from swashplate.equations.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
+from swashplate.equations.marching.observation import ObservedRecord
+from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.model import EquationModel
 from swashplate.parameters.definitions import COLUMNS, REFINEMENTS

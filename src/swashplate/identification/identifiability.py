@@ -445,7 +445,7 @@ class Identifiability:
         said += [each.sentence for each in (*self.null, *self.faint)]
         said += [
             f"{name} = {self.variables.estimates[self.variables.index(name)]:.4g} stands at its "
-            f"{side} bound: no interval is given for it, and the others' hold with it held there."
+            f"{side} bound: no interval is given for it; those of the others let it move."
             for name, side in self.at_bounds.items()
         ]
         if self.correlated:

@@ -760,8 +760,11 @@ def _units(matrix: Array, fixed: Sequence[str], found: Sequence[Fault]) -> tuple
         return ()
     _, sizes, right = np.linalg.svd(matrix[:, moving] / lengths[moving], full_matrices=True)
     null = right[np.count_nonzero(sizes > 1e-9 * sizes[0]) :]
-    part = dict(zip(moving.tolist(), np.linalg.norm(null, axis=0).tolist(), strict=True))
     first = matrix.shape[1] - len(fixed)
+    # of these directions those that move an estimate: fixed parameters among themselves are no unit
+    turn, parts, _ = np.linalg.svd(null[:, moving < first], full_matrices=False)
+    null = turn[:, parts > 1e-6].T @ null
+    part = dict(zip(moving.tolist(), np.linalg.norm(null, axis=0).tolist(), strict=True))
     names = {name for k, name in enumerate(fixed, first) if part.get(k, 0.0) > 1e-4}
     names |= {each.name for each in found if each.outside < UNTOLD}
     return tuple(dict.fromkeys(COLUMNS[name] for name in fixed if name in names))

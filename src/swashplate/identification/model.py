@@ -14,11 +14,11 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.equations import Model as Equations
 from swashplate.equations import instance_of, parameter_paths, state_paths
 from swashplate.equations.fields import made, numbers_of
-from swashplate.equations.jacobian import jacobian, residuals, started_by, triangle
-from swashplate.equations.march import output_of
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.observation import Own as EngineOwn
-from swashplate.equations.record import Record, even_rate, gridded
+from swashplate.equations.marching.jacobian import jacobian, residuals, started_by, triangle
+from swashplate.equations.marching.march import output_of
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.observation import Own as EngineOwn
+from swashplate.equations.marching.record import Record, even_rate, gridded
 from swashplate.errors import DomainError, InputError
 from swashplate.simulation.residuals import Ready
 

@@ -44,8 +44,9 @@ Status = Literal[
 ]
 
 
-USELESS = 1e3
-"""Factor beyond which the interval of a positive unknown is not worth printing. [1]"""
+DECADES = 100.0
+"""Factor each way from which an interval says nothing; for an unknown that is not logarithmic, half
+width in its scales."""
 
 
 class Estimate(NamedTuple):
@@ -85,7 +86,8 @@ def reach(covariance: Covariance, level: float = 0.95) -> Array:
 
     quantiles = student.ppf(0.5 + 0.5 * level, covariance.degrees_of_freedom)
     errors = np.where(covariance.determined, covariance.standard_errors, 0.0)
-    half: Array = np.where(covariance.determined, quantiles * errors, 0.0)
+    known = covariance.determined & covariance.variables.free
+    half: Array = np.where(known, quantiles * errors, 0.0)
     return half
 
 
@@ -130,9 +132,6 @@ def estimates(
     with np.errstate(invalid="ignore"):
         lower = variables.to_values(variables.vector - distances[False])
         upper = variables.to_values(variables.vector + distances[True])
-    # of a positive unknown known to no better than a factor of a thousand nothing is known
-    reached = np.maximum(distances[False], distances[True])
-    vast = variables.logarithmic & np.isfinite(reached) & (reached > np.log(USELESS))
     made = []
     for k, name in enumerate(variables.names):
         value = float(variables.estimates[k])
@@ -141,7 +140,11 @@ def estimates(
             low = variables.at_bound[k] < 0
             side: Status = "at its lower bound" if low else "at its upper bound"
             made.append(Estimate(name, value, side, None, None, None, None))
-        elif not covariance.determined[k] or (below and above) or vast[k]:
+        elif (
+            not covariance.determined[k]
+            or (below and above)
+            or half[k] > (log(DECADES) if variables.logarithmic[k] else DECADES)
+        ):
             made.append(Estimate(name, value, "undetermined", None, None, None, None))
         else:
             freedom = float(covariance.degrees_of_freedom[k])
@@ -425,11 +428,13 @@ def uncertainty(
     InputError
         If there are no more samples than unknowns, or the level is not between 0 and 1.
     """
+    bounded, fit = fit.variables, released(fit)
     clean = separated(fit)
     colours = noise_colours(clean.fit)
     coloured = _with(coloured_noise_covariance(clean.fit, colours=colours), clean.covariance)
     swelling = swelling_noise_covariance(fit)
     own, uneven = _wider(coloured, swelling)
+    own = replace(own, variables=bounded)
     worth = {m: colour for colour in colours for m in colour.members}
     made = Uncertainty(
         with_handed(own, handed),
@@ -450,6 +455,17 @@ def uncertainty(
     )
     made.estimates  # noqa: B018  refuses a wrong level
     return made
+
+
+def released(fit: LinearisedFit) -> LinearisedFit:
+    """The fit with unknowns at a bound free to move.
+
+    An interval of one unknown must allow for all that the others may be. One at its bound may lie
+    anywhere inside: held there, its partners would seem far better known than they are.
+    """
+    if fit.variables.free.all():
+        return fit
+    return replace(fit, variables=fit.variables.released)
 
 
 def _with(covariance: Covariance, added: Array) -> Covariance:

@@ -310,6 +310,19 @@ class Unknowns(Sequence[Unknown]):
         return free
 
     @property
+    def released(self) -> Unknowns:
+        """The same at the same point, with bounds so much wider that none is at one."""
+        items = []
+        for each, side in zip(self.items, self.at_bound, strict=True):
+            low, high, reach = each.low, each.high, each.high - each.low
+            if side < 0:
+                low = low * low / high if each.log else low - reach
+            if side > 0:
+                high = high * high / low if each.log else high + reach
+            items.append(replace(each, low=low, high=high))
+        return replace(self, items=tuple(items), point=self.vector)
+
+    @property
     def slopes(self) -> Array:
         """(K,) derivative of each value by its number in the vector."""
         return self._slopes(self.vector)

@@ -272,7 +272,7 @@ def _followed(qualities: Sequence[RunQuality], which: str) -> Criterion:
             clauses.append(f"{name} {words} in the {which} runs (fit {found.fit_percent:z.0f} %)")
     largest = max((each.nrmse or 0.0 for each in errors.values()), default=0.0)
     return Criterion(
-        f"RMSE over standard deviation, {which} runs",
+        f"RMSE / standard deviation, {which}",
         percent(largest),
         percent(POOR),
         "a constant gain misses less of a step's record",
@@ -293,7 +293,7 @@ def _worse_than_mean(qualities: Sequence[RunQuality], which: str) -> Criterion:
             "contradicts the other runs, or shows what the model has not"
         )
     return Criterion(
-        f"{which} runs worse than their mean",
+        f"{which} runs worse than mean",
         f"{len(worse)}",
         "0",
         "such a run belongs to another machine, or the model lacks what moves it",
@@ -319,7 +319,7 @@ def _required(held: Sequence[RunQuality], required: float) -> Criterion:
     if late:
         failure = f"predicts {late[0]} to {percent(worst)} of its range only"
     return Criterion(
-        "error of the runs predicted, over their range",
+        "error / range, runs predicted",
         percent(worst),
         percent(required),
         "what is required of the model (--require)",
@@ -343,7 +343,7 @@ def _carried_over(fitted: Sequence[RunQuality], held: Sequence[RunQuality]) -> l
         return []
     return [
         Criterion(
-            "RMSE of held-out over fitted runs, where it is large",
+            "RMSE, held-out / fitted",
             f"{largest:.2g}" if largest else "small",
             f"{FAR:g}",
             "twice what manoeuvres differ by anyway",
@@ -362,7 +362,7 @@ def _consistent(assessments: Sequence[Assessment]) -> Criterion:
         )
     names = list(dict.fromkeys(str(each.run) for each in found))
     return Criterion(
-        "runs that contradict the others",
+        "runs contradicting others",
         f"{len(names)}",
         "0",
         "its data are of another machine, unit or sign, and bend all estimates",
@@ -383,7 +383,7 @@ def _determined(assessments: Sequence[Assessment]) -> Criterion:
         total += len(shared)
     words = f"{lost} of {total} unknowns stand at a bound or are not determined"
     return Criterion(
-        "unknowns at bounds or not determined",
+        "unknowns without a value",
         f"{lost} of {total}",
         f"{MOST:.0%}",
         "a fit that leaves most open has found nothing",
@@ -397,7 +397,7 @@ def _bounded(assessments: Sequence[Assessment], predicted: Sequence[RunQuality])
     runs = {each.experiment.name: each.experiment for each in predicted}
     names = unbounded_predictions(assessments, list(runs.values()))
     return Criterion(
-        "unknowns without an interval that predictions depend on",
+        "predictions left open",
         listed(names) or "none",
         "none",
         "the prediction is then as open as the unknown",
@@ -429,7 +429,7 @@ def _of_misfit(misfit: LackOfFit, judged: Sequence[RunQuality]) -> list[Criterio
         fails = ratio > MISFIT
         made.append(
             Criterion(
-                f"lack of fit: residuals of {name} over their known error",
+                f"lack of fit of {name}",
                 f"{ratio:.3g}",
                 f"{MISFIT:g}",
                 "99 of 100 sound campaigns stay below 1.05",
@@ -443,9 +443,9 @@ def _of_misfit(misfit: LackOfFit, judged: Sequence[RunQuality]) -> list[Criterio
             part = abs(fault.size) / 100.0
             made.append(
                 Criterion(
-                    fault.name,
+                    fault.name.removesuffix(" over the campaign"),
                     f"{fault.size:+.2g} %",
-                    f"{percent(DRIFTS)}; {percent(DRIFTS_AWAY)} for any use",
+                    percent(DRIFTS),
                     "no one set of parameters holds for a machine that changes",
                     "use" if significant and part > DRIFTS_AWAY else "values",
                     f"{fault.name} by {fault.size:+.2g} %"
@@ -456,7 +456,7 @@ def _of_misfit(misfit: LackOfFit, judged: Sequence[RunQuality]) -> list[Criterio
     if misfit.clipped:
         made.append(
             Criterion(
-                "channels at an end of their instrument",
+                "clipped channels",
                 f"{len(misfit.clipped)}",
                 "0",
                 "what lies beyond was not measured, and the fit bends to it",
@@ -481,9 +481,9 @@ def _model_error(qualities: Sequence[RunQuality]) -> Criterion:
                 "movement: the model leaves out something that the input causes"
             )
     return Criterion(
-        "correlation of residuals with the input",
+        "residuals follow input",
         f"{strongest:.2f}" if strongest else "none",
-        f"{FOLLOWS:g} where they are {percent(SERIOUS)} of the movement",
+        f"{FOLLOWS:g}",
         "what the input causes grows with it",
         "use",
         "; ".join(clauses),
@@ -537,11 +537,11 @@ def _statements(
     failures = [each for each in criteria if not each.passed and each.rules == "use"]
     subjects = {
         "Convergence": ("convergence", "stages"),
-        "Agreement": ("RMSE over", "predicted runs", "fitted runs"),
-        "Validation": ("held-out", "RMSE of held-out", "error of the runs"),
-        "Identifiability": ("unknowns",),
-        "Lack of fit": ("lack of fit", "drift", "channels at"),
-        "Residuals": ("correlation",),
+        "Agreement": ("RMSE /", "predicted runs", "fitted runs"),
+        "Validation": ("held-out", "RMSE, held-out", "error / range"),
+        "Identifiability": ("unknowns", "predictions"),
+        "Lack of fit": ("lack of fit", "drift", "clipped"),
+        "Residuals": ("residuals",),
     }
     return [
         each._replace(weight="bad")

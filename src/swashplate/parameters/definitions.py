@@ -12,8 +12,8 @@ from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from typing import Literal
 
-from swashplate.equations.definition import Declared, declared_by
-from swashplate.equations.definition import Definition as Meaning
+from swashplate.equations.fields import Declared, declared_by
+from swashplate.equations.fields import Definition as Meaning
 from swashplate.errors import ParameterError
 from swashplate.models.card import Card
 from swashplate.models.pump import Pump

@@ -10,18 +10,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import jacobian as engine
-from swashplate.equations.jacobian import Jacobian as Jacobian
-from swashplate.equations.jacobian import Triangle as Triangle
-from swashplate.equations.observation import ObservedRecord
-from swashplate.equations.observation import Own as EngineOwn
-from swashplate.equations.rows import BLOCK
-from swashplate.equations.run import Instance
+from swashplate.equations.marching import jacobian as engine
+from swashplate.equations.marching.jacobian import Jacobian as Jacobian
+from swashplate.equations.marching.jacobian import Triangle as Triangle
+from swashplate.equations.marching.observation import ObservedRecord
+from swashplate.equations.marching.observation import Own as EngineOwn
+from swashplate.equations.marching.rows import BLOCK
+from swashplate.equations.marching.run import Instance
 from swashplate.errors import InputError
 from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.instance import (
-    SIDES,
     START_PRESSURE,
     check_filter_stability,
     instance_of,
@@ -62,10 +61,8 @@ class Ready(NamedTuple):
 
     instance: Instance
     own: EngineOwn
-    paths: Sequence[str] = ()
-    """Columns of derivatives."""
-    moved: Sequence[bool] | None = None
-    """Whether the record may depend on a column at all."""
+    paths: Sequence[str] = ()  # Columns of derivatives.
+    moved: Sequence[bool] | None = None  # Whether the record may depend on a column at all.
 
 
 def residuals(
@@ -89,23 +86,10 @@ def jacobian(
     out: Array | None = None,
     block: int = BLOCK,
 ) -> Jacobian:
-    """The same residuals with their exact derivatives.
+    """The same residuals with their exact derivatives; see the engine's `jacobian`.
 
-    Parameters
-    ----------
-    parameters : ParameterSet
-        The drive.
-    observed : ObservedRecord
-        The record, and what was measured under it.
-    columns : sequence of str
-        Symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and
-        ``"start_pressure"``. What the record does not depend on gives zeros.
-    own : Own
-        Values of the experiment's own unknowns.
-    out : (k + 1, m) array, optional
-        Where to write; the `rows` of an earlier call, for example.
-    block : int
-        Samples marched at a time, 2 to 512.
+    Columns are symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and
+    ``"start_pressure"``. What the record does not depend on gives zeros.
     """
     names = wanted_columns(columns)
     instance, inner, paths, moved = made_ready(parameters, observed, names, own)
@@ -129,28 +113,14 @@ def triangle(
 
 
 def wanted_columns(columns: Sequence[str]) -> tuple[str, ...]:
-    """Columns that are asked for, symbols taken apart.
-
-    Raises
-    ------
-    InputError
-        If a column is asked for twice.
-    ParameterError
-        If there is no such parameter.
-    """
-    if list(columns).count(START_PRESSURE) > 1:
-        raise InputError(
-            f"{START_PRESSURE} is asked for {list(columns).count(START_PRESSURE)} times."
-        )
-    names = tuple(
-        each
-        for name in columns
-        for each in ((name,) if name == START_PRESSURE else columns_of([name]))
-    )
-    if len(set(names)) != len(names):
-        twice = next(name for k, name in enumerate(names) if name in names[:k])
-        raise InputError(f"{twice} is asked for twice.")
-    return names
+    """Columns that are asked for, symbols taken apart; refused where one is asked for twice."""
+    names: list[str] = []
+    for name in columns:
+        names += [name] if name == START_PRESSURE else columns_of([name])
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise InputError(f"{name} is asked for twice.")
+    return tuple(names)
 
 
 def moved_by(
@@ -163,30 +133,16 @@ def moved_by(
         "plus": by_voltage and high > parameters.numbers["V_dz_plus"],
         "minus": by_voltage and -low > parameters.numbers["V_dz_minus"],
     }
+    moved = {"card.plus": driven["plus"], "card.minus": driven["minus"]}
+    moved["card"] = any(driven.values())
     pump = any(each.signal not in CURRENTS for each in observed.observations)
-    found = []
-    for name in names:
-        path = path_of(name)
-        side = next((side for side in SIDES if path.startswith(f"card.{side}.")), None)
-        if side is not None:
-            found.append(driven[side])
-        elif path == "card.tau":
-            found.append(any(driven.values()))
-        else:
-            found.append(pump)
-    return found
+    return [moved.get(path_of(name).rpartition(".")[0], pump) for name in names]
 
 
 def made_ready(
     parameters: ParameterSet, observed: ObservedRecord, names: Sequence[str], own: Own
 ) -> Ready:
-    """The drive's model with its numbers, for some columns.
-
-    Raises
-    ------
-    InputError
-        If a signal cannot be observed, the filter is unstable, or a start has no value.
-    """
+    """The drive's model with its numbers, for some columns."""
     by_voltage = observed.driven_by == "voltage"
     for each in observed.observations:
         if each.signal not in OBSERVABLE:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.lowering import generating
-from swashplate.equations.march import Sampler, Stored
+from swashplate.equations.code import generating
+from swashplate.equations.marching.march import Sampler, Stored
+from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.run import Instance, Start, Started, check_start, marched
 from swashplate.equations.model import Model
-from swashplate.equations.record import Record
-from swashplate.equations.run import Instance, Start, Started, check_start, marched
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -21,8 +22,6 @@ from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
 Driver = Literal["voltage", "current"]
-MEASURED = ("pump_speed", "load_torque", "supply_pressure")
-"""Inputs beside the command that may be given as signals; otherwise a parameter stands for them."""
 
 
 def check_voltage(record: Record, clip: bool) -> Record:
@@ -49,22 +48,16 @@ def check_voltage(record: Record, clip: bool) -> Record:
 @generating
 def kept_of(model: Model, signals: tuple[str, ...], options: tuple[Any, ...]) -> tuple[Stored, ...]:
     """What a march leaves: currents, and the states from which all else follows."""
-    pump = model.parts[1]
-    inside = [Stored(1, "signals", path) for path in pump.signal_names if path in _inside(model)]
+    card, pump = model.parts
+    assert pump.signals is not None
+    inside = [Stored(1, "signals", path) for path in pump.signals._fields]
     sampler = Sampler(model, signals, options, [*inside, Stored(1, "limits")])
-    kept = [Stored(0, "signals", "current_positive"), Stored(0, "signals", "current_negative")]
-    kept += [Stored(1, "state", path) for path in sampler.carried[1]]
-    if model.parts[0].limits is None:
-        kept.append(Stored(0, "signals", "current"))
-    if model.parts[0].limits is not None:
-        kept.append(Stored(0, "limits"))
-    return tuple(kept)
-
-
-def _inside(model: Model) -> tuple[str, ...]:
-    made = model.parts[1].signals
-    assert made is not None
-    return tuple(made._fields)
+    return (
+        Stored(0, "signals", "current_positive"),
+        Stored(0, "signals", "current_negative"),
+        *(Stored(1, "state", path) for path in sampler.carried[1]),
+        Stored(0, "signals", "current") if card.limits is None else Stored(0, "limits"),
+    )
 
 
 def simulate_drive(
@@ -73,40 +66,26 @@ def simulate_drive(
     start: Start,
     start_pressure: float | None = None,
     measured: Mapping[str, Array] | None = None,
+    *,
+    driver: Driver = "voltage",
 ) -> Simulation:
     """March card and pump over a voltage record; see `Drive.simulate`.
 
     With `start_pressure` the pump begins there [Pa] and only the card's state is that of `start`.
     """
-    check_filter_stability(parameters, record.step)
-    return _simulate(parameters, record, "voltage", start, start_pressure, measured or {})
-
-
-def simulate_pump(
-    parameters: ParameterSet,
-    record: Record,
-    start: Start,
-    start_pressure: float | None = None,
-    measured: Mapping[str, Array] | None = None,
-) -> Simulation:
-    """March the pump alone over a signed current; see `Drive.simulate_current`."""
-    return _simulate(parameters, record, "current", start, start_pressure, measured or {})
-
-
-def _simulate(
-    parameters: ParameterSet,
-    record: Record,
-    driver: Driver,
-    start: Start,
-    start_pressure: float | None,
-    measured: Mapping[str, Array],
-) -> Simulation:
+    if driver == "voltage":
+        check_filter_stability(parameters, record.step)
     instance = instance_of(parameters, driver == "voltage")
-    records = {driver: record.values, **measured}
+    others = measured or {}
+    records = {driver: record.values, **others}
     started = started_at(instance, records, record.step, start, start_pressure)
     kept = kept_of(instance.model, tuple(records), instance.options)
     out, flags = marched(instance, records, record.step, started, kept, driver)
-    return Simulation(parameters.name, record, instance, driver, kept, out, flags, measured)
+    return Simulation(parameters.name, record, instance, driver, kept, out, flags, others)
+
+
+simulate_pump = partial(simulate_drive, driver="current")
+"""March the pump alone over a signed current; see `Drive.simulate_current`."""
 
 
 def started_at(
@@ -120,8 +99,8 @@ def started_at(
 
     Raises
     ------
-    DomainError
-        If the pressure at the start lies beyond a stop of the swash plate or Z15.
+    InputError, DomainError
+        If the pressure at the start [Pa] is no finite number, or beyond a stop or Z15.
     """
     check_start(start)
     started = instance.start({name: float(v[0]) for name, v in records.items()}, step, start)
@@ -136,15 +115,7 @@ def started_at(
 
 
 def check_start_pressure(instance: Instance, pressure: float, started: Started) -> float:
-    """A pressure to start with, refused where the drive cannot have it. [Pa]
-
-    Raises
-    ------
-    InputError
-        If it is no finite number.
-    DomainError
-        If it lies beyond a stop of the swash plate or Z15.
-    """
+    """A pressure to start with, refused where the drive cannot have it. [Pa]"""
     if not np.isfinite(pressure):
         raise InputError(f"The pressure at the start must be a finite number, not {pressure}.")
     k = started.arguments[1]["k"]
@@ -156,30 +127,28 @@ def check_start_pressure(instance: Instance, pressure: float, started: Started) 
     return float(pressure)
 
 
-def measured_records(record: Record, given: Mapping[str, object]) -> dict[str, Array]:
+def measured_records(
+    record: Record,
+    load_torque: ArrayLike | None,
+    pump_speed: ArrayLike | None,
+    supply_pressure: ArrayLike | None,
+) -> dict[str, Array]:
     """Inputs beside the command, on the march's grid.
 
-    Parameters
-    ----------
-    record : Record
-        The command.
-    given : mapping
-        Of `MEASURED` to a number or to as many samples as the command has; None is left out.
-
-    Raises
-    ------
-    InputError
-        For another name, length, or a sample that is not finite.
+    Each is None, a number, or as many finite samples as the command has.
     """
+    given = {
+        "load_torque": load_torque,
+        "pump_speed": pump_speed,
+        "supply_pressure": supply_pressure,
+    }
     found: dict[str, Array] = {}
+    grid = np.arange(record.values.size)
+    size = (record.values.size - 1) // record.substeps + 1
     for name, values in given.items():
         if values is None:
             continue
-        if name not in MEASURED:
-            raise InputError(f"There is no input '{name}'; there are {', '.join(MEASURED)}.")
         samples = np.asarray(values, dtype=np.float64)
-        grid = np.arange(record.values.size)
-        size = (record.values.size - 1) // record.substeps + 1
         if samples.ndim == 0:
             samples = np.full(size, float(samples))
         if samples.shape != (size,):

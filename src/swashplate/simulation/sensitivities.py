@@ -8,16 +8,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.observation import Observation, ObservedRecord
-from swashplate.equations.record import Record
-from swashplate.equations.run import Start
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.run import Start
 from swashplate.errors import InputError
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.instance import PATHS
 from swashplate.simulation.residuals import jacobian
 from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import simulate_drive, simulate_pump
+from swashplate.simulation.run import Driver, simulate_drive
 
 Array = NDArray[np.float64]
 
@@ -34,6 +34,24 @@ ALL_COLUMNS = (
 """Columns of card, pump and motor, refinements apart, in their order."""
 
 
+class Columns:
+    """Derivatives of a signal by its name, computed when they are first asked for."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, found: Sensitivities | None, owner: type | None = None) -> Array:
+        if found is None:
+            return self  # type: ignore[return-value]  # the class's own attribute
+        # the Jacobian of unit weights: every sample observed as zero
+        run = found.simulation
+        seen = Observation(self._name, run.time, np.zeros(run.time.size))
+        observed = ObservedRecord(run.record, [seen], run.driven_by, found.start, run.measured)
+        made = jacobian(found.parameters, observed, found.names).columns
+        found.__dict__[self._name] = made
+        return made
+
+
 @dataclass(frozen=True, eq=False)
 class Sensitivities:
     """Derivatives of the outputs by parameters, one column for each of `names`.
@@ -48,50 +66,23 @@ class Sensitivities:
     """Columns such as ``Z16_plus``, in the order asked for."""
     parameters: ParameterSet = field(repr=False)
     start: Start = "rest"
-    _found: dict[str, Array] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
         return f"Sensitivities({self.simulation!r}, by {', '.join(self.names)})"
 
-    def _columns(self, signal: str) -> Array:
-        """The Jacobian of unit weights: every sample observed as zero."""
-        if signal not in self._found:
-            run = self.simulation
-            zeros = np.zeros(run.time.size)
-            observed = ObservedRecord(
-                run.record,
-                [Observation(signal, run.time, zeros)],
-                run.driven_by,
-                self.start,
-                others=run.measured,
-            )
-            self._found[signal] = jacobian(self.parameters, observed, self.names).columns
-        return self._found[signal]
-
-    @property
-    def current_positive(self) -> Array:
-        """(n, k) derivatives of the positive channel's current. [A/...]"""
-        return self._columns("current_positive")
-
-    @property
-    def current_negative(self) -> Array:
-        """(n, k) derivatives of the negative channel's current, a magnitude. [A/...]"""
-        return self._columns("current_negative")
+    current_positive = Columns()
+    """(n, k) derivatives of the positive channel's current. [A/...]"""
+    current_negative = Columns()
+    """(n, k) derivatives of the negative channel's current, a magnitude. [A/...]"""
+    shaft_speed = Columns()
+    """(n, k) derivatives of the speed. [(rad/s)/...]"""
+    shaft_position = Columns()
+    """(n, k) derivatives of the position. [rad/...]"""
 
     @property
     def current(self) -> Array:
         """(n, k) derivatives of the signed current. [A/...]"""
         return self.current_positive - self.current_negative
-
-    @property
-    def shaft_speed(self) -> Array:
-        """(n, k) derivatives of the speed. [(rad/s)/...]"""
-        return self._columns("shaft_speed")
-
-    @property
-    def shaft_position(self) -> Array:
-        """(n, k) derivatives of the position. [rad/...]"""
-        return self._columns("shaft_position")
 
     def at(self, time: ArrayLike, output: str) -> Array:
         """(m, k) derivatives of an output at other time stamps, by linear interpolation.
@@ -110,31 +101,23 @@ class Sensitivities:
         )
 
 
-def drive_sensitivities(
-    parameters: ParameterSet, record: Record, start: Start, names: Sequence[str] | None
+def sensitivities(
+    parameters: ParameterSet,
+    record: Record,
+    driver: Driver,
+    start: Start,
+    names: Sequence[str] | None,
 ) -> Sensitivities:
-    """Card and pump with derivatives; see `Drive.sensitivities`."""
-    chosen = _chosen(names, ALL_COLUMNS)
-    run = simulate_drive(parameters, record, start)
-    return Sensitivities(run, chosen, parameters, start)
-
-
-def pump_sensitivities(
-    parameters: ParameterSet, record: Record, start: Start, names: Sequence[str] | None
-) -> Sensitivities:
-    """Pump alone with derivatives; see `Drive.sensitivities_current`."""
-    chosen = _chosen(names, PUMP_COLUMNS)
+    """Derivatives by some columns; see `Drive.sensitivities` and `Drive.sensitivities_current`."""
+    chosen = ALL_COLUMNS if driver == "voltage" else PUMP_COLUMNS
+    if names is not None:
+        if isinstance(names, str) or not names:
+            raise InputError("Name at least one parameter to differentiate by, in a list.")
+        chosen = tuple(columns_of(list(names)))
     foreign = [name for name in chosen if PATHS[name].startswith("card.")]
-    if foreign:
+    if foreign and driver == "current":
         raise InputError(
             f"{foreign[0]} belongs to the card, which a given current does not go through."
         )
-    return Sensitivities(simulate_pump(parameters, record, start), chosen, parameters, start)
-
-
-def _chosen(names: Sequence[str] | None, everything: tuple[str, ...]) -> tuple[str, ...]:
-    if names is None:
-        return everything
-    if isinstance(names, str) or not names:
-        raise InputError("Name at least one parameter to differentiate by, in a list.")
-    return tuple(columns_of(list(names)))
+    run = simulate_drive(parameters, record, start, driver=driver)
+    return Sensitivities(run, chosen, parameters, start)

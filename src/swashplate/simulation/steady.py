@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.lowering import generating
-from swashplate.equations.march import Sampler, function_source, indented, value_of
-from swashplate.equations.program import Tuple, leaves
-from swashplate.equations.run import Instance, called, module
-from swashplate.equations.scalars import Code, text
+from swashplate.equations.code import Code, Tuple, generating, leaves
+from swashplate.equations.expressions import text
+from swashplate.equations.marching.march import Sampler, function_source, indented, value_of
+from swashplate.equations.marching.run import Instance, called, module
+from swashplate.equations.writing import lines_of
 from swashplate.models.card import channel_level
 from swashplate.models.drive import drive
 from swashplate.models.pump import (
@@ -21,8 +21,8 @@ from swashplate.models.pump import (
     PumpInputs,
     PumpState,
     pump_constants,
+    pump_sample,
     pump_settled,
-    settled_speed,
 )
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.instance import instance_of
@@ -35,8 +35,7 @@ def _kernel(options: tuple[Any, ...]) -> Callable[..., None]:
     """The compiled map from constant voltages to currents and speeds."""
     sampler = Sampler(drive, ("voltage",), options, [])
     card, pump = sampler.parts
-    code = Code()
-    code.taken = pump.code.taken
+    code = Code(pump.code.taken)
     volts = ex.name("volts")
     plus = card.call(code, channel_level, {"voltage": volts, "p": card.p.items[0]})  # type: ignore[union-attr]
     minus = card.call(
@@ -46,19 +45,21 @@ def _kernel(options: tuple[Any, ...]) -> Callable[..., None]:
     )
     current = ex.make("-", plus, minus)  # type: ignore[arg-type]
     given = (current, *(value_of(pump.p, name) for name in ("pump_speed", "load_torque", "Z9")))
-    speed = pump.call(code, settled_speed, {**pump.known, "inputs": Tuple(PumpInputs, given)})
+    known = {**pump.known, "inputs": Tuple(PumpInputs, given)}
+    known["state"] = pump.call(code, pump_settled, known)
+    speed = value_of(pump.call(code, pump_sample, known), "shaft_speed")
     results = [current, speed]
     sampler.ends = [[ex.name(node.value) for _, node in leaves(part.p)] for part in sampler.parts]
-    read = code.reads(results)  # type: ignore[arg-type]
+    read = code.reads(results)
     for part in sampler.parts:
         sampler.ends[part.part] = [ex.name(name) for name in sorted(read)]
     lines = [
         *sampler.ahead(),
         "for n in range(voltage.size):",
         "    volts = voltage[n]",
-        *indented(code.lines(results)),  # type: ignore[arg-type]
+        *indented(lines_of(code, results)),
         f"    current[n] = {text(current)}",
-        f"    speed[n] = {text(speed)}",  # type: ignore[arg-type]
+        f"    speed[n] = {text(speed)}",
     ]
     source = function_source(
         "settled(voltage, params, given, h, current, speed)",
@@ -71,8 +72,11 @@ def _kernel(options: tuple[Any, ...]) -> Callable[..., None]:
 def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Array]:
     """Signed current [A] and speed [rad/s] that each of many constant voltages settles at."""
     instance = instance_of(parameters, True)
+    card, pump = instance.options
     current, speed = np.empty(voltage.size), np.empty(voltage.size)
-    _kernel(instance.options)(voltage, instance.params, instance.given, 1.0, current, speed)
+    _kernel((card, pump._replace(ripple=None)))(
+        voltage, instance.params, instance.given, 1.0, current, speed
+    )
     return current, speed
 
 

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.lowering import generating
-from swashplate.equations.march import Stored, advance_source
-from swashplate.equations.record import Interpolation, least_substeps
-from swashplate.equations.run import Start, check_domain, check_start, module
+from swashplate.equations.code import generating
+from swashplate.equations.marching.march import Stored, advance_source
+from swashplate.equations.marching.record import Interpolation, least_substeps
+from swashplate.equations.marching.run import Start, check_domain, check_start, module
 from swashplate.errors import InputError
 from swashplate.models.drive import drive
 from swashplate.parameters.parameter_set import ParameterSet

@@ -27,7 +27,7 @@ from swashplate.campaign.rig.instruments import (
 )
 from swashplate.campaign.schema import CHANNEL_KINDS, KINDS, ChannelKind
 from swashplate.drive import Drive
-from swashplate.equations.record import SOURCE_RATE
+from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import FileError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver, source_tests
 from swashplate.maneuvers.checks import positive, whole

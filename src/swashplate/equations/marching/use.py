@@ -28,12 +28,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.fields import floats_of, is_real, made, numbers_of, value_at
-from swashplate.equations.jacobian import jacobian, state_paths
-from swashplate.equations.march import Stored, output_of
+from swashplate.equations.marching.jacobian import jacobian, state_paths
+from swashplate.equations.marching.march import Stored, output_of
+from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
+from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.run import Instance, Part, Start, Started, marched
 from swashplate.equations.model import Model
-from swashplate.equations.observation import Observation, ObservedRecord, Own
-from swashplate.equations.record import Record
-from swashplate.equations.run import Instance, Part, Start, Started, marched
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]

@@ -9,14 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.equations.code import generating, leaves
 from swashplate.equations.fields import floats_of, value_at
-from swashplate.equations.graph import By, Entry, Graph, Group, PartGraph, graph_of
-from swashplate.equations.lowering import generating
-from swashplate.equations.model import Model, Source
-from swashplate.equations.observation import ObservedRecord, Own
-from swashplate.equations.pieces import addresses, pointers
-from swashplate.equations.program import leaves
-from swashplate.equations.rows import (
+from swashplate.equations.marching.graph import By, Entry, Graph, Group, PartGraph, graph_of
+from swashplate.equations.marching.observation import ObservedRecord, Own
+from swashplate.equations.marching.pieces import addresses
+from swashplate.equations.marching.rows import (
     ABREAST,
     BLOCK,
     CALL,
@@ -31,8 +29,9 @@ from swashplate.equations.rows import (
     march_observed,
     room_for,
 )
-from swashplate.equations.run import Instance, Places, Start, check_domain
-from swashplate.equations.triangle import ROWS, aligned, upright
+from swashplate.equations.marching.run import Instance, Places, Start, arrays_of, check_domain
+from swashplate.equations.marching.triangle import ROWS, aligned, upright
+from swashplate.equations.model import Model, Source
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]
@@ -380,7 +379,7 @@ def start_slopes(
     constants: dict[Slot, float] = {}
     states: dict[tuple[int, str], Slopes] = {}
     signals: dict[tuple[int, str], tuple[float, Slopes]] = {}
-    for code, local in zip(graph.codes, graph.locals, strict=True):
+    for code, starts in zip(graph.codes, graph.starts, strict=True):
         i, own = code.part, instance.parts[code.part]
         prefix = f"{model.parts[i].name}." if several else ""
         values: dict[str, float] = {"h": h}
@@ -392,52 +391,23 @@ def start_slopes(
         values |= {f"x_{name}": value for name, value in first.items()}
         for (part, name), (value, _) in signals.items():
             values[code.source(Source(part, name))] = value
-        by_constant: dict[str, Slopes] = {}
-        if local.constants is not None:
-            found, slopes = local.constants.at(values)
-            values |= found
-            for name, by in slopes.items():
-                by_constant[name] = {f"{prefix}{b.path}": s for b, s in by.items()}
-                constants |= {Slot("k", i, name, b.path): s for b, s in by.items()}
-
-        def total(
-            by: Mapping[By, float],
-            i: int = i,
-            prefix: str = prefix,
-            by_constant: Mapping[str, Slopes] = by_constant,
-            known_states: Mapping[tuple[int, str], Slopes] = states,
-        ) -> Slopes:
-            """Derivatives by parameters, through constants, states and signals."""
-            made: Slopes = {}
-            for each, slope in by.items():
-                inner: Slopes = {}
-                if each.kind == "p":
-                    inner = {f"{prefix}{each.path}": 1.0}
-                elif each.kind == "k":
-                    inner = by_constant.get(each.path, {})
-                elif each.kind == "state":
-                    inner = known_states.get((i, each.path), {})
-                elif each.kind == "signal":
-                    inner = signals[each.part, each.path][1]
-                for column, factor in inner.items():
-                    made[column] = made.get(column, 0.0) + slope * factor
-            return made
-
-        began = local.rest if start == "rest" else local.settled
-        if began is not None:
-            found, slopes = began.at(values)
-            states.update({(i, path): total(by) for path, by in slopes.items()})
-        asked = [source.signal for source in graph.sources if source.part == i]
-        if asked and local.sources is None:  # they depend on nothing that is differentiated by
-            known = instance.start(first, h, start).arguments[i]
-            for name in asked:
-                signals[i, name] = float(value_at(known.get("signals", known["state"]), name)), {}
-        elif asked and local.sources is not None:
-            state = instance.start(first, h, start).states[i]
-            values |= {node.value: value_at(state, path) for path, node in leaves(code.state)}
-            found, slopes = local.sources.at(values)
-            for name, by in slopes.items():
-                signals[i, name] = found[name], total(by)
+        starting = starts.get(start, starts["rest"])  # what has no state is always settled
+        found = starting.derived.python(*(values[name] for name in starting.arguments))
+        made: dict[tuple[str, str], Slopes] = {key: {} for key in starting.results}
+        partials = found[len(starting.results) :]
+        for (key, by), slope in zip(starting.entries(), partials, strict=True):
+            if key[0] == "k":
+                constants[Slot("k", i, key[1], by.path)] = slope
+                continue
+            own_column = {f"{prefix}{by.path}": 1.0}
+            inner = own_column if by.kind == "p" else signals[by.part, by.path][1]
+            for column, factor in inner.items():
+                made[key][column] = made[key].get(column, 0.0) + slope * factor
+        for ((kind, name), slopes), value in zip(made.items(), found, strict=False):
+            if kind == "state":
+                states[i, name] = slopes
+            elif kind == "signal":
+                signals[i, name] = value, slopes
     return StartSlopes(constants, states)
 
 
@@ -669,20 +639,9 @@ def _march(
     marched = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
     met = np.array([np.inf])
     room = room_for(layout.rows, layout.constant, layout.states, len(columns), plan)
-    arrays = (
-        pointers(marched),
-        np.array([started.before[name] for name in signals]),
-        places.whole,
-        places.fraction,
-        instance.params,
-        instance.given,
-        states,
-        met,
-        room.flat,
-    )
-    size = marched[0].size
-    pieces = addresses(graph.pieces, layout.pieces)
-    march_observed(pieces, arrays, size, block, h, tangent, program, plan, sink, room)
+    arrays = arrays_of(instance, marched, started, places, states, met, room.flat)
+    pieces, grid = addresses(graph.pieces, layout.pieces), (marched[0].size, block, h)
+    march_observed(pieces, arrays, grid, tangent, program, plan, sink, room)
     check_domain(instance, states, float(met[0]), observed.driven_by)
 
 

@@ -1,34 +1,43 @@
-"""The referee: SciPy's stiff solver on the rates of the five states, restarted at every event.
+"""The five states in continuous time: natural modes, and SciPy's stiff solver as the referee.
 
-It shares the rates with the march of `swashplate.models.full_order`, and nothing of its scheme. A
-limit that holds is -1 or 1, one that does not is 0: the spool at its stroke, the relief valve open,
-the swash plate at a stop. Stops are inelastic.
+The referee restarts at every event. It shares the rates with the march of
+`swashplate.models.full_order`, and nothing of its scheme. A limit that holds is -1 or 1, one that
+does not is 0: the spool at its stroke, the relief valve open, the swash plate at a stop. Stops are
+inelastic.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel
+from swashplate.equations.code import generating
+from swashplate.equations.derivatives import derive
 from swashplate.equations.equation import inlined
+from swashplate.equations.marching.run import module
 from swashplate.errors import DomainError
-from swashplate.full_order.modes import N_STATES, state_matrix
 from swashplate.models.full_order import (
     Motion,
     Plant,
     PlantConstants,
     PlantOptions,
+    Rates,
     free_rates,
 )
+from swashplate.models.machine import Machine
 from swashplate.models.pump import solenoid_force
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 Holds = tuple[int, int, int]
 """Spool, relief valve, swash plate."""
 
+N_STATES = len(Motion._fields)
 LOOKS = 4
 """Points a sample at which a step is searched for an event."""
 SHORT = -1e-12
@@ -50,15 +59,93 @@ SHORTEST = 16
 """Samples below which a smooth stretch is not worth a restart of the solver."""
 
 
+@generating
+def slopes_of(options: PlantOptions) -> Callable[..., None]:
+    """The compiled derivatives of the rates by the five states, as rows of a matrix."""
+    made = derive(free_rates, by="state", options={"options": options})
+    text = "\n\n".join(f"@inlined\n{each}" for each in made.texts.values())
+    lines = [
+        f"matrix[{(1, 2, 4)[row]}, {column}] = found[{len(made.outputs) + place}]"
+        for place, (row, column) in enumerate(made.entries)
+    ]
+    text += "\n\n@kernel\ndef slopes(state, force, p, options, matrix):\n"
+    text += f"    found = {made.name}(state, force, p, options)\n    "
+    text += "\n    ".join(lines) + "\n"
+    return module("full_order_slopes", text, made.names)["slopes"]  # type: ignore[no-any-return]
+
+
+def state_matrix(state: Array, force: float, p: Machine, options: PlantOptions) -> Array:
+    """(5, 5) derivatives of the rates of the five states by themselves, no limit holding."""
+    matrix = np.zeros((N_STATES, N_STATES))
+    slopes_of(options)(Motion(*state), force, p, options, matrix)
+    matrix[0, 1] = matrix[3, 4] = 1.0
+    return matrix
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Eigenvalues of the linearised model, told apart by the states that take part in them."""
+
+    eigenvalues: Complex
+    """All five. [rad/s]"""
+    slow: complex
+    """The pole that the reduced model keeps, -1/τ. [rad/s]"""
+    spool: complex
+    """Spool on the feedback spring, the upper of a pair. [rad/s]"""
+    swash: complex
+    """Swash plate on its return spring and the oil trapped behind the closed valve. [rad/s]"""
+    swash_at_held_pressure: complex
+    """Swash plate on its return spring alone, the source's reckoning. [rad/s]"""
+
+    @staticmethod
+    def frequency_hz(mode: complex) -> float:
+        """Undamped natural frequency. [Hz]"""
+        return abs(mode) / (2.0 * np.pi)
+
+    @staticmethod
+    def damping_ratio(mode: complex) -> float:
+        """Damping ratio. [1]"""
+        return -mode.real / abs(mode)
+
+
+def modes_of(matrix: Array) -> Modes:
+    """Modes of a state matrix.
+
+    The slow pole is the eigenvalue nearest zero. The spool's mode is the one in which position and
+    velocity of the spool take the largest part, by the product of left and right eigenvectors.
+    """
+    values, right = np.linalg.eig(matrix)
+    left = np.linalg.inv(right)
+    parts = np.abs(left.T * right)  # (state, mode), free of the states' units
+    slow = int(np.argmin(np.abs(values)))
+    others = [k for k in range(N_STATES) if k != slow]
+    by_spool = sorted(others, key=lambda k: -float(parts[:2, k].sum() / parts[:, k].sum()))
+    held = np.linalg.eigvals(matrix[3:, 3:])
+    return Modes(
+        values.astype(np.complex128),
+        complex(values[slow]),
+        _upper(values[by_spool[:2]]),
+        _upper(values[by_spool[2:]]),
+        _upper(held),
+    )
+
+
+def _upper(pair: NDArray[np.number]) -> complex:
+    """The eigenvalue of a pair with positive imaginary part, or the slower of two real ones."""
+    if np.iscomplexobj(pair) and np.any(np.imag(pair) > 0.0):
+        return complex(pair[int(np.argmax(np.imag(pair)))])
+    return complex(pair[int(np.argmin(np.abs(pair)))])
+
+
+# --- the referee ----------------------------------------------------------------------------------
+
+
 class Feed(NamedTuple):
     """The current over time."""
 
-    current: Array
-    """At the samples. [A]"""
-    held: bool
-    """Whether it keeps its value between them, in place of a straight line."""
-    step: float
-    """Distance of the samples. [s]"""
+    current: Array  # At the samples. [A]
+    held: bool  # Whether it keeps its value between them, in place of a straight line.
+    step: float  # Distance of the samples. [s]
 
 
 class Case(NamedTuple):
@@ -67,9 +154,6 @@ class Case(NamedTuple):
     p: Plant
     k: PlantConstants
     options: PlantOptions
-
-
-# --- compiled ------------------------------------------------------------------------------------
 
 
 @kernel
@@ -83,12 +167,18 @@ def force_at(time: float, feed: Feed, p: Plant) -> float:
     return solenoid_force(current[n] + rise * (after - current[n]), p.solenoids)
 
 
+@inlined
+def free_of(state: Array, force: float, case: Case) -> Rates:
+    """Rates where no limit holds."""
+    motion = Motion(state[0], state[1], state[2], state[3], state[4])
+    return free_rates(motion, force, case.p.machine, case.options)
+
+
 @kernel
 def rates_at(time: float, state: Array, feed: Feed, case: Case, holds: Holds) -> Array:
     """Rates of the five states; one that a limit holds has none."""
     force = force_at(time, feed, case.p)
-    motion = Motion(state[0], state[1], state[2], state[3], state[4])
-    v_rate, p_rate, r_rate = free_rates(motion, force, case.p.machine, case.options)
+    v_rate, p_rate, r_rate = free_of(state, force, case)
     rates = np.empty(5)
     rates[0] = state[1]
     rates[1] = 0.0 if holds[0] != 0 else v_rate
@@ -118,8 +208,7 @@ def margin_at(time: float, state: Array, feed: Feed, case: Case, holds: Holds) -
     if spool == 0 and relief == 0 and plate == 0:
         return least
     force = force_at(time, feed, case.p)
-    motion = Motion(state[0], state[1], state[2], state[3], state[4])
-    v_rate, p_rate, r_rate = free_rates(motion, force, m, case.options)
+    v_rate, p_rate, r_rate = free_of(state, force, case)
     if spool != 0:
         least = min(least, spool * v_rate)
     if relief != 0:
@@ -168,8 +257,7 @@ def settle(time: float, state: Array, feed: Feed, case: Case) -> Holds:
         relief = -1
         state[2] = k.lower
     force = force_at(time, feed, case.p)
-    motion = Motion(state[0], state[1], state[2], state[3], state[4])
-    v_rate, p_rate, r_rate = free_rates(motion, force, m, case.options)
+    v_rate, p_rate, r_rate = free_of(state, force, case)
     spool = spool if spool * v_rate >= 0.0 else 0
     relief = relief if relief * p_rate >= 0.0 else 0
     if plate != 0 and plate * r_rate < -grip_of(case.p):
@@ -186,35 +274,17 @@ def force_along(feed: Feed, p: Plant) -> Array:
     return force
 
 
-# --- the solver's steps --------------------------------------------------------------------------
-
-
 def solve(feed: Feed, case: Case, start: Motion, tolerance: float) -> Array:
-    """Integrate the five states over a signed current.
+    """The (n, 5) states at the samples of a signed current, by Radau's method.
 
-    Parameters
-    ----------
-    feed, case :
-        Current and machine.
-    start : Motion
-        At the first sample.
-    tolerance : float
-        Relative tolerance; the absolute ones are `TOLERANCES`, in proportion to it, given for 1e-6.
-
-    Returns
-    -------
-    (n, 5) array
-        The states at the samples.
+    The relative tolerance is given; the absolute ones are `TOLERANCES`, in proportion to it, for
+    1e-6. BDF beyond second order is unstable along the imaginary axis, where the plate on its
+    trapped oil swings, and took 25 times as long.
 
     Raises
     ------
     DomainError
         If the solver gives up or a limit chatters, with the time.
-
-    Notes
-    -----
-    It is Radau. BDF beyond second order is unstable along the imaginary axis, where the plate on
-    its trapped oil swings, and took 25 times as long.
     """
     time = feed.step * np.arange(feed.current.size, dtype=np.float64)
     states, state = np.empty((time.size, N_STATES)), np.array(start)
@@ -288,19 +358,10 @@ def _solver(
 
 
 def stretches(force: Array, feed: Feed) -> list[tuple[int, float]]:
-    """Divide a record into stretches with a smooth force and stretches without.
+    """Last sample and longest step [s] of stretches with a smooth force and stretches without.
 
-    A solver that steps over a short pulse of the force never sees it, however small its tolerance.
-
-    Parameters
-    ----------
-    force : (n,) array
-        Net solenoid force at the samples, n at least 2. [N]
-
-    Returns
-    -------
-    list of (int, float)
-        Last sample and longest step [s] of each, in order; the last one ends at the last sample.
+    Of the net solenoid force at the samples, two or more. [N] A solver that steps over a short
+    pulse of the force never sees it, however small its tolerance.
     """
     kinks = np.diff(force) if feed.held else np.diff(force, 2)
     rough = np.zeros(force.size - 1, dtype=bool)  # intervals between samples

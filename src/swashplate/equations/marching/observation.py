@@ -9,9 +9,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.record import Record
-from swashplate.equations.rows import Plan
-from swashplate.equations.run import Start, check_start
+from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.rows import Plan
+from swashplate.equations.marching.run import Start, check_start
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]

@@ -22,9 +22,9 @@ from numba import config, types
 from numba.extending import intrinsic
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.expressions import Node
-from swashplate.equations.program import Choice, Invoke, Item, Let, leaves
-from swashplate.equations.scalars import Code, text
+from swashplate.equations.code import Call, Choice, Code, Item, Let, Rule
+from swashplate.equations.expressions import Node, text
+from swashplate.equations.writing import lines_of
 
 
 def _choose(test: bool, one: Any, two: Any) -> Any:
@@ -66,11 +66,9 @@ def is_flat(item: Item) -> bool:
     return isinstance(item, Let) and is_vector(item.node)
 
 
-def made_by(item: Choice | Invoke) -> tuple[str, ...]:
+def made_by(item: Choice | Call) -> tuple[str, ...]:
     """Names that an item gives their values."""
-    if isinstance(item, Choice):
-        return tuple(name for name, _, _ in item.merged)
-    return tuple(node.value for _, node in leaves(item.result))
+    return tuple(name for name, _, _ in item.merged) if isinstance(item, Choice) else item.results
 
 
 class Statement(NamedTuple):
@@ -117,11 +115,14 @@ class Straight:
                 for name, one, two in item.merged:
                     self.let(name, ex.make("if", item.test, one, two))
             else:
+                assert not isinstance(item, Rule)
                 names = made_by(item)
-                alone = Code()
+                alone = Code(code.taken)
                 alone.items = [item]
-                reads = frozenset(alone.reads(map(ex.name, names)))
-                self._append(Statement(names, code.written([item]), reads, False))
+                made = [*map(ex.name, names)]
+                reads = frozenset(alone.reads(made))
+                self._append(Statement(names, lines_of(alone, made), reads, False))
+                code.names |= alone.names
 
     def let(self, name: str, node: Node) -> None:
         """Append a name and what it stands for."""

@@ -9,37 +9,34 @@ each other (`recur` kernels: strongly connected components), each behind those t
 
 from __future__ import annotations
 
-import ast
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import TopologicalSorter
 from typing import Any, NamedTuple
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.derivatives import derive
-from swashplate.equations.derived import Derived
-from swashplate.equations.equation import equation_of_text
-from swashplate.equations.expressions import Node
-from swashplate.equations.lowering import generating
-from swashplate.equations.march import (
+from swashplate.equations.adjoints import Derivatives, Derived, derived_function
+from swashplate.equations.code import Code, Let, generating, leaves
+from swashplate.equations.expressions import Node, text
+from swashplate.equations.marching.march import (
     PartCode,
     Sampler,
     Start,
     Stored,
     function_source,
     indented,
-    march_piece_source,
+    march_source,
     output_of,
     rest_of,
     settled_of,
 )
+from swashplate.equations.marching.pieces import PIECE, Planned, piece
+from swashplate.equations.marching.rows import STRIDE
+from swashplate.equations.marching.run import module
 from swashplate.equations.model import Model, Source, arguments_of
-from swashplate.equations.pieces import PIECE, Planned, piece
-from swashplate.equations.program import leaves
-from swashplate.equations.rows import STRIDE
-from swashplate.equations.run import module
-from swashplate.equations.scalars import Code, text
+from swashplate.equations.reading import read
+from swashplate.equations.writing import Writer, lines_of
 from swashplate.errors import InputError
 
 WORD = re.compile(r"\b[A-Za-z_]\w*")
@@ -98,7 +95,7 @@ class PartGraph:
     """Piece that computes signals which the march does not leave, -1 for none."""
     aliases: dict[str, str] = field(default_factory=dict)
     """Signals that are a state behind the sample, as far as derivatives go."""
-    constants: list[tuple[str, str]] = field(default_factory=list)
+    constants: set[tuple[str, str]] = field(default_factory=set)
     """Constant and parameter that it depends on."""
     delays: dict[int, str] = field(default_factory=dict)
     """Path of the delay of each tap."""
@@ -106,41 +103,24 @@ class PartGraph:
     """State and parameter that it depends on at the start."""
 
 
-Slopes = dict[str, dict[By, float]]
-"""Derivatives of results by what they depend on."""
+class Starting(NamedTuple):
+    """What is known of a part at the start, with its derivatives, as a function of scalars.
 
+    Results are the constants that a sample reads (``k``), the states (``state``), and the signals
+    that other parts need (``signal``).
+    """
 
-@dataclass(eq=False)
-class Local:
-    """A scalar function with its derivatives, for one evaluation in plain Python."""
-
-    results: tuple[str, ...]
+    results: tuple[tuple[str, str], ...]
+    """Kind and name of each."""
     arguments: tuple[str, ...]
-    by: Mapping[str, By]
+    by: tuple[By, ...]
+    """What each input of `derived` is: a parameter, or a signal of a part before."""
     derived: Derived
 
-    def at(
-        self, values: Mapping[str, float]
-    ) -> tuple[dict[str, float], dict[str, dict[By, float]]]:
-        """Results, and their derivatives, for values of the arguments."""
-        found = self.derived.python(*(values[name] for name in self.arguments))
-        slopes: Slopes = {name: {} for name in self.results}
-        partials = found[len(self.results) :]
-        for (out, inp), partial in zip(self.derived.entries, partials, strict=True):
-            slopes[self.results[out]][self.by[self.derived.inputs[inp]]] = partial
-        return dict(zip(self.results, found, strict=False)), slopes
-
-
-class Locals(NamedTuple):
-    """What is differentiated once at the start, of a part."""
-
-    names: Mapping[str, By]
-    """What a name in the part's code stands for."""
-    constants: Local | None
-    rest: Local | None
-    settled: Local | None
-    sources: Local | None
-    """Signals that others need, by state, parameters and constants."""
+    def entries(self) -> Iterator[tuple[tuple[str, str], By]]:
+        """Results, each with what it is differentiated by."""
+        for out, inp in self.derived.entries:
+            yield self.results[out], self.by[inp]
 
 
 @dataclass(eq=False)
@@ -160,7 +140,8 @@ class Graph:
     """Row of each signal that the march does not leave, by part and path."""
     sources: list[Source]
     """Signals that other parts or observed links need."""
-    locals: list[Locals]
+    starts: list[dict[str, Starting]]
+    """What is known of each part where it starts at rest and, if it can, settled."""
     codes: list[PartCode]
     """The parts' code."""
     signals: tuple[str, ...]
@@ -210,20 +191,24 @@ class _Builder:
         """Row of each number by its name in the code."""
         self.rows = 0
         self.graphs: list[PartGraph] = []
+        self.starts: list[dict[str, Starting]] = []
+        self.found: list[tuple[Derivatives, dict[tuple[str, By], Node]]] = []
+        """What was differentiated of each part, and its partial derivatives."""
         self.values: dict[tuple[int, str], int] = {}
 
     def build(self) -> Graph:
-        flows = [self._flows(part) for part in self.parts]
+        for part in self.parts:
+            self._begin(part)
         # part by part, so that the pieces of the first ones are the same whatever follows
-        for graph, part, partials in zip(self.graphs, self.parts, flows, strict=True):
+        for graph, part in zip(self.graphs, self.parts, strict=True):
             self._keep(graph, part)
             self._values(graph, part)
-            self._part(graph, part, partials)
+            self._part(graph, part)
         for place, _ in self.observed:
             if place.kind == "link":
                 self._row_for(place)
         rows = {each: _place(row, "n - first") for each, row in self.stored.items()}
-        text, names = march_piece_source(self.model, self.signals, self.options, rows)
+        text, names = march_source(self.model, self.signals, self.options, rows)
         march = self._planned("march", text, names)
         return Graph(
             self.graphs,
@@ -233,7 +218,7 @@ class _Builder:
             self.observed,
             self.values,
             list(self.sampler.sources),
-            [self._locals(part) for part in self.parts],
+            self.starts,
             self.parts,
             self.signals,
             (march, *self.pieces),
@@ -302,18 +287,6 @@ class _Builder:
             found[part.source(source)] = By("signal", source.signal, source.part)
         return found
 
-    def _derived(self, part: PartCode, name: str, results: Mapping[str, Node]) -> Derived | None:
-        """Some results of a part with their derivatives, as a function of the scalars it reads."""
-        nodes = list(results.values())
-        known = self._by(part)
-        read = part.code.reads(nodes)
-        arguments = sorted(each for each in read if each in known or self._plain(part, each))
-        active = [each for each in arguments if each in known]
-        if not active:
-            return None
-        function = scalar_function(name, arguments, part.code.lines(nodes), nodes, part.code.names)
-        return derive(function, tuple(active))
-
     def _plain(self, part: PartCode, name: str) -> bool:
         """Whether a name comes from outside, without being differentiated by."""
         samples = {each for tap in part.taps for each in part.tap_samples(tap)}
@@ -347,33 +320,22 @@ class _Builder:
 
     # -- what flows ----------------------------------------------------------------------------
 
-    def _flows(self, part: PartCode) -> dict[str, dict[By, str]]:
-        """Partial derivatives of a part's states, as texts; its aliases are found on the way."""
+    def _begin(self, part: PartCode) -> None:
+        """Differentiate what is needed of a part, and find its aliases."""
         graph = PartGraph(part.part)
         self.graphs.append(graph)
         graph.delays = {tap.number: tap.tap.delay for tap in part.taps if tap.tap.delay}
-        results = self._results(part)
-        derived = self._derived(part, f"{part.own.name}_advance", results)
-        if derived is None:
-            return {}
-        partials = self._partials(part, results, derived)
+        results, known = self._results(part), self._by(part)
+        nodes, order = [*results.values()], [*results]
+        active = sorted(part.code.reads(nodes) & known.keys())
+        found = Derivatives(part.code, nodes, active)
+        keys = [(order[out], known[active[inp]]) for out, inp in found.entries]
+        self.found.append((found, dict(zip(keys, found.partials, strict=True))))
         states = [each for each in results if each.startswith("state.")]
         for signal in [each for each in results if each.startswith("signals.")]:
             for state in states:
                 if results[signal] is results[state]:
                     graph.aliases[signal.removeprefix("signals.")] = state.removeprefix("state.")
-        return {each: partials[each] for each in states if partials[each]}
-
-    def _partials(
-        self, part: PartCode, results: Mapping[str, Node], derived: Derived
-    ) -> dict[str, dict[By, str]]:
-        known, texts = self._by(part), returned(derived)
-        order = list(results)
-        found: dict[str, dict[By, str]] = {each: {} for each in order}
-        for k, (out, inp) in enumerate(derived.entries):
-            said = " | ".join(each[len(derived.outputs) + k] for each in texts)
-            found[order[out]][known[derived.inputs[inp]]] = said
-        return found
 
     def _keep(self, graph: PartGraph, part: PartCode) -> None:
         """Numbers of a part that the march leaves: states, inputs as they come, known signals."""
@@ -417,7 +379,7 @@ class _Builder:
             return
         nodes = [part.signal(signal) for signal in late]
         ahead, rows = self._arguments(part, part.code.reads(nodes))
-        inner = [*rows, *part.code.lines(nodes)]
+        inner = [*rows, *lines_of(part.code, nodes)]
         for signal, node in zip(late, nodes, strict=True):
             self.values[part.part, signal] = self._new_row()
             inner.append(f"{_place(self.values[part.part, signal], 'm')} = {text(node)}")
@@ -428,27 +390,32 @@ class _Builder:
             {},
         )
 
-    def _part(
-        self, graph: PartGraph, part: PartCode, partials: Mapping[str, Mapping[By, str]]
-    ) -> None:
-        results, own = self._results(part), part.own.name
-        signals = {
-            each: node
-            for each, node in results.items()
+    def _part(self, graph: PartGraph, part: PartCode) -> None:
+        own = part.own.name
+        derivatives, partials = self.found[self.graphs.index(graph)]
+
+        def fill(name: str, outs: Iterable[str]) -> int:
+            wanted = {*outs}
+            some = {key: node for key, node in partials.items() if key[0] in wanted}
+            return self._fill(graph, part, name, derivatives, some)
+
+        signals = [
+            each
+            for each in self._results(part)
             if each.startswith("signals.") and each.removeprefix("signals.") not in graph.aliases
-        }
+        ]
         # derivatives are carried through sub-steps once, for states and signals
         together = part.code.repeats
         if signals and not together:
-            graph.signal_piece = self._fill(graph, part, f"{own}_signals", signals)
-        states = list(partials)
+            graph.signal_piece = fill(f"{own}_signals", signals)
+        states = list(dict.fromkeys(out for out, _ in partials if out.startswith("state.")))
         flows = {
-            out: {f"state.{by.path}" for by in each if by.kind == "state"} & {*states}
-            for out, each in partials.items()
+            out: {f"state.{by.path}" for each, by in partials if each == out and by.kind == "state"}
+            & {*states}
+            for out in states
         }
         if together:
-            every = {each: results[each] for each in states}
-            filled = self._fill(graph, part, own, every | signals)
+            filled = fill(own, [*states, *signals])
         at_sample = {
             by.path
             for out, by in graph.entries
@@ -459,7 +426,7 @@ class _Builder:
         for c, outs in enumerate([states] if together else _weakly_connected(states, flows)):
             name = f"{own}_{c}" if len(outs) < len(states) else own
             if not together:
-                filled = self._fill(graph, part, name, {each: results[each] for each in outs})
+                filled = fill(name, outs)
             groups = []
             for members in _strongly_connected(outs, flows):
                 bare = tuple(each.removeprefix("state.") for each in members)
@@ -477,74 +444,42 @@ class _Builder:
                 )
                 groups.append(Group(bare, after, stored))
             graph.components.append(Component(filled, groups, together))
-        constants = self._constants(part)
-        if constants is not None:
-            graph.constants = [
-                (constants.results[out], constants.by[constants.derived.inputs[inp]].path)
-                for out, inp in constants.derived.entries
-            ]
-        for local in (self._start(part, rest_of(part)), self._settled(part)):
-            if local is not None:
-                graph.started |= {
-                    (local.results[out], local.by[local.derived.inputs[inp]].path)
-                    for out, inp in local.derived.entries
-                    if local.by[local.derived.inputs[inp]].kind == "p"
-                }
+        starts = {"rest": self._starting(part, rest_of(part))}
+        settled = settled_of(part)
+        if settled is not None:
+            starts["steady"] = self._starting(part, settled)
+        self.starts.append(starts)
+        for each in starts.values():
+            for (kind, name), by in each.entries():
+                if kind == "k":
+                    graph.constants.add((name, by.path))
+                elif kind == "state" and by.kind == "p":
+                    graph.started.add((name, by.path))
 
-    def _local(
-        self, part: PartCode, name: str, code: Code, results: Mapping[str, Node]
-    ) -> Local | None:
-        """Some results with their derivatives, None where they depend on nothing."""
-        nodes, known = list(results.values()), self._by(part)
-        if code is part.prologue:  # what it makes is not what it takes
-            known = {each: by for each, by in known.items() if by.kind == "p"}
-        read = code.reads(nodes)
-        arguments = sorted(each for each in read if each in known or self._plain(part, each))
-        active = tuple(each for each in arguments if each in known)
-        if not nodes or not active:
-            return None
-        function = scalar_function(name, arguments, code.lines(nodes), nodes, code.names)
-        by = {each: known[each] for each in active}
-        return Local(tuple(results), tuple(arguments), by, derive(function, active))
-
-    def _constants(self, part: PartCode) -> Local | None:
-        results = {name: ex.name(name) for name in self._constant_names(part)}
-        return self._local(part, f"{part.own.name}_constants", part.prologue, results)
-
-    def _constant_names(self, part: PartCode) -> list[str]:
-        """Constants that the part's sample or its start reads."""
-        names = dict.fromkeys(self.sampler.constants(part))
-        if "k" in part.known:
-            every = {each for _, node in leaves(part.known["k"]) for each in node.reads}
-            own = {*part.parameters}
-            for start in (rest_of(part), settled_of(part)):
-                if start is not None:
-                    nodes = [node for _, node in leaves(start.value)]
-                    read = start.code.reads(nodes)
-                    names |= dict.fromkeys(sorted((every & read) - own))
-        return list(names)
-
-    def _start(self, part: PartCode, start: Start | None) -> Local | None:
-        if start is None:
-            return None
-        found = dict(leaves(start.value))
-        results = {path: found[path] for path in self._states(part)}
-        return self._local(part, f"{part.own.name}_start", start.code, results)
-
-    def _settled(self, part: PartCode) -> Local | None:
-        return self._start(part, settled_of(part))
-
-    def _locals(self, part: PartCode) -> Locals:
-        sources = {
-            s.signal: part.signal(s.signal) for s in self.sampler.sources if s.part == part.part
+    def _starting(self, part: PartCode, start: Start) -> Starting:
+        """Constants, states and signals of a part at the start, with their derivatives."""
+        begins, states = dict(leaves(start.value)), dict(leaves(part.state))
+        code = Code(part.code.taken, ruled=True)
+        code.items = [*part.prologue.items, *start.code.items]
+        code.items += [Let(states[path].value, node) for path, node in begins.items()]
+        code.items += part.code.items
+        results = {("k", name): ex.name(name) for name in self.sampler.constants(part)}
+        results |= {("state", path): begins[path] for path in self._states(part)}
+        results |= {
+            ("signal", s.signal): part.signal(s.signal)
+            for s in self.sampler.sources
+            if s.part == part.part
         }
-        return Locals(
-            self._by(part),
-            self._constants(part),
-            self._start(part, rest_of(part)),
-            self._settled(part),
-            self._local(part, f"{part.own.name}_sources", part.code, sources),
-        )
+        known = {name: by for name, by in self._by(part).items() if by.kind in ("p", "signal")}
+        read = code.reads(results.values())
+        arguments = sorted(each for each in read if each in known or self._plain(part, each))
+        active = [each for each in arguments if each in known]
+        named = [(f"{kind} {name}", node) for (kind, name), node in results.items()]
+        name = f"{part.own.name}_start"
+        says = f"Constants, states and signals of {part.own.name} at the start."
+        by = [(each, each) for each in active]
+        derived = derived_function(name, says, arguments, code, named, by, chained=True)
+        return Starting((*results,), (*arguments,), tuple(known[a] for a in active), derived)
 
     def _links(self) -> dict[str, dict[str, float]]:
         """Partial derivatives of observed links: numbers, or refused."""
@@ -554,126 +489,67 @@ class _Builder:
                 continue
             link = self.model.links[place.path]
             assert link.equation is not None
-            derived = derive(link.equation, arguments_of(link.equation))
-            numbers = literals(derived)
-            if len(numbers) < len(derived.entries):
+            arguments = arguments_of(link.equation)
+            code = Code(arguments, ruled=True)
+            made = read(code, link.equation, {each: ex.name(each) for each in arguments})
+            assert isinstance(made, Node)
+            derived = Derivatives(code, [made], arguments)
+            if any(each.op != "number" for each in derived.partials):
                 raise InputError(
                     f"Model {self.model.name}: the link {link.name} must be a sum of signals with "
                     "constant factors; put anything else into a part's sample."
                 )
             found[link.name] = {
-                derived.inputs[inp]: numbers[k] for k, (_, inp) in enumerate(derived.entries)
+                arguments[inp]: float(each.value)
+                for (_, inp), each in zip(derived.entries, derived.partials, strict=True)
             }
         return found
 
     # -- pieces --------------------------------------------------------------------------------
 
     def _fill(
-        self, graph: PartGraph, part: PartCode, name: str, results: Mapping[str, Node]
+        self,
+        graph: PartGraph,
+        part: PartCode,
+        name: str,
+        derivatives: Derivatives,
+        partials: Mapping[tuple[str, By], Node],
     ) -> int:
         """Piece that writes partial derivatives at known states into rows of the block."""
-        derived = self._derived(part, f"{name}_part", results)
-        if derived is None:
+        rows = {}
+        for key, partial in partials.items():
+            if partial.op == "number":
+                graph.entries[key] = Entry(-1, float(partial.value))
+            else:
+                rows[key] = self._new_row()
+                graph.entries[key] = Entry(rows[key])
+        if not rows:
             return -1
-        known, order, literal = self._by(part), list(results), literals(derived)
-        arguments, body, returns = straight(derived)
-        stores = []
-        for k, (out, inp) in enumerate(derived.entries):
-            key = (order[out], known[derived.inputs[inp]])
-            if k in literal:
-                graph.entries[key] = Entry(-1, literal[k])
-                continue
-            row = self._new_row()
-            graph.entries[key] = Entry(row)
-            stores.append(f"{_place(row, 'm')} = {returns[len(derived.outputs) + k]}")
-        if not stores:
-            return -1
-        ahead, rows = self._arguments(part, arguments)
-        called = {each.name: each.compiled for each in derived.callees}
+        taken, wanted = {*part.code.taken}, [partials[key] for key in rows]
+        writer = Writer(taken, derivatives.items, wanted, derivatives.hints)
+        ahead, loads = self._arguments(part, writer.needed)
+        # what only one side of a choice makes would carry its value from one sample to the next, as
+        # far as a compiler can know, and the loop would not become vector instructions
+        begun = [f"{name} = {value}" for name, value in writer.inner.items()]
+        stores = [
+            f"{_place(row, 'm')} = {made}"
+            for row, made in zip(rows.values(), writer.texts, strict=True)
+        ]
         return self._piece(
             f"fill_{name}",
             "Partial derivatives at known states.",
-            [*ahead, "for m in range(count):", *indented([*rows, *body, *stores])],
-            {**called, **derived.names},
+            [
+                *ahead,
+                "for m in range(count):",
+                *indented([*loads, *begun, *writer.lines, *stores]),
+            ],
+            writer.functions,
         )
 
 
 def _place(row: int, at: str) -> str:
     """Text of a number in a row of the block."""
     return f"flat[{row * STRIDE} + {at}]"
-
-
-def scalar_function(
-    name: str,
-    arguments: Sequence[str],
-    lines: Sequence[str],
-    results: Sequence[Node],
-    names: Mapping[str, Any],
-) -> Any:
-    """An equation of scalars from straight code."""
-    returned_type = ", ".join("float" for _ in results)
-    returned_type = f"tuple[{returned_type}]" if len(results) != 1 else "float"
-    made = ", ".join(text(node) for node in results)
-    body = [*lines, f"return {made}" if len(results) == 1 else f"return ({made},)"]
-    head = f"def {name}({', '.join(f'{each}: float' for each in arguments)}) -> {returned_type}:"
-    return equation_of_text("\n".join([head, *indented(body), ""]), name, dict(names))
-
-
-def straight(derived: Derived) -> tuple[list[str], list[str], list[str]]:
-    """Names of a derived function's arguments, lines of its body, and texts of what it returns."""
-    tree = ast.parse(derived.source).body[0]
-    assert isinstance(tree, ast.FunctionDef)
-    *body, last = tree.body[1:]
-    assert isinstance(last, ast.Return)
-    assert not any(isinstance(each, ast.Return) for node in body for each in ast.walk(node))
-    lines = [*begun(body), *(line for node in body for line in ast.unparse(node).splitlines())]
-    value = last.value
-    elements = value.elts if isinstance(value, ast.Tuple) else [value]
-    return [each.arg for each in tree.args.args], lines, [ast.unparse(e) for e in elements if e]
-
-
-def begun(body: Sequence[ast.stmt]) -> list[str]:
-    """Lines that give a number to names which only one branch of an `if` makes.
-
-    In a loop such a name would carry its value from one sample to the next, as far as a compiler
-    can know, and the loop would not become vector instructions.
-    """
-    first: dict[str, str] = {}
-    for node in body:
-        if not isinstance(node, ast.If):
-            continue
-        for each in ast.walk(node):
-            if isinstance(each, ast.Assign) and isinstance(each.targets[0], ast.Name):
-                truth = isinstance(each.value, ast.Compare | ast.BoolOp)
-                first.setdefault(each.targets[0].id, "False" if truth else "0.0")
-            elif isinstance(each, ast.Assign) and isinstance(each.targets[0], ast.Tuple):
-                names = [e.id for e in each.targets[0].elts if isinstance(e, ast.Name)]
-                first |= {name: "0.0" for name in names if name not in first}
-    return [f"{name} = {value}" for name, value in first.items()]
-
-
-def literals(derived: Derived) -> dict[int, float]:
-    """Partial derivatives that are the same number wherever the function returns."""
-    found, texts = {}, returned(derived)
-    for k in range(len(derived.entries)):
-        values = {each[len(derived.outputs) + k] for each in texts}
-        if len(values) == 1:
-            try:
-                found[k] = float(ast.literal_eval(values.pop()))
-            except (ValueError, SyntaxError):
-                continue
-    return found
-
-
-def returned(derived: Derived) -> list[list[str]]:
-    """Texts of what a generated function returns, for each of its returns."""
-    found = []
-    for node in ast.walk(ast.parse(derived.source)):
-        if isinstance(node, ast.Return) and node.value is not None:
-            value = node.value
-            elements = value.elts if isinstance(value, ast.Tuple) else [value]
-            found.append([ast.unparse(each) for each in elements])
-    return found
 
 
 def _weakly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> list[list[str]]:
