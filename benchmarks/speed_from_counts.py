@@ -193,7 +193,7 @@ def time_table() -> list[str]:
     import timing
 
     def hour() -> None:
-        speed_from_counts(long_time, unwrap_counts(readings, bits=16).counts, counts_per_turn=TURN)
+        speed_from_counts(long_time, unwrap_counts(readings, 2**16).counts, counts_per_turn=TURN)
 
     long_time = np.arange(3600 * RATE + 1) * PERIOD
     readings = np.floor(20000.0 * np.sin(0.1 * long_time)) % 2**16

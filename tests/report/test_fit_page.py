@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swashplate import Campaign, Drive, FileError, InputError, maneuvers
-from swashplate.campaign import rig
+from swashplate import Campaign, Channel, Drive, FileError, InputError, maneuvers
+from swashplate.campaign import Source, rig
 from swashplate.identification.assessment import Measures, assess, run_qualities
 from swashplate.identification.cross_validation import CrossValidation, Fold, FoldEstimate, HeldRun
 from swashplate.identification.fitting import Fit, fit
@@ -33,7 +33,7 @@ from swashplate.report.fit_page import (
 from swashplate.report.fit_page.files import plot_overlay
 from swashplate.report.fit_page.numbers import percent, plain, spread, unit_text
 from swashplate.report.fit_page.page import StageProfile
-from swashplate.report.fit_page.runs import Shown, ignored_words, shown_runs
+from swashplate.report.fit_page.runs import Shown, ignored_words, off_scale, shown_runs
 from swashplate.report.fit_page.truth import in_the_fits_scales
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
@@ -281,6 +281,17 @@ def test_every_sample_is_in_the_file(read: Page, fitted: Fit) -> None:
     time = np.frombuffer(b64decode(clock["data"]), "<f4")
     assert time.size == kept.size
     assert (np.diff(time) >= 0.0).all()
+
+
+def test_ignored_spikes_leave_the_scale_to_what_counts() -> None:
+    values, weight = np.linspace(0.0, 1.0, 50), np.ones(50)
+    values[[10, 20]], weight[[10, 30]] = 99.0, 0.0
+    source = Source(Path("log.csv"), "x")
+    channel = Channel("speed", "shaft_speed", "rad/s", np.arange(50.0), values, weight, source)
+    # the other spike counts, so that its size is the scale
+    assert not off_scale(channel, values).any()
+    values[20] = 0.4
+    assert np.flatnonzero(off_scale(channel, values)).tolist() == [10]
 
 
 def test_the_page_needs_no_network(read: Page) -> None:

@@ -6,18 +6,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swashplate.campaign.stamps import Array, Rows, increasing, signal
+from swashplate.campaign.stamps import GAP, Array, Rows, increasing, signal
 from swashplate.errors import InputError
 from swashplate.maneuvers.checks import positive, row, whole
 
-WIDEST = 53
-"""Widest counter that a float64 holds to the count. [bit]"""
+WIDEST = 2**53
+"""Most readings of a counter that a float64 holds to the count."""
+DOUBTFUL = 0.25
+"""A step larger than this share of a counter may have been another one. [1]"""
 SUSTAINED = 5
 """A speed lasts if the median of this many neighbouring intervals has it."""
 MARGIN = 1.5
 """A jump is this much faster than anything that lasts."""
-GAP = 1.5
-"""An interval of more than this many usual ones is a gap."""
 FEWEST = 32
 """Readings that a counter shows at least; fewer may be those of a switch."""
 ORDINARY = 0.998
@@ -30,7 +30,7 @@ class CounterRangeError(InputError):
     """A reading outside its counter; `said` leaves out what would be right."""
 
     def __init__(self, said: str) -> None:
-        super().__init__(f"{said}; give the right bits or modulus.")
+        super().__init__(f"{said}; give the right modulus.")
         self.said = said
 
 
@@ -39,40 +39,19 @@ class Unwrapped(NamedTuple):
 
     counts: Array
     """Position from the first row's reading on. [count]"""
-    rollovers: Rows
-    """Rows at which the counter passed its end, either way."""
     doubtful: Rows
     """Rows whose step is so large that a roll-over more or less may be what happened."""
 
 
-class LostCounts(NamedTuple):
-    """Jumps that no motion explains."""
-
-    rows: Rows
-    """Rows that the jumps lead to."""
-    steps: Array
-    """Change of the count at each of them. [count]"""
-    max_speed: float
-    """The speed above which a change counts as a jump. [count/s]"""
-
-
-def unwrap_counts(
-    counts: ArrayLike,
-    *,
-    bits: int | None = None,
-    modulus: int | None = None,
-    doubtful_share: float = 0.25,
-) -> Unwrapped:
-    """Take the roll-overs out of a counter's readings: each step is the shortest way round.
+def unwrap_counts(counts: ArrayLike, modulus: int) -> Unwrapped:
+    """Counts without the roll-overs of a counter: each step is the shortest way round.
 
     Parameters
     ----------
     counts : array_like, shape (n,)
         Readings, whole numbers from 0 up or, of a signed counter, from -modulus/2 up. [count]
-    bits, modulus : int
-        Width of the counter, or how many readings it has: one of the two.
-    doubtful_share : float
-        Steps larger than this share of the modulus are reported as doubtful. [1]
+    modulus : int
+        How many readings the counter has: 65536 for 16 bits.
 
     Raises
     ------
@@ -80,9 +59,24 @@ def unwrap_counts(
         If a reading is no whole number or outside the counter, or a step is exactly half the
         modulus, so that neither way round is the shorter.
     """
-    readings = _whole_counts(counts)
-    size = _modulus(bits, modulus)
-    _check_range(readings, size)
+    readings = row("counts", counts)
+    broken = np.flatnonzero(np.floor(readings) != readings)
+    if broken.size:
+        raise InputError(
+            f"counts must be whole numbers, but row {broken[0]} (the first is 0) is "
+            f"{readings[broken[0]]}."
+        )
+    size = whole("modulus", modulus)
+    if not 2 <= size <= WIDEST:
+        raise InputError(f"A counter must have from 2 to 2^53 readings, not {size}.")
+    signed = readings.min() < 0.0
+    low, high = (-(size // 2), (size - 1) // 2) if signed else (0, size - 1)
+    outside = np.flatnonzero((readings < low) | (readings > high))
+    if outside.size:
+        raise CounterRangeError(
+            f"counts hold {readings[outside[0]]:.0f} in row {outside[0]} (the first is 0), outside "
+            f"the {low} to {high} of a {'signed ' if signed else ''}counter of {size} readings"
+        )
     steps = np.diff(readings)
     short = steps - size * np.floor(steps / size + 0.5)
     ambiguous = np.flatnonzero(short == -0.5 * size)
@@ -93,51 +87,8 @@ def unwrap_counts(
             f"is 0), half the range of a counter of {size}, which may be up or down; cut the "
             "record there."
         )
-    position = np.empty_like(readings)
-    position[0] = readings[0]
-    np.cumsum(short, out=position[1:])
-    position[1:] += readings[0]
-    return Unwrapped(
-        position,
-        np.flatnonzero(short != steps) + 1,
-        np.flatnonzero(np.abs(short) > positive("doubtful_share", doubtful_share) * size) + 1,
-    )
-
-
-def _whole_counts(counts: ArrayLike) -> Array:
-    readings = row("counts", counts)
-    broken = np.flatnonzero(np.floor(readings) != readings)
-    if broken.size:
-        raise InputError(
-            f"counts must be whole numbers, but row {broken[0]} (the first is 0) is "
-            f"{readings[broken[0]]}."
-        )
-    return readings
-
-
-def _modulus(bits: int | None, modulus: int | None) -> int:
-    if (bits is None) == (modulus is None):
-        raise InputError("Give either the bits of the counter or its modulus, one of the two.")
-    size = (
-        2 ** min(whole("bits", bits), WIDEST + 1) if bits is not None else whole("modulus", modulus)
-    )
-    if not 2 <= size <= 2**WIDEST:
-        raise InputError(
-            f"A counter must have from 1 to {WIDEST} bits, not "
-            f"{f'{bits} bits' if bits is not None else f'a modulus of {modulus}'}."
-        )
-    return size
-
-
-def _check_range(readings: Array, size: int) -> None:
-    signed = readings.min() < 0.0
-    low, high = (-(size // 2), (size - 1) // 2) if signed else (0, size - 1)
-    outside = np.flatnonzero((readings < low) | (readings > high))
-    if outside.size:
-        raise CounterRangeError(
-            f"counts hold {readings[outside[0]]:.0f} in row {outside[0]} (the first is 0), outside "
-            f"the {low} to {high} of a {'signed ' if signed else ''}counter of {size} readings"
-        )
+    position = readings[0] + np.concatenate([[0.0], np.cumsum(short)])
+    return Unwrapped(position, np.flatnonzero(np.abs(short) > DOUBTFUL * size) + 1)
 
 
 def ambiguous_gaps(time: Array, readings: Array, modulus: int) -> Rows:
@@ -235,47 +186,34 @@ def radians_per_count(counts_per_turn: float, gear_ratio: float = 1.0, sign: int
     return sign * 2.0 * np.pi / turn
 
 
-def find_lost_counts(
-    time: ArrayLike, counts: ArrayLike, *, max_speed: float | None = None
-) -> LostCounts:
-    """Find changes of the count that are faster than the shaft can turn.
+def find_lost_counts(time: ArrayLike, counts: ArrayLike) -> Rows:
+    """Rows at which the count changed faster than the shaft can turn.
 
     Parameters
     ----------
     time : array_like, shape (n,)
-        Stamps, even or not. [s]
+        Stamps, even or not, six or more. [s]
     counts : array_like, shape (n,)
         Position without roll-overs. [count]
-    max_speed : float, optional
-        Greatest speed of the encoder. Without it, 1.5 times the greatest speed that lasts: the
-        median over five neighbouring intervals, which isolated jumps do not reach. [count/s]
 
     Returns
     -------
-    LostCounts
-        Rows at which the count changed by more than `max_speed` allows, one count of rounding
+    array of int
+        Rows that jumps lead to: faster than 1.5 times the greatest speed that lasts (the median
+        over five neighbouring intervals, which isolated jumps do not reach), one count of rounding
         granted. A loss that is no larger than the motion within a sample is not seen.
 
     Raises
     ------
     InputError
-        If the stamps do not increase, a number is not finite, or the record is too short for an
-        estimate.
+        If the stamps do not increase, a number is not finite, or the record is too short.
     """
     stamps = increasing(time)
-    steps = np.diff(signal("counts", counts, stamps.size))
-    intervals = np.diff(stamps)
-    if max_speed is not None:
-        limit = positive("max_speed", max_speed)
-    elif steps.size < SUSTAINED:
-        raise InputError(
-            f"A record of {stamps.size} rows is too short to estimate the greatest speed; give "
-            "max_speed."
-        )
-    else:
-        limit = MARGIN * _lasting(steps, intervals)
-    jumps = np.flatnonzero(np.abs(steps) > limit * intervals + 1.0)
-    return LostCounts(jumps + 1, steps[jumps], limit)
+    steps, intervals = np.diff(signal("counts", counts, stamps.size)), np.diff(stamps)
+    if steps.size < SUSTAINED:
+        raise InputError(f"A record of {stamps.size} rows is too short to tell lost counts.")
+    limit = MARGIN * _lasting(steps, intervals)
+    return np.flatnonzero(np.abs(steps) > limit * intervals + 1.0) + 1
 
 
 def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int | None:

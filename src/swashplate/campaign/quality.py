@@ -146,7 +146,7 @@ def _of_channel(experiment: Experiment, channel: Channel, *, signed: bool) -> Qu
         elif stuck is not None and stuck > STUCK:
             findings.append(f"stands still for {stuck:.3g} s while the input is away from rest")
         if channel.counts is not None and time.size >= 8:
-            lost = int(find_lost_counts(time, channel.counts[used]).rows.size)
+            lost = int(find_lost_counts(time, channel.counts[used]).size)
         if lost:
             times = "once" if lost == 1 else f"{lost} times"
             findings.append(f"jumps {times} as no motion does: lost or doubled counts")

@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import positive, row
+from swashplate.maneuvers.checks import row
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
+GAP = 1.5
+"""An interval of more than this many usual ones is a gap."""
 TOLERANCE = 0.05
 """How far off an even grid stamps may lie and still count as even, in sample periods.
 
@@ -39,8 +41,6 @@ class StampStatistics(NamedTuple):
     """Median interval. [s]"""
     jitter: float
     """Standard deviation of the intervals about their median, gaps left out. [s]"""
-    shortest: float
-    """Shortest interval. [s]"""
     longest: float
     """Longest interval, gap or not. [s]"""
     gaps: Rows
@@ -98,34 +98,29 @@ def stamps_of(time: ArrayLike) -> Stamps:
     return Stamps(grid, period)
 
 
-def stamp_statistics(time: ArrayLike, *, gap: float = 1.5) -> StampStatistics:
+def stamp_statistics(time: ArrayLike) -> StampStatistics:
     """Rate, jitter and gaps of stamps.
 
     Parameters
     ----------
     time : array_like, shape (n,)
         Stamps, two or more. [s]
-    gap : float
-        An interval of more than this many medians is a gap.
 
     Raises
     ------
     InputError
-        If the stamps do not increase, a number is not finite, or `gap` is not above 1.
+        If the stamps do not increase or a number is not finite.
     """
     stamps = increasing(time)
-    if positive("gap", gap) <= 1.0:
-        raise InputError(f"gap must be above 1, in median intervals, not {gap:g}.")
     intervals = np.diff(stamps)
     median = float(np.median(intervals))
-    wide = intervals > gap * median
+    wide = intervals > GAP * median
     usual = intervals[~wide]
     return StampStatistics(
         rows=stamps.size,
         rate=1.0 / median,
         period=median,
         jitter=float(np.sqrt(np.mean((usual - median) ** 2))),
-        shortest=float(intervals.min()),
         longest=float(intervals.max()),
         gaps=np.flatnonzero(wide) + 1,
         missing=int(np.sum(np.round(intervals[wide] / median) - 1.0)),
