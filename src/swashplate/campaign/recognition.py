@@ -62,13 +62,6 @@ class Recognised:
     unit: str
     rest: float
     """The input at rest, not rounded. [unit]"""
-    noise: float
-    """Standard deviation of the noise from sample to sample, an upper estimate. [unit]"""
-    residual: float
-    """RMS of record less manoeuvre, returns and jumps left out; of a free record its RMS about
-    rest. [unit]"""
-    reason: str
-    """Why it is that, or what spoke against every kind: one sentence."""
     levels: tuple[float, ...] = ()
     """Levels of a step or of stairs in their order, without the rest at the end. [unit]"""
     slope: float | None = None
@@ -81,14 +74,7 @@ class Recognised:
     """Frequency of a sine. [Hz]"""
 
 
-def recognise(
-    time: ArrayLike,
-    voltage: ArrayLike,
-    *,
-    unit: str = "V",
-    rest: float | None = None,
-    smallest: float | None = None,
-) -> Recognised:
+def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recognised:
     """Name of the manoeuvre of a record, from the command alone.
 
     Parameters
@@ -98,12 +84,8 @@ def recognise(
     voltage : (n,) array_like
         The command, with the noise and steps of its instrument. [unit]
     unit : str
-        Its unit, for the name. All levels are relative to `rest`.
-    rest : float, optional
-        The command at rest; by default what the record begins with, which in V must then be within
-        0.5 V of zero. [unit]
-    smallest : float, optional
-        Smallest change that counts as a command; by default 0.1 V, in other units any. [unit]
+        Its unit, for the name. All levels are relative to what the record begins with, which in V
+        must be within 0.5 V of zero. Changes of less than 0.1 V are no command, in other units any.
 
     Returns
     -------
@@ -123,25 +105,17 @@ def recognise(
     any phase, but has a whole period at least, about rest. Chirps, multisines, joysticks and
     different manoeuvres after one another are free.
     """
-    trace = _trace(time, voltage, unit, rest, smallest)
-
-    def plain(kind: Literal["rest", "free"], reason: str) -> Recognised:
-        rms = float(np.sqrt(np.mean(trace.values**2)))
-        return Recognised(kind, kind, unit, trace.rest, trace.noise, rms, reason)
-
-    if unit == "V" and rest is None and abs(trace.rest) > LARGEST_ZERO:
-        return plain("free", f"it begins at {trace.rest:.3g} V, which is no rest")
+    trace = _trace(time, voltage, unit)
+    if unit == "V" and abs(trace.rest) > LARGEST_ZERO:
+        return Recognised("free", "free", unit, trace.rest)
     if trace.peak <= trace.least:
-        return plain("rest", f"it stays within {trace.least:.2g} {unit} of {trace.rest:.4g} {unit}")
-    if trace.time.size < SHORTEST:
-        return plain("free", f"{trace.time.size} samples are too few to tell")
-    reasons = []
-    for what, find in (("step or stairs", _stairs), ("ramp", _ramp), ("sine", _sine)):
-        found = find(trace, unit)
-        if isinstance(found, Recognised):
-            return found
-        reasons.append(f"no {what}: {found}")
-    return plain("free", "; ".join(reasons))
+        return Recognised("rest", "rest", unit, trace.rest)
+    if trace.time.size >= SHORTEST:
+        for find in (_stairs, _ramp, _sine):
+            found = find(trace, unit)
+            if found is not None:
+                return found
+    return Recognised("free", "free", unit, trace.rest)
 
 
 def roundest(value: float, uncertainty: float) -> float:
@@ -173,7 +147,7 @@ class _Trace:
     """Input less its value at rest. [unit]"""
     rest: float
     rest_error: float
-    """Standard error of `rest`, 0 where it was given. [unit]"""
+    """Standard error of `rest`. [unit]"""
     noise: float
     """Standard deviation from sample to sample. [unit]"""
     least: float
@@ -210,9 +184,7 @@ class _Trace:
         return chosen
 
 
-def _trace(
-    time: ArrayLike, voltage: ArrayLike, unit: str, rest: float | None, smallest: float | None
-) -> _Trace:
+def _trace(time: ArrayLike, voltage: ArrayLike, unit: str) -> _Trace:
     stamps, values = _row(time, "time"), _row(voltage, "input")
     if stamps.size != values.size:
         raise InputError(f"There are {stamps.size} time stamps for {values.size} input samples.")
@@ -224,11 +196,10 @@ def _trace(
             f"after {stamps[late - 1]:g} s."
         )
     noise = _noise(stamps, values)
-    zero, error = _rest(values, noise) if rest is None else (float(rest), 0.0)
+    zero, error = _rest(values, noise)
     values = values - zero
     peak = float(np.abs(values).max())
-    if smallest is None:
-        smallest = SMALLEST_VOLTS if unit == "V" else 0.0
+    smallest = SMALLEST_VOLTS if unit == "V" else 0.0
     # more noise than that may well be what is commanded
     least = max(smallest, min(SURE * noise, SURE * smallest), 1e-12 * abs(zero))
     spacing = float(np.median(steps)) if steps.size else 0.0
@@ -291,7 +262,7 @@ class _Ending(NamedTuple):
     last: int
 
 
-def _ending(trace: _Trace, first: int, earliest: float) -> _Ending | str:
+def _ending(trace: _Trace, first: int, earliest: float) -> _Ending | None:
     """How it goes on from the first sample off the curve; `earliest` is where that began. [s]"""
     size = trace.time.size
     if first >= size:
@@ -302,18 +273,18 @@ def _ending(trace: _Trace, first: int, earliest: float) -> _Ending | str:
         return _Ending("fall", first, last)
     start, stop = float(trace.time[first]), float(trace.time[min(last, size - 1)])
     if abs(trace.values[-1]) > max(trace.tolerance, 0.05 * trace.peak):
-        return f"after {start:.4g} s it goes on instead of returning to rest"
+        return None
     tail = trace.values[first:last]
     turns = np.count_nonzero(np.abs(np.diff(np.sign(tail[np.abs(tail) > trace.tolerance]))) > 1)
     if stop - start > 0.75 * (start - earliest) or turns > 1:
-        return f"what follows after {start:.4g} s is no return to rest"
+        return None
     return _Ending("return", first, last)
 
 
 def _judged(
     trace: _Trace, model: Array, ending: _Ending, jumps: list[tuple[int, int]] | None = None
-) -> float | str:
-    """RMS of record less model; or why the whole or any part of it is too large."""
+) -> float | None:
+    """RMS of record less model, None where the whole or any part of it is too large."""
     kept = np.ones(model.size, dtype=np.bool_)
     if ending.kind != "none":
         model[ending.last :] = 0.0
@@ -325,12 +296,12 @@ def _judged(
     quality = float(np.hypot(0.01 * trace.peak, 1.5 * trace.noise))
     rms = float(np.sqrt(squares.mean()))
     if not rms <= quality:
-        return f"it is off by {rms:.2g} RMS, more than {quality:.2g}"
+        return None
     parts = max(min(50, squares.size // 8), 1)
     edges = np.linspace(0, squares.size, parts, endpoint=False).astype(np.intp)
     means = np.add.reduceat(squares, edges) / np.diff(edges, append=squares.size)
     worst = float(np.sqrt(means.max()))
-    return rms if worst <= 3.0 * quality else f"a part of it is off by {worst:.2g} RMS"
+    return rms if worst <= 3.0 * quality else None
 
 
 # --- steps and stairs -----------------------------------------------------------------------------
@@ -345,10 +316,10 @@ class _Level(NamedTuple):
     """Samples from `first` to before `last` are held."""
 
 
-def _stairs(trace: _Trace, unit: str) -> Recognised | str:
-    """Levels that are held, with jumps between them, or why it is none of that."""
+def _stairs(trace: _Trace, unit: str) -> Recognised | None:
+    """Levels that are held, with jumps between them, None of other records."""
     held = _held_levels(trace)
-    if isinstance(held, str):
+    if held is None:
         return held
     levels, ending = held
     model = np.zeros_like(trace.values)
@@ -361,7 +332,7 @@ def _stairs(trace: _Trace, unit: str) -> Recognised | str:
     if ending.kind == "fall":
         jumps.append((levels[-1].last, ending.first))
     rms = _judged(trace, model, ending, jumps)
-    if isinstance(rms, str):
+    if rms is None:
         return rms
     errors = [
         np.hypot(trace.noise / (each.last - each.first) ** 0.5, trace.rest_error) for each in levels
@@ -371,34 +342,30 @@ def _stairs(trace: _Trace, unit: str) -> Recognised | str:
         for each, error in zip(levels, errors, strict=True)
     )
     if len(levels) == 1:
-        name, what = f"step {heights[0]:+g} {unit}", f"a level of {heights[0]:g} {unit} fits"
+        name = f"step {heights[0]:+g} {unit}"
     else:
         shown = [*heights, 0.0] if ending.kind == "fall" else heights
         name = f"stairs {'/'.join(f'{height:g}' for height in shown)} {unit}"
-        what = f"{len(levels)} levels fit"
     return Recognised(
         "step" if len(levels) == 1 else "stairs",
         name,
         unit,
         trace.rest,
-        trace.noise,
-        rms,
-        f"{what} to {rms:.2g} {unit} RMS",
         levels=heights,
     )
 
 
-def _held_levels(trace: _Trace) -> tuple[list[_Level], _Ending] | str:
+def _held_levels(trace: _Trace) -> tuple[list[_Level], _Ending] | None:
     """Levels other than the rest before and after, and the ending."""
     values, least = trace.values, max(2.0 * trace.tolerance, SMALLEST_JUMP * trace.peak)
     jumps = np.flatnonzero(np.abs(np.diff(values)) > least)
     if jumps.size == 0:
-        return "there is no jump"
+        return None
     groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > HELD) + 1)
     if len(groups) > MOST_JUMPS:
-        return f"there are {len(groups)} jumps"
+        return None
     if any(group[-1] - group[0] >= trace.jump for group in groups):
-        return "it moves between levels without jumping"
+        return None
     firsts = [0, *(int(group[-1]) + 1 for group in groups)]
     lasts = [*(int(group[0]) + 1 for group in groups), values.size]
     levels: list[_Level] = []
@@ -408,22 +375,22 @@ def _held_levels(trace: _Trace) -> tuple[list[_Level], _Ending] | str:
         sure = np.median(values[first : first + max(HELD, (last - first) // 10)])
         leaves = min(trace.first(np.abs(values[first:last] - sure) > trace.tolerance, first), last)
         if leaves - first < (1 if final else HELD):
-            return f"it holds no level at {trace.time[first]:.4g} s"
+            return None
         level = _Level(float(values[first:leaves].mean()), float(trace.time[first]), first, leaves)
         resting = abs(level.height) <= trace.tolerance
         if leaves < last:
             if resting or not final:
-                return f"it drifts at {trace.time[leaves]:.4g} s"
+                return None
             start = levels[0].start if levels else level.start
             ending = _ending(trace, leaves, start)
-            if isinstance(ending, str):
+            if ending is None:
                 return ending
             if ending.kind == "none" or ending.first - first < HELD:
-                return f"it drifts at {trace.time[leaves]:.4g} s"
+                return None
             return [*levels, level], ending
         if final and resting:
             ending = _Ending("fall", first, first)
-            return (levels, ending) if levels else "there is no level but rest"
+            return (levels, ending) if levels else None
         if levels or not resting:
             levels.append(level)
     return levels, _Ending("none", values.size, values.size)
@@ -445,35 +412,35 @@ def _trimmed(trace: _Trace, first: int, last: int) -> tuple[int, int]:
 # --- ramps ----------------------------------------------------------------------------------------
 
 
-def _ramp(trace: _Trace, unit: str) -> Recognised | str:
-    """A straight rise from rest, perhaps to a level that is held, or why it is none."""
+def _ramp(trace: _Trace, unit: str) -> Recognised | None:
+    """A straight rise from rest, perhaps to a level that is held, None of other records."""
     time = trace.time
     values = trace.values * np.sign(trace.values[np.abs(trace.values).argmax()])
     low, high = (int((values >= share * trace.peak).argmax()) for share in (0.1, 0.8))
     if high - low < HELD or time[high] - time[low] < 0.1:
-        return "it rises in a jump"
+        return None
     leaves = high
     for _ in range(2):  # once more with all that lies on the first line
         slope, start, error = _line(trace, low, leaves)
         if slope == 0.0 or not time[0] - trace.spacing <= start < time[low]:
-            return "its rise is not straight"
+            return None
         line = slope * np.maximum(time - start, 0.0)
         leaves = trace.first(np.abs(trace.values[low:] - line[low:]) > trace.tolerance, low)
         if leaves < high:
-            return "its rise is not straight"
+            return None
     ending, limit = _ending(trace, leaves, start), None
     near = trace.values[leaves + 2 : leaves + 2 + HELD]
-    if (isinstance(ending, str) or ending.kind == "return") and near.size == HELD:
+    if (ending is None or ending.kind == "return") and near.size == HELD:
         away = np.abs(trace.values[leaves + 2 :] - np.median(near)) > trace.tolerance
         stops = trace.first(away, leaves + 2)
         if time[stops - 1] - time[leaves] >= SHORTEST_HOLD:
             limit = float(trace.values[leaves + 2 : stops].mean())
             ending = _ending(trace, stops, start)
             line = np.minimum(line, limit) if limit > 0.0 else np.maximum(line, limit)
-    if isinstance(ending, str):
+    if ending is None:
         return ending
     rms = _judged(trace, line, ending)
-    if isinstance(rms, str):
+    if rms is None:
         return rms
     shown = roundest(slope, max(3.0 * error, 0.002 * abs(slope)))
     return Recognised(
@@ -481,9 +448,6 @@ def _ramp(trace: _Trace, unit: str) -> Recognised | str:
         f"ramp {shown:+g} {unit}/s",
         unit,
         trace.rest,
-        trace.noise,
-        rms,
-        f"a slope of {shown:g} {unit}/s fits to {rms:.2g} {unit} RMS",
         slope=shown,
         limit=None if limit is None else roundest(limit, 0.002 * trace.peak),
     )
@@ -528,34 +492,34 @@ class _Tone:
         return self.mean + self.amplitude * np.sin(self.omega * (time - self.crossing))
 
 
-def _sine(trace: _Trace, unit: str) -> Recognised | str:
-    """One frequency, at least a whole period of it, or why it is none."""
+def _sine(trace: _Trace, unit: str) -> Recognised | None:
+    """One frequency, at least a whole period of it, None of other records."""
     guess = _guessed(trace)
-    if isinstance(guess, str):
+    if guess is None:
         return guess
     departs = trace.first(np.abs(trace.values) > trace.tolerance, 0)
     certain = int(np.searchsorted(trace.time, guess[1]))
     if certain - departs < COARSEST:
-        return "it is too short"
+        return None
     tone = _fitted(trace, guess[0], departs, certain)
     start = _start(trace, tone, departs)
     first = int(np.searchsorted(trace.time, start - 1e-9))
     leaves = _leaves(trace, tone, first)
     if leaves < certain:
-        return f"it is no sine at {trace.time[leaves]:.4g} s"
+        return None
     tone = _fitted(trace, tone, first, leaves)
     ending = _ending(trace, leaves, start)
-    if isinstance(ending, str):
+    if ending is None:
         return ending
     end = float(trace.time[min(leaves, trace.time.size - 1)])
     if (end - start) * tone.omega < 2.0 * np.pi * 0.99:
-        return "it is less than a period long"
+        return None
     if abs(tone.mean) > max(0.02 * tone.amplitude, trace.noise) and first:
-        return f"its mean lies {tone.mean:.2g} {unit} from rest"
+        return None
     model = tone(trace.time)
     model[:first] = 0.0
     rms = _judged(trace, model, ending)
-    if isinstance(rms, str):
+    if rms is None:
         return rms
     hertz = tone.omega / (2.0 * np.pi)
     frequency = roundest(hertz, max(3.0 * tone.error / (2.0 * np.pi), 0.001 * hertz))
@@ -567,20 +531,17 @@ def _sine(trace: _Trace, unit: str) -> Recognised | str:
         unit,
         # where it begins within the sine there is no rest to see
         trace.rest if first else trace.rest + tone.mean,
-        trace.noise,
-        rms,
-        f"a sine of {amplitude:g} {unit} at {frequency:g} Hz fits to {rms:.2g} {unit} RMS",
         amplitude=amplitude,
         frequency=frequency,
     )
 
 
-def _guessed(trace: _Trace) -> tuple[_Tone, float] | str:
+def _guessed(trace: _Trace) -> tuple[_Tone, float] | None:
     """A tone through the changes of sign, and the last instant up to which they are a sine's."""
     beyond = np.flatnonzero(np.abs(trace.values) > BAND * trace.peak)
     changes = np.flatnonzero(np.diff(np.signbit(trace.values[beyond])))
     if changes.size < 2:
-        return "it changes its sign fewer than twice"
+        return None
     before, after = beyond[changes], beyond[changes + 1]
     crossings = 0.5 * (trace.time[before] + trace.time[after])
     halves = np.diff(crossings)
@@ -588,9 +549,9 @@ def _guessed(trace: _Trace) -> tuple[_Tone, float] | str:
     uneven = np.abs(halves - half) > EVEN * half
     regular = int(uneven.argmax()) if uneven.any() else halves.size
     if regular < max(halves.size - 1, 1):
-        return f"its changes of sign are uneven at {crossings[regular]:.4g} s"
+        return None
     if 2.0 * half < COARSEST * trace.spacing:
-        return "it has fewer than six samples in a period"
+        return None
     # the last may be a part of the return
     even = crossings[: min(regular + 1, max(crossings.size - 1, 2))]
     half, first = np.polynomial.Polynomial.fit(np.arange(even.size), even, 1).convert().coef[::-1]
