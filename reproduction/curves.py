@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reproduction.catalogue import Shown
 from reproduction.content import Curve, Figure, Level, Panel
-from swashplate.analysis.levers import pulled
+from swashplate.analysis.whatif import pulled
 from swashplate.campaign.ammeter import rectified_current
 from swashplate.campaign.filters import matched_speed
 from swashplate.drive import Drive
