@@ -26,7 +26,7 @@ from swashplate.simulation.instance import (
     instance_of,
     path_of,
 )
-from swashplate.simulation.run import check_start_pressure, started_at
+from swashplate.simulation.run import start_states, started_at
 
 Array = NDArray[np.float64]
 
@@ -157,10 +157,8 @@ def made_ready(
     start: dict[str, float] = {}
     if own.start_pressure is not None:
         started = started_at(instance, observed.records, observed.record.step, observed.start)
-        pressure = check_start_pressure(instance, own.start_pressure, started)
-        start["pump.pressure"] = pressure
-        if instance.parts[1].options.damping is not None:
-            start["pump.plate_pressure"] = pressure
+        states = start_states(instance, own.start_pressure, started)
+        start = {f"pump.{path}": pressure for path, pressure in states.items()}
     elif START_PRESSURE in names:
         raise InputError(f"{START_PRESSURE} is a column, so Own needs a value of it.")
     return Ready(

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.code import generating
 from swashplate.equations.marching.march import Sampler, Stored
 from swashplate.equations.marching.record import Record
-from swashplate.equations.marching.run import Instance, Start, Started, check_start, marched
+from swashplate.equations.marching.run import Instance, Start, Started, marched
 from swashplate.equations.model import Model
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters.parameter_set import ParameterSet
@@ -95,27 +95,25 @@ def started_at(
     start: Start,
     start_pressure: float | None = None,
 ) -> Started:
-    """Where a record begins.
-
-    Raises
-    ------
-    InputError, DomainError
-        If the pressure at the start [Pa] is no finite number, or beyond a stop or Z15.
-    """
-    check_start(start)
+    """Where a record begins, with the pump at a pressure of its own if one is given. [Pa]"""
     started = instance.start({name: float(v[0]) for name, v in records.items()}, step, start)
     if start_pressure is None:
         return started
-    pressure = check_start_pressure(instance, start_pressure, started)
     card, pump = started.states
-    pump = pump._replace(pressure=pressure)
-    if instance.parts[1].options.damping is not None:
-        pump = pump._replace(plate_pressure=pressure)
+    pump = pump._replace(**start_states(instance, start_pressure, started))
     return started._replace(states=(card, pump))
 
 
-def check_start_pressure(instance: Instance, pressure: float, started: Started) -> float:
-    """A pressure to start with, refused where the drive cannot have it. [Pa]"""
+def start_states(instance: Instance, pressure: float, started: Started) -> dict[str, float]:
+    """Numbers of the pump's state that a pressure at the start sets. [Pa]
+
+    Raises
+    ------
+    InputError
+        If it is no finite number.
+    DomainError
+        If it lies beyond a stop of the swash plate or Z15.
+    """
     if not np.isfinite(pressure):
         raise InputError(f"The pressure at the start must be a finite number, not {pressure}.")
     k = started.arguments[1]["k"]
@@ -124,7 +122,7 @@ def check_start_pressure(instance: Instance, pressure: float, started: Started) 
             f"{instance.name}: the pressure at the start is {pressure:.6g} Pa, but the stops of "
             f"the swash plate and Z15 keep it between {k.lower:.6g} and {k.upper:.6g} Pa."
         )
-    return float(pressure)
+    return dict.fromkeys(instance.model.parts[1].free_start["pressure"], float(pressure))
 
 
 def measured_records(
