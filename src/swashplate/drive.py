@@ -18,10 +18,9 @@ from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.batch import Batch, SquaredError, simulate_drives
 from swashplate.simulation.instance import at_every_rate
+from swashplate.simulation.residuals import Sensitivities, sensitivities
 from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import check_voltage, measured_records, simulate_drive
-from swashplate.simulation.sensitivities import Sensitivities, sensitivities
-from swashplate.simulation.steady import steady_states
+from swashplate.simulation.run import check_voltage, measured_records, simulate_drive, steady_states
 from swashplate.simulation.stepper import Stepper
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from swashplate.models.pump import (
 from swashplate.models.refinements import static_leakage
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import instance_of
-from swashplate.simulation.steady import pressure_limits, settled_state
+from swashplate.simulation.run import pressure_limits, settled_state
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
