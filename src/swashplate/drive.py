@@ -61,26 +61,12 @@ class Drive:
 
     @classmethod
     def preset(cls, name: str) -> Drive:
-        """A packaged drive: ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``.
-
-        Raises
-        ------
-        ParameterError
-            For another name.
-        """
+        """A packaged drive: ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``."""
         return cls(load_preset(name))
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Drive:
-        """A drive from a parameter file.
-
-        Raises
-        ------
-        FileError
-            If the file cannot be read.
-        ParameterError
-            If an entry is wrong; the sentence names file, parameter and rule.
-        """
+        """A drive from a parameter file; a wrong entry is named with file, parameter and rule."""
         return cls(load_set(path))
 
     def to_toml(self, path: str | Path) -> None:
@@ -139,12 +125,9 @@ class Drive:
         """The drive with a card's filter that means the same at every rate.
 
         The source's filter is a recursion at 512 Hz (`ParameterSet.rate`): marched at another rate
-        it is another filter. In its place comes the differential equation with the same poles.
-
-        Raises
-        ------
-        InputError
-            If there is none, since the recursion changes its sign from sample to sample.
+        it is another filter. In its place comes the differential equation with the same poles;
+        where there is none, since the recursion changes its sign from sample to sample, an
+        `InputError`.
         """
         return Drive(at_every_rate(self.parameters))
 
@@ -313,12 +296,7 @@ class Drive:
     ) -> Stepper:
         """The drive one sample at a time: command in, sample out, numbers as in `simulate`.
 
-        Parameters
-        ----------
-        h : float
-            Interval between samples. [s]
-        interpolation, start :
-            As in `simulate`.
+        `h` is the interval between samples [s]; other arguments as in `simulate`.
         """
         return Stepper(self.parameters, h, interpolation, start)
 

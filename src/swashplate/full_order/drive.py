@@ -220,13 +220,7 @@ class FullOrderDrive:
 
     @classmethod
     def preset(cls, name: str) -> FullOrderDrive:
-        """One of the source's axes with its assumed physical set.
-
-        Raises
-        ------
-        ParameterError
-            For a name other than ``"hoist"``, ``"slew"``, ``"luff"``.
-        """
+        """The ``"hoist"``, ``"slew"`` or ``"luff"`` of the source with its assumed physical set."""
         physical = PhysicalSet.preset(name)
         return cls(Drive.preset(name), physical)
 
@@ -420,15 +414,10 @@ class FullOrderDrive:
     ) -> Array:
         """(n, k) exact derivatives of a signal by parameters, those of the march's own steps.
 
-        Parameters
-        ----------
-        voltage, rate, start, substeps :
-            As in `simulate`.
-        parameters : sequence of str
-            Columns of physical quantities (``"swash_inertia"``, ``"swash_stop_plus"``), of the
-            solenoids (``"Z19_plus"``) and of the card (``"omega_plus"``, ``"tau"``).
-        signal : str
-            Of `swashplate.models.full_order.PlantSignals`, ``"shaft_position"`` or a current.
+        Parameters are columns of physical quantities (``"swash_inertia"``, ``"swash_stop_plus"``),
+        of the solenoids (``"Z19_plus"``) and of the card (``"omega_plus"``, ``"tau"``); the signal
+        is of `swashplate.models.full_order.PlantSignals`, ``"shaft_position"`` or a current. Other
+        arguments as in `simulate`.
         """
         record = record_of(voltage, rate, what="voltage")
         columns = [path_of(name) for name in parameters]

@@ -132,15 +132,7 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
 
     @classmethod
     def from_toml(cls, path: str | Path) -> PhysicalSet:
-        """A set from a file.
-
-        Raises
-        ------
-        FileError
-            If the file cannot be read.
-        ParameterError
-            If an entry is wrong; the sentence names file, quantity and rule.
-        """
+        """A set from a file; a wrong entry is named with file, quantity and rule."""
         return read_set(read_text(path), str(path))
 
     def to_toml(self, path: str | Path) -> None:
@@ -163,20 +155,12 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         return air_in(self.numbers)
 
     def to_lumped(self, Z6: float | None = None) -> dict[str, Change]:
-        """Lumped parameters that the set stands for.
+        """Lumped parameters that the set stands for; Kruse eqs. 6.56-6.70 and table 6.1.
 
-        Parameters
-        ----------
-        Z6 : float, optional
-            Value to move to along the gauge Z6↔Z8: away from the stops only Z7/(1+Z6) and
-            Z8/(1+Z6) count. By default the physical A_s²B/(k_r V), of a bulk modulus at rest.
-
-        Returns
-        -------
-        dict
-            Z1 to Z16 and Z18 by symbol, pairs (plus, minus) where the directions differ; Kruse
-            eqs. 6.56-6.70 and table 6.1. The solenoids' Z17 and Z19 to Z22 are not the pump's
-            geometry.
+        Z1 to Z16 and Z18 by symbol, pairs (plus, minus) where the directions differ; the solenoids'
+        Z17 and Z19 to Z22 are not the pump's geometry. `Z6` is where to move to along the gauge
+        Z6↔Z8: away from the stops only Z7/(1+Z6) and Z8/(1+Z6) count; by default the physical
+        A_s²B/(k_r V).
         """
         n, P0 = self.numbers, rest_pressure(self.numbers)
         stiffness = rest_modulus(n) / n["oil_volume"]
@@ -229,13 +213,7 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         return PhysicalSet, (self.name, self.title, dict(self.entries))
 
     def replace(self, **changes: Change) -> PhysicalSet:
-        """A set with other values in SI, e.g. ``replace(load_torque=2e3)``, marked as the user's.
-
-        Raises
-        ------
-        ParameterError
-            For an unknown name or a value that breaks a rule.
-        """
+        """A set with other values in SI, ``replace(load_torque=2e3)``, marked as the user's."""
         entries = dict(self.entries)
         for name, change in changes.items():
             quantity = quantity_of(name)
@@ -243,15 +221,10 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         return replace(self, entries=entries)
 
     def scaled(self, epsilon: float) -> PhysicalSet:
-        """The set with inertias times ε and dampings times √ε: the way to the reduced model.
+        """The set with inertias times ε > 0 and dampings times √ε: the way to the reduced model.
 
         The frequencies rise by 1/√ε and the damping ratios stay. The load's inertia acts on the
         swash plate's rate, as a damping does, and is scaled like one.
-
-        Raises
-        ------
-        ParameterError
-            Unless ε is above 0.
         """
         if not epsilon > 0.0:
             raise ParameterError(f"epsilon is {epsilon:g}, but must be above 0.")

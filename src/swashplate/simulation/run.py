@@ -38,13 +38,7 @@ Driver = Literal["voltage", "current"]
 
 
 def check_voltage(record: Record, clip: bool) -> Record:
-    """Refuse, or on request clip, a command beyond ±10 V.
-
-    Raises
-    ------
-    InputError
-        Naming the first sample out of range.
-    """
+    """Refuse, or on request clip, a command beyond ±10 V; the first such sample is named."""
     low, high = float(record.values.min()), float(record.values.max())
     if low >= -FULL_VOLTAGE and high <= FULL_VOLTAGE:
         return record
