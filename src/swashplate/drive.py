@@ -61,12 +61,12 @@ class Drive:
 
     @classmethod
     def preset(cls, name: str) -> Drive:
-        """A packaged drive: ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``."""
+        """A packaged drive: ``"hoist"``, ``"slew"``, ``"luff"``, ``"neutral"``; else `ParameterError`."""
         return cls(load_preset(name))
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Drive:
-        """A drive from a parameter file; a wrong entry is named with file, parameter and rule."""
+        """A drive from a parameter file; a `ParameterError` names file, parameter and rule."""
         return cls(load_set(path))
 
     def to_toml(self, path: str | Path) -> None:

@@ -132,7 +132,7 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
 
     @classmethod
     def from_toml(cls, path: str | Path) -> PhysicalSet:
-        """A set from a file; a wrong entry is named with file, quantity and rule."""
+        """A set from a file; a `ParameterError` names file, quantity and rule."""
         return read_set(read_text(path), str(path))
 
     def to_toml(self, path: str | Path) -> None:
