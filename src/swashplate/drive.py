@@ -61,7 +61,7 @@ class Drive:
 
     @classmethod
     def preset(cls, name: str) -> Drive:
-        """A packaged drive: ``"hoist"``, ``"slew"``, ``"luff"``, ``"neutral"``; else `ParameterError`."""
+        """The packaged ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``; else `ParameterError`."""
         return cls(load_preset(name))
 
     @classmethod
