@@ -86,6 +86,46 @@ def test_starts_are_resumed_after_a_kill(campaign: Path, tmp_path: Path) -> None
     ).read_text("utf-8")
 
 
+def test_ctrl_c_stops_the_whole_search_and_resume_goes_on(campaign: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "swashplate", "fit", "virtual/campaign.toml", "--no-report"]
+    command += ["--setup", "setup.toml", "--starts", "12", "--jobs", "2", "--out"]
+    store = tmp_path / "fitted" / "starts"
+    running = subprocess.Popen(
+        [*command, "fitted"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 120.0
+    while not list(store.glob("card/start-*.json")):
+        assert running.poll() is None, "it ended before it could be interrupted"
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    os.killpg(running.pid, signal.SIGINT)  # as a terminal does
+    said, _ = running.communicate(timeout=60.0)
+    assert running.returncode == 130
+    assert "Interrupted in the stage 'card': interrupted after " in said
+    assert "--resume goes on" in said
+    assert "Usable" not in said
+    assert not (store / "pump").exists()
+    assert not (tmp_path / "fitted" / "drive.toml").exists()
+    for words in ([*command, "fitted", "--resume"], [*command, "whole"]):
+        subprocess.run(words, cwd=tmp_path, capture_output=True, check=True)
+    resumed, whole = ((tmp_path / name / "drive.toml").read_text() for name in ("fitted", "whole"))
+    assert resumed == whole
+
+
+def test_a_folder_that_cannot_be_written_is_said_before_the_fit(
+    refused: Words, campaign: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("", "utf-8")
+    said = refused("fit", "virtual/campaign.toml", "--setup", "setup.toml", "--out", "file/fitted")
+    assert "file/fitted cannot be made" in said
+    assert not list(tmp_path.glob("fitted*"))
+
+
 def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path: Path) -> None:
     asked = ("--folds", "2", "--bootstrap", "40", "--profile", "Z8", "--profile", "J_plus")
     setup = ("--setup", "setup.toml", "--jobs", "1", "--figures", "svg")

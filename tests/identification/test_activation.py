@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.identification.activation import acting, activation, need_of
-from swashplate.identification.fit import smooth
-from swashplate.identification.forces import Forces
+from swashplate.identification.drive_model import Forces
+from swashplate.identification.excitation import acting, activation, need_of
+from swashplate.identification.fitting import smooth
 from swashplate.identification.unknowns import Unknown
 
 HOIST = Drive(smooth(Drive.preset("hoist").parameters))

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from swashplate.errors import InputError
-from swashplate.identification.advice import Candidate, advise
-from swashplate.identification.variables import Variables
+from swashplate.identification.experiment_design import Candidate, advise
+from swashplate.identification.unknowns import Unknowns
 
-AB = Variables.of("ab", np.ones(2))
+AB = Unknowns.of("ab", np.ones(2))
 
 
 def diagonal(*errors: float) -> np.ndarray:
@@ -76,7 +76,7 @@ def test_a_candidate_that_mixes_known_and_unknown_tells_of_the_unknown_alone() -
 
 def test_the_order_is_that_of_determinants_computed_apart() -> None:
     rng = np.random.default_rng(8)
-    variables = Variables.of("abcd", np.ones(4))
+    variables = Unknowns.of("abcd", np.ones(4))
     present = rng.normal(size=(30, 4))
     candidates = [Candidate(f"c{k}", rng.normal(size=(20, 4)) * (k + 1)) for k in range(5)]
     gains = {
@@ -98,7 +98,7 @@ def test_from_nothing() -> None:
 
 
 def test_an_unknown_at_its_bound_counts_as_known() -> None:
-    variables = Variables.of("ab", np.ones(2), at_bound=[1, 0])
+    variables = Unknowns.of("ab", np.ones(2), at_bound=[1, 0])
     (found,) = advise(np.zeros((0, 2)), [Candidate("sum", np.array([[1.0, 4.0]]))], variables)
     assert [gain.name for gain in found.gains] == ["b"]
     assert found.gains[0].after == pytest.approx(0.25)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from swashplate.identification.autocorrelation import NoiseColour, grid_of
-from swashplate.identification.autoregression import autoregression
+from swashplate.identification.bootstrap import autoregression
+from swashplate.identification.noise import NoiseColour, grid_of
 
 
 def colour(correlation: np.ndarray, length: int) -> NoiseColour:

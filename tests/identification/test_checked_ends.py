@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from swashplate import Experiment
-from swashplate.identification.checked_ends import checked_ends
-from swashplate.identification.held import minimiser
-from swashplate.identification.intervals import estimates, reach
-from swashplate.identification.linearising import linearised_fit
+from swashplate.identification.linearised import linearised_fit
 from swashplate.identification.problem import Problem
+from swashplate.identification.profile import checked_ends, minimiser
 from swashplate.identification.solving import solve
-from swashplate.identification.uncertainty import uncertainty
+from swashplate.identification.uncertainty import estimates, reach, uncertainty
 from swashplate.identification.unknowns import Unknown, Unknowns
 
 TIME = np.linspace(0.0, 4.0, 81)
@@ -47,7 +45,7 @@ def test_a_stop_that_is_just_touched_has_no_upper_end(
     noise = 0.02 * np.random.default_rng(2).normal(size=TIME.size)
     noise[-2:] = -0.012  # less than one standard deviation
     found = problem(experiment, TIME + noise)
-    best = solve(found, found.unknowns.vector({"stop": 3.9})).vector
+    best = solve(found, found.unknowns.vector_of({"stop": 3.9})).vector
     values = found.unknowns.values(best)
     assert 3.9 < values["stop"] < 4.0
     linearised = linearised_fit(found, best)

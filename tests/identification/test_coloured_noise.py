@@ -5,11 +5,14 @@ import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
-from swashplate.identification.autocorrelation import NoiseColour
-from swashplate.identification.coloured_noise import coloured_noise_covariance, noise_model
-from swashplate.identification.covariance import white_noise_covariance
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
-from swashplate.identification.variables import Variables
+from swashplate.identification.noise import (
+    NoiseColour,
+    coloured_noise_covariance,
+    noise_model,
+    white_noise_covariance,
+)
+from swashplate.identification.unknowns import Unknowns
 
 N = 3000
 TIME = np.arange(N) / 512.0
@@ -32,7 +35,7 @@ def fit(noise: np.ndarray, weight: np.ndarray | None = None) -> LinearisedFit:
         LinearisedRun(f"run {k}", "speed", TIME, factor * each + jacobian @ step, jacobian, weight)
         for k, each in enumerate(noise)
     ]
-    return LinearisedFit.of(runs, Variables.of("abc", np.ones(3)))
+    return LinearisedFit.of(runs, Unknowns.of("abc", np.ones(3)))
 
 
 def exact(rho: float, runs: int, weight: np.ndarray | None = None) -> np.ndarray:
@@ -112,7 +115,7 @@ def test_gaps_and_several_channels() -> None:
         for k, each in enumerate(noise)
     ]
     silent = LinearisedRun("run 0", "current", TIME, np.zeros(N), np.zeros((N, 3)))
-    made = LinearisedFit.of([*runs, silent], Variables.of("abc", np.ones(3)))
+    made = LinearisedFit.of([*runs, silent], Unknowns.of("abc", np.ones(3)))
     expected = np.sqrt(np.diag(inverse @ dense @ inverse))
     found = coloured_noise_covariance(made).standard_errors
     np.testing.assert_allclose(found, expected, rtol=0.1)

@@ -3,13 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-import pytest
 
 from swashplate.errors import DomainError
-from swashplate.identification.dormant import dormant, nominal_effects, woken
-from swashplate.identification.edges import past_edge
-from swashplate.identification.solving import Evaluation, solve
-from swashplate.identification.starts import solve_from
+from swashplate.identification.solving import Evaluation
+from swashplate.identification.starts import dormant, nominal_effects, past_edge, solve_from, woken
 
 BOUNDS = (np.array([-20.0]), np.array([20.0]))
 
@@ -92,25 +89,3 @@ def test_an_unknown_without_effect_is_woken() -> None:
 def test_a_search_that_lost_the_stop_finds_it_again() -> None:
     (result,) = solve_from(Stop(), [np.full(1, 5.0)])
     np.testing.assert_allclose(result.vector, [1.5])
-
-
-@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
-def test_sqp_ends_at_the_same_point_in_any_unit_of_cost(unit: float) -> None:
-    """Residuals x - 1, 2 (y - 3), x + y - 4.5: x = 11/9 and y = 27.5/9 by the normal equations."""
-    rows = np.array([[1.0, 0.0], [0.0, 2.0], [1.0, 1.0]])
-    wanted = np.array([1.0, 6.0, 4.5])
-
-    class Plane:
-        start = np.zeros(2)
-        bounds = (np.full(2, -10.0), np.full(2, 10.0))
-
-        def evaluate(self, vector: np.ndarray, *, compressed: bool = True) -> Evaluation:
-            return Evaluation(unit * (rows @ vector - wanted), unit * rows)
-
-        def cost(self, vector: np.ndarray) -> float:
-            return 0.5 * float(np.sum(self.evaluate(vector).residuals ** 2))
-
-    # normal equations [[2, 1], [1, 5]] (x, y) = (5.5, 16.5)
-    found = solve(Plane(), np.zeros(2), method="slsqp")
-    np.testing.assert_allclose(found.vector, [11.0 / 9.0, 27.5 / 9.0], rtol=1e-4)
-    assert found.converged

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from swashplate.errors import InputError
-from swashplate.identification.error_tables import ErrorTable, error_table, sine_error
-from swashplate.identification.exclusions import (
+from swashplate.identification.error_tables import (
     SOURCE_RULES,
     ComparedRun,
+    ErrorTable,
     WholeKind,
+    error_table,
+    sine_error,
 )
 
 TIME = np.arange(0.0, 10.0, 0.1)

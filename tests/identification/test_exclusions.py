@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from swashplate.identification.exclusions import (
+from swashplate.identification.error_tables import (
     ComparedRun,
     FastSines,
     Overshoot,

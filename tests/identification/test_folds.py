@@ -14,15 +14,16 @@ from hypothesis import strategies as st
 from swashplate import Campaign, Channel, Drive, Experiment, InputError, maneuvers
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.identification.fit import fit
-from swashplate.identification.fold_results import (
+from swashplate.identification.assessment import Measures
+from swashplate.identification.cross_validation import (
     CrossValidation,
     Fold,
     FoldEstimate,
     HeldRun,
+    cross_validate,
+    deal,
 )
-from swashplate.identification.folds import cross_validate, deal
-from swashplate.identification.measures import Measures
+from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Setup
 from swashplate.identification.validation import pooled, predict
 
@@ -163,7 +164,7 @@ def test_each_fold_is_predicted_by_a_fit_to_the_others(
     )
     fold = found.folds[0]
     others = [each for each in campaign if each.name not in fold.held]
-    alone = fit(others, Drive.preset("hoist").parameters, SETUP)
+    alone = fit(Drive.preset("hoist").parameters, others, SETUP)
     (held,) = fold.held
     predicted = {each.channel: each for each in predict(alone.parameters, [campaign[held]])}
     for run in fold.runs:
@@ -226,7 +227,7 @@ def test_pooled_measures_match_those_of_the_predictions(
     qualities = []
     for fold in found.folds:
         others = [each for each in campaign if each.name not in fold.held]
-        parameters = fit(others, Drive.preset("hoist").parameters, SETUP).parameters
+        parameters = fit(Drive.preset("hoist").parameters, others, SETUP).parameters
         qualities += predict(parameters, [campaign[name] for name in fold.held])
     for name, expected in pooled(qualities).items():
         assert found.measures[name].rmse == pytest.approx(expected.rmse, rel=1e-9)

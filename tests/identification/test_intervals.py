@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from swashplate.errors import InputError
-from swashplate.identification.covariance import Covariance
-from swashplate.identification.intervals import Estimate, estimates
-from swashplate.identification.variables import Variables
+from swashplate.identification.noise import Covariance
+from swashplate.identification.uncertainty import Estimate, estimates
+from swashplate.identification.unknowns import Unknowns
 
 
 def covariance(freedom: float = np.inf, **more: object) -> Covariance:
-    variables = Variables.of(
+    variables = Unknowns.of(
         ["plain", "positive"], [3.0, 2.0], scales=[10.0, 1.0], logarithmic=[False, True], **more
     )
     matrix = np.diag([0.01, 0.04])

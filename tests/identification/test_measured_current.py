@@ -9,7 +9,7 @@ from swashplate import Channel, Experiment
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.campaign.kinds import ChannelKind
 from swashplate.errors import InputError
-from swashplate.identification.measured_current import measured_current
+from swashplate.identification.drive_model import measured_current
 
 RATE = 512.0
 TIME = np.arange(1025) / RATE

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate.errors import InputError
-from swashplate.identification.measures import measures, pooled_measures
+from swashplate.identification.assessment import measures, pooled_measures
 
 MEASURED = np.array([0.0, 2.0, 4.0, 6.0])
 SIMULATED = np.array([1.0, 2.0, 4.0, 5.0])

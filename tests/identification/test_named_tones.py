@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from swashplate.identification.named_tones import distinct, tone_sentences
-from swashplate.identification.tones import Tone
+from swashplate.identification.spectral_lines import Tone, distinct, tone_sentences
 
 
 def tone(channel: str, low: float, high: float, share: float) -> Tone:

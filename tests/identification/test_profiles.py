@@ -6,7 +6,7 @@ from scipy.optimize import brentq, least_squares, minimize_scalar
 from scipy.stats import t as student
 
 from swashplate.errors import DomainError, InputError
-from swashplate.identification.profiles import Profile, Threshold, profile, threshold
+from swashplate.identification.profile import Profile, Threshold, profile, threshold
 
 RNG = np.random.default_rng(6)
 J = RNG.normal(size=(60, 3)) @ np.array([[1.0, 0.0, 0.0], [0.9, 0.3, 0.0], [0.0, 0.2, 2.0]])

@@ -9,9 +9,9 @@ from swashplate import Experiment
 from swashplate.errors import InputError
 from swashplate.executors import Serial
 from swashplate.identification.assessment import Assessment
-from swashplate.identification.fit import StageFit
+from swashplate.identification.bootstrap import bootstraps_of, profiles_of
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.problem import Problem
-from swashplate.identification.refits import bootstraps_of, profiles_of
 from swashplate.identification.setup import Free, Stage
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns

@@ -13,15 +13,15 @@ from swashplate.campaign import rig
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.cli import app
-from swashplate.identification.fit import smooth
-from swashplate.identification.setup import Free, Setup, Stage, load_setup
-from swashplate.identification.soundness import (
+from swashplate.identification.data_checks import (
     Finding,
     check_runs,
     check_sound,
     refuse_unsound,
+    time_constant,
 )
-from swashplate.identification.unmoved import time_constant
+from swashplate.identification.fitting import smooth
+from swashplate.identification.setup import Free, Setup, Stage, load_setup
 
 NOMINAL = smooth(Drive.preset("hoist").parameters)
 TRUTH = Drive(NOMINAL).scale(Z10=1.1)

@@ -9,9 +9,8 @@ import pytest
 from swashplate import Campaign, Channel, Drive, Experiment
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.drives import at_rate_of
-from swashplate.identification.fit import fit, smooth
+from swashplate.identification.drive_model import DriveModel, at_rate_of
+from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import Free, Setup, Stage, load_setup, setup_names
 from swashplate.identification.staging import stage_problem
 from swashplate.maneuvers import source_tests
@@ -78,7 +77,7 @@ def test_a_clock_that_is_late_is_found(campaign: Campaign) -> None:
         free={"Z8": Free(relative=(0.5, 2.0), log=True)},
         clock_offsets={"shaft_speed": 0.05},
     )
-    found = fit(late, Drive.preset("hoist").parameters, Setup(stages=(stage,))).stages[-1].values
+    found = fit(Drive.preset("hoist").parameters, late, Setup(stages=(stage,))).stages[-1].values
     (offset,) = [value for name, value in found.items() if name.startswith("clock")]
     assert abs(offset) == pytest.approx(0.02, abs=2e-4)
 
@@ -120,7 +119,7 @@ def test_a_recursion_of_another_rate_gives_way_to_its_equation() -> None:
     names = ("zeta_plus", "omega_plus")
     free = {name: Free(relative=(0.5, 2.0)) for name in names}
     setup = Setup(stages=(Stage(name="card", part="card", free=free),))
-    found = fit([run], Drive.preset("hoist").parameters, setup, tolerance=1e-12)
+    found = fit(Drive.preset("hoist").parameters, [run], setup, tolerance=1e-12)
     assert found.parameters.rate is found.nominal.rate is None
     for name in names:
         assert found.parameters.numbers[name] == pytest.approx(truth.parameters.numbers[name])

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
-from swashplate.identification.tones import separated
+from swashplate.identification.spectral_lines import separated
 from swashplate.identification.uncertainty import uncertainty
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 RUNS, N, RATE = 4, 4096, 512.0
 TIME = np.arange(N) / RATE
@@ -24,7 +24,7 @@ def fitted(noise: np.ndarray, weight: np.ndarray | None = None) -> tuple[Lineari
         LinearisedRun(f"run {k}", "current", TIME, w * (e + DESIGN @ estimate), rows, weight)
         for k, e in enumerate(noise)
     ]
-    return LinearisedFit.of(runs, Variables.of("abc", np.ones(3))), estimate
+    return LinearisedFit.of(runs, Unknowns.of("abc", np.ones(3))), estimate
 
 
 def ripple(rng: np.random.Generator) -> np.ndarray:
@@ -59,7 +59,7 @@ def test_shares_are_of_all_runs_of_a_channel() -> None:
         else run
         for k, run in enumerate(fit.runs)
     ]
-    tones = separated(LinearisedFit.of(runs, Variables.of("abc", np.ones(3)))).tones
+    tones = separated(LinearisedFit.of(runs, Unknowns.of("abc", np.ones(3)))).tones
     # a third of the samples, two thirds: each with the same part of ripple
     power = 32.0 * np.mean(LEVEL**2)
     assert sum(each.share for each in tones) == pytest.approx(power / (power + 1.0), rel=0.05)
@@ -102,7 +102,7 @@ def test_white_noise_and_short_runs_have_no_tones() -> None:
     fit, _ = fitted(np.random.default_rng(5).normal(size=(RUNS, N)))
     assert separated(fit).tones == ()
     short = LinearisedRun("short", "current", TIME[:100], np.ones(100), DESIGN[:100])
-    assert separated(LinearisedFit.of([short], Variables.of("abc", np.ones(3)))).tones == ()
+    assert separated(LinearisedFit.of([short], Unknowns.of("abc", np.ones(3)))).tones == ()
 
 
 def test_the_tone_is_named() -> None:

@@ -9,15 +9,22 @@ import pytest
 from swashplate import Drive, Experiment
 from swashplate.campaign.experiment import InputSignal
 from swashplate.identification.assessment import Assessment, RunQuality, compared
-from swashplate.identification.fit import StageFit
-from swashplate.identification.judgements import Statement, listed, percent
-from swashplate.identification.null_directions import Direction
+from swashplate.identification.fitting import StageFit
+from swashplate.identification.identifiability import Direction
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage
 from swashplate.identification.solving import solve
 from swashplate.identification.starts import StartResult
 from swashplate.identification.unknowns import Unknown, Unknowns
-from swashplate.identification.verdict import Verdict, part_of_range, verdict
+from swashplate.identification.verdict import (
+    Criterion,
+    Statement,
+    Verdict,
+    listed,
+    part_of_range,
+    percent,
+    verdict,
+)
 
 TIME = np.linspace(0.0, 4.0, 81)
 WAVE = 10.0 * np.sin(2.0 * np.pi * TIME[:-1] / 4.0)
@@ -38,6 +45,10 @@ def quality(experiment: Callable[..., Experiment]) -> Make:
         return compared(replace(run, input=drive), "y", simulated)
 
     return make
+
+
+def criterion(found: Verdict, name: str) -> Criterion:
+    return next(each for each in found.criteria if each.name == name)
 
 
 def statement(found: Verdict, subject: str) -> Statement:
@@ -82,11 +93,13 @@ def test_a_drive_that_hardly_simulates_is_not_usable(
 
 def test_one_run_that_contradicts_the_others_is_named(quality: Make) -> None:
     runs = [quality(WAVE + 0.1 * SWAP, f"run {k}") for k in range(20)]
+    assert criterion(verdict((), runs), "predicted runs worse than mean").passed
     found = verdict((), [*runs, quality(-WAVE, "turned")])
-    assert found.usable
-    agreement = statement(found, "Agreement")
-    assert agreement.weight == "look"
-    assert "mean in turned: contradicts the other runs" in agreement.sentences[0]
+    assert not found.usable
+    failed = criterion(found, "predicted runs worse than mean")
+    assert failed.value == "1"
+    assert "mean in turned: it contradicts the other runs" in failed.failure
+    assert statement(found, "Agreement").weight == "bad"
 
 
 def test_large_residuals_that_follow_the_input_are_a_model_error(quality: Make) -> None:
@@ -141,6 +154,12 @@ def test_a_fit_that_carries_over_is_usable(experiment, measured, stage) -> None:
     assert "the fit carries over" in validation.sentences[0]
 
 
+def test_what_is_required_decides(quality: Make) -> None:
+    found = verdict((), [quality(WAVE + 0.24 * SWAP)], required=0.01)
+    assert found.headline == "Not usable: predicts y to 1.2 % of its range only."
+    assert criterion(found, "error / range, runs predicted").limit == "1 %"
+
+
 def test_a_fit_without_runs_held_out_says_so(stage) -> None:
     found = verdict([Assessment(stage())], [])
     assert found.usable
@@ -173,9 +192,7 @@ def test_a_faint_direction_asks_for_attention_where_the_intervals_show_it(stage)
     vars(assessment)["uncertainty"] = replace(known, quoted=quoted)
     wide = statement(verdict([assessment], []), "Identifiability")
     assert wide.weight == "look"
-    assert wide.sentences[-1] == (
-        "rise: intervals wider than ±10 % along faint directions: gain and lag."
-    )
+    assert wide.sentences[-1] == "rise: not determined to within ±10 %: gain and lag."
 
 
 def test_most_unknowns_at_bounds_is_hopeless(experiment, measured, stage) -> None:
@@ -198,7 +215,7 @@ def test_an_interrupted_fit_is_not_usable(experiment, measured, stage) -> None:
         whole, solution=replace(whole.solution, converged=False, message="too many evaluations")
     )
     found = verdict([Assessment(unfinished)], [held])
-    assert found.usable
+    assert not found.usable
     assert "not converged (too many evaluations)" in " ".join(found.sentences)
 
 

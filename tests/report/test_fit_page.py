@@ -14,14 +14,12 @@ import pytest
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
 from swashplate.campaign import rig
-from swashplate.identification.assessment import assess, run_qualities
-from swashplate.identification.fit import Fit, fit
-from swashplate.identification.fold_results import CrossValidation, Fold, FoldEstimate, HeldRun
-from swashplate.identification.measures import Measures
-from swashplate.identification.named_tones import distinct
-from swashplate.identification.profile_side import Point
-from swashplate.identification.profiles import Profile, Threshold
+from swashplate.identification.assessment import Measures, assess, run_qualities
+from swashplate.identification.cross_validation import CrossValidation, Fold, FoldEstimate, HeldRun
+from swashplate.identification.fitting import Fit, fit
+from swashplate.identification.profile import Point, Profile, Threshold
 from swashplate.identification.setup import Setup
+from swashplate.identification.spectral_lines import distinct
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.starts import StartResult
 from swashplate.identification.validation import predict
@@ -85,7 +83,7 @@ def fitted(campaign: Campaign) -> Fit:
         channels={**first.channels, "current": replace(channel, weight=weight)},
         ignored=((0.0, 0.5, "the dither starts"),),
     )
-    return fit([first, *runs[1:]], campaign.drive("hoist").parameters, SETUP, threads=1)
+    return fit(campaign.drive("hoist").parameters, [first, *runs[1:]], SETUP, threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -355,8 +353,8 @@ def test_truth_is_moved_to_the_scales_that_the_fit_held(campaign: Campaign) -> N
     stages = [{"name": "pump", "part": "pump", "free": free}]
     nominal = Drive.preset("hoist")
     begun = fit(
-        campaign.select(role="fit"),
         nominal.parameters,
+        campaign.select(role="fit"),
         Setup.model_validate({"stages": stages}),
         max_evaluations=1,
     )

@@ -78,7 +78,7 @@ def drives(assessments: Sequence[Assessment], draws: int = 200, seed: int = 0) -
     -----
     Errors are normal in the solver's vector, so that a logarithmic unknown is log-normal. What the
     card's stage does not know moves pump and motor as the fit would follow it, see
-    `identification.handed_on`.
+    `identification.uncertainty`.
     """
     if not assessments:
         raise InputError("A Monte Carlo needs the assessment of at least one stage.")

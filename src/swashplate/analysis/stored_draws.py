@@ -56,7 +56,7 @@ def stored_draws(
                 "campaign is."
             )
         stored = load_fit(place / STORED, Campaign.from_toml(tests))
-        _check_same(drive, Drive(stored.fit.parameters), place)
+        _check_same(drive, stored.fit.drive, place)
         return drives(assess(stored.fit.stages), draws, seed)
     if not (place / ESTIMATES).is_file():
         raise InputError(

@@ -12,9 +12,7 @@ from swashplate.cli.terminal import table
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swashplate.identification.advice import Advice, Gain
-    from swashplate.identification.candidates import SensorAdvice
-    from swashplate.identification.sensors import Sensor
+    from swashplate.identification.experiment_design import Advice, Gain, Sensor, SensorAdvice
 
 NAMED = 4
 """Unknowns that a row names."""

@@ -168,8 +168,8 @@ def check(
 def _beside_the_drives(campaign: Campaign) -> list[str]:
     """What stands out when each axis's drive is simulated under the runs' commands."""
     from swashplate.campaign.shortcomings import beyond_the_card
-    from swashplate.identification.fit import smooth
-    from swashplate.identification.soundness import check_runs
+    from swashplate.identification.data_checks import check_runs
+    from swashplate.identification.fitting import smooth
 
     found = []
     for name, axis in campaign.axes.items():

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from swashplate.cli.inputs import DRIVE, NUMBERS
 from swashplate.cli.terminal import table
 from swashplate.cli.validate import made_folder
 
@@ -14,9 +15,9 @@ if TYPE_CHECKING:
 
     from swashplate.identification.assessment import Assessment, RunQuality
     from swashplate.identification.bootstrap import Bootstrap
-    from swashplate.identification.fit import Fit
-    from swashplate.identification.fold_results import CrossValidation
-    from swashplate.identification.intervals import Estimate
+    from swashplate.identification.cross_validation import CrossValidation
+    from swashplate.identification.fitting import Fit
+    from swashplate.identification.uncertainty import Estimate
 
 
 def estimates_table(
@@ -118,12 +119,19 @@ def written(
 ) -> list[str]:
     """Write the drive and the estimates; lines that say so."""
     import polars as pl
+    from tomlkit import dumps
 
-    from swashplate.drive import Drive
-    from swashplate.tables import write_table
+    from swashplate.identification.own_model import ModelParameters
+    from swashplate.tables import write_table, write_text
 
     made_folder(out)
-    Drive(fit.parameters).to_toml(out / "drive.toml")
+    if isinstance(fit.parameters, ModelParameters):
+        found = {name: float(value) for name, value in fit.parameters.numbers.items()}
+        write_text(dumps({fit.parameters.name: found}), out / NUMBERS)
+        lines = [f"Numbers:   {out / NUMBERS}"]
+    else:
+        fit.drive.to_toml(out / DRIVE)
+        lines = [f"Drive:     {out / DRIVE}"]
     rows = []
     for each in assessments:
         bootstrap = (bootstraps or {}).get(each.stage.stage.name)
@@ -149,4 +157,4 @@ def written(
                 row["bootstrap upper 95 %"] = None if ends is None else ends[1]
             rows.append(row)
     write_table(pl.DataFrame(rows, infer_schema_length=None), out / "estimates.csv")
-    return [f"Drive:     {out / 'drive.toml'}", f"Estimates: {out / 'estimates.csv'}"]
+    return [*lines, f"Estimates: {out / 'estimates.csv'}"]

@@ -16,11 +16,12 @@ if TYPE_CHECKING:
     from swashplate.executors import Executor
     from swashplate.identification.assessment import Assessment, RunQuality
     from swashplate.identification.bootstrap import Bootstrap
-    from swashplate.identification.fit import Fit
-    from swashplate.identification.fit_file import StageProfile
-    from swashplate.identification.fold_results import CrossValidation
+    from swashplate.identification.cross_validation import CrossValidation
+    from swashplate.identification.fitting import Fit
     from swashplate.identification.setup import Setup
-    from swashplate.identification.solving import Loss, Method
+    from swashplate.identification.solving import Loss
+    from swashplate.identification.staging import Parameters
+    from swashplate.identification.storing import StageProfile
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -35,8 +36,9 @@ class Wanted:
     """Unknowns by name, or ``"all"``."""
     seed: int = 0
     executor: Executor | None = None
-    method: Method = "trf"
     loss: Loss = "linear"
+    required: float = 0.1
+    """Largest error of held-out runs over their range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,15 +130,15 @@ def judged_fit(
     campaign: Campaign,
     axis: str,
     runs: Sequence[Experiment],
-    nominal: ParameterSet,
+    nominal: Parameters,
     plan: Setup,
     result: Fit,
     wanted: Wanted,
 ) -> Judged:
     """Assess a fit, predict the runs held back, and compute what else was asked for."""
     from swashplate.identification.assessment import assess
-    from swashplate.identification.folds import cross_validate
-    from swashplate.identification.refits import bootstraps_of
+    from swashplate.identification.bootstrap import bootstraps_of
+    from swashplate.identification.cross_validation import cross_validate
     from swashplate.identification.validation import predict
     from swashplate.identification.verdict import verdict
 
@@ -145,7 +147,7 @@ def judged_fit(
         _check(wanted.profiles, assessments)
         predicted = predict(result.parameters, campaign.select(axis=axis, role="validate"))
         planned = [each.name for each in result.setup.stages]
-        judged = verdict(assessments, predicted, planned=planned)
+        judged = verdict(assessments, predicted, planned=planned, required=wanted.required)
         folds = None
         if wanted.folds:
             folds = cross_validate(
@@ -155,7 +157,6 @@ def judged_fit(
                 folds=wanted.folds,
                 seed=wanted.seed,
                 executor=wanted.executor,
-                method=wanted.method,
                 loss=wanted.loss,
                 watch=lambda _, done: status.update(f"{done} of {wanted.folds} folds"),
             )
@@ -196,8 +197,8 @@ def _check(names: Sequence[str], assessments: Sequence[Assessment]) -> None:
 def _profiles(
     assessment: Assessment, wanted: Wanted, show: Callable[[str], None]
 ) -> list[StageProfile]:
-    from swashplate.identification.fit_file import StageProfile
-    from swashplate.identification.refits import profiles_of
+    from swashplate.identification.bootstrap import profiles_of
+    from swashplate.identification.storing import StageProfile
 
     name = assessment.stage.stage.name
     names = None

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from swashplate.cli.arguments import AxisName, CampaignPath
-from swashplate.cli.inputs import parameters_of
-from swashplate.cli.terminal import note, say, show, side, working
+from swashplate.cli.arguments import AxisName, CampaignPath, OwnModel
+from swashplate.cli.inputs import model_parameters_of, parameters_of
+from swashplate.cli.terminal import note, say, show, working
 from swashplate.cli.validation_tables import (
     MEASURES,
     RESIDUALS,
@@ -19,14 +20,15 @@ from swashplate.cli.validation_tables import (
     measures_table,
     quality_tables,
     residual_table,
+    shown_verdict,
 )
 from swashplate.errors import FileError, InputError
 
 if TYPE_CHECKING:
     from swashplate.campaign.campaign import Campaign
     from swashplate.identification.assessment import RunQuality
+    from swashplate.identification.staging import Parameters
     from swashplate.identification.verdict import Verdict
-    from swashplate.parameters.parameter_set import ParameterSet
 
 EXAMPLES = """\
 Examples:
@@ -49,6 +51,7 @@ def validate(
     ],
     path: CampaignPath = Path("campaign.toml"),
     axis: AxisName = None,
+    model: OwnModel = None,
     role: Annotated[
         Role, typer.Option(help="Runs that were held back, those to fit, or both.")
     ] = "validate",
@@ -56,6 +59,9 @@ def validate(
         Path | None,
         typer.Option(help="Folder for report.html and measures.csv.", metavar="DIR"),
     ] = None,
+    require: Annotated[
+        float, typer.Option(help="Largest error, in % of a channel's range.", min=0.0)
+    ] = 10.0,
     figures: Annotated[
         Figures | None,
         typer.Option(help="Figures for print as well, in DIR/figures.", show_default=False),
@@ -79,7 +85,7 @@ def validate(
     if figures is not None and out is None:
         raise InputError("--figures needs a folder to write them to: give --out DIR.")
     with working(f"Reading {path}"):
-        parameters = parameters_of(drive)
+        parameters: Parameters | None = None if model else parameters_of(drive)
         campaign = Campaign.from_toml(path)
         chosen = chosen_axis(campaign, axis)
         wanted = ("fit", "validate") if role == "all" else (role,)
@@ -90,10 +96,13 @@ def validate(
             "another one is asked for with --role."
         )
     with working("Predicting"):
+        if parameters is None:
+            assert model is not None
+            parameters = model_parameters_of(drive, model, runs)
         predicted = predict(parameters, runs)
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
-        judged = verdict((), predicted)
+        judged = verdict((), predicted, required=require / 100.0)
         qualities = with_speeds(predicted)
         errors = channel_errors(qualities, source_rules(parameters.name))
     lines = []
@@ -113,10 +122,7 @@ def validate(
         say(f"- {words}")
     for line in lines:
         note(line)
-    if not judged.usable:
-        side.print(judged.headline)
-        raise typer.Exit(1)
-    say(judged.headline)
+    shown_verdict(judged)
 
 
 def chosen_axis(campaign: Campaign, axis: str | None) -> str:
@@ -140,8 +146,23 @@ def made_folder(folder: Path) -> Path:
     return folder
 
 
+def check_folder(folder: Path) -> None:
+    """See to it, before long work, that a folder can be made and written to; nothing is made yet.
+
+    Raises
+    ------
+    FileError
+        If it cannot.
+    """
+    there = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
+    if not there.is_dir():
+        raise FileError(f"{folder} cannot be made: {there} is no folder.")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise FileError(f"{folder} cannot be written to: {there} is read-only or another user's.")
+
+
 def _written(
-    parameters: ParameterSet,
+    parameters: Parameters,
     campaign: Campaign,
     predicted: Sequence[RunQuality],
     judged: Verdict,

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from swashplate.cli.terminal import table
+from typer import Exit
+
+from swashplate.cli.terminal import say, show, side, table
 
 if TYPE_CHECKING:
     import polars as pl
     from rich.table import Table
 
-    from swashplate.identification.assessment import RunQuality
-    from swashplate.identification.measures import Measures
+    from swashplate.identification.assessment import Measures, RunQuality
     from swashplate.identification.validation import ChannelErrors
+    from swashplate.identification.verdict import Verdict
 
 
 MEASURES = (
@@ -186,3 +188,32 @@ def measures_table(qualities: Sequence[RunQuality]) -> pl.DataFrame:
         )
     # a column whose first rows are empty must not be taken for text
     return pl.DataFrame(rows, infer_schema_length=None)
+
+
+def criteria_table(verdict: Verdict) -> Table:
+    """The acceptance criteria, those that are not met first."""
+    made = table("Acceptance criteria", "criterion", ">value", ">limit", "", wrap="criterion")
+    for each in sorted(verdict.criteria, key=lambda each: each.passed):
+        made.add_row(each.name, each.value, each.limit, "met" if each.passed else "NOT MET")
+    return made
+
+
+def shown_verdict(verdict: Verdict) -> None:
+    """Print criteria, range of validity, what is assumed, and the headline.
+
+    Raises
+    ------
+    Exit
+        With code 1 if what was judged is not usable.
+    """
+    show(criteria_table(verdict))
+    if verdict.assumed:
+        say("Assumed, cannot be checked from these logs:")
+    for words in verdict.assumed:
+        say(f"- {words}")
+    if not verdict.usable:
+        side.print(verdict.headline)
+        raise Exit(1)
+    say(verdict.headline)
+    if verdict.validity:
+        say(verdict.validity)

@@ -1,25 +1,277 @@
-"""Errors of a fit's estimates: for coloured residuals, and for white ones beside them."""
+"""Uncertainty of the estimates: standard errors and confidence intervals, priors taken in."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf, log
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.identification.autocorrelation import NoiseColour, noise_colours
-from swashplate.identification.checked_ends import CheckedEnd
-from swashplate.identification.coloured_noise import coloured_noise_covariance
-from swashplate.identification.covariance import Covariance, white_noise_covariance
-from swashplate.identification.handed_on import Handed, with_handed
-from swashplate.identification.intervals import Estimate, estimates, reach
-from swashplate.identification.linearised import LinearisedFit
-from swashplate.identification.named_tones import tone_sentences
-from swashplate.identification.swelling_noise import swelling_noise_covariance
-from swashplate.identification.tones import Tone, separated
+from swashplate.errors import InputError
+from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.linearised import LinearisedFit, linearised_fit
+from swashplate.identification.noise import (
+    Covariance,
+    NoiseColour,
+    coloured_noise_covariance,
+    noise_colours,
+    swelling_noise_covariance,
+    white_noise_covariance,
+)
+from swashplate.identification.problem import Problem
+from swashplate.identification.profile import CheckedEnd
+from swashplate.identification.spectral_lines import Tone, separated, tone_sentences
+from swashplate.identification.unknowns import Unknowns
+
+if TYPE_CHECKING:
+    from swashplate.campaign.experiment import Experiment
+    from swashplate.identification.assessment import Assessment
+    from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
+
+Status = Literal[
+    "estimated",
+    "at its lower bound",
+    "at its upper bound",
+    "undetermined",
+    "no lower end",
+    "no upper end",
+]
+
+
+DECADES = 100.0
+"""Factor each way from which an interval says nothing; for an unknown that is not logarithmic, half
+width in its scales."""
+
+
+class Estimate(NamedTuple):
+    """One unknown with what is known of its error."""
+
+    name: str
+    value: float
+    status: Status
+    standard_error: float | None
+    """In the unknown's unit; of a logarithmic one the value times the logarithm's. None unless
+    estimated."""
+    lower: float | None
+    """End of the interval; asymmetric about the value for a logarithmic unknown. None where there
+    is no end."""
+    upper: float | None
+    degrees_of_freedom: float | None
+
+    @property
+    def relative_half_width(self) -> float:
+        """Half of the interval over the value's size; infinite where an end is missing."""
+        if self.lower is None or self.upper is None or self.value == 0.0:
+            return inf
+        return 0.5 * (self.upper - self.lower) / abs(self.value)
+
+
+def reach(covariance: Covariance, level: float = 0.95) -> Array:
+    """(K,) half widths of the intervals in the solver's vector; 0 for unknowns without one.
+
+    Raises
+    ------
+    InputError
+        If the level is not between 0 and 1.
+    """
+    if not 0.0 < level < 1.0:
+        raise InputError(f"The level {level:g} of an interval must lie between 0 and 1.")
+    from scipy.stats import t as student
+
+    quantiles = student.ppf(0.5 + 0.5 * level, covariance.degrees_of_freedom)
+    errors = np.where(covariance.determined, covariance.standard_errors, 0.0)
+    known = covariance.determined & covariance.variables.free
+    half: Array = np.where(known, quantiles * errors, 0.0)
+    return half
+
+
+def estimates(
+    covariance: Covariance,
+    *,
+    level: float = 0.95,
+    ends: Mapping[tuple[int, bool], float] = MappingProxyType({}),
+) -> tuple[Estimate, ...]:
+    """Estimates with intervals from a covariance.
+
+    Parameters
+    ----------
+    covariance : Covariance
+        Of the solver's vector.
+    level : float
+        Probability of the intervals, between 0 and 1.
+    ends : mapping, optional
+        By unknown's number and side, True for the upper, distances of ends that differ from the
+        covariance's, in the solver's vector; inf where there is none.
+
+    Raises
+    ------
+    InputError
+        If the level is not between 0 and 1.
+
+    Notes
+    -----
+    An interval is symmetric in the solver's vector, ± Student's quantile times the standard error,
+    and carried over from there: a positive unknown never has a negative end. Student's rather than
+    the normal quantile, because the variance is itself estimated, from a number of independent
+    stretches of residual that may be small.
+    """
+    half = reach(covariance, level)
+    variables = covariance.variables
+    errors = covariance.standard_errors
+    distances = {
+        upper: np.array([ends.get((k, upper), half[k]) for k in range(half.size)])
+        for upper in (False, True)
+    }
+    open_ended = {upper: np.isinf(distances[upper]) for upper in distances}
+    with np.errstate(invalid="ignore"):
+        lower = variables.to_values(variables.vector - distances[False])
+        upper = variables.to_values(variables.vector + distances[True])
+    made = []
+    for k, name in enumerate(variables.names):
+        value = float(variables.estimates[k])
+        below, above = bool(open_ended[False][k]), bool(open_ended[True][k])
+        if variables.at_bound[k]:
+            low = variables.at_bound[k] < 0
+            side: Status = "at its lower bound" if low else "at its upper bound"
+            made.append(Estimate(name, value, side, None, None, None, None))
+        elif (
+            not covariance.determined[k]
+            or (below and above)
+            or half[k] > (log(DECADES) if variables.logarithmic[k] else DECADES)
+        ):
+            made.append(Estimate(name, value, "undetermined", None, None, None, None))
+        else:
+            freedom = float(covariance.degrees_of_freedom[k])
+            error = float(abs(variables.slopes[k]) * errors[k])
+            status: Status = "estimated"
+            if below or above:
+                status = "no lower end" if below else "no upper end"
+            made.append(
+                Estimate(
+                    name,
+                    value,
+                    status,
+                    error if status == "estimated" else None,
+                    None if below else float(lower[k]),
+                    None if above else float(upper[k]),
+                    freedom,
+                )
+            )
+    return tuple(made)
+
+
+class Handed(NamedTuple):
+    """An earlier stage's estimates as the later one takes them for granted."""
+
+    covariance: Covariance
+    """Of the earlier stage's vector."""
+    slopes: Array
+    """(K, K_earlier) by how much the later stage's vector follows the earlier one's."""
+
+    @property
+    def added(self) -> Array:
+        """(K, K) covariance that it adds to the later stage's own."""
+        added: Array = self.slopes @ self.covariance.matrix @ self.slopes.T
+        return added
+
+
+def slopes_by_earlier(
+    stage: StageFit, earlier: StageFit, linearised: LinearisedFit
+) -> Array | None:
+    """Derivatives of a stage's estimates by those of an earlier one.
+
+    Parameters
+    ----------
+    stage : StageFit
+        Pump and motor, driven by the current that the card makes.
+    earlier : StageFit
+        The card.
+    linearised : LinearisedFit
+        Of the later stage at its optimum.
+
+    Returns
+    -------
+    (K, K_earlier) array or None
+        None where the later stage takes nothing from the earlier one: its current is measured, or
+        it frees the same part itself.
+
+    Notes
+    -----
+    The later estimate makes J₂ᵀ r₂ = 0, so to first order dθ₂/dθ₁ = -(J₂ᵀJ₂)⁻¹ J₂ᵀ ∂r₂/∂θ₁: the
+    second step of a two-step estimate (Murphy and Topel 1985). Gauss-Newton's approximation, as
+    everywhere here: second derivatives times residuals are left out.
+    """
+    model = stage.problem.model
+    if not isinstance(model, DriveModel) or model.part != "pump" or earlier.stage.part != "card":
+        return None
+    simulated = [
+        number
+        for number, each in enumerate(stage.problem.experiments)
+        if stage.stage.current == "simulated" and each.input.kind == "voltage"
+    ]
+    if not simulated:
+        return None
+    chain = DriveModel(
+        model.parameters_at(stage.problem.unknowns.targets(stage.solution.vector, "")), "chain"
+    )
+    unknowns, vector = earlier.problem.unknowns, earlier.solution.vector
+    names = [name for each in unknowns if each.run is None for name in each.targets]
+    products = np.zeros((linearised.rank, len(unknowns)))
+    rows = {(run.name, run.channel): run for run in linearised.runs}
+    values = dict(stage.problem.unknowns.targets(stage.solution.vector, ""))
+    for number in simulated:
+        experiment = stage.problem.experiments[number]
+        own = stage.problem.unknowns.targets(stage.solution.vector, experiment.name)
+        by_card = chain.linearise(
+            {name: value for name, value in own.items() if name not in values}, experiment, names
+        )
+        by_vector = unknowns.chain(vector, names, "")
+        for name, weight in stage.problem.weights[number].items():
+            used = weight > 0.0
+            if not used.any():
+                continue
+            run = rows[experiment.name, name]
+            moved = weight[used, None] * (by_card[name].by[used] @ by_vector)
+            products += (run.jacobian @ linearised.whitening).T @ moved
+    slopes: Array = -linearised.whitening @ products
+    return slopes
+
+
+def with_handed(own: Covariance, handed: Sequence[Handed]) -> Covariance:
+    """A stage's covariance with what earlier stages do not know.
+
+    The degrees of freedom are Satterthwaite's, of the sum of the variances.
+    """
+    if not handed:
+        return own
+    total = own.matrix.copy()
+    variance = np.diag(own.matrix).copy()
+    spread = _part(variance, own.degrees_of_freedom)
+    for each in handed:
+        added = np.where(np.outer(own.determined, own.determined), each.added, 0.0)
+        total += added
+        # of each earlier unknown by itself, as if they were independent of each other
+        parts = each.slopes**2 * np.diag(each.covariance.matrix)
+        share = parts / np.maximum(parts.sum(axis=1, keepdims=True), 1e-300)
+        freedom = 1.0 / np.maximum(
+            np.sum(share**2 / each.covariance.degrees_of_freedom, axis=1), 1e-300
+        )
+        spread += _part(np.diag(added), freedom)
+    variance = np.diag(total)
+    freedom = np.divide(variance**2, spread, out=np.full_like(variance, np.inf), where=spread > 0.0)
+    return replace(own, matrix=total, degrees_of_freedom=freedom)
+
+
+def _part(variance: Array, freedom: Array) -> Array:
+    part: Array = variance**2 / freedom
+    return part
+
 
 NOTABLE = 1.2
 """Ratio of the errors under noise that differs along the runs to those under stationary noise from
@@ -176,11 +428,13 @@ def uncertainty(
     InputError
         If there are no more samples than unknowns, or the level is not between 0 and 1.
     """
+    bounded, fit = fit.variables, released(fit)
     clean = separated(fit)
     colours = noise_colours(clean.fit)
     coloured = _with(coloured_noise_covariance(clean.fit, colours=colours), clean.covariance)
     swelling = swelling_noise_covariance(fit)
     own, uneven = _wider(coloured, swelling)
+    own = replace(own, variables=bounded)
     worth = {m: colour for colour in colours for m in colour.members}
     made = Uncertainty(
         with_handed(own, handed),
@@ -201,6 +455,17 @@ def uncertainty(
     )
     made.estimates  # noqa: B018  refuses a wrong level
     return made
+
+
+def released(fit: LinearisedFit) -> LinearisedFit:
+    """The fit with unknowns at a bound free to move.
+
+    An interval of one unknown must allow for all that the others may be. One at its bound may lie
+    anywhere inside: held there, its partners would seem far better known than they are.
+    """
+    if fit.variables.free.all():
+        return fit
+    return replace(fit, variables=fit.variables.released)
 
 
 def _with(covariance: Covariance, added: Array) -> Covariance:
@@ -224,3 +489,139 @@ def _wider(coloured: Covariance, swelling: Covariance) -> tuple[Covariance, tupl
     )
     names = np.array(coloured.variables.names)
     return quoted, tuple(names[ratio > NOTABLE])
+
+
+P = TypeVar("P", bound=Problem)
+
+LEAST = 1e-6
+"""Smallest worth: residuals that are all but zero leave a prior its say on what they leave open."""
+
+
+def weighed(problem: P, vector: Array) -> P:
+    """The problem with priors that count as much as the residuals are really worth.
+
+    The cost takes every residual for an independent one of variance 1. Where a hundred of them are
+    worth one, data would outweigh a prior a hundred times too much. So a prior counts as often as
+    that: by the ratio of its unknown's variance under the noise that the residuals show to its
+    variance under the noise that the cost assumes, both from the data alone; by the median of the
+    others where the data alone do not determine the unknown.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was fitted.
+    vector : (K,) array
+        The solver's vector, at or near the optimum.
+
+    Raises
+    ------
+    InputError
+        If there are no more samples than unknowns.
+    """
+    bare = replace(problem, unknowns=problem.unknowns.with_worths(None))
+    fit = linearised_fit(bare, vector)
+    own = uncertainty(fit).own
+    assumed = np.sum(fit.whitening**2, axis=1)
+    known = own.determined & (assumed > 0.0)
+    ratio = np.diag(own.matrix)[known] / assumed[known]
+    found = np.full(known.size, float(np.median(ratio)) if known.any() else 1.0)
+    found[known] = ratio
+    worths = [
+        max(float(worth), LEAST)
+        for worth, unknown in zip(found, problem.unknowns, strict=True)
+        if unknown.prior is not None
+    ]
+    return with_worths(problem, worths)
+
+
+def with_worths(problem: P, worths: Sequence[float]) -> P:
+    """The problem with these worths of its priors, in the order of the unknowns."""
+    return replace(problem, unknowns=problem.unknowns.with_worths(worths))
+
+
+def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tuple[str, ...]:
+    """What each prior adds, and how far from it the estimate lies."""
+    said = []
+    errors = quoted.standard_errors
+    for k, unknown in enumerate(unknowns):
+        prior = unknown.prior
+        if prior is None:
+            continue
+        scale = 1.0 if unknown.log else unknown.scale
+        middle = log(prior.mean) if unknown.log else prior.mean
+        pull = (float(vector[k]) * scale - middle) / prior.deviation
+        share = min(float(errors[k] * scale / prior.deviation) ** 2, 1.0)
+        percent = 100.0 * share
+        part = f"{percent:.0f}" if percent >= 10.0 else f"{percent:.2g}"
+        spread = f"{100.0 * prior.deviation:.3g} %" if unknown.log else f"{prior.deviation:.4g}"
+        said.append(
+            f"The prior of {unknown.name}, {prior.mean:.5g} ± {spread}, makes up "
+            f"{part} % of what is known of it; the estimate lies "
+            f"{abs(pull):.2g} deviations {'above' if pull >= 0.0 else 'below'} its mean."
+        )
+    return tuple(said)
+
+
+OPEN = 0.01
+"""Part of a channel's range that a prediction moves by, for 10 % of an unknown, from which it
+depends on that unknown."""
+
+
+def unbounded_predictions(
+    assessments: Sequence[Assessment], experiments: Sequence[Experiment]
+) -> tuple[str, ...]:
+    """Unknowns without an interval on which the prediction of some runs depends.
+
+    Parameters
+    ----------
+    assessments : sequence of Assessment
+        Of the stages.
+    experiments : sequence of Experiment
+        The runs that are predicted; each is looked at in the channels that a stage fits.
+
+    Notes
+    -----
+    Only a prediction that leaves the directions which the fitted runs determine is unbounded: of
+    two unknowns of which the fit tells the product, it depends on the product alone.
+    """
+    names = []
+    for each in assessments:
+        model, found = each.stage.problem.model, each.uncertainty
+        if not isinstance(model, DriveModel):
+            continue
+        unknowns, vector = each.stage.problem.unknowns, each.stage.solution.vector
+        status = [estimate.status for estimate in found.estimates]
+        undetermined = np.array(
+            [s == "undetermined" and u.run is None for s, u in zip(status, unknowns, strict=True)]
+        )
+        # a better optimum that was met says nothing of how far an unknown can go
+        one_ended = np.zeros(len(unknowns), dtype=np.bool_)
+        one_ended[[e.number for e in found.ends if np.isinf(e.distance) and e.better is None]] = (
+            True
+        )
+        if not (undetermined | one_ended).any():
+            continue
+        lengths = np.linalg.norm(each.linearised.triangle, axis=0)
+        lengths[lengths == 0.0] = 1.0
+        # directions that the fitted runs determine, in units of their effect there
+        told = np.linalg.qr(lengths[:, None] * each.linearised.whitening)[0]
+        chain = DriveModel(each.stage.drive.parameters, "card" if model.part == "card" else "chain")
+        chain = replace(chain, forces=model.forces)
+        for experiment in experiments:
+            if experiment.input.kind != "voltage" or not chain.signals_of(experiment):
+                continue
+            targets = [t for u in unknowns if u.run is None for t in u.targets]
+            values = {t: v for t, v in unknowns.targets(vector, "").items() if t in targets}
+            by_name = unknowns.chain(vector, targets, "")
+            for name, part in chain.linearise(values, experiment, targets).items():
+                channel = experiment[name]
+                rows = part.by[channel.used] @ by_name
+                reach = float(np.ptp(channel.values[channel.used]))
+                if channel.is_position:
+                    rows = rows - rows.mean(axis=0)
+                open_rows = rows / lengths
+                open_rows = (open_rows - (open_rows @ told) @ told.T) * lengths
+                moved = 0.1 * np.where(undetermined, np.abs(open_rows).max(axis=0), 0.0)
+                moved += 0.1 * np.where(one_ended, np.abs(rows).max(axis=0), 0.0)
+                names += [unknowns.names[k] for k in np.flatnonzero(moved > OPEN * reach)]
+    return tuple(dict.fromkeys(names))

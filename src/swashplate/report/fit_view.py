@@ -11,7 +11,7 @@ from matplotlib.ticker import NullLocator
 
 from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment, RunQuality
-from swashplate.identification.intervals import Estimate
+from swashplate.identification.uncertainty import Estimate
 from swashplate.report.style import (
     BLUE,
     FAINT,

@@ -11,11 +11,10 @@ from typing import Any, Literal
 from swashplate.campaign.experiment import Experiment
 from swashplate.drive import Drive
 from swashplate.identification.assessment import RunQuality
-from swashplate.identification.error_tables import LargestError, sine_error
-from swashplate.identification.exclusions import SOURCE_RULES
-from swashplate.identification.fit import fit
-from swashplate.identification.known_truth import drawn
+from swashplate.identification.error_tables import SOURCE_RULES, LargestError, sine_error
+from swashplate.identification.fitting import fit
 from swashplate.identification.setup import load_setup
+from swashplate.identification.staging import drawn
 from swashplate.identification.validation import (
     channel_errors,
     compared_run,
@@ -115,8 +114,8 @@ def _fitted(nominal: Drive, axis: str, runs: Sequence[Experiment], seed: int) ->
     starts = [
         drawn(nominal, setup, STARTS * seed + number, spread=SPREAD) for number in range(STARTS)
     ]
-    fits = [fit(runs, start.parameters, setup) for start in starts]
-    return min(fits, key=lambda each: each.stages[-1].solution.cost).parameters
+    fits = [fit(start.parameters, runs, setup) for start in starts]
+    return min(fits, key=lambda each: each.stages[-1].solution.cost).drive.parameters
 
 
 def _explained(axis: str, seed: int) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from swashplate.campaign.encoder import interpolate_counts
 from swashplate.drive import Drive
-from swashplate.identification.measured_current import measured_current
+from swashplate.identification.drive_model import measured_current
 from swashplate.reproduction.bench import ON_CURRENT, Bench
 from swashplate.reproduction.catalogue import Shown
 from swashplate.reproduction.content import Curve, Figure, Panel

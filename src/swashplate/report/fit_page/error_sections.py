@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from swashplate.identification.error_tables import ErrorTable
-from swashplate.identification.exclusions import Rule
+from swashplate.identification.error_tables import ErrorTable, Rule
 from swashplate.identification.validation import ChannelErrors, channel_errors
 from swashplate.report.fit_page.numbers import listed
 from swashplate.report.fit_page.runs import ShownRun

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from swashplate.campaign.campaign import Campaign
 from swashplate.errors import FileError
 from swashplate.identification.assessment import Assessment, RunQuality, assess
-from swashplate.identification.fit import Fit
+from swashplate.identification.fitting import Fit
 from swashplate.identification.starts import StartResult
 from swashplate.identification.validation import ignored_windows
 from swashplate.identification.verdict import starts_of

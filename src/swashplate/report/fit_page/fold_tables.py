@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment
-from swashplate.identification.fold_results import CrossValidation
+from swashplate.identification.cross_validation import CrossValidation
 from swashplate.identification.validation import pooled, with_speeds
 from swashplate.report.fit_page.numbers import NONE, fixed, percent, plain, unit_text
 from swashplate.report.fit_page.verdict import rmse_words

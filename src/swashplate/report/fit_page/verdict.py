@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from swashplate.errors import InputError
-from swashplate.identification.assessment import Assessment, RunQuality
-from swashplate.identification.judgements import Statement
-from swashplate.identification.measures import Measures
-from swashplate.identification.named_tones import distinct
-from swashplate.identification.tones import Tone
+from swashplate.identification.assessment import Assessment, Measures, RunQuality
+from swashplate.identification.spectral_lines import Tone, distinct
 from swashplate.identification.validation import pooled
-from swashplate.identification.verdict import Verdict
+from swashplate.identification.verdict import Statement, Verdict
 from swashplate.report.display_units import display_unit
 from swashplate.report.fit_page.numbers import count, plain
 from swashplate.report.fit_page.runs import ShownRun, conditions
@@ -52,6 +49,17 @@ def statements(
             for words in uncertainty_sentences(each)
         ]
         made.append(Statement("Errors", "plain", tuple(said)))
+    if judged.criteria:
+        lines = (
+            f"{'Met' if each.passed else 'NOT MET'}: {each.name}: {each.value} "
+            f"(limit {each.limit}; {each.reason})."
+            for each in judged.criteria
+        )
+        made.append(Statement("Acceptance criteria", "plain", tuple(lines)))
+    if judged.validity:
+        made.append(Statement("Range of validity", "plain", (judged.validity,)))
+    if judged.assumed:
+        made.append(Statement("Assumed, cannot be checked", "plain", judged.assumed))
     if findings:
         text = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
         made.append(Statement("Data", "look", (text,)))

@@ -1,4 +1,4 @@
-"""Tones in residuals, such as an ammeter's ripple: found, and told apart from the noise."""
+"""Spectral lines in residuals, such as an ammeter's ripple: found, and told from the noise."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from scipy.fft import irfft, rfft, rfftfreq
 from scipy.ndimage import median_filter
 from scipy.signal import hilbert, welch
 
-from swashplate.identification.autocorrelation import Grid, grid_of, unweighted
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
+from swashplate.identification.noise import Grid, grid_of, unweighted
 
 Array = NDArray[np.float64]
+
 
 SEGMENT = 1024
 """Samples in a stretch of the averaged spectrum: 2 s at 512 Hz, a resolution of some 0.75 Hz."""
@@ -213,3 +214,49 @@ def _band(tone: Tone, size: int, step: float) -> NDArray[np.bool_]:
     frequencies = rfftfreq(size, step)
     inside: NDArray[np.bool_] = (frequencies >= tone.low) & (frequencies <= tone.high)
     return inside
+
+
+def distinct(tones: Sequence[Tone]) -> tuple[Tone, ...]:
+    """Tones by channel and frequency, those whose bands overlap as one.
+
+    A line that was taken out in several rounds is one tone: the strongest, with the shares of all.
+    """
+    made: list[Tone] = []
+    end = 0.0
+    channels = list(dict.fromkeys(tone.channel for tone in tones))
+    for tone in sorted(tones, key=lambda each: (channels.index(each.channel), each.low)):
+        if made and made[-1].channel == tone.channel and tone.low <= end:
+            strongest = max(made[-1], tone, key=lambda each: each.share)
+            made[-1] = strongest._replace(share=made[-1].share + tone.share)
+            end = max(end, tone.high)
+        else:
+            made.append(tone)
+            end = tone.high
+    return tuple(made)
+
+
+def tone_sentences(tones: Sequence[Tone]) -> tuple[str, ...]:
+    """What tones there are, one sentence a channel."""
+    channels: dict[str, list[Tone]] = {}
+    for tone in distinct(tones):
+        channels.setdefault(tone.channel, []).append(tone)
+    said = []
+    for channel, alike in channels.items():
+        most = max(alike, key=lambda each: each.share)
+        what, them = f"A tone at {most.frequency:.3g} Hz makes", "it"
+        largest = ""
+        if len(alike) > 1:
+            what, them = (
+                (
+                    f"{len(alike)} tones between {alike[0].frequency:.3g} and "
+                    f"{alike[-1].frequency:.3g} Hz make"
+                ),
+                "them",
+            )
+            largest = f", the largest {100.0 * most.share:.2g} % at {most.frequency:.3g} Hz"
+        share = sum(each.share for each in alike)
+        said.append(
+            f"{what} {100.0 * share:.2g} % of the residuals' variance of {channel}{largest}; "
+            f"no unknown depends on {them}, and the noise is judged without {them}."
+        )
+    return tuple(said)

@@ -1,0 +1,770 @@
+"""Lack of fit: what is left in residuals that noise does not explain, and what would explain it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import degrees, inf, isfinite, sqrt
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.errors import DomainError, InputError
+from swashplate.identification.drive_model import CURRENTS, DriveModel
+from swashplate.identification.linearised import TOLERANCE, triangular_factor
+from swashplate.identification.model import simulated
+from swashplate.identification.noise import (
+    LONGEST,
+    Grid,
+    correlation_length,
+    grid_of,
+    pair_sums,
+)
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
+
+if TYPE_CHECKING:
+    from swashplate.identification.assessment import Assessment
+    from swashplate.identification.problem import Problem
+
+Array = NDArray[np.float64]
+
+EXPLAINS = 0.2
+"""Part of the residuals' squares from which a fault is named as a likely cause."""
+
+SAME_DIRECTION = 1e-6
+"""Part of a fault's effect outside the estimates' below which both are the same: derivatives are
+exact to about 1e-9, and a fault of 3 % would then leave 3e-8 of the signal."""
+
+PLAUSIBLE_SCALE = 0.03
+"""Error of an instrument's scale that occurs without notice: a wheel, a clamp, a gear. [1]"""
+
+PLAUSIBLE_DELAY = 0.01
+"""Error of time stamps that occurs without notice: a filter, a logger's buffer. [s]"""
+
+COMMAND_CHANGE = 1e-3
+"""Relative change of the command by which its effect is found, downwards: 10 V is the limit. [1]"""
+
+SAME_STAMPS = 0.01
+"""The same of late stamps and a longer delay, compared by whole samples: stamps have jitter. [1]"""
+
+FAR = 100.0
+"""One-step estimate of a relative error beyond which one step says nothing, tau's apart. [%]"""
+
+UNTOLD = 1e-4
+"""Part of a fixed parameter's effect outside the estimates' below which it is a unit of them."""
+
+DWELLS = 0.1
+"""Time for which a noisy channel stands at its very largest value only if it is clipped. [s]"""
+
+LONGEST_SHOWN = 2.0
+"""Largest lag of the curves. [s]"""
+
+DEVIATIONS = 1.96
+"""Half width of the bands, in standard deviations: 95 %."""
+
+CHANCE = 0.05
+"""Probability that unrelated signals are said to be related, all lags together."""
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualTest:
+    """Whiteness of the residuals of one channel of one run, and independence of the input."""
+
+    lags: Array
+    """(m,) from 0. [s]"""
+    autocorrelation: Array
+    """(m,) of the residuals."""
+    white_band: float
+    """Half width of the 95 % band of white noise."""
+    cross_lags: Array
+    """(2 m - 1,) positive where the residual comes after the input. [s]"""
+    cross_correlation: Array
+    """(2 m - 1,) of the residuals with the input."""
+    cross_band: float
+    """Half width of the 95 % band of residuals, coloured as these are, without relation to the
+    input."""
+    duration: float
+    """Time over which the residuals stay correlated; 0 if they are white. [s]"""
+    samples: int
+    verdict: str
+    """In words."""
+
+    @property
+    def white(self) -> bool:
+        """Whether nothing but white noise is left."""
+        return self.duration == 0.0
+
+    @property
+    def peak(self) -> tuple[float, float]:
+        """Lag of the largest cross-correlation [s], and its value."""
+        place = int(np.argmax(np.abs(self.cross_correlation)))
+        return float(self.cross_lags[place]), float(self.cross_correlation[place])
+
+
+def residual_test(
+    time: Array, residual: Array, command: Array, *, longest: float = LONGEST_SHOWN
+) -> ResidualTest:
+    """Test the residuals of one channel of one run.
+
+    Parameters
+    ----------
+    time : (n,) array
+        Stamps of the samples that count; gaps are respected. [s]
+    residual : (n,) array
+        Simulated less measured, weights left out.
+    command : (n,) array
+        The input at the same stamps, in its unit.
+    longest : float
+        Largest lag of the curves; at most a quarter of the run is shown. [s]
+
+    Raises
+    ------
+    InputError
+        If lengths differ, a number is not finite, or there are fewer than 8 samples.
+
+    Notes
+    -----
+    The band of the cross-correlation is 1.96 √(Σ ρ_r ρ_u/n): two coloured signals without any
+    relation show large correlations by chance (Bartlett's formula), and a band of 1.96/√n would
+    call every one of them a finding.
+    """
+    if not time.shape == residual.shape == command.shape:
+        raise InputError(
+            f"{time.size} stamps, {residual.size} residuals and {command.size} samples of the "
+            "input do not belong together."
+        )
+    if time.size < 8:
+        raise InputError(f"{time.size} samples tell nothing of correlation; 8 are the least.")
+    if not (np.isfinite(residual).all() and np.isfinite(command).all()):
+        raise InputError("Residuals and input must be finite; leave the other samples out.")
+    grid = grid_of(time)
+    most = max(int(LONGEST * grid.size), 1)
+    own, counts = _autocorrelation(residual - residual.mean(), grid, most)
+    theirs, _ = _autocorrelation(command - command.mean(), grid, most)
+    length = correlation_length(own, counts)
+    shown = min(most, max(int(longest / grid.step), 1))
+    cross = _cross_correlation(residual - residual.mean(), command - command.mean(), grid, shown)
+    # beyond the residuals' own length their estimated correlation is chance
+    kept = slice(1, max(length, 1) + 1)
+    inflation = max(1.0, 1.0 + 2.0 * float(own[kept] @ theirs[kept]))
+    band = DEVIATIONS * float(np.sqrt(inflation / time.size))
+    lags: Array = np.arange(shown + 1.0) * grid.step
+    made = ResidualTest(
+        lags,
+        own[: shown + 1],
+        DEVIATIONS / float(np.sqrt(time.size)),
+        np.concatenate([-lags[:0:-1], lags]),
+        cross,
+        min(band, 1.0),
+        length * grid.step,
+        time.size,
+        "",
+    )
+    return _judged(made, residual, command)
+
+
+def _judged(test: ResidualTest, residual: Array, command: Array) -> ResidualTest:
+    if not np.any(residual != residual[0]):
+        what = "exactly zero" if residual[0] == 0.0 else f"{residual[0]:.4g} throughout"
+        return replace(test, verdict=f"The residuals are {what}: there is no noise to test.")
+    colour = (
+        "The residuals are white"
+        if test.white
+        else f"The residuals stay correlated over {test.duration:.2g} s"
+    )
+    if not np.any(command != command[0]):
+        return replace(test, verdict=f"{colour}; the input is constant and explains nothing.")
+    from scipy.stats import norm
+
+    # neighbouring lags say the same: as many looks as correlation lengths fit
+    looks = max(test.cross_lags.size / max(test.duration / test.lags[1], 1.0), 1.0)
+    limit = float(norm.isf(0.5 * CHANCE / looks)) / DEVIATIONS * test.cross_band
+    lag, value = test.peak
+    if abs(value) <= limit:
+        return replace(test, verdict=f"{colour} and have no relation to the input.")
+    when = (
+        f"{lag:.2g} s after it"
+        if lag > 0.0
+        else f"{-lag:.2g} s before it"
+        if lag < 0.0
+        else "at the same time"
+    )
+    return replace(
+        test,
+        verdict=(
+            f"{colour} and follow the input (correlation {value:+.2f} {when}): the model leaves "
+            "out something that the input causes."
+        ),
+    )
+
+
+def _autocorrelation(samples: Array, grid: Grid, lags: int) -> tuple[Array, Array]:
+    sums, counts = pair_sums(samples, grid, lags)
+    means = sums / np.maximum(counts, 1.0)
+    if not means[0] > 0.0:
+        return np.where(np.arange(lags + 1) == 0, 1.0, 0.0), counts
+    return np.clip(means / means[0], -1.0, 1.0), counts
+
+
+def _cross_correlation(residual: Array, command: Array, grid: Grid, lags: int) -> Array:
+    """(2 lags + 1,) at the lags -lags to lags, the residual after the input."""
+    scale = float(np.linalg.norm(residual) * np.linalg.norm(command))
+    if not scale > 0.0:
+        return np.zeros(2 * lags + 1)
+    size = next_fast_len(grid.size + lags, real=True)
+    spectra = rfft(grid.spread(command), size).conj() * rfft(grid.spread(residual), size)
+    products = irfft(spectra, size)
+    return np.concatenate([products[size - lags :], products[: lags + 1]]) / scale
+
+
+@dataclass(frozen=True, eq=False)
+class Fault:
+    """Something wrong with machine or instruments that would change what is measured in one way."""
+
+    name: str
+    """``"scale of counts"``, ``"time stamps of current"``, or a fixed parameter: ``"tau"``."""
+    unit: str
+    size: float
+    """One-step estimate from the residuals, all estimates following. [unit]"""
+    standard_error: float
+    """Of the size, all estimates following; inf where they make up for it. [unit]"""
+    share: float
+    """Part of the residuals' squares that it explains beyond the estimates. [1]"""
+    outside: float
+    """Part of its effect that no change of the estimates makes up for. [1]"""
+    same_as: tuple[str, ...]
+    """Estimates that make up for it, the largest effect first."""
+    plausible: float = inf
+    """Size that occurs without notice; inf for what is no fault of an instrument. [unit]"""
+
+    @property
+    def hidden(self) -> bool:
+        """Whether the logs cannot tell it: one of plausible size passes as other estimates."""
+        told = self.outside > SAME_DIRECTION and 2.0 * self.standard_error < self.plausible
+        return isfinite(self.plausible) and not told
+
+    @property
+    def cause(self) -> str:
+        """It as a likely cause, in words."""
+        return (
+            f"{self.name} by {self.size:+.3g} {self.unit} "
+            f"(explains {100.0 * self.share:.0f} % of what is left)"
+        )
+
+    @property
+    def assumption(self) -> str:
+        """It as an assumption, in words."""
+        if isfinite(self.standard_error):
+            return (
+                f"{self.name}: an error below {2.0 * self.standard_error:.2g} {self.unit} does not "
+                "show"
+            )
+        others = ", ".join(self.same_as)
+        return f"{self.name}: the same as other values of {others} (to {self.outside:.0e})"
+
+
+@dataclass(frozen=True)
+class ChannelFit:
+    """Residuals of one channel of one run against its known measurement error."""
+
+    run: str
+    channel: str
+    ratio: float
+    """Root mean square of the residuals, estimates adjusted within their errors, over the error."""
+    samples: int
+
+
+@dataclass(frozen=True, eq=False)
+class LackOfFit:
+    """What a fit leaves unexplained, and what would explain it."""
+
+    runs: tuple[ChannelFit, ...]
+    """Of the channels whose measurement error is known: counts, or noise that is stated."""
+    faults: tuple[Fault, ...]
+    """All that were looked at, those that explain most first."""
+    units: tuple[str, ...]
+    """Fixed parameters that no measurement of these channels tells: the estimates are in units of
+    them."""
+    clipped: tuple[str, ...]
+    """Sentences on channels that stand at an end of their instrument."""
+
+    @property
+    def ratios(self) -> dict[str, float]:
+        """Root mean square over all runs of each channel with a known error, over that error."""
+        found = {}
+        for name in dict.fromkeys(each.channel for each in self.runs):
+            alike = [each for each in self.runs if each.channel == name]
+            squares = sum(each.samples * each.ratio**2 for each in alike)
+            found[name] = sqrt(squares / sum(each.samples for each in alike))
+        return found
+
+    @property
+    def causes(self) -> tuple[Fault, ...]:
+        """Faults that explain a large part of the residuals, the likeliest first; three at most."""
+        likely = (each for each in self.faults if each.share >= EXPLAINS)
+        return tuple(e for e in likely if e.unit != "%" or e.name == "tau" or abs(e.size) <= FAR)[
+            :3
+        ]
+
+    @property
+    def assumed(self) -> tuple[Fault, ...]:
+        """Faults of instruments that these logs cannot tell: they are assumed away."""
+        return tuple(each for each in self.faults if each.hidden)
+
+    def fault(self, name: str) -> Fault | None:
+        """The fault of a name, None if it was not looked at."""
+        return next((each for each in self.faults if each.name == name), None)
+
+
+def measurement_error(channel: Channel) -> float | None:
+    """Known standard deviation of a channel's measurement error, in its unit.
+
+    The stated noise, or that of rounding to whole counts, 1/√12 of one; None where neither is
+    known.
+    """
+    if channel.noise is not None:
+        return channel.noise
+    return None if channel.encoder is None else abs(channel.encoder.angle_per_count) / sqrt(12.0)
+
+
+def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
+    """Test a fit for lack of fit, and look for causes.
+
+    Parameters
+    ----------
+    assessments : sequence of Assessment
+        Of all stages, in their order.
+
+    Notes
+    -----
+    χ² against the known measurement error (Draper and Smith 1998, section 1.5, with the pure error
+    known beforehand). Causes by Rao's score test (Rao 1948): each fault is a further unknown; its
+    derivatives, freed of what the estimates can make up for, are projected on the residuals, which
+    gives its size after one Gauss-Newton step and the part of their squares that it explains. All
+    stages are taken together, each in units of its own noise, so that a later stage's residuals
+    are not laid to what an earlier one does not know exactly. All follows from the triangular
+    factor of all derivatives.
+    """
+    blocks = [block for each in assessments for block in _StageBlocks(each, assessments).blocks()]
+    places: dict[str, int] = {}
+    for group in ("estimates", "fixed", "faults"):
+        for block in blocks:
+            for name in getattr(block, group):
+                places.setdefault(name, len(places))
+        if group == "estimates":
+            count = len(places)
+        elif group == "fixed":
+            constants = list(places)[count:]
+    triangle = np.zeros((0, len(places) + 1))
+    for block in blocks:
+        triangle = triangular_factor(np.vstack([triangle, block.placed(places)]))
+    basis, inverse = _span(triangle[:, :count])
+    shift = inverse @ triangle[:, -1]
+    left = triangle[:, -1] - basis @ (basis.T @ triangle[:, -1])
+    squares = float(left @ left)
+    spare = max(sum(block.residual.size for block in blocks) - count, 1)
+    deviation = sqrt(squares / spare)
+    names, meanings = list(places), {k: v for each in blocks for k, v in each.meanings.items()}
+    found = []
+    for name in names[count:]:
+        column = triangle[:, places[name]]
+        length = float(np.linalg.norm(column))
+        if not length > 0.0:
+            continue
+        beyond = column - basis @ (basis.T @ column)
+        along = float(np.linalg.norm(beyond))
+        told = along > SAME_DIRECTION * length and squares > 0.0
+        pull = float(beyond @ left) if told else 0.0
+        change = inverse @ column
+        effect = np.abs(change) * np.linalg.norm(triangle[:, :count], axis=0)
+        order = [int(k) for k in np.argsort(-effect)[:4] if effect[k] > 0.01 * length]
+        factor, unit, plausible = meanings[name]
+        found.append(
+            Fault(
+                name,
+                unit,
+                -factor * pull / along**2 if told else 0.0,
+                factor * deviation / along if told else inf,
+                pull**2 / (along**2 * squares) if told else 0.0,
+                along / length,
+                tuple(dict.fromkeys(names[k].split(": ")[1] for k in order)),
+                plausible,
+            )
+        )
+    twins = [twin for each in assessments for twin in _late_commands(each)][:1]
+    return LackOfFit(
+        tuple(fit for block in blocks for fit in block.against_known(places, shift)),
+        (*sorted(found, key=lambda each: -each.share), *twins),
+        _units(triangle[:, : count + len(constants)], constants, found),
+        clipped_channels(_distinct(assessments)),
+    )
+
+
+def clipped_channels(experiments: Sequence[Experiment]) -> tuple[str, ...]:
+    """Sentences on channels that stand at an end of their instrument, with the limits to state.
+
+    A channel is clipped where it reads its very largest or smallest value for 0.1 s and longer
+    while the input moves by more than a tenth of its range: no noisy signal does that. Positions
+    are passed over, as they stand still by themselves.
+    """
+    said = []
+    for name in dict.fromkeys(name for each in experiments for name in each.channels):
+        runs = [each for each in experiments if name in each.channels]
+        if runs[0][name].is_position:
+            continue
+        low, high = (
+            float(pick([pick(each[name].values) for each in runs])) for pick in (np.min, np.max)
+        )
+        inputs = [each.input.values for each in runs]
+        reach = float(np.max([x.max() for x in inputs]) - np.min([x.min() for x in inputs]))
+        for end in (low, high):
+            if any(end in (each[name].limits or ()) for each in runs):
+                continue
+            moved = max((_moved_at(end, each, name) for each in runs), default=0.0)
+            if moved > 0.1 * reach:
+                unit = runs[0][name].unit
+                said.append(
+                    f"'{name}' stands at exactly {end:.6g} {unit} while the input moves by "
+                    f"{moved:.3g} {runs[0].input.unit}: it is clipped there. Say limits = "
+                    f"[{low:.6g}, {high:.6g}] in its channel, and such samples are ignored."
+                )
+    return tuple(said)
+
+
+def _moved_at(end: float, experiment: Experiment, name: str) -> float:
+    """By how much the input moves in the longest stretch in which a channel stands at an end."""
+    channel = experiment[name]
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], channel.values == end, [0]])))
+    most = 0.0
+    for first, after in zip(edges[::2], edges[1::2], strict=True):
+        if channel.time[after - 1] - channel.time[first] >= DWELLS:
+            most = max(most, float(np.ptp(experiment.input.at(channel.time[first:after]))))
+    return most
+
+
+class _Block(NamedTuple):
+    """One channel of one run: derivatives by all that could explain its residuals."""
+
+    run: str
+    channel: Channel
+    residual: Array
+    """(n,) in units of the noise."""
+    weight: Array
+    """(n,) factors from the channel's unit to those."""
+    estimates: Mapping[str, Array]
+    """(n,) derivatives by each number of the vectors, by ``"stage: unknown"``."""
+    fixed: Mapping[str, Array]
+    """(n,) by the logarithm of each fixed parameter."""
+    faults: Mapping[str, Array]
+    """(n,) by faults of instruments and of the campaign."""
+    meanings: Mapping[str, tuple[float, str, float]]
+    """Factor to its unit, unit, and plausible size of each fixed parameter and fault."""
+
+    def placed(self, places: Mapping[str, int]) -> Array:
+        """(n, P + 1) all columns and the residual."""
+        made = np.zeros((self.residual.size, len(places) + 1))
+        for name, values in (*self.estimates.items(), *self.fixed.items(), *self.faults.items()):
+            made[:, places[name]] = values
+        made[:, -1] = self.residual
+        return made
+
+    def against_known(self, places: Mapping[str, int], shift: Array) -> list[ChannelFit]:
+        """The residuals, estimates shifted by (K,), over the known error; none if it is unknown."""
+        error = measurement_error(self.channel)
+        if error is None or not error > 0.0:
+            return []
+        left = self.residual.copy()
+        for name, values in self.estimates.items():
+            left -= shift[places[name]] * values
+        ratio = float(np.sqrt(np.mean((left / self.weight) ** 2))) / error
+        return [ChannelFit(self.run, self.channel.name, ratio, left.size)]
+
+
+class _StageBlocks:
+    """A stage's runs with derivatives by its own and by earlier estimates, and by faults."""
+
+    def __init__(self, assessment: Assessment, assessments: Sequence[Assessment]) -> None:
+        self.assessment, self.stage = assessment, assessment.stage
+        self.problem, self.vector = self.stage.problem, self.stage.solution.vector
+        self.noise = _noise_units(assessment)
+        model = self.problem.model
+        self.model = model
+        self.earlier: list[Assessment] = []
+        self.fixed: list[str] = []
+        if not isinstance(model, DriveModel):
+            return
+        part = model.part
+        simulated_currents = self.stage.stage.current == "simulated"
+        if part == "pump" and simulated_currents and _all_voltages(self.problem.experiments):
+            part = "chain"
+            self.earlier = [
+                each
+                for each in assessments[: assessments.index(assessment)]
+                if each.stage.stage.part == "card"
+            ]
+        self.model = DriveModel(self.stage.drive.parameters, part, model.currents, model.forces)
+        self.fixed = self._constants(part, [each.stage.problem for each in assessments])
+
+    def _constants(self, part: str, problems: Sequence[Problem]) -> list[str]:
+        """Columns of the drive that no stage estimates and that are not zero or infinite."""
+        taken = {t for each in problems for unknown in each.unknowns for t in unknown.targets}
+        if any(isinstance(p.model, DriveModel) and p.model.forces is not None for p in problems):
+            taken |= set(columns_of(["Z19", "Z20", "Z21", "Z22"]))
+        blocks = {"card": ("control_card",), "pump": ("pump_motor",)}
+        numbers = self.stage.parameters.numbers
+        return [
+            name
+            for name, symbol in COLUMNS.items()
+            if CATALOGUE[symbol].block in blocks.get(part, ("control_card", "pump_motor"))
+            and name not in taken
+            and numbers[name] != 0.0
+            and isfinite(numbers[name])
+        ]
+
+    def blocks(self) -> list[_Block]:
+        """One for each channel of each run."""
+        made = []
+        runs = {(run.name, run.channel): run for run in self.assessment.linearised.runs}
+        free = self.assessment.linearised.variables.free
+        for number, experiment in enumerate(self.problem.experiments):
+            outputs = self.problem.outputs(self.vector, number)
+            by_others = self._by_others(number)
+            commanded = self._by_command(number, outputs)
+            for name, weights in self.problem.weights[number].items():
+                run = runs.get((experiment.name, name))
+                if run is None:
+                    continue
+                used, scale = weights > 0.0, self.noise[name]
+                weight = weights[used] / scale
+                estimates = {
+                    f"{self.stage.stage.name}: {label}": run.jacobian[:, k] / scale
+                    for k, label in enumerate(self.problem.unknowns.names)
+                    if self.problem.unknowns[k].run in (None, experiment.name) and free[k]
+                }
+                held: dict[str, Array] = {}
+                for label, column in by_others.get(name, {}).items():
+                    target = held if label in self.fixed else estimates
+                    target[label] = weight * column[used]
+                place = number / max(len(self.problem.experiments) - 1, 1) - 0.5
+                faults = {
+                    **_instrument_faults(experiment, experiment[name], outputs[name], place),
+                    **commanded.get(name, {}),
+                }
+                made.append(
+                    _Block(
+                        experiment.run,
+                        experiment[name],
+                        run.residual / scale,
+                        weight,
+                        estimates,
+                        held,
+                        {label: weight * found[0][used] for label, found in faults.items()},
+                        {
+                            **dict.fromkeys(held, (100.0, "%", inf)),
+                            **{label: found[1] for label, found in faults.items()},
+                        },
+                    )
+                )
+        return made
+
+    def _by_others(self, number: int) -> dict[str, dict[str, Array]]:
+        """By channel, (m,) derivatives by earlier stages' estimates and fixed parameters."""
+        names = list(self.fixed)
+        for each in self.earlier:
+            names += _machine(each.stage.problem)
+        if not names:
+            return {}
+        assert isinstance(self.model, DriveModel)
+        experiment = self.problem.experiments[number]
+        values = self.problem.unknowns.targets(self.vector, experiment.name)
+        numbers = self.stage.parameters.numbers
+        made: dict[str, dict[str, Array]] = {}
+        for channel, part in self.model.linearise(values, experiment, names).items():
+            columns = {name: part.by[:, k] * numbers[name] for k, name in enumerate(self.fixed)}
+            first = len(self.fixed)
+            for each in self.earlier:
+                targets, found = _machine(each.stage.problem), each.stage
+                chain = found.problem.unknowns.chain(found.solution.vector, targets, "")
+                by = part.by[:, first : first + len(targets)] @ chain
+                first += len(targets)
+                for k, label in enumerate(found.problem.unknowns.names):
+                    if found.problem.unknowns[k].run is None and each.linearised.variables.free[k]:
+                        columns[f"{found.stage.name}: {label}"] = by[:, k]
+            made[channel] = columns
+        return made
+
+    def _by_command(
+        self, number: int, outputs: Mapping[str, Array]
+    ) -> dict[str, dict[str, tuple[Array, tuple[float, str, float]]]]:
+        """By channel, the effect of a scale error of the command, by a difference."""
+        experiment = self.problem.experiments[number]
+        if not isinstance(self.model, DriveModel) or self.model.part == "pump":
+            return {}
+        signal = experiment.input
+        less = replace(
+            experiment, input=replace(signal, values=(1.0 - COMMAND_CHANGE) * signal.values)
+        )
+        values = self.problem.unknowns.targets(self.vector, experiment.name)
+        plain = {k: v for k, v in values.items() if not k.startswith("offset ")}
+        try:
+            changed = simulated(self.model, plain, less)
+            before = simulated(self.model, plain, experiment)
+        except DomainError:
+            return {}
+        meaning = (100.0, "%", 100.0 * PLAUSIBLE_SCALE)
+        return {
+            name: {
+                "scale of the command": ((before[name] - changed[name]) / COMMAND_CHANGE, meaning)
+            }
+            for name in outputs
+        }
+
+
+def _instrument_faults(
+    experiment: Experiment, channel: Channel, output: Array, place: float
+) -> dict[str, tuple[Array, tuple[float, str, float]]]:
+    """Effects (m,) of faults on a channel's reading, with factor, unit and plausible size.
+
+    `place` is that of the run in the campaign, from -1/2 to 1/2.
+    """
+    name, time = channel.name, channel.time
+    slope = np.gradient(output, time) if time.size > 2 else np.zeros_like(output)
+    about = output - output[0] if channel.is_position else output
+    made = {
+        f"scale of {name}": (output, (100.0, "%", 100.0 * PLAUSIBLE_SCALE)),
+        f"time stamps of {name}": (-slope, (1e3, "ms", 1e3 * PLAUSIBLE_DELAY)),
+        f"drift of {name} over the campaign": (about * place, (100.0, "%", inf)),
+    }
+    if channel.kind in CURRENTS:
+        return made
+    signal = experiment.input.at(time)
+    turned = np.sign(np.diff(signal, prepend=signal[:1]))
+    # the direction of the last change of the command, 0 before the first
+    last = np.maximum.accumulate(np.where(turned != 0.0, np.arange(turned.size), 0))
+    way = turned[last] * (np.abs(slope) > 1e-3 * np.abs(slope).max(initial=0.0))
+    lost = np.ones_like(time)
+    factor, unit = (degrees(1.0), "deg") if channel.unit.startswith("rad") else (1.0, channel.unit)
+    if channel.is_position:
+        step = np.diff(time, prepend=time[:1])
+        way, lost = np.cumsum(way * step), time - time[0]
+        unit = f"{unit}/s"
+    return {
+        **made,
+        f"load or leakage, as a loss of {name},": (-lost, (factor, unit, inf)),
+        f"friction or hysteresis, as a lag of {name},": (-way, (factor, unit, inf)),
+    }
+
+
+def _late_commands(assessment: Assessment) -> list[Fault]:
+    """Late stamps of the command beside a longer tau, where that is fixed: both by one sample."""
+    stage = assessment.stage
+    model, problem = stage.problem.model, stage.problem
+    if not isinstance(model, DriveModel) or model.part == "pump":
+        return []
+    if any("tau" in each.targets for each in problem.unknowns):
+        return []
+    experiment, (numbers, step) = problem.experiments[0], (stage.parameters.numbers, 0.0)
+    step = float(np.median(np.diff(experiment.input.time)))
+    signal = experiment.input
+    later = np.concatenate([signal.values[:1], signal.values[:-1]])
+    values = {
+        k: v
+        for k, v in problem.unknowns.targets(stage.solution.vector, experiment.name).items()
+        if not k.startswith("offset ")
+    }
+    shifted = replace(experiment, input=replace(signal, values=later))
+    first = simulated(model, values, shifted)
+    second = simulated(model, {**values, "tau": numbers["tau"] + step}, experiment)
+    plain = simulated(model, values, experiment)
+    apart = sum(float(np.sum((first[k] - second[k]) ** 2)) for k in first)
+    moved = sum(float(np.sum((first[k] - plain[k]) ** 2)) for k in first)
+    outside = sqrt(apart / moved) if moved > 0.0 else inf
+    if outside > SAME_STAMPS:
+        return []
+    return [
+        Fault(
+            "time stamps of the command",
+            "ms",
+            0.0,
+            inf,
+            0.0,
+            outside,
+            (f"the fixed tau = {1e3 * numbers['tau']:.3g} ms",),
+            1e3 * PLAUSIBLE_DELAY,
+        )
+    ]
+
+
+def _all_voltages(experiments: Sequence[Experiment]) -> bool:
+    return all(each.input.kind == "voltage" for each in experiments)
+
+
+def _machine(problem: Problem) -> list[str]:
+    """Names in the model that a problem's unknowns of the machine set."""
+    return [t for each in problem.unknowns if each.run is None for t in each.targets]
+
+
+def _noise_units(assessment: Assessment) -> dict[str, float]:
+    """What a stage's residuals are divided by, by channel: noise that independent samples have.
+
+    Where the measurement error is known, that; elsewhere the residuals themselves, with as many
+    samples to one as their correlation says.
+    """
+    problem, colours = assessment.stage.problem, assessment.uncertainty.colours
+    units = {}
+    for name in problem.channels:
+        runs = [run for run in assessment.linearised.runs if run.channel == name]
+        channel = next(each[name] for each in problem.experiments if name in each.channels)
+        error = measurement_error(channel)
+        if error is not None:
+            units[name] = error / problem.scales[name]
+            continue
+        squares = sum(float(run.residual @ run.residual) for run in runs)
+        level = sqrt(squares / max(sum(run.residual.size for run in runs), 1))
+        inflation = max((each.inflation for each in colours if each.channel == name), default=1.0)
+        units[name] = max(level * sqrt(inflation), 1e-300)
+    return units
+
+
+def _span(matrix: Array) -> tuple[Array, Array]:
+    """Orthonormal basis (m, rank) of a matrix's columns (m, k), and its pseudoinverse (k, m)."""
+    lengths = np.linalg.norm(matrix, axis=0)
+    moving = lengths > 1e-14 * lengths.max(initial=0.0)
+    inverse = np.zeros(matrix.shape[::-1])
+    if not moving.any():
+        return np.zeros((matrix.shape[0], 0)), inverse
+    left, sizes, right = np.linalg.svd(matrix[:, moving] / lengths[moving], full_matrices=False)
+    kept = sizes > TOLERANCE * sizes[0]
+    inverse[moving] = (right[kept].T / sizes[kept]) @ left[:, kept].T / lengths[moving, None]
+    return left[:, kept], inverse
+
+
+def _distinct(assessments: Sequence[Assessment]) -> list[Experiment]:
+    """The experiments of all stages, each once."""
+    runs = {run.name: run for each in assessments for run in each.stage.problem.experiments}
+    return list(runs.values())
+
+
+def _units(matrix: Array, fixed: Sequence[str], found: Sequence[Fault]) -> tuple[str, ...]:
+    """Fixed parameters that nothing measured tells.
+
+    Those, among the last columns of (m, K + F), with a part in a null direction of all, or with an
+    effect that the estimates make up for.
+    """
+    lengths = np.linalg.norm(matrix, axis=0)
+    moving = np.flatnonzero(lengths > 1e-12 * lengths.max(initial=0.0))
+    if not moving.size:
+        return ()
+    _, sizes, right = np.linalg.svd(matrix[:, moving] / lengths[moving], full_matrices=True)
+    null = right[np.count_nonzero(sizes > 1e-9 * sizes[0]) :]
+    first = matrix.shape[1] - len(fixed)
+    # of these directions those that move an estimate: fixed parameters among themselves are no unit
+    turn, parts, _ = np.linalg.svd(null[:, moving < first], full_matrices=False)
+    null = turn[:, parts > 1e-6].T @ null
+    part = dict(zip(moving.tolist(), np.linalg.norm(null, axis=0).tolist(), strict=True))
+    names = {name for k, name in enumerate(fixed, first) if part.get(k, 0.0) > 1e-4}
+    names |= {each.name for each in found if each.outside < UNTOLD}
+    return tuple(dict.fromkeys(COLUMNS[name] for name in fixed if name in names))

@@ -1,0 +1,153 @@
+"""Lack of fit on virtual campaigns: silent where all is sound, and each fault by its name."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate import Campaign, Drive
+from swashplate.campaign import rig
+from swashplate.campaign.experiment import Experiment
+from swashplate.identification.assessment import Assessment, assess
+from swashplate.identification.fitting import fit
+from swashplate.identification.lack_of_fit import clipped_channels, lack_of_fit
+from swashplate.identification.setup import load_setup
+from swashplate.identification.validation import predict
+from swashplate.identification.verdict import Verdict, verdict
+from swashplate.maneuvers import ramp, sine, step
+
+TESTS = {
+    "ramp": ramp(1.0, settle=4.5),
+    "step": step(2.0),
+    "slow": sine(4.0, 0.1, settle=4.5, length=20.0),
+    "large": sine(6.0, 0.1, settle=4.5, length=20.0),
+    "middle": sine(5.0, 0.1, settle=4.5, length=20.0),
+}
+NOISE = {"current": 0.004}
+Logs = Callable[[dict[str, np.ndarray]], None]
+
+
+def fitted(
+    folder: Path, drive: Drive | None = None, logs: Logs | None = None, each: bool = False
+) -> tuple[list[Assessment], Verdict]:
+    """A slew campaign of five tests, changed, and its judgement."""
+    nominal = Drive.preset("slew")
+    runs = {}
+    for place, (name, maneuver) in enumerate(TESTS.items()):
+        truth = drive if drive is not None else nominal
+        if each:
+            truth = truth.scale(Z10=1.0 + 0.08 * (place / 4.0 - 0.5))
+        made = rig.run(nominal, {name: maneuver}, truth=truth, validate=[name] * (name == "middle"))
+        columns = {key: values.copy() for key, values in made.runs[name].columns.items()}
+        if logs is not None:
+            logs(columns)
+        runs[name] = replace(made.runs[name], columns=columns)
+    campaign = Campaign.from_toml(rig.write(replace(made, runs=runs), folder / "virtual"))
+    result = fit(nominal.parameters, campaign.select(role="fit"), load_setup("slew"))
+    assessments = list(assess(result.stages))
+    predicted = predict(result.parameters, campaign.select(role="validate"))
+    return assessments, verdict(assessments, predicted)
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Assessment], Verdict]:
+    return fitted(tmp_path_factory.mktemp("sound"))
+
+
+def failed(found: Verdict) -> set[str]:
+    return {each.name for each in found.criteria if not each.passed}
+
+
+MISFIT = "lack of fit of counts"
+DRIFT = "drift of counts"
+
+
+def test_a_sound_campaign_passes_every_criterion(sound) -> None:
+    assessments, found = sound
+    assert found.grade == "Usable", found.headline
+    assert not failed(found)
+    assert lack_of_fit(assessments).ratios["counts"] == pytest.approx(1.0, abs=0.05)
+    assert found.validity.startswith("Holds for ramps, steps and sines of up to 0.1 Hz from -6 to")
+    assert "never reached" in found.validity
+
+
+def test_the_units_of_the_estimates_are_found_by_computation(sound) -> None:
+    units = lack_of_fit(sound[0]).units
+    # each stands for a scale that no speed tells: pressure, force, travel, piston motion
+    assert {"Z9", "Z4", "Z5", "Z6"} <= set(units)
+    assert "V_dz" not in units
+    assert any(words.startswith("The estimates are in units of") for words in sound[1].assumed)
+
+
+def test_late_stamps_of_the_command_are_the_fixed_delay(sound) -> None:
+    fault = lack_of_fit(sound[0]).fault("time stamps of the command")
+    assert fault is not None
+    assert fault.hidden
+    assert fault.outside < 0.01
+    assert "the same as other values of the fixed tau" in " ".join(sound[1].assumed)
+
+
+def test_a_longer_delay_than_the_fixed_one_is_named(tmp_path: Path) -> None:
+    nominal = Drive.preset("slew")
+    tau = nominal.parameters.numbers["tau"]
+    assessments, found = fitted(tmp_path, nominal.replace(tau=tau + 0.02))
+    assert found.grade == "Usable for prediction", found.headline
+    assert failed(found) == {MISFIT}
+    causes = {each.name: each for each in lack_of_fit(assessments).causes}
+    # after one step: the other estimates have moved to make up for a part of it
+    assert causes["time stamps of counts"].size == pytest.approx(20.0, rel=0.2)
+    assert "parameter values not to be trusted because residuals of counts are" in found.headline
+
+
+def test_a_load_is_named(tmp_path: Path) -> None:
+    nominal = Drive.preset("slew")
+    lost = np.radians(0.08)
+    loaded = nominal.replace(load_torque=3e4, motor_leakage=float(lost) / 3e4)
+    assessments, found = fitted(tmp_path, loaded)
+    assert MISFIT in failed(found)
+    first = lack_of_fit(assessments).causes[0]
+    assert first.name == "load or leakage, as a loss of counts,"
+    assert first.size == pytest.approx(0.08, rel=0.1)
+
+
+def test_a_drift_is_named_and_rules_out_the_use(tmp_path: Path) -> None:
+    assessments, found = fitted(tmp_path, each=True)
+    assert found.grade == "Not usable"
+    assert {MISFIT, DRIFT} <= failed(found)
+    # 8 % over five runs, of which the fourth of five is held out
+    assert lack_of_fit(assessments).causes[0].name.startswith(DRIFT)
+    assert lack_of_fit(assessments).causes[0].size == pytest.approx(6.0, abs=2.0)
+
+
+def test_a_clipped_ammeter_is_found_with_the_limits_to_state(tmp_path: Path) -> None:
+    def clip(columns: dict[str, np.ndarray]) -> None:
+        columns["current"] = np.minimum(columns["current"], 0.2)
+
+    assessments, found = fitted(tmp_path, logs=clip)
+    assert found.grade == "Not usable"
+    assert "clipped channels" in failed(found)
+    said = lack_of_fit(assessments).clipped
+    assert len(said) == 1
+    assert "'current' stands at exactly 0.2 A" in said[0]
+    assert ", 0.2] in its channel" in said[0]
+
+
+def test_a_run_of_another_machine_is_named(tmp_path: Path) -> None:
+    runs = 0
+
+    def stranger(columns: dict[str, np.ndarray]) -> None:
+        nonlocal runs
+        runs += 1
+        if runs == 1:
+            columns["counts"] = np.floor(0.2 * columns["counts"])
+
+    _, found = fitted(tmp_path, logs=stranger)
+    assert found.grade == "Not usable"
+    assert "slew_ramp contradicts the other runs" in found.headline.replace("\n", " ")
+
+
+def test_a_constant_channel_at_rest_is_not_clipped(experiment) -> None:
+    still: Experiment = experiment("still", 1.0, np.zeros(81))
+    assert clipped_channels([still]) == ()
