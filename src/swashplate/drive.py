@@ -61,7 +61,7 @@ class Drive:
 
     @classmethod
     def preset(cls, name: str) -> Drive:
-        """The packaged ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``; else `ParameterError`."""
+        """A packaged ``"hoist"``, ``"slew"``, ``"luff"``, ``"neutral"``; else a `ParameterError`."""
         return cls(load_preset(name))
 
     @classmethod
