@@ -61,7 +61,7 @@ class Drive:
 
     @classmethod
     def preset(cls, name: str) -> Drive:
-        """A packaged ``"hoist"``, ``"slew"``, ``"luff"``, ``"neutral"``; else a `ParameterError`."""
+        """A packaged drive, ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``, by its name."""
         return cls(load_preset(name))
 
     @classmethod
