@@ -31,7 +31,7 @@ from swashplate.models.pump import (
 from swashplate.models.refinements import static_leakage
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import instance_of
-from swashplate.simulation.steady import pressure_limits, settled_state
+from swashplate.simulation.run import pressure_limits, settled_state
 
 if TYPE_CHECKING:
     import polars
