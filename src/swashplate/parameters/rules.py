@@ -132,11 +132,12 @@ def broken_rules(numbers: Mapping[str, Array]) -> Iterator[Broken]:
 
 def out_of_range(definition: Definition, values: Array) -> Mask:
     """Which values lie outside a definition's range."""
-    low = values < definition.lower if definition.above is None else values <= definition.lower
-    high = np.isposinf(values) & (not definition.can_be_off)
-    if isfinite(definition.upper):
-        high = values >= definition.upper
-    return low | high | np.isnan(values) | np.isneginf(values)
+    # what is no number passes no comparison
+    strict = definition.above is not None or not isfinite(definition.lower)
+    allowed = values > definition.lower if strict else values >= definition.lower
+    if isfinite(definition.upper) or not definition.can_be_off:
+        allowed &= values < definition.upper
+    return np.logical_not(allowed)
 
 
 def range_sentence(column: str, definition: Definition, values: Array, i: int) -> str:

@@ -117,6 +117,11 @@ def triangle(
 
 def wanted_columns(columns: Sequence[str]) -> tuple[str, ...]:
     """Columns that are asked for, symbols taken apart; refused where one is asked for twice."""
+    return _wanted(tuple(columns))
+
+
+@lru_cache(maxsize=256)
+def _wanted(columns: tuple[str, ...]) -> tuple[str, ...]:
     names: list[str] = []
     for name in columns:
         names += [name] if name == START_PRESSURE else columns_of([name])
