@@ -158,13 +158,6 @@ class Activation:
         """(runs,) durations for one unknown. [s]"""
         return self.seconds[:, self.names.index(name)]
 
-    @property
-    def idle(self) -> tuple[str, ...]:
-        """Unknowns whose need no run meets."""
-        return tuple(
-            name for k, name in enumerate(self.names) if not (self.seconds[:, k] > 0.0).any()
-        )
-
 
 def activation(
     simulations: Mapping[str, Simulation],
@@ -317,10 +310,6 @@ class Outlook:
         for run, share in zip(self.linearised.runs, self.excitation.share, strict=True):
             shares[self.activation.runs.index(run.name)] += share
         return shares
-
-    def effect(self, name: str) -> float:
-        """Length of the change of all weighted residuals for 1 % of an unknown; 1 is one noise."""
-        return float(self.identifiability.sensitivity[self.linearised.variables.index(name)])
 
     def marks(self, name: str) -> tuple[Mark, ...]:
         """What each run is worth for an unknown.
