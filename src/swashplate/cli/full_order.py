@@ -138,7 +138,7 @@ def full_order(
         _say_table(full, title, head, tables, rate, out)
     else:
         options = Options(rate, interpolation, start, clip, time_column, column)
-        _say_run(full, title, head, tables, command, options, method, out, plot)
+        _say_run(full, title, head, tables, command, options, method, out=out, plot=plot)
 
 
 def _say_table(
@@ -176,6 +176,7 @@ def _say_run(
     command: str,
     options: Options,
     method: Method,
+    *,
     out: Path | None,
     plot: Path | None,
 ) -> None:

@@ -134,9 +134,9 @@ def _march(shared: _Sets, blocks: Sequence[_Block]) -> list[_Marched]:
             shared.records,
             record.step,
             shared.output,
-            shared.measured,
-            shared.weight,
-            shared.keep,
+            measured=shared.measured,
+            weight=shared.weight,
+            keep=shared.keep,
         )
         worst = found.worst[:size]
         bad = ~(np.isfinite(found.end[:size]) & (worst > 0.0))

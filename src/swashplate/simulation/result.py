@@ -190,24 +190,21 @@ class Simulation(Signals):
                 found[signal] = self.turned()
             else:
                 group = next((each for each in (INSIDE, MOTOR) if signal in each), (signal,))
-                out, _ = self._observed(tuple(Stored(1, "signals", each) for each in group))
+                out = self._observed(tuple(Stored(1, "signals", each) for each in group))
                 found |= dict(zip(group, out, strict=True))
         return found[signal]
 
-    def _observed(self, wanted: tuple[Stored, ...]) -> tuple[Array, Flags]:
+    def _observed(self, wanted: tuple[Stored, ...]) -> Array:
         """Signals of the pump at the states that the march left."""
-        packed = sum(each.kind == "limits" for each in wanted)
-        size = self.out.shape[1]
-        out = np.empty((len(wanted) - packed, size))
-        flags = np.empty((packed, size), dtype=np.uint8)
+        out = np.empty((len(wanted), self.out.shape[1]))
         kept = tuple(each for each in self.kept if each.kind != "limits")
         kept += tuple(Stored(1, "input", name) for name in self.measured)
         rows = np.vstack([self.out, *self.measured.values()]) if self.measured else self.out
         instance, signals = self.instance, (self.driven_by, *self.measured)
         observe_kernel(instance.model, 1, signals, instance.options, kept, wanted)(
-            instance.params, instance.given, self.record.step, rows, out, flags
+            instance.params, instance.given, self.record.step, rows, out
         )
-        return out, flags
+        return out
 
     current_positive = Signal()
     """Current of the solenoid towards positive speed, never negative. [A]"""
@@ -241,9 +238,8 @@ class Simulation(Signals):
     @cached_property
     def limits(self) -> Flags:
         """Limits that act at each sample, bits of `Limit`."""
-        _, flags = self._observed((Stored(1, "limits"),))
         # the pump's limits in their order, with the card's between the first and the second
-        pump = flags[0]
+        pump = self._observed((Stored(1, "limits"),))[0].astype(np.uint8)
         bits = (pump & 1) | ((pump & 0b11110) << 1)
         if self.driven_by_voltage:
             bits = bits | (self.flags[0] << 1)

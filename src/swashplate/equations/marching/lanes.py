@@ -326,6 +326,7 @@ def march_lanes(
     records: Mapping[str, Array],
     h: float,
     output: str,
+    *,
     measured: Array,
     weight: Array,
     keep: bool,

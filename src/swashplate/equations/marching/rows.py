@@ -421,8 +421,7 @@ def rotate(
     base: int,
     plan: Plan,
     r: int,
-    at: int,
-    end: int,
+    stamps: tuple[int, int],
     sink: Sink,
     used: int,
     products: Array,
@@ -431,10 +430,10 @@ def rotate(
 
     Parameters
     ----------
-    seen, base, plan, r, at, sink :
+    seen, base, plan, r, sink :
         As in `place`.
-    end : int
-        The stamp behind the last.
+    stamps : (int, int)
+        The first stamp of the observation, and the one behind the last.
     used : int
         Rows that wait in the sink to be rotated.
     products : array
@@ -445,6 +444,7 @@ def rotate(
     int
         Rows that wait now.
     """
+    at, end = stamps
     while at < end:
         if plan.weight[at] == 0.0:
             at += 1
@@ -528,7 +528,7 @@ def deliver(
             end += 1
         room.progress[r] = end
         if sink.factor.size > 0:
-            used = rotate(rows, base, plan, r, at, end, sink, used, room.products)
+            used = rotate(rows, base, plan, r, (at, end), sink, used, room.products)
         elif end > at:
             place(rows, base, plan, r, at, end - at, sink, at)
     return used
@@ -548,9 +548,7 @@ def finish(sink: Sink, room: Room, used: int) -> None:
 def march_observed(
     pieces: Any,
     arrays: tuple[Any, ...],
-    size: int,
-    block: int,
-    h: float,
+    grid: tuple[int, int, float],
     tangent: Array,
     program: Program,
     plan: Plan,
@@ -565,15 +563,14 @@ def march_observed(
         Addresses of the generated pieces; the first one marches.
     arrays : tuple of array
         What they take, from ``records`` on (see `pieces.PIECE`).
-    size, block : int
-        Samples of the record, and most of them in a block.
-    h : float
-        Step. [s]
+    grid : (int, int, float)
+        Samples of the record, most of them in a block, and the step. [1, 1, s]
     tangent : array
         Derivatives of the states at the first sample, replaced by those behind the last.
     program, plan, sink, room :
         What to do, where to look, what to fill, where to work.
     """
+    size, block, h = grid
     used, count, flat = int(plan.first[0]), 0, room.flat
     for first in range(0, size, block):
         carry(room, count)
