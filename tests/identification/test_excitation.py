@@ -70,12 +70,10 @@ def test_before_a_fit_each_run_is_marked() -> None:
     assert found.activation.runs == ("low", "high")
     assert found.marks("Z13_plus") == ("none", "most")
     assert found.marks("Z13_minus") == ("none", "none")
-    verdict = found.identifiability
-    effect = dict(zip(verdict.variables.names, verdict.sensitivity, strict=True))
-    assert effect["Z13_minus"] == 0.0
+    assert found.effect("Z13_minus") == 0.0
     # the speed is Z10 times an angle: 1 % of it is 1 % of all speeds, over their noise
     speeds = np.concatenate([HOIST.simulate(each.input.values).shaft_speed for each in RUNS])
-    assert effect["Z10"] == pytest.approx(np.linalg.norm(0.01 * speeds) / 0.01)
+    assert found.effect("Z10") == pytest.approx(np.linalg.norm(0.01 * speeds) / 0.01)
     assert found.sentences() == (
         "Z13_minus needs the swash plate at its stop (minus), which no run has.",
         "Z13_plus: 100 % of what the runs tell of it comes from high alone.",

@@ -311,6 +311,10 @@ class Outlook:
             shares[self.activation.runs.index(run.name)] += share
         return shares
 
+    def effect(self, name: str) -> float:
+        """Length of the change of all weighted residuals for 1 % of an unknown; 1 is one noise."""
+        return float(self.identifiability.sensitivity[self.linearised.variables.index(name)])
+
     def marks(self, name: str) -> tuple[Mark, ...]:
         """What each run is worth for an unknown.
 
