@@ -5,6 +5,7 @@ What takes long to import is imported inside the command that needs it, so that
 """
 
 import io
+import os
 import sys
 from typing import Annotated, Any
 
@@ -155,6 +156,9 @@ app.command("doctor", epilog=doctor.EXAMPLES, rich_help_panel="This installation
 
 def main() -> None:
     """Run the command line."""
+    # the matrices are tall and thin, so that threads of the linear algebra mostly wait for each
+    # other; runs, starts and draws are spread over the cores instead
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without "±" or "−" shows "?"
     app(prog_name="swashplate")
