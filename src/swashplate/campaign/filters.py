@@ -15,7 +15,7 @@ from swashplate.campaign.encoder import interpolated, radians_per_count
 from swashplate.campaign.low_passes import Form, Taps, filtered_by, intervals_of, recursion_of
 from swashplate.campaign.stamps import Array, Stamps, samples, signal, stamps_of
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import positive
+from swashplate.maneuvers.pieces import positive
 
 LOW_PASS = 2.0 * np.pi * 10.0
 """a, cut-off of the low pass. [rad/s]"""

@@ -10,7 +10,7 @@ from swashplate.campaign.kalman_march import NOISE_ROOT, ORDER, filter_positions
 from swashplate.campaign.rounding import rounded_positions
 from swashplate.campaign.stamps import Array, signal, stamps_of
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import not_negative, positive
+from swashplate.maneuvers.pieces import not_negative, positive
 
 FASTEST = 3.0
 """Greatest bandwidth that is tried, in rad an interval: nearly that of the samples."""

@@ -7,7 +7,7 @@ import numpy as np
 from swashplate.campaign.stamps import Array, Stamps
 from swashplate.equations.cache import kernel
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import positive
+from swashplate.maneuvers.pieces import positive
 
 Form = Literal["source", "exact"]
 """How the filters are made discrete.

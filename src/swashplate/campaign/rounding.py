@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swashplate.campaign.stamps import Array
-from swashplate.maneuvers.checks import row
+from swashplate.maneuvers.pieces import row
 
 
 class Positions(NamedTuple):

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from swashplate.campaign.stamps import Array, even_period, samples
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import positive, whole
+from swashplate.maneuvers.pieces import positive, whole
 
 
 def savitzky_golay_speed(

@@ -27,7 +27,6 @@ from swashplate.cli import (
     linearize,
     parameters,
     report,
-    reproduce,
     rig,
     sensitivity,
     simulate,
@@ -122,9 +121,6 @@ def options(
 
 app.command("demo", epilog=demo.EXAMPLES, rich_help_panel="Everything at once")(demo.demo)
 app.command("tour", epilog=tour.EXAMPLES, rich_help_panel="Everything at once")(tour.tour)
-app.command("reproduce", epilog=reproduce.EXAMPLES, rich_help_panel="Everything at once")(
-    reproduce.reproduce
-)
 app.command("simulate", epilog=simulate.EXAMPLES, rich_help_panel="Simulate")(simulate.simulate)
 app.command("compare", epilog=compare.EXAMPLES, rich_help_panel="Simulate")(compare.compare)
 app.command("axes", epilog=parameters.AXES_EXAMPLES, rich_help_panel="Simulate")(parameters.axes)

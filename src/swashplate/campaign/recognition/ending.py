@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.campaign.recognition.recognised import Window
 from swashplate.campaign.recognition.rounding import roundest
 from swashplate.campaign.recognition.trace import Trace
-from swashplate.maneuvers.curves import NEAR, Hermite, return_within
+from swashplate.maneuvers.pieces import NEAR, Hermite, return_within
 
 Array = NDArray[np.float64]
 Curve = Callable[[Array], Array]

@@ -11,7 +11,7 @@ from swashplate.campaign.recognition.recognised import Recognised, Window
 from swashplate.campaign.recognition.slopes import find_ramp
 from swashplate.campaign.recognition.trace import Trace, trace_of
 from swashplate.campaign.recognition.waves import find_sine
-from swashplate.maneuvers.checks import not_negative
+from swashplate.maneuvers.pieces import not_negative
 
 SHORTEST = 16
 """Samples below which nothing is told apart."""

@@ -17,7 +17,7 @@ from swashplate.drive import Drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import InputError, ParameterError
 from swashplate.maneuvers import Maneuver, source_tests
-from swashplate.maneuvers.checks import positive, whole
+from swashplate.maneuvers.pieces import positive, whole
 from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
