@@ -18,8 +18,7 @@ from swashplate.equations.marching.pieces import addresses, run_once
 from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.run import arrays_of, march_of
 from swashplate.simulation.instance import instance_of
-from swashplate.simulation.residuals import jacobian
-from swashplate.simulation.sensitivities import PUMP_COLUMNS
+from swashplate.simulation.residuals import PUMP_COLUMNS, jacobian
 
 Array = NDArray[np.float64]
 

@@ -18,10 +18,9 @@ from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.batch import Batch, SquaredError, simulate_drives
 from swashplate.simulation.instance import at_every_rate
+from swashplate.simulation.residuals import Sensitivities, sensitivities
 from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import check_voltage, measured_records, simulate_drive
-from swashplate.simulation.sensitivities import Sensitivities, sensitivities
-from swashplate.simulation.steady import steady_states
+from swashplate.simulation.run import check_voltage, measured_records, simulate_drive, steady_states
 from swashplate.simulation.stepper import Stepper
 
 if TYPE_CHECKING:
@@ -62,26 +61,12 @@ class Drive:
 
     @classmethod
     def preset(cls, name: str) -> Drive:
-        """A packaged drive: ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``.
-
-        Raises
-        ------
-        ParameterError
-            For another name.
-        """
+        """A packaged drive, ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``, by its name."""
         return cls(load_preset(name))
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Drive:
-        """A drive from a parameter file.
-
-        Raises
-        ------
-        FileError
-            If the file cannot be read.
-        ParameterError
-            If an entry is wrong; the sentence names file, parameter and rule.
-        """
+        """A drive from a parameter file; a `ParameterError` names file, parameter and rule."""
         return cls(load_set(path))
 
     def to_toml(self, path: str | Path) -> None:
@@ -140,12 +125,9 @@ class Drive:
         """The drive with a card's filter that means the same at every rate.
 
         The source's filter is a recursion at 512 Hz (`ParameterSet.rate`): marched at another rate
-        it is another filter. In its place comes the differential equation with the same poles.
-
-        Raises
-        ------
-        InputError
-            If there is none, since the recursion changes its sign from sample to sample.
+        it is another filter. In its place comes the differential equation with the same poles;
+        where there is none, since the recursion changes its sign from sample to sample, an
+        `InputError`.
         """
         return Drive(at_every_rate(self.parameters))
 
@@ -314,12 +296,7 @@ class Drive:
     ) -> Stepper:
         """The drive one sample at a time: command in, sample out, numbers as in `simulate`.
 
-        Parameters
-        ----------
-        h : float
-            Interval between samples. [s]
-        interpolation, start :
-            As in `simulate`.
+        `h` is the interval between samples [s]; other arguments as in `simulate`.
         """
         return Stepper(self.parameters, h, interpolation, start)
 

@@ -8,10 +8,14 @@ import polars as pl
 import pytest
 
 from swashplate import Drive, InputError, ParameterError, maneuvers
-from swashplate.analysis.bands import bands
-from swashplate.analysis.draws import independent_drives
-from swashplate.analysis.monte_carlo import Deviations, draw_deviations, drives
-from swashplate.analysis.stored_draws import stored_draws
+from swashplate.analysis.monte_carlo import (
+    Deviations,
+    bands,
+    draw_deviations,
+    drives,
+    independent_drives,
+    stored_draws,
+)
 from swashplate.campaign import Campaign, rig
 from swashplate.errors import FileError
 from swashplate.identification.assessment import assess

@@ -123,7 +123,7 @@ def test_completing_with_inertias_in_place_of_frequencies() -> None:
         ({"control_arm": 0.2}, "control_arm is given as 0.2 m, but 0.127914042 follows from Z3"),
         ({"load_torque": 1e9}, "the load holds a stroker pressure of .* Pa at rest"),
         ({"valve_gain": 1.0}, r"no quantity 'valve_gain' \(did you mean valve_flow_gain\?\)"),
-        ({"oil_volume": (1e-4, 2e-4)}, "oil_volume takes one value, not 2"),
+        ({"oil_volume": (1e-4, 2e-4)}, "oil_volume has one value, not a plus and a minus one"),
         ({"oil_volume": "big"}, r"oil_volume must be a number in m\^3"),
     ],
 )

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from swashplate.campaign.stamps import Array, Mask, increasing, signal
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import not_negative, positive
+from swashplate.maneuvers.pieces import not_negative, positive
 
 
 class ZeroCrossings(NamedTuple):

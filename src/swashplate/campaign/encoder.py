@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from swashplate.campaign.stamps import GAP, Array, Rows, increasing, signal
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import positive, row, whole
+from swashplate.maneuvers.pieces import positive, row, whole
 
 WIDEST = 2**53
 """Most readings of a counter that a float64 holds to the count."""

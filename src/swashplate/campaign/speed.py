@@ -18,7 +18,7 @@ from swashplate.campaign.experiment import Channel
 from swashplate.campaign.stamps import Array, Stamps, signal, stamps_of
 from swashplate.equations.cache import kernel
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import positive, whole
+from swashplate.maneuvers.pieces import positive, whole
 
 LOW_PASS = 2.0 * np.pi * 10.0
 """a, cut-off of the low pass. [rad/s]"""

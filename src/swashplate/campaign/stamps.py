@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import row
+from swashplate.maneuvers.pieces import row
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -5,6 +5,7 @@ What takes long to import is imported inside the command that needs it, so that
 """
 
 import io
+import os
 import sys
 from typing import Annotated, Any
 
@@ -28,7 +29,6 @@ from swashplate.cli import (
     linearize,
     parameters,
     report,
-    reproduce,
     rig,
     sensitivity,
     simulate,
@@ -123,9 +123,6 @@ def options(
 
 app.command("demo", epilog=demo.EXAMPLES, rich_help_panel="Everything at once")(demo.demo)
 app.command("tour", epilog=tour.EXAMPLES, rich_help_panel="Everything at once")(tour.tour)
-app.command("reproduce", epilog=reproduce.EXAMPLES, rich_help_panel="Everything at once")(
-    reproduce.reproduce
-)
 app.command("simulate", epilog=simulate.EXAMPLES, rich_help_panel="Simulate")(simulate.simulate)
 app.command("compare", epilog=compare.EXAMPLES, rich_help_panel="Simulate")(compare.compare)
 app.command("axes", epilog=parameters.AXES_EXAMPLES, rich_help_panel="Simulate")(parameters.axes)
@@ -161,6 +158,9 @@ app.command("doctor", epilog=doctor.EXAMPLES, rich_help_panel="This installation
 
 def main() -> None:
     """Run the command line."""
+    # the matrices are tall and thin, so that threads of the linear algebra mostly wait for each
+    # other; runs, starts and draws are spread over the cores instead
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without "±" or "−" shows "?"
     app(prog_name="swashplate")

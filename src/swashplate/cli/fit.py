@@ -18,7 +18,7 @@ from swashplate.cli.fit_output import (
 )
 from swashplate.cli.inputs import parameters_of
 from swashplate.cli.judging import Wanted, judged_fit
-from swashplate.cli.terminal import Shown, long_work, note, say, show, waiting, working
+from swashplate.cli.terminal import Shown, Timing, long_work, note, say, show, waiting, working
 from swashplate.cli.validate import check_folder, chosen_axis
 from swashplate.cli.validation_tables import shown_verdict
 from swashplate.errors import InputError
@@ -117,6 +117,7 @@ def fit(
         Figures | None,
         typer.Option(help="Figures for print as well, in DIR/figures.", show_default=False),
     ] = None,
+    timing: Annotated[bool, typer.Option("--timing", help="Say how long each part took.")] = False,
 ) -> None:
     """Identify a drive, or a model of your own, from its tests.
 
@@ -127,22 +128,24 @@ def fit(
     far, of several starts those that ended, and the exit code is 130. It is 1 if
     the result is not usable.
     """
-    from swashplate.campaign import Campaign
-    from swashplate.executors import Dask, Processes
-    from swashplate.identification.fitting import fit as fitted
-    from swashplate.identification.fitting import refined
-    from swashplate.identification.own_model import ModelSetup
-    from swashplate.identification.solving import longest_left
-    from swashplate.identification.staging import setup_of
-
     if 0 < bootstrap < FEWEST_DRAWS:
         raise InputError(
             f"{bootstrap} draws do not reach the ends of a 95 % interval; take {FEWEST_DRAWS} or "
             "more, 1000 for smooth ones."
         )
     check_folder(out)
+    clock = Timing()
     if model is not None and (setup is not None or begin is not None or joint):
         raise InputError(f"{model} says what is free and where it begins: leave out the others.")
+    with working("Starting"):
+        from swashplate.campaign import Campaign
+        from swashplate.executors import Dask, Processes
+        from swashplate.identification.fitting import fit as fitted
+        from swashplate.identification.fitting import refined
+        from swashplate.identification.own_model import ModelSetup
+        from swashplate.identification.solving import longest_left
+        from swashplate.identification.staging import setup_of
+    clock.ended("start")
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
         chosen = chosen_axis(campaign, axis)
@@ -157,6 +160,7 @@ def fit(
             plan = setup_of(campaign, chosen, setup)
             drive = campaign.drive(chosen) if begin is None else None
             nominal = parameters_of(begin or "") if drive is None else drive.parameters
+    clock.ended("reading")
     executor = Dask(dask) if dask is not None else Processes(jobs or None)
     begun = perf_counter()
     with long_work("Fitting") as shown:
@@ -172,6 +176,7 @@ def fit(
         if joint and len(plan.stages) > 1 and not result.interrupted:
             result = refined(result, runs, watch=watch)
     seconds = perf_counter() - begun
+    clock.ended("search, kernels loaded")
     if result.interrupted and starts:
         last = result.stages[-1]
         note(
@@ -181,6 +186,7 @@ def fit(
         raise typer.Exit(INTERRUPTED)
     wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, loss, require / 100.0)
     found = judged_fit(campaign, chosen, runs, nominal, plan, result, wanted)
+    clock.ended("judging")
     lines = [
         *written(result, found.assessments, campaign, out, found.bootstraps),
         found.stored(out),
@@ -189,6 +195,7 @@ def fit(
         lines.append(found.reported(out))
     if figures is not None:
         lines.append(found.drawn(out, figures))
+    clock.ended("report and files")
     note(f"{campaign.title}{' (virtual)' if campaign.virtual else ''}: fitted in {seconds:.2f} s")
     for each_run in runs:
         for sentence in each_run.notes:
@@ -217,6 +224,9 @@ def fit(
             say(f"- {sentence}")
     for line in lines:
         note(line)
+    if timing:
+        clock.ended("tables")
+        show(clock.table())
     if result.interrupted:
         note("Interrupted: this is the best so far, not an optimum.")
         raise typer.Exit(INTERRUPTED)

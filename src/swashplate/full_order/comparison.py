@@ -19,8 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate import maneuvers
 from swashplate.equations.marching.record import SOURCE_RATE, least_substeps
 from swashplate.equations.marching.run import Start
-from swashplate.full_order.drive import FullOrderDrive, Method
-from swashplate.full_order.result import FullOrderSimulation
+from swashplate.full_order.drive import FullOrderDrive, FullOrderSimulation, Method
 from swashplate.simulation.result import read_only
 from swashplate.tables import Tabular
 

@@ -11,30 +11,44 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
-from math import inf, isnan, sqrt, tan
+from math import sqrt, tan
 from pathlib import Path
 from types import MappingProxyType
 from typing import Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.equations.equation import interpreted
-from swashplate.equations.fields import Declared, Definition, Flag, declared_by
+from swashplate.equations.fields import Flag, declared_by
 from swashplate.errors import InputError, ParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine
-from swashplate.parameters.files import AXES
+from swashplate.parameters.definitions import Definition, definition_of
+from swashplate.parameters.files import AXES, written
 from swashplate.parameters.files import load_preset as load_parameters
-from swashplate.parameters.parameter_set import Change, Pair, ParameterSet, Status, Value
+from swashplate.parameters.parameter_set import (
+    Change,
+    Pair,
+    Parameter,
+    ParameterSet,
+    Value,
+    value_of,
+)
+from swashplate.parameters.rules import out_of_range, range_sentence
 from swashplate.parameters.schema import Entry
 from swashplate.units import to_si
 
-QUANTITIES: Mapping[str, Declared] = {each.symbol: each for each in declared_by(Machine)}
+QUANTITIES: Mapping[str, Definition] = {
+    each.symbol: definition_of(each, "physical") for each in declared_by(Machine)
+}
 """Quantities by name, from the spool to the load."""
-CHOICES: Mapping[str, Declared] = {
-    name: Declared(name, Definition(meaning, unit, 0.0, above=above, stands_for=symbol), (name,))
-    for name, symbol, meaning, unit, above in (
+CHOICES: Mapping[str, Definition] = {
+    name: Definition(
+        meaning, unit, 0.0, above=above, stands_for=stands_for, symbol=name, block="physical"
+    )
+    for name, stands_for, meaning, unit, above in (
         ("spool_frequency", "ω_sp", "natural frequency of the spool", "rad/s", 0.0),
         ("spool_damping_ratio", "ζ_sp", "damping ratio of the spool", "1", None),
         (
@@ -57,40 +71,7 @@ AGREES = 1e-9
 
 
 @dataclass(frozen=True)
-class PhysicalValue:
-    """One quantity of a set."""
-
-    quantity: Declared
-    value: Value
-    source: str = ""
-    status: Status = "user"
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """Its one or two numbers, in the order of ``quantity.columns``."""
-        return tuple(self.value) if isinstance(self.value, Pair) else (self.value,)
-
-    @property
-    def unit(self) -> str:
-        """SI unit of the value."""
-        return self.quantity.definition.unit
-
-    def check(self, owner: str) -> None:
-        """Refuse a value out of range: owner, quantity, value and range in a `ParameterError`."""
-        definition = self.quantity.definition
-        for column, value in zip(self.quantity.columns, self.values, strict=True):
-            low = value < definition.lower or value == definition.above
-            high = value >= definition.upper and not (value == inf and definition.can_be_off)
-            if low or high or isnan(value) or value == -inf:
-                unit = "" if definition.unit == "1" else f" {definition.unit}"
-                raise ParameterError(
-                    f"{owner}: {column} ({definition.name}) is {value:g}{unit}, but must be "
-                    f"{definition.range}."
-                )
-
-
-@dataclass(frozen=True)
-class PhysicalSet(Mapping[str, PhysicalValue]):
+class PhysicalSet(Mapping[str, Parameter]):
     """All physical quantities of a drive, by name; one that has a default may be left out.
 
     Raises
@@ -101,7 +82,7 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
 
     name: str
     title: str
-    entries: Mapping[str, PhysicalValue]
+    entries: Mapping[str, Parameter]
     numbers: Mapping[str, float] = field(init=False, repr=False, compare=False)
     """Every single value by column, e.g. ``swash_stop_plus``."""
 
@@ -109,9 +90,9 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         for name in self.entries:
             quantity_of(name)
         entries = {
-            name: PhysicalValue(each, each.definition.default, status="assumed")
+            name: Parameter(each, each.default, status="assumed")
             for name, each in QUANTITIES.items()
-            if each.definition.default is not None
+            if each.default is not None
         } | dict(self.entries)
         missing = [name for name in QUANTITIES if name not in entries]
         if missing:
@@ -119,8 +100,8 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         ordered = {name: entries[name] for name in QUANTITIES}
         numbers: dict[str, float] = {}
         for entry in ordered.values():
-            entry.check(self.name)
-            numbers |= zip(entry.quantity.columns, entry.values, strict=True)
+            _check_range(self.name, entry)
+            numbers |= zip(entry.definition.columns, entry.values, strict=True)
         _check_together(self.name, numbers)
         object.__setattr__(self, "entries", MappingProxyType(ordered))
         object.__setattr__(self, "numbers", MappingProxyType(numbers))
@@ -132,15 +113,7 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
 
     @classmethod
     def from_toml(cls, path: str | Path) -> PhysicalSet:
-        """A set from a file.
-
-        Raises
-        ------
-        FileError
-            If the file cannot be read.
-        ParameterError
-            If an entry is wrong; the sentence names file, quantity and rule.
-        """
+        """A set from a file; a `ParameterError` names file, quantity and rule."""
         return read_set(read_text(path), str(path))
 
     def to_toml(self, path: str | Path) -> None:
@@ -163,20 +136,12 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         return air_in(self.numbers)
 
     def to_lumped(self, Z6: float | None = None) -> dict[str, Change]:
-        """Lumped parameters that the set stands for.
+        """Lumped parameters that the set stands for; Kruse eqs. 6.56-6.70 and table 6.1.
 
-        Parameters
-        ----------
-        Z6 : float, optional
-            Value to move to along the gauge Z6↔Z8: away from the stops only Z7/(1+Z6) and
-            Z8/(1+Z6) count. By default the physical A_s²B/(k_r V), of a bulk modulus at rest.
-
-        Returns
-        -------
-        dict
-            Z1 to Z16 and Z18 by symbol, pairs (plus, minus) where the directions differ; Kruse
-            eqs. 6.56-6.70 and table 6.1. The solenoids' Z17 and Z19 to Z22 are not the pump's
-            geometry.
+        Z1 to Z16 and Z18 by symbol, pairs (plus, minus) where the directions differ; the solenoids'
+        Z17 and Z19 to Z22 are not the pump's geometry. `Z6` is where to move to along the gauge
+        Z6↔Z8: away from the stops only Z7/(1+Z6) and Z8/(1+Z6) count; by default the physical
+        A_s²B/(k_r V).
         """
         n, P0 = self.numbers, rest_pressure(self.numbers)
         stiffness = rest_modulus(n) / n["oil_volume"]
@@ -208,7 +173,7 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
     def __repr__(self) -> str:
         return f"PhysicalSet({self.name!r}, {len(self)} quantities)"
 
-    def __getitem__(self, name: str) -> PhysicalValue:
+    def __getitem__(self, name: str) -> Parameter:
         quantity_of(name)
         return self.entries[name]
 
@@ -229,29 +194,18 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         return PhysicalSet, (self.name, self.title, dict(self.entries))
 
     def replace(self, **changes: Change) -> PhysicalSet:
-        """A set with other values in SI, e.g. ``replace(load_torque=2e3)``, marked as the user's.
-
-        Raises
-        ------
-        ParameterError
-            For an unknown name or a value that breaks a rule.
-        """
+        """A set with other values in SI, ``replace(load_torque=2e3)``, marked as the user's."""
         entries = dict(self.entries)
         for name, change in changes.items():
             quantity = quantity_of(name)
-            entries[name] = PhysicalValue(quantity, value_of(quantity, change))
+            entries[name] = Parameter(quantity, value_of(name, quantity, change))
         return replace(self, entries=entries)
 
     def scaled(self, epsilon: float) -> PhysicalSet:
-        """The set with inertias times ε and dampings times √ε: the way to the reduced model.
+        """The set with inertias times ε > 0 and dampings times √ε: the way to the reduced model.
 
         The frequencies rise by 1/√ε and the damping ratios stay. The load's inertia acts on the
         swash plate's rate, as a damping does, and is scaled like one.
-
-        Raises
-        ------
-        ParameterError
-            Unless ε is above 0.
         """
         if not epsilon > 0.0:
             raise ParameterError(f"epsilon is {epsilon:g}, but must be above 0.")
@@ -264,7 +218,7 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         )
 
 
-def quantity_of(name: str) -> Declared:
+def quantity_of(name: str) -> Definition:
     """What a quantity is; a name that none has is refused."""
     if name in QUANTITIES:
         return QUANTITIES[name]
@@ -276,22 +230,6 @@ def quantity_of(name: str) -> Declared:
         else f"{hint}; the quantities are {', '.join(QUANTITIES)}"
     )
     raise ParameterError(f"A physical set has no quantity '{name}'{choice}.")
-
-
-def value_of(quantity: Declared, change: float | tuple[float, ...]) -> Value:
-    """A value in the form that the quantity has: one number or a pair."""
-    name, several = quantity.symbol, len(quantity.fields) > 1
-    try:
-        numbers = [float(each) for each in (change if isinstance(change, tuple) else (change,))]
-    except (TypeError, ValueError):
-        raise ParameterError(
-            f"{name} must be a number in {quantity.definition.unit}, or a pair of them, not "
-            f"{change!r}."
-        ) from None
-    if len(numbers) > (2 if several else 1):
-        kind = "one value or two (plus, minus)" if several else "one value"
-        raise ParameterError(f"{name} takes {kind}, not {len(numbers)}.")
-    return Pair(numbers[0], numbers[-1]) if several else numbers[0]
 
 
 def air_in(numbers: Mapping[str, float]) -> Flag:
@@ -313,6 +251,13 @@ def rest_modulus(numbers: Mapping[str, float]) -> float:
 def _known(numbers: Mapping[str, float]) -> Machine:
     """A machine of what is known; nothing else may be asked of it."""
     return Machine(*(numbers.get(name, 0.0) for name in Machine._fields))
+
+
+def _check_range(owner: str, entry: Parameter) -> None:
+    for column, value in zip(entry.definition.columns, entry.values, strict=True):
+        if out_of_range(entry.definition, np.array([value]))[0]:
+            said = range_sentence(column, entry.definition, np.array([value]), 0)
+            raise ParameterError(f"{owner}: {said}")
 
 
 def _check_together(owner: str, numbers: Mapping[str, float]) -> None:
@@ -339,8 +284,8 @@ def _check_together(owner: str, numbers: Mapping[str, float]) -> None:
 
 
 def chosen_over(
-    assumed: Mapping[str, PhysicalValue], chosen: Mapping[str, Change | PhysicalValue]
-) -> dict[str, PhysicalValue]:
+    assumed: Mapping[str, Parameter], chosen: Mapping[str, Change | Parameter]
+) -> dict[str, Parameter]:
     """What a set is completed from: assumed values, and the user's in SI in their place.
 
     Names are those of quantities and of `CHOICES`. An inertia or damping also takes the place of
@@ -348,9 +293,9 @@ def chosen_over(
     """
     entries = dict(assumed)
     for name, change in chosen.items():
-        if not isinstance(change, PhysicalValue):
+        if not isinstance(change, Parameter):
             quantity = chosen_quantity(name)
-            change = PhysicalValue(quantity, value_of(quantity, change))
+            change = Parameter(quantity, value_of(name, quantity, change))
         entries[name] = change
         instead = IN_PLACE_OF.get(name)
         if instead is not None and instead not in chosen:
@@ -358,7 +303,7 @@ def chosen_over(
     return entries
 
 
-def chosen_quantity(name: str) -> Declared:
+def chosen_quantity(name: str) -> Definition:
     """What may be chosen by a name: a quantity, or one of `CHOICES`."""
     return CHOICES[name] if name in CHOICES else quantity_of(name)
 
@@ -369,7 +314,7 @@ def from_lumped(
     *,
     name: str | None = None,
     title: str = "",
-    entries: Mapping[str, Change | PhysicalValue] | None = None,
+    entries: Mapping[str, Change | Parameter] | None = None,
     **chosen: Change,
 ) -> PhysicalSet:
     """Complete a physical set from lumped parameters and a few chosen values.
@@ -411,12 +356,12 @@ def from_lumped(
             )
     numbers: dict[str, float] = {}
     for entry in given.values():
-        entry.check(owner)
-        numbers |= zip(entry.quantity.columns, entry.values, strict=True)
+        _check_range(owner, entry)
+        numbers |= zip(entry.definition.columns, entry.values, strict=True)
     following = _completed(owner, parameters.numbers, numbers, set(given))
     complete = {}
     for symbol, (follows, origin) in following.items():
-        made = PhysicalValue(QUANTITIES[symbol], follows, f"from {origin}", "assumed")
+        made = Parameter(QUANTITIES[symbol], follows, f"from {origin}", "assumed")
         if symbol in given:
             _check_agreement(owner, given[symbol], made)
         complete[symbol] = given.get(symbol, made)
@@ -516,8 +461,8 @@ def _motor_leakage(owner: str, Z: Mapping[str, float], chosen: Mapping[str, floa
     return leakages[0] if leakages else 0.0
 
 
-def _check_agreement(owner: str, entry: PhysicalValue, made: PhysicalValue) -> None:
-    columns = entry.quantity.columns
+def _check_agreement(owner: str, entry: Parameter, made: Parameter) -> None:
+    columns = entry.definition.columns
     for column, value, follows in zip(columns, entry.values, made.values, strict=True):
         if value != follows and not abs(value - follows) <= AGREES * abs(follows):
             raise ParameterError(
@@ -548,7 +493,7 @@ def load_preset(name: str) -> PhysicalSet:
 
 
 @cache
-def load_choices(name: str) -> Mapping[str, PhysicalValue]:
+def load_choices(name: str) -> Mapping[str, Parameter]:
     """What a packaged set assumes; everything else in it follows from the lumps."""
     origin = f"{name}.toml"
     contents = validated(parse_toml(_packaged(name), origin), PhysicalFile, origin)
@@ -583,7 +528,7 @@ def read_set(text: str, origin: str) -> PhysicalSet:
 
 def dump_set(physical: PhysicalSet) -> str:
     """A physical set as TOML text that `read_set` turns back into an equal set."""
-    from tomlkit import comment, document, dumps, inline_table, table
+    from tomlkit import comment, document, dumps, table
 
     text = document()
     text.add(comment("swashplate physical set; SI units; [plus, minus] as magnitudes"))
@@ -592,32 +537,29 @@ def dump_set(physical: PhysicalSet) -> str:
     text.add("title", physical.title)
     entries = table()
     for name, each in physical.items():
-        entry = inline_table()
-        value = list(each.values) if isinstance(each.value, Pair) else each.value
-        source = {"source": each.source} if each.source else {}
-        entry.update({"value": value, "unit": each.unit, **source, "status": each.status})
-        entries.add(name, entry)
+        entries.add(name, written(each))
     text.add("physical", entries)
     return dumps(text)
 
 
-def si_value(quantity: Declared, number: float, unit: str) -> float:
+def si_value(quantity: Definition, number: float, unit: str) -> float:
     """A quantity's number in SI; a unit that measures something else is refused."""
-    definition = quantity.definition
-    return to_si(number, unit, definition.unit, f"{quantity.symbol} ({definition.name})")
+    return to_si(number, unit, quantity.unit, f"{quantity.symbol} ({quantity.name})")
 
 
-def _entries(contents: PhysicalFile) -> dict[str, PhysicalValue]:
+def _entries(contents: PhysicalFile) -> dict[str, Parameter]:
     known = quantity_of if contents.lumps is None else chosen_quantity
     return {name: _value(known(name), entry) for name, entry in contents.physical.items()}
 
 
-def _value(quantity: Declared, entry: Entry) -> PhysicalValue:
+def _value(quantity: Definition, entry: Entry) -> Parameter:
     """One entry of a file, in SI."""
     if entry.bounds is not None:
         raise ParameterError(
             f"{quantity.symbol} has bounds; leave them out, a fit is given its own."
         )
     given = entry.value if isinstance(entry.value, list) else [entry.value]
-    numbers = tuple(si_value(quantity, number, entry.unit) for number in given)
-    return PhysicalValue(quantity, value_of(quantity, numbers), entry.source, entry.status)
+    first, *second = (si_value(quantity, number, entry.unit) for number in given)
+    change = (first, second[0]) if second else first
+    value = value_of(quantity.symbol, quantity, change)
+    return Parameter(quantity, value, entry.source, entry.status)

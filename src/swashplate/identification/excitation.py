@@ -157,13 +157,6 @@ class Activation:
         """(runs,) durations for one unknown. [s]"""
         return self.seconds[:, self.names.index(name)]
 
-    @property
-    def idle(self) -> tuple[str, ...]:
-        """Unknowns whose need no run meets."""
-        return tuple(
-            name for k, name in enumerate(self.names) if not (self.seconds[:, k] > 0.0).any()
-        )
-
 
 def activation(
     simulations: Mapping[str, Simulation],

@@ -370,15 +370,13 @@ class Candidate(NamedTuple):
     derivatives: Array
     """(m, K) of what it would measure by the solver's vector, over the noise's deviation; or their
     triangular factor."""
-    inflation: float = 1.0
-    """Samples that stand for one independent one."""
     duration: float | None = None
     """How long it takes, if that is to count. [s]"""
 
     @property
     def rows(self) -> Array:
-        """(<= K, K) triangular factor with coloured noise counted."""
-        return triangular_factor(self.derivatives / np.sqrt(self.inflation))
+        """(<= K, K) triangular factor."""
+        return triangular_factor(self.derivatives)
 
 
 class Gain(NamedTuple):
@@ -412,9 +410,6 @@ class Advice:
     d_gain: float
     """Mean factor by which standard errors shrink along the directions determined already
     (D-criterion), 1 is none."""
-    a_gain: float
-    """Factor by which the root mean square standard error of the unknowns determined already
-    shrinks (A-criterion), 1 is none."""
     duration: float | None
 
     @property
@@ -477,16 +472,13 @@ def advise(
     Raises
     ------
     InputError
-        If there is no candidate, a shape is wrong, a number is not finite, or an inflation is
-        below 1.
+        If there is no candidate, a shape is wrong, or a number is not finite.
     """
     if not candidates:
         raise InputError("There is no candidate to choose from.")
     _check("what is known at present", present, variables.count)
     for each in candidates:
         _check(each.name, each.derivatives, variables.count)
-        if not 1.0 <= each.inflation < inf:
-            raise InputError(f"{each.name}: {each.inflation:g} samples cannot stand for one.")
     judged = [_judge(present, each, variables, tolerance) for each in candidates]
     return tuple(sorted(judged, key=lambda each: each.rank))
 
@@ -508,8 +500,6 @@ def _judge(present: Array, candidate: Candidate, variables: Unknowns, tolerance:
         spent = basis[0][:, basis[1] > tolerance * max(float(basis[1].max(initial=0.0)), 1e-300)]
         seen = seen - spent @ (spent.T @ seen)
     shrinking = np.log1p(np.linalg.svd(seen, compute_uv=False) ** 2).sum() if seen.size else 0.0
-    both_known = known_now & known_then
-    squares = float(np.sum(before[both_known] ** 2)), float(np.sum(after[both_known] ** 2))
     return Advice(
         candidate.name,
         tuple(
@@ -519,7 +509,6 @@ def _judge(present: Array, candidate: Candidate, variables: Unknowns, tolerance:
         tuple(names[k] for k in np.flatnonzero(free & (after <= KNOWN) & (before > KNOWN))),
         then.shape[1] - now.shape[1],
         float(np.exp(0.5 * shrinking / max(now.shape[1], 1))),
-        float(np.sqrt(squares[0] / squares[1])) if squares[1] > 0.0 else 1.0,
         candidate.duration,
     )
 

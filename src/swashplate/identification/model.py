@@ -79,13 +79,6 @@ class Differentiable(Protocol):
         ...
 
 
-class Reduced(NamedTuple):
-    """An experiment's weighted residuals and derivatives, as a triangular factor."""
-
-    triangle: Array
-    """(k+1, k+1) factor R of [J r], r the weighted residuals simulated less measured."""
-
-
 @runtime_checkable
 class Reducing(Protocol):
     """A model that gives the triangular factor of [J r] without ever holding J."""
@@ -96,8 +89,8 @@ class Reducing(Protocol):
         experiment: Experiment,
         names: Sequence[str],
         weights: Mapping[str, Array],
-    ) -> Reduced:
-        """Triangular factor by some of the unknowns.
+    ) -> Array:
+        """Triangular factor by some of the unknowns: (k+1, k+1) array R of [J r].
 
         Parameters
         ----------
@@ -300,7 +293,7 @@ class EquationModel(ABC):
         experiment: Experiment,
         names: Sequence[str],
         weights: Mapping[str, Array],
-    ) -> Reduced:
+    ) -> Array:
         """Triangular factor of weighted residuals and derivatives; see `model.Reducing`."""
         known = self.signals_of(experiment)
         channels = [name for name in weights if name in known]
@@ -309,7 +302,7 @@ class EquationModel(ABC):
         shifts = _shifts(values, channels, offsets=True)
         ready = self.ready(values, experiment, observed, columns, shifts)
         found = triangle(ready.instance, observed, ready.paths, ready.own, moved=ready.moved)
-        return Reduced(np.column_stack([found.factor[:, :-1] @ chain, found.factor[:, -1]]))
+        return np.column_stack([found.factor[:, :-1] @ chain, found.factor[:, -1]])
 
     def _chain(
         self, names: Sequence[str], channels: Sequence[str], observed: ObservedRecord

@@ -168,7 +168,7 @@ class Problem:
         assert isinstance(self.model, Reducing)
         triangle = self.model.reduce(
             self._values(vector, number)[0], experiment, names, self.weights[number]
-        ).triangle
+        )
         chain = self.unknowns.chain(vector, names, experiment.name)
         return Evaluation(triangle[:, -1], triangle[:, :-1] @ chain)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,25 +71,6 @@ Parameters = ParameterSet | ModelParameters
 """The numbers of what is fitted: a drive, or a model of one's own."""
 LARGEST_START_PRESSURE = 4e6
 """Bound of a free pressure at the start where the set-up gives none. [Pa]"""
-
-
-@dataclass(frozen=True)
-class DriveProblem(Problem):
-    """The problem of a drive, which knows that more current makes more force."""
-
-    @property
-    def rising(self) -> tuple[tuple[int, ...], ...]:
-        """For each direction the places of the solenoids' forces, where all are unknown."""
-        assert isinstance(self.model, DriveModel)
-        names, known = self.unknowns.names, self.model.forces
-        if known is None:
-            return ()
-        groups = []
-        for side in ("plus", "minus"):
-            forces = [name for name in known.names if f"_{side}_" in name]
-            if all(name in names and self.unknowns[names.index(name)].log for name in forces):
-                groups.append(tuple(names.index(name) for name in forces))
-        return tuple(groups)
 
 
 def setup_of(campaign: Campaign, axis: str, name: str | None = None) -> Setup:
@@ -165,7 +146,7 @@ def stage_problem(
         *_clocks(stage, runs, channels),
         *_own(stage, runs, channels),
     )
-    return DriveProblem(
+    return Problem(
         DriveModel(_switched_on(parameters, free), stage.part, currents, forces),
         tuple(weighted(each, stage) for each in runs),
         Unknowns(unknowns),

@@ -24,7 +24,7 @@ from swashplate.models.pump import (
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import card_of, instance_of, without_ripple
-from swashplate.simulation.steady import pump_arguments, steady_states
+from swashplate.simulation.run import pump_arguments, steady_states
 
 Array = NDArray[np.float64]
 Input = Literal[

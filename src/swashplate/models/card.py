@@ -74,8 +74,7 @@ class CardInputs(NamedTuple):
     """The command as the card looks at it. [V]"""
 
     at: Window  # Three samples around t - τ, two from there and one before.
-    span: Window
-    """Three samples around the end of the interval of one sample about t - τ, t - τ + h/2."""
+    span: Window  # Three samples around the end of the sample interval about t - τ, t - τ + h/2.
 
 
 class ChannelConstants(NamedTuple):
@@ -117,8 +116,7 @@ class CardState(NamedTuple):
 class CardSignals(NamedTuple):
     """What is known of the card at a sample."""
 
-    current: float
-    """Signed current, that of the positive channel less that of the negative one. [A]"""
+    current: float  # Signed, that of the positive channel less that of the negative one. [A]
     current_positive: float
     current_negative: float  # I of each channel, never negative. [A]
     steady_positive: float
@@ -141,10 +139,8 @@ class ChannelSignals(NamedTuple):
 class CardOptions(NamedTuple):
     """Forms of the card."""
 
-    literal: Flag = OFF
-    """Literal sign of the Coulomb term in the recursion, in place of the smooth one."""
-    split: Flag = OFF
-    """lim1 and the decay take over within a step, where the current passes I_t1 and I_t2."""
+    literal: Flag = OFF  # Literal sign of the Coulomb term in the recursion, not the smooth one.
+    split: Flag = OFF  # lim1 and the decay take over within a step, at I_t1 and I_t2.
     exact: Flag = OFF  # The filter's differential equation, in place of the recursion for 512 Hz.
 
 

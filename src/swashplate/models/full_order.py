@@ -61,8 +61,7 @@ class Plant(NamedTuple):
 class PlantOptions(NamedTuple):
     """Forms of the machine."""
 
-    symmetric: Flag = OFF
-    """Root √((ΔP - sgn(x)P)/2) in place of the published √((ΔP - P)/2) (erratum 13)."""
+    symmetric: Flag = OFF  # √((ΔP - sgn(x)P)/2) in place of the published root (erratum 13).
     air: Flag = OFF  # The oil has free air in it, see `mixture_modulus`.
     held: Flag = OFF  # The current keeps its value between samples, in place of a straight line.
 
@@ -103,8 +102,7 @@ class PlantConstants(NamedTuple):
     rest_pressure: float  # P0, which holds the load at rest with the plate upright. [Pa]
     lower: float
     upper: float  # Pressures at which the relief valve opens. [Pa]
-    reserve: float
-    """2 less the fastest rate times a sub-step: above 0 where the scheme is stable. [1]"""
+    reserve: float  # 2 less the fastest rate times a sub-step: above 0 where stable. [1]
 
 
 class PlantSignals(NamedTuple):
@@ -113,12 +111,10 @@ class PlantSignals(NamedTuple):
     solenoid_force: float  # Net force of both solenoids on the spool. [N]
     spool_position: float  # Displacement of the spool. [m]
     spool_velocity: float  # [m/s]
-    orifice_opening: float
-    """Effective opening, what the orifices leave of the spool's displacement. [m]"""
+    orifice_opening: float  # What the orifices leave of the spool's displacement. [m]
     valve_flow: float  # Flow through the valve towards the stroking piston. [m³/s]
     piston_pressure: float  # Stroker pressure P. [Pa]
-    stroker_pressure: float
-    """Stroking pressure δP = P - P0 about the one that holds the load at rest. [Pa]"""
+    stroker_pressure: float  # δP = P - P0 about the one that holds the load at rest. [Pa]
     swash_angle: float  # [rad]
     swash_rate: float  # [rad/s]
     shaft_speed: float  # Speed of the shaft, of the turret for slew. [rad/s]

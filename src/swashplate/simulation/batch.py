@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations import Model, instance_of, parameter_paths
+from swashplate.equations import Model, instance_of, parameter_paths, state_paths
 from swashplate.equations.fields import floats_of
 from swashplate.equations.library import TAN_22_5
 from swashplate.equations.marching.lanes import LANES, march_lanes
@@ -257,14 +257,16 @@ def simulate_many(
     given: Any = None,
     executor: Executor | None = None,
 ) -> Batch:
-    """Simulate many parameter sets of a model over one record, from rest.
+    """Simulate many parameter sets of a model over one record, from rest or states of one's own.
 
     Parameters
     ----------
     model, p, inputs, rate, options, given :
         As in `swashplate.equations.simulate`.
     changes : mapping of str to (m,) array_like
-        Values of parameters by path, one for each set; the others are those of `p`.
+        Values of parameters by path, one for each set; the others are those of `p`. With
+        ``start.`` before its path, a number of the state at the first sample, as `begin` of
+        `swashplate.equations.simulate`.
     output : str
         The signal to return; with `cost` it is not needed.
     cost : SquaredError, optional
@@ -288,9 +290,12 @@ def simulate_many(
     records = records_of(instance, inputs, rate)
     paths, several = parameter_paths(model), len(model.parts) > 1
     values, count = _given_sets(changes)
+    starts = [f"start.{path}" for path in state_paths(model)]
     for path in values:
-        if path not in paths:
-            raise InputError(f"{model.name} has no parameter '{path}'; it has {', '.join(paths)}.")
+        if path not in (*paths, *starts):
+            raise InputError(
+                f"{model.name} has no parameter '{path}'; it has {', '.join((*paths, *starts))}."
+            )
     observed = cost.output if cost is not None else output
     if not observed:
         raise InputError(f"{model.name}: say which output of the sets is wanted, or give a cost.")
@@ -303,7 +308,7 @@ def simulate_many(
         if part.given is not None:
             givens += [f"given {prefix}{path}" for path in floats_of(part.given)]
     held |= dict(zip(givens, instance.given, strict=True))
-    numbers = {path: values.get(path, np.full(count, number)) for path, number in held.items()}
+    numbers = {**{path: np.full(count, number) for path, number in held.items()}, **values}
     failures: dict[int, str] = {}
     for path, column in values.items():
         late = path in delays

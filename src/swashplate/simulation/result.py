@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import IntFlag
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,18 +70,26 @@ def read_only(array: NDArray[T]) -> NDArray[T]:
     return view
 
 
-class Signal:
-    """A signal of a run by its name: a read-only array, computed when it is first asked for."""
+class Named:
+    """An attribute of a result by its name: an array, computed when it is first asked for."""
+
+    def __init__(self, made: Callable[[Any, str], Array]) -> None:
+        self._made = made
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
 
-    def __get__(self, run: Signals | None, owner: type | None = None) -> Array:
-        if run is None:
+    def __get__(self, result: object | None, owner: type | None = None) -> Array:
+        if result is None:
             return self  # type: ignore[return-value]  # the class's own attribute
         # an attribute of that name is found before this
-        found = run.__dict__[self._name] = run.sampled(run.fine(self._name))
+        found = result.__dict__[self._name] = self._made(result, self._name)
         return found
+
+
+def signal(run: Signals, name: str) -> Array:
+    """A signal at the record's samples."""
+    return run.sampled(run.fine(name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,27 +214,27 @@ class Simulation(Signals):
         )
         return out
 
-    current_positive = Signal()
+    current_positive = Named(signal)
     """Current of the solenoid towards positive speed, never negative. [A]"""
-    current_negative = Signal()
+    current_negative = Named(signal)
     """Current of the other solenoid, never negative. [A]"""
-    current = Signal()
+    current = Named(signal)
     """Signed current, positive less negative; an ammeter reads the sum of both. [A]"""
-    solenoid_force = Signal()
+    solenoid_force = Named(signal)
     """Net force of both solenoids on the spool. [N]"""
-    spool_position = Signal()
+    spool_position = Named(signal)
     """Displacement of the spool, within its stroke. [m]"""
-    orifice_opening = Signal()
+    orifice_opening = Named(signal)
     """Effective opening, what the orifices leave of the spool's displacement. [m]"""
-    stroker_pressure = Signal()
+    stroker_pressure = Named(signal)
     """Stroking pressure δP about its equilibrium. [Pa]"""
-    swash_angle = Signal()
+    swash_angle = Named(signal)
     """Angle of the swash plate. [rad]"""
-    shaft_speed = Signal()
+    shaft_speed = Named(signal)
     """Speed of the shaft, of the turret for slew. [rad/s]"""
-    shaft_position = Signal()
+    shaft_position = Named(signal)
     """Trapezoidal integral of the speed on the march's grid, zero at the start. [rad]"""
-    motor_torque = Signal()
+    motor_torque = Named(signal)
     """Torque that the motor bears, positive where it drives towards positive speed. [N m]"""
 
     @cached_property

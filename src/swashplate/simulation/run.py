@@ -1,20 +1,33 @@
-"""Simulation of a drive: from a parameter set and a record to a result."""
+"""Simulation of a drive: from a parameter set and a record to a result, and its steady states."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.code import generating
-from swashplate.equations.marching.march import Sampler, Stored
+from swashplate.equations import expressions as ex
+from swashplate.equations.code import Code, Tuple, generating, leaves
+from swashplate.equations.expressions import text
+from swashplate.equations.marching.march import Sampler, Stored, function_source, indented, value_of
 from swashplate.equations.marching.record import Record
-from swashplate.equations.marching.run import Instance, Start, Started, check_start, marched
+from swashplate.equations.marching.run import Instance, Start, Started, called, marched, module
 from swashplate.equations.model import Model
+from swashplate.equations.writing import lines_of
 from swashplate.errors import DomainError, InputError
+from swashplate.models.card import channel_level
+from swashplate.models.drive import drive
+from swashplate.models.pump import (
+    PumpConstants,
+    PumpInputs,
+    PumpState,
+    pump_constants,
+    pump_sample,
+    pump_settled,
+)
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import check_filter_stability, instance_of
@@ -25,13 +38,7 @@ Driver = Literal["voltage", "current"]
 
 
 def check_voltage(record: Record, clip: bool) -> Record:
-    """Refuse, or on request clip, a command beyond ±10 V.
-
-    Raises
-    ------
-    InputError
-        Naming the first sample out of range.
-    """
+    """Refuse, or on request clip, a command beyond ±10 V; the first such sample is named."""
     low, high = float(record.values.min()), float(record.values.max())
     if low >= -FULL_VOLTAGE and high <= FULL_VOLTAGE:
         return record
@@ -95,27 +102,25 @@ def started_at(
     start: Start,
     start_pressure: float | None = None,
 ) -> Started:
-    """Where a record begins.
-
-    Raises
-    ------
-    InputError, DomainError
-        If the pressure at the start [Pa] is no finite number, or beyond a stop or Z15.
-    """
-    check_start(start)
+    """Where a record begins, with the pump at a pressure of its own if one is given. [Pa]"""
     started = instance.start({name: float(v[0]) for name, v in records.items()}, step, start)
     if start_pressure is None:
         return started
-    pressure = check_start_pressure(instance, start_pressure, started)
     card, pump = started.states
-    pump = pump._replace(pressure=pressure)
-    if instance.parts[1].options.damping is not None:
-        pump = pump._replace(plate_pressure=pressure)
+    pump = pump._replace(**start_states(instance, start_pressure, started))
     return started._replace(states=(card, pump))
 
 
-def check_start_pressure(instance: Instance, pressure: float, started: Started) -> float:
-    """A pressure to start with, refused where the drive cannot have it. [Pa]"""
+def start_states(instance: Instance, pressure: float, started: Started) -> dict[str, float]:
+    """Numbers of the pump's state that a pressure at the start sets. [Pa]
+
+    Raises
+    ------
+    InputError
+        If it is no finite number.
+    DomainError
+        If it lies beyond a stop of the swash plate or Z15.
+    """
     if not np.isfinite(pressure):
         raise InputError(f"The pressure at the start must be a finite number, not {pressure}.")
     k = started.arguments[1]["k"]
@@ -124,7 +129,7 @@ def check_start_pressure(instance: Instance, pressure: float, started: Started) 
             f"{instance.name}: the pressure at the start is {pressure:.6g} Pa, but the stops of "
             f"the swash plate and Z15 keep it between {k.lower:.6g} and {k.upper:.6g} Pa."
         )
-    return float(pressure)
+    return dict.fromkeys(instance.model.parts[1].free_start["pressure"], float(pressure))
 
 
 def measured_records(
@@ -158,3 +163,77 @@ def measured_records(
             raise InputError(f"{name} is {samples[bad]} at sample {bad}; it must be finite.")
         found[name] = np.interp(grid, grid[:: record.substeps], samples)
     return found
+
+
+# --- steady states --------------------------------------------------------------------------------
+
+
+@generating
+def _kernel(options: tuple[Any, ...]) -> Callable[..., None]:
+    """The compiled map from constant voltages to currents and speeds."""
+    sampler = Sampler(drive, ("voltage",), options, [])
+    card, pump = sampler.parts
+    code = Code(pump.code.taken)
+    volts = ex.name("volts")
+    plus = card.call(code, channel_level, {"voltage": volts, "p": card.p.items[0]})  # type: ignore[union-attr]
+    minus = card.call(
+        code,
+        channel_level,
+        {"voltage": ex.make("neg", volts), "p": card.p.items[1]},  # type: ignore[union-attr]
+    )
+    current = ex.make("-", plus, minus)  # type: ignore[arg-type]
+    given = (current, *(value_of(pump.p, name) for name in ("pump_speed", "load_torque", "Z9")))
+    known = {**pump.known, "inputs": Tuple(PumpInputs, given)}
+    known["state"] = pump.call(code, pump_settled, known)
+    speed = value_of(pump.call(code, pump_sample, known), "shaft_speed")
+    results = [current, speed]
+    sampler.ends = [[ex.name(node.value) for _, node in leaves(part.p)] for part in sampler.parts]
+    read = code.reads(results)
+    for part in sampler.parts:
+        sampler.ends[part.part] = [ex.name(name) for name in sorted(read)]
+    lines = [
+        *sampler.ahead(),
+        "for n in range(voltage.size):",
+        "    volts = voltage[n]",
+        *indented(lines_of(code, results)),
+        f"    current[n] = {text(current)}",
+        f"    speed[n] = {text(speed)}",
+    ]
+    source = function_source(
+        "settled(voltage, params, given, h, current, speed)",
+        "Signed current and speed that each of many constant voltages settles at.",
+        lines,
+    )
+    return module("drive_settled", source, sampler.names | code.names)["settled"]  # type: ignore[no-any-return]
+
+
+def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Array]:
+    """Signed current [A] and speed [rad/s] that each of many constant voltages settles at."""
+    instance = instance_of(parameters, True)
+    card, pump = instance.options
+    current, speed = np.empty(voltage.size), np.empty(voltage.size)
+    _kernel((card, pump._replace(ripple=None)))(
+        voltage, instance.params, instance.given, 1.0, current, speed
+    )
+    return current, speed
+
+
+def pump_arguments(instance: Instance, current: float, step: float = 1.0) -> dict[str, Any]:
+    """What the pump's equations take under a constant current, by the arguments' names."""
+    p, options, _ = instance.parts[1]
+    known: dict[str, Any] = {"p": p, "options": options, "h": step}
+    known["k"] = called(pump_constants, known)
+    known["inputs"] = PumpInputs(current, p.pump_speed, p.load_torque, p.Z9)
+    return known
+
+
+def settled_state(instance: Instance, current: float) -> PumpState:
+    """State of the pump that a constant signed current settles at."""
+    made: PumpState = called(pump_settled, pump_arguments(instance, current))
+    return made
+
+
+def pressure_limits(instance: Instance) -> PumpConstants:
+    """Pressures at which stops and relief valve act, with the other constants. [Pa]"""
+    made: PumpConstants = pump_arguments(instance, 0.0)["k"]
+    return made

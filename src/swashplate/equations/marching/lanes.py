@@ -276,8 +276,8 @@ class Lanes:
     columns: Mapping[str, tuple[int, float | None]]
     """Row and default of each parameter and given that is read, as `march_lanes` takes them."""
     taps: Sequence[Delayed]
-    ends: Sequence[int]
-    """Rows of states and cost."""
+    starts: Mapping[str, int]
+    """Row of each state, as `march_lanes` takes them."""
 
 
 @generating
@@ -288,7 +288,7 @@ def lanes_of(
     source, names, rows, sampler = lanes_source(model, signals, options, output)
     made = module(f"{model.name}_lanes", source, names)
     columns: dict[str, tuple[int, float | None]] = {}
-    taps, ends = [], [rows["cost"]]
+    taps, starts = [], {}
     for part in sampler.used():
         prefix = f"{part.own.name}." if len(model.parts) > 1 else ""
         defaults, states = part.own.parameters._field_defaults, dict(leaves(part.state))
@@ -302,8 +302,9 @@ def lanes_of(
             delay = f"{prefix}{each.tap.delay}" if each.tap.delay else None
             fraction = rows.get(part.fraction(each))
             taps.append(Delayed(each.number, delay, each.tap.ahead, fraction))
-        ends += [rows[states[path].value] for path in sampler.carried[part.part]]
-    return Lanes(made["prepare"], made["march"], rows, columns, taps, ends)
+        for path in sampler.carried[part.part]:
+            starts[f"start.{prefix}{path}"] = rows[states[path].value]
+    return Lanes(made["prepare"], made["march"], rows, columns, taps, starts)
 
 
 class Marched(NamedTuple):
@@ -331,13 +332,14 @@ def march_lanes(
     weight: Array,
     keep: bool,
 ) -> Marched:
-    """March LANES sets over one record, from rest.
+    """March LANES sets over one record, from rest but for what the numbers say.
 
     Parameters
     ----------
     numbers : mapping of str to (LANES,) array
         Every parameter by its path, and every given, ``"given "`` before it; parameters that a type
-        has a default for may be left out.
+        has a default for may be left out. States at the first sample, ``"start."`` before their
+        paths, where they are not those at rest.
     records : mapping of str to (n,) array
         External signals, zero before.
     h : float
@@ -369,6 +371,8 @@ def march_lanes(
     values = tuple(np.require(each, np.float64, ["C", "W"]) for each in records.values())
     with np.errstate(all="ignore"):  # of ways that are not taken there is nothing to say
         lanes.prepare(h, block.reshape(-1))
+        for path in lanes.starts.keys() & numbers.keys():
+            block[lanes.starts[path]] = numbers[path]
         lanes.march(values, whole, h, block.reshape(-1), measured, weight, outputs)
-    end = block[lanes.ends].sum(axis=0)
+    end = block[[lanes.rows["cost"], *lanes.starts.values()]].sum(axis=0)
     return Marched(block[lanes.rows["cost"]], worst, end, outputs[:, :size])

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
 from swashplate.equations import expressions as ex
@@ -84,8 +84,13 @@ class TapOf(NamedTuple):
     tap: Tap
 
 
-def taps_of(model: Model, signals: Sequence[str]) -> list[TapOf]:
+def taps_of(model: Model, signals: Sequence[str]) -> tuple[TapOf, ...]:
     """All taps on signals that are given as records, numbered."""
+    return _taps_of(model, tuple(signals))
+
+
+@lru_cache(maxsize=256)
+def _taps_of(model: Model, signals: tuple[str, ...]) -> tuple[TapOf, ...]:
     found: list[TapOf] = []
     for i, part in enumerate(model.parts):
         for name in part.input_types:
@@ -93,7 +98,7 @@ def taps_of(model: Model, signals: Sequence[str]) -> list[TapOf]:
             outside = model.link_of(i, name) is None and tap.signal in signals
             if outside and part.looked_at(name):
                 found.append(TapOf(i, name, len(found), tap))
-    return found
+    return tuple(found)
 
 
 class PartCode:

@@ -4,6 +4,7 @@ What is here knows no model: it works on rows of a block of samples that a plan 
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -150,19 +151,13 @@ def room_for(
     for row, value in constant.items():
         table[row] = value
     observations, low_passes = plan.kept.shape
-    idle = (derived + 1,) * (-(derived + 1) % ABREAST)
     seen = aligned(observations, derived + 2, STRIDE)
-    own = np.array([*range(derived + 1), *idle], dtype=np.int64)
-    columns = np.zeros((observations, 4, own.size), dtype=np.int64)
-    for r in range(observations):
-        columns[r, :2] = (r * (derived + 2) + own) * STRIDE + CARRIED
-        columns[r, 2] = own
     return Room(
         flat,
         table,
         seen,
         seen.reshape(-1),
-        columns,
+        _columns(observations, derived),
         np.zeros((observations, low_passes, derived + 2)),
         np.zeros((observations, derived + 1, 3)),
         np.empty(STRIDE),
@@ -170,6 +165,18 @@ def room_for(
         np.empty((2, states, ABREAST)),
         plan.first[:-1].copy(),
     )
+
+
+@lru_cache(maxsize=256)
+def _columns(observations: int, derived: int) -> Indices:
+    """Rows of each observation, for `follow`."""
+    idle = (derived + 1,) * (-(derived + 1) % ABREAST)
+    own = np.array([*range(derived + 1), *idle], dtype=np.int64)
+    columns = np.zeros((observations, 4, own.size), dtype=np.int64)
+    for r in range(observations):
+        columns[r, :2] = (r * (derived + 2) + own) * STRIDE + CARRIED
+        columns[r, 2] = own
+    return columns
 
 
 @subroutine

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyBboxPatch
 
+from reproduction.content import Diagram, Figure, Panel, Role
 from swashplate.report.broken_lines import draw_broken
 from swashplate.report.style import (
     BLUE,
@@ -29,7 +30,6 @@ from swashplate.report.style import (
     zero_line,
 )
 from swashplate.report.traces import draw, fit_time
-from swashplate.reproduction.content import Diagram, Figure, Panel, Role
 
 WIDTH, WIDE = 5.6, 8.6
 SINGLE, STACKED = 1.85, 1.15

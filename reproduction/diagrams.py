@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from swashplate.reproduction.content import Arrow, Diagram, Figure, Node
+from reproduction.content import Arrow, Diagram, Figure, Node
 
 _AMMETER = Diagram(
     (

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any, Literal
 
+from reproduction.bench import SEVERITY, Bench
+from reproduction.content import Cell, Table
 from swashplate.campaign import Experiment
 from swashplate.drive import Drive
 from swashplate.identification.assessment import RunQuality
@@ -24,8 +26,6 @@ from swashplate.identification.validation import (
     with_speeds,
 )
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.reproduction.bench import SEVERITY, Bench
-from swashplate.reproduction.content import Cell, Table
 
 SPREAD = 0.02
 """Standard deviation of the logarithm by which the fit's start differs from the truth: well within
@@ -43,7 +43,7 @@ NOTHING = "–"
 
 def thesis_errors() -> dict[str, dict[str, Any]]:
     """The source's own numbers, by table."""
-    text = files("swashplate.reproduction").joinpath("thesis_errors.toml").read_text("utf-8")
+    text = files("reproduction").joinpath("thesis_errors.toml").read_text("utf-8")
     return tomllib.loads(text)
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import matplotlib
 from matplotlib.backends.backend_pdf import PdfPages
 
-from swashplate.report.reproduction.sheets import Sheets
-from swashplate.report.reproduction.wording import (
+from reproduction.content import Cell, Figure, Reproduction, Table
+from reproduction.sheets import Sheets
+from reproduction.wording import (
     ABSENT,
     LEAD,
     NOT_MEASURED,
@@ -18,7 +19,6 @@ from swashplate.report.reproduction.wording import (
     errata_of,
 )
 from swashplate.report.style import GREY, NORMAL, SMALL
-from swashplate.reproduction.content import Cell, Figure, Reproduction, Table
 from swashplate.tables import write_whole
 
 DENSE = 6.6

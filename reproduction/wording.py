@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from swashplate.reproduction.content import Figure, Reproduction, Table
-from swashplate.reproduction.errata import ERRATA
+from reproduction.content import Figure, Reproduction, Table
+from reproduction.errata import ERRATA
 
 TITLE = "Kruse (2001), reproduced"
 LEAD = (

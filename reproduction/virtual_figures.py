@@ -6,13 +6,13 @@ from typing import Literal
 
 import numpy as np
 
+from reproduction.bench import ON_CURRENT, Bench
+from reproduction.catalogue import Shown
+from reproduction.content import Curve, Figure, Panel
+from reproduction.curves import MULTIPLIED, filtered_speed_deg_s
 from swashplate.campaign import interpolate_counts
 from swashplate.drive import Drive
 from swashplate.identification.drive_model import measured_current
-from swashplate.reproduction.bench import ON_CURRENT, Bench
-from swashplate.reproduction.catalogue import Shown
-from swashplate.reproduction.content import Curve, Figure, Panel
-from swashplate.reproduction.curves import MULTIPLIED, filtered_speed_deg_s
 from swashplate.simulation.run import simulate_pump
 
 WINDOW = (1.55, 1.75)

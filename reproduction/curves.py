@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.analysis.levers import pulled
+from reproduction.catalogue import Shown
+from reproduction.content import Curve, Figure, Level, Panel
+from swashplate.analysis.whatif import pulled
 from swashplate.campaign import matched_speed
 from swashplate.drive import Drive
 from swashplate.maneuvers import source_tests
-from swashplate.reproduction.catalogue import Shown
-from swashplate.reproduction.content import Curve, Figure, Level, Panel
 from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]

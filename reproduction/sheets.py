@@ -9,10 +9,10 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 
-from swashplate.report.reproduction.drawing import draw_figure, height_of
-from swashplate.report.reproduction.wording import as_mathtext, length_of
+from reproduction.content import Cell, Figure
+from reproduction.drawing import draw_figure, height_of
+from reproduction.wording import as_mathtext, length_of
 from swashplate.report.style import FAINT, GREY, INK, SMALL, new_figure
-from swashplate.reproduction.content import Cell, Figure
 
 WIDTH, HEIGHT = 8.27, 11.69
 LEFT, TOP, BOTTOM = 0.85, 0.7, 0.75

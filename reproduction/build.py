@@ -7,24 +7,24 @@ from collections.abc import Callable, Collection
 from importlib.metadata import version
 from platform import python_version
 
-from swashplate.__about__ import __version__
-from swashplate.drive import Drive
-from swashplate.errors import InputError
-from swashplate.parameters.files import AXES
-from swashplate.reproduction.bench import SEVERITY, Bench
-from swashplate.reproduction.catalogue import ERROR_TABLES, FIGURES, TABLES, Shown
-from swashplate.reproduction.content import Figure, Reproduction, Table
-from swashplate.reproduction.curves import (
+from reproduction.bench import SEVERITY, Bench
+from reproduction.catalogue import ERROR_TABLES, FIGURES, TABLES, Shown
+from reproduction.content import Figure, Reproduction, Table
+from reproduction.curves import (
     current_figure,
     inside_figure,
     larger_figure,
     other_card_figure,
     speed_figure,
 )
-from swashplate.reproduction.diagrams import DIAGRAMS
-from swashplate.reproduction.parameter_tables import parameter_table
-from swashplate.reproduction.virtual_errors import ErrorTables
-from swashplate.reproduction.virtual_figures import encoder_figure, measured_current_figure
+from reproduction.diagrams import DIAGRAMS
+from reproduction.parameter_tables import parameter_table
+from reproduction.virtual_errors import ErrorTables
+from reproduction.virtual_figures import encoder_figure, measured_current_figure
+from swashplate.__about__ import __version__
+from swashplate.drive import Drive
+from swashplate.errors import InputError
+from swashplate.parameters.files import AXES
 
 ALL = (*(f"figure {each.number}" for each in FIGURES), *(f"table {number}" for number in TABLES))
 """Names of all that can be reproduced, in the order in which it is made."""

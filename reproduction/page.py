@@ -12,8 +12,9 @@ import matplotlib
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from swashplate.report.reproduction.drawing import is_wide, own_canvas
-from swashplate.report.reproduction.wording import (
+from reproduction.content import Figure, Reproduction
+from reproduction.drawing import is_wide, own_canvas
+from reproduction.wording import (
     ABSENT,
     LEAD,
     NOT_MEASURED,
@@ -22,7 +23,6 @@ from swashplate.report.reproduction.wording import (
     chapters,
     errata_of,
 )
-from swashplate.reproduction.content import Figure, Reproduction
 from swashplate.tables import write_text
 
 
@@ -51,7 +51,7 @@ def write_page(
             begin(f"drawing figure {figure.number}")
         pictures[figure.number] = _picture(figure)
     environment = Environment(
-        loader=PackageLoader("swashplate.report.reproduction", ""),
+        loader=PackageLoader("reproduction", ""),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -59,7 +59,7 @@ def write_page(
     )
     environment.filters["sub"] = as_html
     look = files("swashplate.report.fit_page").joinpath("page.css").read_text("utf-8")
-    own = files("swashplate.report.reproduction").joinpath("page.css").read_text("utf-8")
+    own = files("reproduction").joinpath("page.css").read_text("utf-8")
     text = environment.get_template("page.html").render(
         title=TITLE,
         lead=LEAD,
