@@ -279,7 +279,15 @@ def smoothed_spectrum(fit):
     return spectral_covariance(fit), np.zeros(fit.variables.count)
 
 
+def larger_of_both(fit):
+    """The larger error of the smoothed spectrum and of band scores, HC3."""
+    from swashplate.identification.noise import coloured_noise_covariance
+
+    return coloured_noise_covariance(fit), np.zeros(fit.variables.count)
+
+
 METHODS = {
+    "larger of smoothed spectrum and band scores": larger_of_both,
     "white noise": white,
     "smoothed-spectrum sandwich": smoothed_spectrum,
     "autocovariance sandwich": autocovariance,

@@ -18,6 +18,7 @@ from swashplate.identification.linearising import linearised_fit
 from swashplate.identification.noise import (
     Covariance,
     NoiseColour,
+    coloured_noise_covariance,
     noise_colours,
     spectral_covariance,
     white_noise_covariance,
@@ -417,7 +418,7 @@ def uncertainty(
     bounded, fit = fit.variables, released(fit)
     clean, lines = without_lines(fit)
     colours = noise_colours(clean)
-    own = replace(spectral_covariance(fit), variables=bounded)
+    own = replace(coloured_noise_covariance(fit), variables=bounded)
     worth = {m: colour for colour in colours for m in colour.members}
     made = Uncertainty(
         with_handed(own, handed),
@@ -478,7 +479,7 @@ def weighed(problem: P, vector: Array) -> P:
     """
     bare = replace(problem, unknowns=problem.unknowns.with_worths(None))
     fit = linearised_fit(bare, vector)
-    own = uncertainty(fit).own
+    own = spectral_covariance(fit)
     assumed = np.sum(fit.whitening**2, axis=1)
     known = own.determined & (assumed > 0.0)
     ratio = np.diag(own.matrix)[known] / assumed[known]
