@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 from swashplate.errors import InputError
 from swashplate.identification.bootstrap import Bootstrap, Resampling, refit_bootstrap
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
-from swashplate.identification.noise import coloured_noise_covariance
+from swashplate.identification.noise import spectral_covariance
 from swashplate.identification.unknowns import Unknowns
 
 N, RUNS = 2048, 4
@@ -45,9 +45,10 @@ def refitted(resampling: Resampling, draws: int) -> Bootstrap:
 def test_it_agrees_with_the_covariance() -> None:
     made, _ = fit(0.95, 1)
     found = refitted(Resampling(made, seed=1), 1000)
-    expected = coloured_noise_covariance(made).standard_errors[:2]
-    # the standard deviation of a standard deviation of 1000 draws is 2 %
-    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance))[:2], expected, rtol=0.1)
+    expected = spectral_covariance(made).standard_errors[:2]
+    # draws come from an autoregression, the covariance from a smoothed spectrum: each knows the
+    # noise at the low frequencies of the derivatives to some 10 %
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance))[:2], expected, rtol=0.2)
     assert found.covariance[2, 2] == 0.0
 
 

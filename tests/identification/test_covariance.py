@@ -5,7 +5,7 @@ import pytest
 
 from swashplate.errors import InputError
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
-from swashplate.identification.noise import spectrum, white_noise_covariance
+from swashplate.identification.noise import white_noise_covariance
 from swashplate.identification.unknowns import Unknowns
 
 RNG = np.random.default_rng(3)
@@ -34,14 +34,6 @@ def test_white_noise_errors_are_the_textbooks() -> None:
     np.testing.assert_allclose(found.standard_errors, [1.1247, 0.1179], atol=5e-5)
     assert found.degrees_of_freedom.tolist() == [9.0, 9.0]
     assert "too small" in found.label
-
-
-@pytest.mark.parametrize("size", [9, 10])
-def test_a_spectrum_is_the_cosine_sum(size: int) -> None:
-    window = np.array([3.0, 2.0, 1.0])
-    angle = 2.0 * np.pi * np.arange(size // 2 + 1) / size
-    expected = 3.0 + 4.0 * np.cos(angle) + 2.0 * np.cos(2.0 * angle)
-    np.testing.assert_allclose(spectrum(window, size), expected, atol=1e-12)
 
 
 def test_undetermined_and_bounded_unknowns_have_no_number() -> None:

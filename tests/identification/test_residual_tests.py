@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from swashplate.errors import InputError
-from swashplate.identification.lack_of_fit import residual_test
+from swashplate.identification.assessment import residual_test
 
 N = 4000
 TIME = np.arange(N) / 512.0

@@ -3,7 +3,7 @@
 import numpy as np
 
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
-from swashplate.identification.noise import Covariance, swelling_noise_covariance
+from swashplate.identification.noise import Covariance, band_score_covariance
 from swashplate.identification.unknowns import Unknowns
 
 RUNS, N = 6, 5120
@@ -39,7 +39,7 @@ def scattered(
             noise *= 1.0 + 4.0 * pulses
         fit, estimate = fitted(noise, pulses)
         estimates.append(estimate)
-        found.append(swelling_noise_covariance(fit))
+        found.append(band_score_covariance(fit))
     return np.sqrt(np.mean(np.square(estimates), axis=0)), found
 
 

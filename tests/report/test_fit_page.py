@@ -19,7 +19,6 @@ from swashplate.identification.cross_validation import CrossValidation, Fold, Fo
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profile import Point, Profile, Threshold
 from swashplate.identification.setup import Setup
-from swashplate.identification.spectral_lines import distinct
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.starts import StartResult
 from swashplate.identification.validation import predict
@@ -258,17 +257,17 @@ def test_a_position_is_judged_by_its_speed_too(read: Page) -> None:
     assert "start transient" in read.words
 
 
-def test_tones_are_told_once_and_listed_in_a_table(read: Page, assessments) -> None:
-    tones = [distinct(each.uncertainty.tones) for each in assessments]
-    listed = [tone for each in tones if len(each) > 1 for tone in each]
-    heads = sum(len(each) > 1 for each in tones)
-    assert heads > 0
-    rows = [row for row in read.tables["tones"] if row[0] != "channel"]
-    assert [row[0] for row in rows] == [tone.channel for tone in listed]
+def test_spectral_lines_are_listed_in_a_table(read: Page, assessments) -> None:
+    lines = [each.uncertainty.lines for each in assessments]
+    listed = [line for each in lines if len(each) > 1 for line in each]
+    assert listed
+    rows = [row for row in read.tables["lines"] if row[0] != "channel"]
+    assert [row[0] for row in rows] == [line.channel for line in listed]
     found = [number(row[1]) for row in rows]
-    assert found == pytest.approx([tone.frequency for tone in listed], rel=5e-3)
+    assert found == pytest.approx([line.frequency for line in listed], rel=5e-3)
     # in the verdict and beside the intervals
-    assert len(re.findall(r"\d+ tones between", read.words)) == 2 * heads
+    heads = sum(len(each) > 1 for each in lines)
+    assert len(re.findall(r"\d+ spectral lines between", read.words)) == 2 * heads
 
 
 def test_every_sample_is_in_the_file(read: Page, fitted: Fit) -> None:

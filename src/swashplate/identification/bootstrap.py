@@ -23,14 +23,14 @@ from swashplate.identification.noise import (
     NoiseColour,
     colour_of,
     grid_of,
-    noise_model,
+    noise_colours,
     pair_sums,
     unweighted,
 )
 from swashplate.identification.problem import Problem
 from swashplate.identification.profile import Profile, Threshold, minimiser, profile, threshold
 from swashplate.identification.solving import solve
-from swashplate.identification.spectral_lines import separated
+from swashplate.identification.spectral_lines import without_lines
 from swashplate.identification.unknowns import Unknowns
 from swashplate.parameters.parameter_set import ParameterSet
 
@@ -148,18 +148,19 @@ class Resampling:
     Residuals are whitened with an autoregression, moving blocks of these innovations are drawn
     within the run, and coloured again (post-blackened blocks, Davison and Hinkley 1997, section
     8.2). Blocks of the residuals themselves cut every slow swing in two: with residuals that are
-    correlated over a fiftieth of a run their 95 % intervals covered 88 %. The autoregression is
-    that of the noise, not of the residuals, which lack what the fit took (`coloured_noise`). Gaps
-    are marched over and then left out, and weights are put back where noise lands.
+    correlated over a fiftieth of a run their 95 % intervals covered 88 %. Residuals are enlarged
+    by the root of the samples over those that the fit leaves. Gaps are marched over and then left
+    out, and weights are put back where noise lands.
     """
 
     def __init__(self, fit: LinearisedFit, *, seed: int = 0, block: float | None = None) -> None:
         if block is not None and not block > 0.0:
             raise InputError(f"A block of {block:g} s is none; give a positive length.")
-        model = noise_model(fit)
+        colours = noise_colours(fit)
+        spare = fit.samples / fit.spare_samples
         self.fit, self.seed = fit, seed
         self._runs: dict[int, _Run] = {}
-        for colour in model.colours:
+        for colour in colours:
             samples = sum(fit.runs[m].time.size for m in colour.members)
             process = autoregression(colour, samples)
             innovations = {
@@ -172,7 +173,7 @@ class Resampling:
                 # a run too short for innovations of its own borrows the others'
                 enough = innovations[m].size >= max(FEWEST, 4.0 * length)
                 own = innovations[m] if enough else common
-                size = float(np.sqrt(model.levels[m]))
+                size = float(np.sqrt(spare * np.mean(unweighted(fit.runs[m]) ** 2)))
                 self._runs[m] = _Run(fit.runs[m].time, process, own, length, size)
 
     @property
@@ -413,7 +414,7 @@ def bootstraps_of(
     shared = tuple(
         _Again(
             replace(each.stage, problem=replace(each.stage.problem, threads=1)),
-            Resampling(separated(each.linearised).fit, seed=seed),
+            Resampling(without_lines(each.linearised)[0], seed=seed),
         )
         for each in assessments
     )

@@ -19,12 +19,16 @@ from swashplate.identification.noise import (
     NoiseColour,
     coloured_noise_covariance,
     noise_colours,
-    swelling_noise_covariance,
+    spectral_covariance,
     white_noise_covariance,
 )
 from swashplate.identification.problem import Problem
 from swashplate.identification.profile import CheckedEnd
-from swashplate.identification.spectral_lines import Tone, separated, tone_sentences
+from swashplate.identification.spectral_lines import (
+    SpectralLine,
+    line_sentences,
+    without_lines,
+)
 from swashplate.identification.unknowns import Unknowns
 
 if TYPE_CHECKING:
@@ -273,11 +277,6 @@ def _part(variance: Array, freedom: Array) -> Array:
     return part
 
 
-NOTABLE = 1.2
-"""Ratio of the errors under noise that differs along the runs to those under stationary noise from
-which it is said that they differ."""
-
-
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
     """Errors of a fit's estimates: those to quote, and others beside them."""
@@ -285,25 +284,19 @@ class Uncertainty:
     quoted: Covariance
     """That of the stage's own noise with what earlier stages handed on."""
     own: Covariance
-    """The larger one, unknown by unknown, of the next two."""
-    coloured: Covariance
-    """Stationary coloured noise."""
-    swelling: Covariance
-    """Noise that differs along the runs."""
+    """That of the stage's own noise."""
     white: Covariance
     """Too small where residuals are coloured; to stand beside the others."""
     colours: tuple[NoiseColour, ...]
     samples: tuple[tuple[str, int, float], ...]
     """For each run its label, samples, and the independent samples that they are worth."""
-    uneven: tuple[str, ...]
-    """Unknowns whose error is notably larger because the noise is not alike everywhere."""
     noisy: bool
     """Whether there are any residuals at all."""
     level: float
     handed: tuple[Handed, ...] = ()
     """What earlier stages do not know."""
-    tones: tuple[Tone, ...] = ()
-    """Lines in the residuals' spectra, taken out before the noise was judged."""
+    lines: tuple[SpectralLine, ...] = ()
+    """Of the residuals, removed before it was judged how long they stay correlated."""
     ends: tuple[CheckedEnd, ...] = ()
     """Sides on which the cost does not rise as the covariance says."""
     priors: tuple[str, ...] = ()
@@ -334,7 +327,7 @@ class Uncertainty:
         """What the errors rest on."""
         if not self.noisy:
             return ("The residuals are exactly zero: errors of zero say nothing of other tests.",)
-        said = list(tone_sentences(self.tones))
+        said = list(line_sentences(self.lines))
         for colour in self.colours:
             if colour.length:
                 worth = (
@@ -359,11 +352,6 @@ class Uncertainty:
             said.append(
                 f"White-noise errors would be {ratio:.2g} times too small; the report shows them "
                 "for comparison only."
-            )
-        if self.uneven:
-            said.append(
-                f"The noise is not alike in all parts of the runs: {', '.join(self.uneven)} "
-                f"{'has' if len(self.uneven) == 1 else 'have'} wider intervals for it."
             )
         said += self.priors
         for end in self.ends:
@@ -429,29 +417,23 @@ def uncertainty(
         If there are no more samples than unknowns, or the level is not between 0 and 1.
     """
     bounded, fit = fit.variables, released(fit)
-    clean = separated(fit)
-    colours = noise_colours(clean.fit)
-    coloured = _with(coloured_noise_covariance(clean.fit, colours=colours), clean.covariance)
-    swelling = swelling_noise_covariance(fit)
-    own, uneven = _wider(coloured, swelling)
-    own = replace(own, variables=bounded)
+    clean, lines = without_lines(fit)
+    colours = noise_colours(clean)
+    own = replace(coloured_noise_covariance(fit), variables=bounded)
     worth = {m: colour for colour in colours for m in colour.members}
     made = Uncertainty(
         with_handed(own, handed),
         own,
-        coloured,
-        swelling,
         white_noise_covariance(fit),
         colours,
         tuple(
             (run.label, run.time.size, worth[m].effective_samples(run.time.size))
             for m, run in enumerate(fit.runs)
         ),
-        uneven,
         fit.squares > 0.0,
         level,
         tuple(handed),
-        clean.tones,
+        lines,
     )
     made.estimates  # noqa: B018  refuses a wrong level
     return made
@@ -466,29 +448,6 @@ def released(fit: LinearisedFit) -> LinearisedFit:
     if fit.variables.free.all():
         return fit
     return replace(fit, variables=fit.variables.released)
-
-
-def _with(covariance: Covariance, added: Array) -> Covariance:
-    known = np.outer(covariance.determined, covariance.determined)
-    return replace(covariance, matrix=covariance.matrix + np.where(known, added, 0.0))
-
-
-def _wider(coloured: Covariance, swelling: Covariance) -> tuple[Covariance, tuple[str, ...]]:
-    """The larger of two errors, unknown by unknown, and where the second is notably larger."""
-    narrow = np.where(coloured.determined, coloured.standard_errors, 1.0)
-    ratio = np.where(coloured.determined, swelling.standard_errors, 0.0) / np.where(
-        narrow > 0.0, narrow, 1.0
-    )
-    stretch = np.maximum(ratio, 1.0)
-    quoted = Covariance(
-        "coloured",
-        coloured.variables,
-        coloured.matrix * np.outer(stretch, stretch),
-        coloured.determined,
-        np.where(ratio > 1.0, swelling.degrees_of_freedom, coloured.degrees_of_freedom),
-    )
-    names = np.array(coloured.variables.names)
-    return quoted, tuple(names[ratio > NOTABLE])
 
 
 P = TypeVar("P", bound=Problem)
@@ -520,7 +479,7 @@ def weighed(problem: P, vector: Array) -> P:
     """
     bare = replace(problem, unknowns=problem.unknowns.with_worths(None))
     fit = linearised_fit(bare, vector)
-    own = uncertainty(fit).own
+    own = spectral_covariance(fit)
     assumed = np.sum(fit.whitening**2, axis=1)
     known = own.determined & (assumed > 0.0)
     ratio = np.diag(own.matrix)[known] / assumed[known]

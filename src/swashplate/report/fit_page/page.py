@@ -34,7 +34,7 @@ from swashplate.report.fit_page.statistics_plots import (
     waterfall_item,
 )
 from swashplate.report.fit_page.truth import in_the_fits_scales
-from swashplate.report.fit_page.verdict import statements, tones_of, uncertainty_sentences
+from swashplate.report.fit_page.verdict import lines_of, statements, uncertainty_sentences
 from swashplate.tables import write_text
 
 
@@ -133,7 +133,7 @@ def write_fit_report(
                 each.stage.stage.name,
                 each.identifiability,
                 uncertainty_sentences(each),
-                tones_of(each),
+                lines_of(each),
             )
             for each in assessed
         ],

@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from swashplate.campaign import Campaign
-from swashplate.identification.lack_of_fit import ResidualTest
+from swashplate.identification.assessment import ResidualTest
 from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.staging import Parameters
 from swashplate.identification.validation import source_rules

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.identification.lack_of_fit import ResidualTest
+from swashplate.identification.assessment import ResidualTest
 from swashplate.report.broken_lines import thinned
 
 Array = NDArray[np.float64]

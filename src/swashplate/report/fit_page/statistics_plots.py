@@ -10,12 +10,12 @@ from bokeh.embed import json_item
 from bokeh.models import BasicTicker, ColorBar, ColumnDataSource, LinearColorMapper, Range1d, Span
 from bokeh.plotting import figure
 
+from swashplate.identification.criteria import SAME
 from swashplate.identification.identifiability import Identifiability
 from swashplate.identification.noise import Covariance
 from swashplate.identification.profile import Profile
 from swashplate.identification.starts import StartResult
 from swashplate.identification.unknowns import Unknown
-from swashplate.identification.verdict import SAME
 from swashplate.report.fit_page.bokeh_style import dress
 from swashplate.report.style import BLUE, FAINT, GREY, VERMILION
 

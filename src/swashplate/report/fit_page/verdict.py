@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment, Measures, RunQuality
-from swashplate.identification.spectral_lines import Tone, distinct
+from swashplate.identification.spectral_lines import SpectralLine
 from swashplate.identification.validation import pooled
 from swashplate.identification.verdict import Statement, Verdict
 from swashplate.report.display_units import display_unit
@@ -101,9 +101,9 @@ def uncertainty_sentences(assessment: Assessment) -> tuple[str, ...]:
         return (f"There are no intervals: {error}",)
 
 
-def tones_of(assessment: Assessment) -> tuple[Tone, ...]:
-    """Tones in a stage's residuals; none where there are no intervals."""
+def lines_of(assessment: Assessment) -> tuple[SpectralLine, ...]:
+    """Spectral lines in a stage's residuals; none where there are no intervals."""
     try:
-        return distinct(assessment.uncertainty.tones)
+        return assessment.uncertainty.lines
     except InputError:
         return ()
