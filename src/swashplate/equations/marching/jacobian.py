@@ -591,8 +591,8 @@ def triangle(
         overflown = np.asarray(~np.isfinite(factor)).any(axis=0)
         bad = [*names, "the residuals"][int(np.argmax(overflown))]
         raise DomainError(
-            f"{instance.name}: {bad}: the derivatives are too large for a least-squares problem; check "
-            "the size of the parameters and weights."
+            f"{instance.name}: {bad}: the derivatives are too large for a least-squares problem; "
+            "check the size of the parameters and weights."
         )
     return Triangle(names, upright(factor), sink.squares)
 
