@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -61,6 +62,10 @@ SURE = 0.9
 """A correlation from which no band is asked: in short runs of one slow movement it reaches 1."""
 SAME = 1e-6
 """Costs that differ by less than this part are the same optimum."""
+
+
+SIGNIFICANT = 5.0
+"""Standard errors from which a fault's size is taken for one: a dozen are looked at in each fit."""
 
 
 class Criterion(NamedTuple):
@@ -307,19 +312,31 @@ def misfit_criteria(misfit: LackOfFit, judged: Sequence[RunQuality]) -> list[Cri
             )
         )
     for fault in misfit.faults:
-        significant = abs(fault.size) > 4.0 * fault.standard_error
+        significant = abs(fault.size) > SIGNIFICANT * fault.standard_error
+        size = f"{fault.size:+.2g} {fault.unit}"
         if fault.name.startswith("drift of "):
             part = abs(fault.size) / 100.0
+            drifts = significant and part > DRIFTS and fault.share > EXPLAINS
             made.append(
                 Criterion(
                     fault.name.removesuffix(" over the campaign"),
-                    f"{fault.size:+.2g} %",
+                    size,
                     percent(DRIFTS),
                     "no one set of parameters holds for a machine that changes",
-                    "use" if significant and part > DRIFTS_AWAY else "values",
-                    f"{fault.name} by {fault.size:+.2g} %"
-                    if significant and part > DRIFTS and fault.share > EXPLAINS
-                    else "",
+                    "use" if part > DRIFTS_AWAY else "values",
+                    f"{fault.name} by {size}" if drifts else "",
+                )
+            )
+        elif isfinite(fault.plausible) and not fault.hidden:
+            wrong = significant and abs(fault.size) > fault.plausible / 3.0
+            made.append(
+                Criterion(
+                    fault.name,
+                    size,
+                    f"{fault.plausible / 3.0:.2g} {fault.unit}",
+                    "an instrument that is off by more shows in these logs",
+                    "values",
+                    f"{fault.name} off by {size}" if wrong else "",
                 )
             )
     if misfit.clipped:
