@@ -13,7 +13,7 @@ export PIP_BUILD_CONSTRAINT := constraints.txt
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test golden lint docs figures bench cluster fuzz tools browser calibration coverage dist \
+.PHONY: help .venv demo test golden lint docs figures reproduce bench cluster fuzz tools browser calibration coverage dist \
   format clean
 
 help: ## list the targets
@@ -55,6 +55,9 @@ docs: $(STAMP) ## build the documentation into docs/_build/html; warnings are er
 
 figures: $(STAMP) ## make all figures of README and documentation again
 	@$(BIN)/python docs/figures.py
+
+reproduce: $(STAMP) ## compute the source's figures and tables anew, into reproduction/made
+	@$(BIN)/python -m reproduction
 
 bench: $(STAMP) tools ## measure the speed against C (needs a C compiler)
 	@$(BIN)/python benchmarks/run.py

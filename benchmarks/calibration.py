@@ -71,9 +71,9 @@ def campaign(axis, case, seed, compared):
     from swashplate import Campaign, Drive
     from swashplate.campaign import rig
     from swashplate.identification.assessment import assess
-    from swashplate.identification.fit import fit
-    from swashplate.identification.known_truth import drawn, true_value
+    from swashplate.identification.fitting import fit
     from swashplate.identification.setup import load_setup
+    from swashplate.identification.staging import drawn, true_value
 
     setup, nominal = load_setup(axis), Drive.preset(axis)
     # campaigns of two cells share neither machine nor noise
@@ -85,7 +85,7 @@ def campaign(axis, case, seed, compared):
     with tempfile.TemporaryDirectory() as folder:
         read = Campaign.from_toml(rig.write(tests, Path(folder) / "virtual"))
         runs = read.select(role="fit")
-    assessments = assess(fit(runs, nominal.parameters, setup, threads=1).stages)
+    assessments = assess(fit(nominal.parameters, runs, setup, threads=1).stages)
     found = [("product", assessments[-1].stage.parameters, [a.uncertainty for a in assessments])]
     if compared:
         found += candidates(assessments)

@@ -32,8 +32,8 @@ PROCESS = """
 import resource, sys, time
 begun = time.perf_counter()
 from swashplate import Campaign
-from swashplate.campaign.quality import examine
-from swashplate.campaign.speed import speed_of
+from swashplate.campaign import examine
+from swashplate.campaign import speed_of
 run = Campaign.from_toml(sys.argv[1]).experiments[0]
 read = time.perf_counter()
 examine(run)

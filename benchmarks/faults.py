@@ -132,8 +132,8 @@ def simulated_campaign(fault, axis, seed):
     """Logs of a campaign with a fault, and the machine that was simulated."""
     from swashplate import Drive
     from swashplate.campaign import rig
-    from swashplate.identification.known_truth import drawn
     from swashplate.identification.setup import load_setup
+    from swashplate.identification.staging import drawn
     from swashplate.maneuvers import source_tests
 
     nominal = Drive.preset(axis)
@@ -230,10 +230,10 @@ def campaign(name, axis, seed):
     from swashplate.errors import SwashplateError
     from swashplate.identification.assessment import assess
     from swashplate.identification.data_checks import check_runs
-    from swashplate.identification.fit import fit, smooth
-    from swashplate.identification.known_truth import true_value
+    from swashplate.identification.fitting import fit, smooth
     from swashplate.identification.lack_of_fit import lack_of_fit
     from swashplate.identification.setup import load_setup
+    from swashplate.identification.staging import true_value
     from swashplate.identification.validation import predict
     from swashplate.identification.verdict import verdict
 
@@ -244,7 +244,7 @@ def campaign(name, axis, seed):
         runs, held = read.select(role="fit"), read.select(role="validate")
     try:
         found = len(check_runs(runs, smooth(nominal.parameters)))
-        result = fit(runs, nominal.parameters, load_setup(axis), threads=1)
+        result = fit(nominal.parameters, runs, load_setup(axis), threads=1)
     except SwashplateError as error:
         return (name, axis, seed, "refused", "Not usable", 2, "", str(error), "", "", "B", "")
     assessments, drive = assess(result.stages), result.parameters

@@ -15,8 +15,7 @@ from swashplate.equations.marching.observation import Observation, ObservedRecor
 from swashplate.equations.marching.record import record_of
 from swashplate.maneuvers import source_tests
 from swashplate.parameters.definitions import columns_of
-from swashplate.simulation.residuals import jacobian, residuals, triangle
-from swashplate.simulation.sensitivities import ALL_COLUMNS, PUMP_COLUMNS
+from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS, jacobian, residuals, triangle
 
 Array = NDArray[np.float64]
 

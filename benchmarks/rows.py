@@ -14,11 +14,11 @@ from timing import Timing, cores_used, in_turns, one_core
 from swashplate import Drive, Serial, SquaredError, maneuvers
 from swashplate.equations.marching.march import Stored
 from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.pieces import addresses, run_once
 from swashplate.equations.marching.record import record_of
-from swashplate.equations.marching.run import march_kernel
+from swashplate.equations.marching.run import arrays_of, march_of
 from swashplate.simulation.instance import instance_of
-from swashplate.simulation.residuals import jacobian
-from swashplate.simulation.sensitivities import PUMP_COLUMNS
+from swashplate.simulation.residuals import PUMP_COLUMNS, jacobian
 
 Array = NDArray[np.float64]
 
@@ -34,25 +34,25 @@ class Kernel:
         self.at_rest, self.states = started.flat, started.flat.copy()
         self.constants = started.arguments[1]["k"]
         kept = (Stored(1, "signals", "shaft_speed"),)
-        self.march = march_kernel(self.instance.model, (signal,), self.instance.options, kept)
+        self.march = march_of(self.instance.model, (signal,), self.instance.options, kept)
+        self.pieces = addresses((self.march,), (0,))
+        self.out, self.met = np.empty((1, values.size)), np.empty(1)
+        self.values = (values,)
         places = self.instance.places((signal,), STEP)
-        self.given = (
-            (values,),
-            (started.before[signal],),
-            places.whole,
-            places.fraction,
-            self.instance.params,
-            self.instance.given,
-            STEP,
+        self.arrays = arrays_of(
+            self.instance,
+            self.values,
+            started,
+            places,
+            self.states,
+            self.met,
+            self.out.reshape(-1),
         )
-        self.out = np.empty((1, values.size))
-        self.flags = np.empty((0, values.size), dtype=np.uint8)
 
     def __call__(self) -> Array:
         """The shaft speed from rest."""
-        self.states[:] = self.at_rest
-        size = self.out.shape[1]
-        self.march(*self.given, self.states, (0, size), self.out, self.flags)
+        self.states[:], self.met[:] = self.at_rest, np.inf
+        run_once(self.pieces, self.arrays, self.out.size, STEP)
         return self.out[0]
 
 

@@ -10,10 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swashplate.campaign.encoder import interpolate_counts, radians_per_count, unwrap_counts
-from swashplate.campaign.filters import matched_speed, path_delay, speed_from_counts
-from swashplate.campaign.kalman import smooth_counts
-from swashplate.campaign.savitzky_golay import savitzky_golay_speed
+from swashplate.campaign import (
+    interpolate_counts,
+    matched_speed,
+    path_delay,
+    radians_per_count,
+    savitzky_golay_speed,
+    speed_from_counts,
+    unwrap_counts,
+)
 
 PAGE = Path(__file__).parent.parent / "docs" / "speed-from-counts.md"
 RATE = 512
@@ -75,11 +80,6 @@ def savitzky_golay(counts: Array) -> Array:
     return savitzky_golay_speed(TIME, angle, window=0.1, order=2)
 
 
-def kalman(counts: Array) -> Array:
-    """Smoother with the likeliest process noise [rad/s]."""
-    return smooth_counts(TIME, counts, counts_per_turn=TURN).speed
-
-
 class Method(NamedTuple):
     """A way to the speed and the delay it is known to have [s]."""
 
@@ -91,7 +91,6 @@ METHODS = {
     "differences": Method(differences, 0.5 * PERIOD),
     "source": Method(source, path_delay(PERIOD)),
     "Savitzky-Golay": Method(savitzky_golay, 0.0),
-    "Kalman": Method(kalman, 0.0),
 }
 MATCHED = "source, to its match"
 
@@ -194,21 +193,12 @@ def time_table() -> list[str]:
     import timing
 
     def hour() -> None:
-        speed_from_counts(long_time, unwrap_counts(readings, bits=16).counts, counts_per_turn=TURN)
-
-    def smooth() -> None:
-        smooth_counts(time, counts, counts_per_turn=TURN)
+        speed_from_counts(long_time, unwrap_counts(readings, 2**16).counts, counts_per_turn=TURN)
 
     long_time = np.arange(3600 * RATE + 1) * PERIOD
     readings = np.floor(20000.0 * np.sin(0.1 * long_time)) % 2**16
-    time, counts = long_time[:110605], np.floor(20000.0 * np.sin(0.1 * long_time[:110605]))
-    sensitivities = np.random.default_rng(0).normal(size=(time.size, 17))
     runs = {
         "one hour at 512 Hz: roll-overs, interpolation, source's filters": hour,
-        "110,605 samples, 17 sensitivities: matched filters": lambda: matched_speed(
-            time, sensitivities
-        ),
-        "110,605 samples: smoother, its process noise estimated": smooth,
     }
     lines = [f"Measured on: {table.machine()}.", "", "| what | median |", "|---|--:|"]
     for what, run in runs.items():

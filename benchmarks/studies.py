@@ -15,7 +15,7 @@ from swashplate.executors import Processes
 from swashplate.full_order.drive import FullOrderDrive
 from swashplate.identification.assessment import assess
 from swashplate.identification.bootstrap import bootstraps_of
-from swashplate.identification.fit import fit
+from swashplate.identification.fitting import fit
 from swashplate.identification.setup import load_setup
 from swashplate.identification.validation import predict
 from swashplate.report.fit_page import write_fit_report
@@ -38,7 +38,7 @@ def fit_study_rows() -> Iterator[Row]:
         # the first round is not counted: it compiles, or loads what was compiled
         for _ in range(ROUNDS + 1):
             begin = time.perf_counter()
-            result = fit(runs, nominal, setup)
+            result = fit(nominal, runs, setup)
             fitted.append(time.perf_counter() - begin)
             begin = time.perf_counter()
             assessed = assess(result.stages)

@@ -16,7 +16,7 @@ from typing import Any
 import typer.main
 from pydantic import BaseModel
 
-from swashplate.campaign.schema import CampaignFile
+from swashplate.campaign import CampaignFile
 from swashplate.cli import EPILOG, HELP, app
 from swashplate.identification.setup import Setup
 from swashplate.parameters.definitions import CATALOGUE, REFINEMENTS, Block, Definition

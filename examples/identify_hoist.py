@@ -18,9 +18,9 @@ from swashplate import Campaign, Drive
 from swashplate.campaign import rig
 from swashplate.identification.assessment import assess
 from swashplate.identification.excitation import outlook
-from swashplate.identification.fit import fit, smooth
-from swashplate.identification.known_truth import drawn, true_value
+from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import load_setup
+from swashplate.identification.staging import drawn, true_value
 from swashplate.identification.validation import predict, with_speeds
 from swashplate.identification.verdict import verdict
 from swashplate.report.figures import plot_fit, save_figure
@@ -70,7 +70,7 @@ for stage in setup.stages:
 # that the fitted card makes.
 
 # %%
-result = fit(runs, start, setup)
+result = fit(start, runs, setup)
 for each in result.stages:
     print(f"{each.stage.name}: {each.solution.message}")
 fitted = Drive(result.parameters)

@@ -15,11 +15,10 @@ import numpy as np
 
 from swashplate import Drive, maneuvers
 from swashplate.analysis.envelope import envelope
-from swashplate.analysis.largest_sine import largest_sine
 from swashplate.analysis.limits import limit_shares
-from swashplate.analysis.performance import performance
+from swashplate.analysis.outcomes import performance, trial
 from swashplate.analysis.sizing import WIDEST, Requirements, size
-from swashplate.analysis.trial import trial
+from swashplate.analysis.tracking import largest_sine
 from swashplate.analysis.whatif import what_if
 from swashplate.report.figures import plot_limit_timeline, save_figure
 

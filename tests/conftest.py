@@ -13,7 +13,7 @@ settings.register_profile(
     "swashplate",
     derandomize=True,
     deadline=None,  # the first example of a component compiles it
-    max_examples=150,
+    max_examples=50,
     suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow],
 )
 settings.load_profile("swashplate")

@@ -24,8 +24,8 @@ from .parameters.parameter_set import ParameterSet as ParameterSet
 from .simulation.batch import Batch as Batch
 from .simulation.batch import SquaredError as SquaredError
 from .simulation.batch import simulate_many as simulate_many
+from .simulation.residuals import Sensitivities as Sensitivities
 from .simulation.result import Limit as Limit
 from .simulation.result import Simulation as Simulation
-from .simulation.sensitivities import Sensitivities as Sensitivities
 from .simulation.stepper import Sample as Sample
 from .simulation.stepper import Stepper as Stepper

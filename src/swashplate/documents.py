@@ -1,10 +1,11 @@
-"""TOML documents in: read, checked against a schema, refused in one sentence."""
+"""TOML and JSON documents in: read, checked against a schema, refused in one sentence."""
 
 from __future__ import annotations
 
 import tomllib
 from difflib import get_close_matches
 from pathlib import Path
+from reprlib import Repr
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from swashplate.errors import FileError, ParameterError
@@ -67,6 +68,33 @@ def validated(content: Any, model: type[Model], origin: str) -> Model:
         raise ParameterError(f"{origin}: {_sentence(found[0], model, found)}.") from None
 
 
+def read_json(path: str | Path, model: type[Model], *, strict: bool = True) -> Model:
+    """A JSON file checked against a schema; strictly, a text is no number, not even `"12"`.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read or is not JSON.
+    ParameterError
+        For the first entry that is wrong; the sentence names it and says what would be right.
+    """
+    from pydantic import ValidationError
+
+    text = read_text(path)
+    try:
+        return model.model_validate_json(text, strict=strict)
+    except ValidationError as error:
+        found = error.errors()
+        if found[0]["type"] == "json_invalid":
+            reason = found[0]["msg"].removeprefix("Invalid JSON: ")
+            raise FileError(f"{path} is not JSON: {reason}.") from None
+        raise ParameterError(f"{path}: {_sentence(found[0], model, found)}.") from None
+
+
+_SHORT = Repr()
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 100
+
+
 def _sentence(error: ErrorDetails, model: type[BaseModel], others: list[ErrorDetails]) -> str:
     where = [str(part) for part in error["loc"] if part not in _BRANCHES]
     path, kind = ".".join(where), error["type"]
@@ -89,7 +117,7 @@ def _sentence(error: ErrorDetails, model: type[BaseModel], others: list[ErrorDet
     message = error["msg"].removeprefix("Value error, ").rstrip(".")
     if kind == "value_error":
         return f"{path}: {message}" if path else message
-    return f"{path} is {error['input']!r}, but {message[0].lower()}{message[1:]}"
+    return f"{path} is {_SHORT.repr(error['input'])}, but {message[0].lower()}{message[1:]}"
 
 
 _BRANCHES = ("str", "float", "list[float]", "constrained-list")

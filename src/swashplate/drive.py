@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, TypedDict, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,19 +18,9 @@ from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.batch import Batch, SquaredError, simulate_drives
 from swashplate.simulation.instance import at_every_rate
+from swashplate.simulation.residuals import Sensitivities, sensitivities
 from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import (
-    check_voltage,
-    measured_records,
-    simulate_drive,
-    simulate_pump,
-)
-from swashplate.simulation.sensitivities import (
-    Sensitivities,
-    drive_sensitivities,
-    pump_sensitivities,
-)
-from swashplate.simulation.steady import steady_states
+from swashplate.simulation.run import check_voltage, measured_records, simulate_drive, steady_states
 from swashplate.simulation.stepper import Stepper
 
 if TYPE_CHECKING:
@@ -45,6 +35,14 @@ if TYPE_CHECKING:
     )
 
 Array = NDArray[np.float64]
+
+
+class Given(TypedDict, total=False):
+    """How a record is given, see `Drive.simulate`."""
+
+    time: ArrayLike | None
+    interpolation: Interpolation | None
+    substeps: int | None
 
 
 @dataclass(frozen=True)
@@ -63,35 +61,18 @@ class Drive:
 
     @classmethod
     def preset(cls, name: str) -> Drive:
-        """A packaged drive: ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``.
-
-        Raises
-        ------
-        ParameterError
-            For another name.
-        """
+        """A packaged drive, ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``, by its name."""
         return cls(load_preset(name))
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Drive:
-        """A drive from a parameter file.
-
-        Raises
-        ------
-        FileError
-            If the file cannot be read.
-        ParameterError
-            If an entry is wrong; the sentence names file, parameter and rule.
-        """
+        """A drive from a parameter file; a `ParameterError` names file, parameter and rule."""
         return cls(load_set(path))
 
     def to_toml(self, path: str | Path) -> None:
         """Store the parameters; `from_toml` gives an equal drive back.
 
-        Raises
-        ------
-        FileError
-            If the file cannot be written; an older file of that name then stays as it was.
+        If the file cannot be written (`FileError`), an older one stays as it was.
         """
         from swashplate.tables import write_text
 
@@ -144,12 +125,9 @@ class Drive:
         """The drive with a card's filter that means the same at every rate.
 
         The source's filter is a recursion at 512 Hz (`ParameterSet.rate`): marched at another rate
-        it is another filter. In its place comes the differential equation with the same poles.
-
-        Raises
-        ------
-        InputError
-            If there is none, since the recursion changes its sign from sample to sample.
+        it is another filter. In its place comes the differential equation with the same poles;
+        where there is none, since the recursion changes its sign from sample to sample, an
+        `InputError`.
         """
         return Drive(at_every_rate(self.parameters))
 
@@ -203,44 +181,27 @@ class Drive:
         DomainError
             If the solenoid overpowers the feedback spring.
         """
-        record = _voltage_record(voltage, rate, time, interpolation, clip, substeps)
-        measured = {
-            "load_torque": load_torque,
-            "pump_speed": pump_speed,
-            "supply_pressure": supply_pressure,
-        }
-        inputs = measured_records(record, measured)
-        return simulate_drive(self.parameters, record, start, measured=inputs)
+        record = _record(
+            voltage, rate, time=time, interpolation=interpolation, clip=clip, substeps=substeps
+        )
+        measured = measured_records(record, load_torque, pump_speed, supply_pressure)
+        return simulate_drive(self.parameters, record, start, measured=measured)
 
     def simulate_current(
         self,
         current: ArrayLike,
         rate: float = SOURCE_RATE,
         *,
-        time: ArrayLike | None = None,
-        interpolation: Interpolation | None = None,
         start: Start = "rest",
-        substeps: int | None = None,
         load_torque: ArrayLike | None = None,
         pump_speed: ArrayLike | None = None,
         supply_pressure: ArrayLike | None = None,
+        **options: Unpack[Given],
     ) -> Simulation:
         """Simulate pump and motor alone over a signed current [A]; arguments as `simulate`."""
-        record = record_of(
-            current,
-            rate,
-            what="current",
-            time=time,
-            interpolation=interpolation,
-            substeps=substeps,
-        )
-        measured = {
-            "load_torque": load_torque,
-            "pump_speed": pump_speed,
-            "supply_pressure": supply_pressure,
-        }
-        inputs = measured_records(record, measured)
-        return simulate_pump(self.parameters, record, start, measured=inputs)
+        record = record_of(current, rate, what="current", **options)
+        measured = measured_records(record, load_torque, pump_speed, supply_pressure)
+        return simulate_drive(self.parameters, record, start, measured=measured, driver="current")
 
     def sensitivities(
         self,
@@ -248,11 +209,9 @@ class Drive:
         rate: float = SOURCE_RATE,
         *,
         parameters: Sequence[str] | None = None,
-        time: ArrayLike | None = None,
-        interpolation: Interpolation | None = None,
         start: Start = "rest",
         clip: bool = False,
-        substeps: int | None = None,
+        **options: Unpack[Given],
     ) -> Sensitivities:
         """Simulate with exact derivatives of currents, speed and position.
 
@@ -261,11 +220,11 @@ class Drive:
         parameters : sequence of str, optional
             Symbols (``"Z16"`` stands for both directions) or columns (``"Z16_plus"``) to
             differentiate by; by default all of card, pump and motor.
-        voltage, rate, time, interpolation, start, clip, substeps :
-            As in `simulate`.
+        voltage, rate, start, clip, **options :
+            As in `simulate`; `time`, `interpolation`, `substeps`.
         """
-        record = _voltage_record(voltage, rate, time, interpolation, clip, substeps)
-        return drive_sensitivities(self.parameters, record, start, parameters)
+        record = _record(voltage, rate, clip=clip, **options)
+        return sensitivities(self.parameters, record, "voltage", start, parameters)
 
     def sensitivities_current(
         self,
@@ -273,21 +232,12 @@ class Drive:
         rate: float = SOURCE_RATE,
         *,
         parameters: Sequence[str] | None = None,
-        time: ArrayLike | None = None,
-        interpolation: Interpolation | None = None,
         start: Start = "rest",
-        substeps: int | None = None,
+        **options: Unpack[Given],
     ) -> Sensitivities:
         """The same for pump and motor alone over a signed current. [A]"""
-        record = record_of(
-            current,
-            rate,
-            what="current",
-            time=time,
-            interpolation=interpolation,
-            substeps=substeps,
-        )
-        return pump_sensitivities(self.parameters, record, start, parameters)
+        record = record_of(current, rate, what="current", **options)
+        return sensitivities(self.parameters, record, "current", start, parameters)
 
     def simulate_many(
         self,
@@ -329,18 +279,12 @@ class Drive:
             raise InputError("A batch needs either a voltage or a current.")
         if current is None:
             assert voltage is not None
-            record = _voltage_record(voltage, rate, None, interpolation, False, None)
+            record = _record(voltage, rate, interpolation=interpolation)
         else:
             record = record_of(current, rate, what="current", interpolation=interpolation)
+        by_voltage = current is None
         return simulate_drives(
-            self.parameters,
-            changes,
-            record,
-            by_voltage=current is None,
-            cost=cost,
-            output=output,
-            to=to,
-            executor=executor,
+            self.parameters, changes, record, by_voltage, cost, output, to, executor
         )
 
     def stepper(
@@ -352,12 +296,7 @@ class Drive:
     ) -> Stepper:
         """The drive one sample at a time: command in, sample out, numbers as in `simulate`.
 
-        Parameters
-        ----------
-        h : float
-            Interval between samples. [s]
-        interpolation, start :
-            As in `simulate`.
+        `h` is the interval between samples [s]; other arguments as in `simulate`.
         """
         return Stepper(self.parameters, h, interpolation, start)
 
@@ -413,15 +352,7 @@ class Drive:
         """
         from swashplate.linear import linearize_drive
 
-        return linearize_drive(
-            self.parameters,
-            voltage=at,
-            current=current,
-            speed=speed,
-            input=input,
-            outputs=outputs,
-            coulomb=coulomb,
-        )
+        return linearize_drive(self.parameters, at, current, speed, input, outputs, coulomb)
 
     def frequency_response(
         self,
@@ -467,16 +398,7 @@ class Drive:
         """
         from swashplate.linear import sweep
 
-        return sweep(
-            self.parameters,
-            frequencies,
-            amplitudes,
-            bias=bias,
-            input=input,
-            output=output,
-            rate=rate,
-            tolerance=tolerance,
-        )
+        return sweep(self.parameters, frequencies, amplitudes, bias, input, output, rate, tolerance)
 
     @overload
     def steady_speed(self, voltage: float) -> float: ...
@@ -508,15 +430,8 @@ class Drive:
         return current.reshape(volts.shape), speed.reshape(volts.shape)
 
 
-def _voltage_record(
-    voltage: ArrayLike,
-    rate: float,
-    time: ArrayLike | None,
-    interpolation: Interpolation | None,
-    clip: bool,
-    substeps: int | None,
+def _record(
+    voltage: ArrayLike, rate: float, *, clip: bool = False, **options: Unpack[Given]
 ) -> Record:
-    record = record_of(
-        voltage, rate, what="voltage", time=time, interpolation=interpolation, substeps=substeps
-    )
-    return check_voltage(record, clip)
+    """A command on the march's grid."""
+    return check_voltage(record_of(voltage, rate, what="voltage", **options), clip)

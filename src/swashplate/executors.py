@@ -18,6 +18,9 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 Shared = TypeVar("Shared")
 
+LOOK = 2.0
+"""How often a client looks whether its cluster is still there, while nothing ends. [s]"""
+
 
 class Executor(Protocol):
     """Runs one function over many items; all give the same results, in any order."""
@@ -72,8 +75,25 @@ _shared: Any = None
 
 
 def _receive(shared: Any) -> None:
+    """What a worker does first: keep what all items share, and end when its parent does.
+
+    A parent that is killed cannot end its workers, and what they hold of its pipes would keep
+    whoever reads them waiting.
+    """
+    from threading import Thread
+
     global _shared
     _shared = shared
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _apply(function: Callable[[Any, Any], Any], item: Any) -> Any:
@@ -99,12 +119,13 @@ class Processes:
         """
         from concurrent.futures import ProcessPoolExecutor
         from concurrent.futures.process import BrokenProcessPool
-        from multiprocessing import get_context
+        from multiprocessing import active_children, get_context
 
         workers = min(self.workers or available_cores(), max(len(items), 1))
         if workers == 1:
             yield from Serial().run(function, shared, items)
             return
+        others = set(active_children())
         # spawned, not forked: a fork copies locks of NumPy's and Numba's threads in any state
         with ProcessPoolExecutor(
             workers, get_context("spawn"), initializer=_receive, initargs=(shared,)
@@ -116,6 +137,10 @@ class Processes:
                     "A worker process died or could not import the model; a model must stand in a "
                     "module, and a script must guard its start by if __name__ == '__main__'."
                 ) from None
+            except BaseException:  # Ctrl-C, or whoever asked has had enough: nobody waits for them
+                for worker in set(active_children()) - others:
+                    worker.terminate()
+                raise
 
 
 def _completed(
@@ -156,26 +181,43 @@ class Dask:
         Raises
         ------
         InputError
-            If Dask is not installed or no scheduler answers.
+            If Dask is not installed, no scheduler answers, or it is lost.
         """
-        try:
-            from distributed import Client, as_completed
-        except ImportError:
-            raise InputError(
-                "A cluster needs Dask: install swashplate with its extra 'dask'."
-            ) from None
+        from importlib.util import find_spec
+
+        if find_spec("distributed") is None:
+            raise InputError("A cluster needs Dask: install swashplate with its extra 'dask'.")
+        from concurrent.futures import CancelledError
+        from queue import Empty, Queue
+
+        from distributed import Client, Future
+
         try:
             client = Client(self.address, timeout=10, set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(f"No Dask scheduler answers at {self.address}: {error}.") from None
+        ended: Queue[Future] = Queue()
         with client:
-            sent = client.scatter(shared, broadcast=True, hash=False)
-            futures = {
-                client.submit(function, sent, item, pure=False, retries=self.retries): k
-                for k, item in enumerate(items)
-            }
-            for future, result in as_completed(list(futures), loop=client.loop, with_results=True):
-                yield futures.pop(future), result
+            try:
+                sent = client.scatter(shared, broadcast=True, hash=False)
+                waiting = {}
+                for k, item in enumerate(items):
+                    future = client.submit(function, sent, item, pure=False, retries=self.retries)
+                    waiting[future.key] = k, future
+                    future.add_done_callback(ended.put)
+                while waiting:
+                    try:
+                        future = ended.get(timeout=LOOK)
+                    except Empty:
+                        if client.status in ("running", "connecting"):
+                            continue
+                        raise ConnectionError from None
+                    yield waiting.pop(future.key)[0], future.result()
+            except (OSError, CancelledError) as error:
+                raise InputError(
+                    f"The Dask scheduler at {self.address} was lost "
+                    f"({type(error).__name__}): start it and this again."
+                ) from None
 
 
 def available_cores() -> int:

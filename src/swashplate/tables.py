@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
 from secrets import token_hex
@@ -22,6 +23,26 @@ class Form(NamedTuple):
     endings: tuple[str, ...]
     also: tuple[str, ...] = ()
     """Endings that are taken without being offered."""
+
+
+class Tabular(ABC):
+    """A result that is a table."""
+
+    @abstractmethod
+    def to_polars(self) -> polars.DataFrame:
+        """The table, SI."""
+
+    def write(self, path: str | Path) -> None:
+        """Write the table of `to_polars` as CSV or Parquet, by the path's ending.
+
+        The file appears whole or not at all: it is written beside and renamed.
+
+        Raises
+        ------
+        FileError
+            For another ending, or a folder that cannot be written.
+        """
+        write_table(self.to_polars(), path)
 
 
 TABLE = Form("a table", (".csv", ".parquet"), (".pq",))

@@ -7,11 +7,16 @@ import polars as pl
 import pytest
 
 from swashplate import Drive, FileError, InputError
-from swashplate.analysis.acceleration import acceleration_curve, speed_limits
 from swashplate.analysis.compensation import inverse_map
-from swashplate.analysis.envelope import Envelope, envelope
-from swashplate.analysis.largest_sine import largest_sine, sine_errors
-from swashplate.analysis.steady_edges import Edge, edge
+from swashplate.analysis.envelope import (
+    Edge,
+    Envelope,
+    acceleration_curve,
+    edge,
+    envelope,
+    speed_limits,
+)
+from swashplate.analysis.tracking import largest_sine, sine_errors
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError, ParameterError
-from swashplate.analysis.levers import LEVERS, column_factors, find_lever, pulled, pulled_columns
+from swashplate.analysis.whatif import LEVERS, column_factors, find_lever, pulled, pulled_columns
 from swashplate.parameters.definitions import columns_of
 
 HOIST_Z16 = (1.1634e-04, 1.5126e-04)

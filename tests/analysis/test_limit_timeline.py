@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, Limit, maneuvers
-from swashplate.analysis.limit_timeline import limit_timeline
+from swashplate.analysis.limits import limit_timeline
 
 
 def test_spans_hold_what_the_flags_say(hoist: Drive) -> None:

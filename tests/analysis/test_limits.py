@@ -5,8 +5,7 @@ import polars as pl
 import pytest
 
 from swashplate import DomainError, Drive, InputError, Limit, maneuvers
-from swashplate.analysis.limits import limit_shares
-from swashplate.analysis.removals import REMOVALS
+from swashplate.analysis.limits import REMOVALS, limit_shares
 
 SINE = maneuvers.sine(9.0, 0.1).sample()
 

@@ -8,16 +8,19 @@ import polars as pl
 import pytest
 
 from swashplate import Drive, InputError, ParameterError, maneuvers
-from swashplate.analysis.bands import bands
-from swashplate.analysis.draws import independent_drives
-from swashplate.analysis.monte_carlo import Deviations, draw_deviations, drives
-from swashplate.analysis.stored_draws import stored_draws
-from swashplate.campaign import rig
-from swashplate.campaign.campaign import Campaign
+from swashplate.analysis.monte_carlo import (
+    Deviations,
+    bands,
+    draw_deviations,
+    drives,
+    independent_drives,
+    stored_draws,
+)
+from swashplate.campaign import Campaign, rig
 from swashplate.errors import FileError
 from swashplate.identification.assessment import assess
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.fit import fit
+from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Free, Setup, load_setup
 from swashplate.identification.storing import save_fit
 from swashplate.identification.unknowns import Unknown, Unknowns
@@ -179,7 +182,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     virtual = rig.run("hoist", {name: tests[name] for name in names}, seed=3)
     path = rig.write(virtual, place / "virtual")
     campaign = Campaign.from_toml(path)
-    result = fit(campaign.experiments, Drive.preset("hoist").parameters, small_setup())
+    result = fit(Drive.preset("hoist").parameters, campaign.experiments, small_setup())
     save_fit(result, campaign.experiments, place / "fit.json", campaign=path)
     return place
 
@@ -187,7 +190,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_stored_fit_gives_drives_of_its_quoted_errors(fitted):
     drawn = stored_draws(fitted, draws=400, seed=1)
     campaign = Campaign.from_toml(fitted / "virtual" / "campaign.toml")
-    result = fit(campaign.experiments, Drive.preset("hoist").parameters, small_setup())
+    result = fit(Drive.preset("hoist").parameters, campaign.experiments, small_setup())
     columns = drawn.columns
     for each in assess(result.stages):
         for estimate in each.uncertainty.estimates:

@@ -2,14 +2,18 @@ import numpy as np
 import pytest
 
 from swashplate import InputError, maneuvers
-from swashplate.analysis import outcome_batch
-from swashplate.analysis.outcome_batch import batch_outcomes, undefined_sentences
+from swashplate.analysis import outcomes as outcome_batch
 from swashplate.analysis.outcomes import (
     OUTCOMES,
+    Trial,
+    batch_outcomes,
     find_outcomes,
     outcome_matrix,
+    proportional_speed,
+    speed_per_volt,
+    trial,
+    undefined_sentences,
 )
-from swashplate.analysis.trial import Trial, proportional_speed, speed_per_volt, trial
 
 RATE = 10.0
 TIME = np.arange(41) / RATE

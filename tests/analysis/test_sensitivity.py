@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from swashplate import InputError, maneuvers
-from swashplate.analysis.sensitivity import one_at_a_time, ranges_of
-from swashplate.analysis.sobol import sobol
-from swashplate.analysis.trial import trial
+from swashplate.analysis.outcomes import trial
+from swashplate.analysis.sensitivity import one_at_a_time, ranges_of, sobol
 
 
 @pytest.fixture(scope="module")

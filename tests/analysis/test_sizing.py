@@ -3,10 +3,14 @@ import pytest
 
 from swashplate import Drive, InputError, maneuvers
 from swashplate.analysis import sizing
-from swashplate.analysis.performance import Performance, command_for, performance, wanted
-from swashplate.analysis.search import smallest_alone, smallest_change
-from swashplate.analysis.sizing import WIDEST, Requirements, size
-from swashplate.analysis.trial import proportional_speed
+from swashplate.analysis.outcomes import (
+    Performance,
+    command_for,
+    performance,
+    proportional_speed,
+    wanted,
+)
+from swashplate.analysis.sizing import WIDEST, Requirements, size, smallest_alone, smallest_change
 
 BOX = np.full(2, 0.5), np.full(2, 2.0)
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from swashplate import InputError, ParameterError, maneuvers
-from swashplate.analysis.trial import trial
+from swashplate.analysis.outcomes import trial
 from swashplate.analysis.whatif import AS_IS, CHANGED, what_if
 
 BOTH = {"orifice": 1.5, "pump": 1.5}

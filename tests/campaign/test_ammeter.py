@@ -5,20 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swashplate.campaign.ammeter import rectified_current, signed_by_command, zero_crossings
+from swashplate.campaign import signed_by_command, zero_crossings
 from swashplate.errors import InputError
 
 TIME = np.arange(11) * 0.1
-
-
-def test_magnitudes_add_up() -> None:
-    np.testing.assert_allclose(
-        rectified_current([0.4, 0.0, 0.1], [0.0, -0.3, 0.2]), [0.4, 0.3, 0.3]
-    )
-    with pytest.raises(InputError, match="same shape, not \\(2,\\) and \\(3,\\)"):
-        rectified_current([1.0, 2.0], [1.0, 2.0, 3.0])
-    with pytest.raises(InputError, match="row 1 .* is not"):
-        rectified_current([1.0, np.nan], [1.0, 2.0])
 
 
 def test_a_crossing_between_two_samples() -> None:
@@ -27,7 +17,6 @@ def test_a_crossing_between_two_samples() -> None:
     found = zero_crossings(TIME, signal, width=0.26)
     np.testing.assert_allclose(found.instants, [0.475])
     np.testing.assert_array_equal(np.flatnonzero(found.masked), [4, 5, 6])
-    assert found.fraction == pytest.approx(3 / 11)
 
 
 def test_a_stay_at_zero_is_masked_at_both_ends() -> None:
@@ -41,7 +30,6 @@ def test_rest_and_the_return_to_it_are_no_crossings() -> None:
     signal = np.array([0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
     found = zero_crossings(TIME, signal, width=0.2)
     assert found.instants.size == 0
-    assert found.fraction == 0.0
 
 
 def test_noise_below_the_level_has_no_sign() -> None:
@@ -61,7 +49,6 @@ def test_the_mask_holds_all_samples_of_the_wrong_sign(lag: float, frequency: flo
     late = time > lag
     wrong = late & (np.abs(signed.current - current) > 1e-9)
     assert np.all(signed.masked[wrong])
-    assert signed.fraction == np.mean(signed.masked)
 
 
 def test_sign_of_a_current_on_its_way_to_zero() -> None:

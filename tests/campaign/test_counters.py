@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swashplate.campaign.counters import rolls_over_at
+from swashplate.campaign import rolls_over_at
 
 TIME = np.linspace(0.0, 10.0, 2001)
 THERE_AND_BACK = np.floor(9000.0 * np.sin(0.6 * TIME))

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from swashplate import Campaign, InputError, ParameterError
-from swashplate.campaign.draft import draft
-from swashplate.campaign.guesses import guess
+from swashplate.campaign import draft_campaign as draft
+from swashplate.campaign.draft import guess
 from swashplate.logs import Column
 
 
@@ -77,10 +77,22 @@ def test_an_axis_for_each_prefix_and_logs_without_some(tmp_path: Path) -> None:
     assert content["runs"][1]["only"] == ["boom"]
 
 
-def test_a_log_without_a_command(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text("time,current\n0,1\n1,2\n", "utf-8")
-    with pytest.raises(InputError, match="no column looks like a command or voltage among 'time'"):
-        draft([tmp_path / "log.csv"], tmp_path)
+def test_a_log_without_a_command_leaves_a_line_to_fill_in(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("time,current,Kanal 3\n0,1,2\n1,2,3\n", "utf-8")
+    text = draft([tmp_path / "log.csv"], tmp_path)
+    assert "column = \"FIXME\"    # which of 'time', 'current', 'Kanal 3' commands?" in text
+    (tmp_path / "campaign.toml").write_text(text, "utf-8")
+    with pytest.raises(InputError, match="For the input: .* has no column 'FIXME'; it has 'time'"):
+        Campaign.from_toml(tmp_path / "campaign.toml")
+    columns = {"Kanal 3": "voltage"}
+    text = draft([tmp_path / "log.csv"], tmp_path, columns=columns, units={"Kanal 3": "mV"})
+    (tmp_path / "campaign.toml").write_text(text, "utf-8")
+    drive = Campaign.from_toml(tmp_path / "campaign.toml")["log"].input
+    assert (drive.kind, drive.values.tolist()) == ("voltage", [0.002, 0.003])
+    with pytest.raises(InputError, match="No log has a column 'Kanal 4'"):
+        draft([tmp_path / "log.csv"], tmp_path, columns={"Kanal 4": "voltage"})
+    with pytest.raises(InputError, match="cannot be a 'volts': it is time, voltage"):
+        draft([tmp_path / "log.csv"], tmp_path, columns={"Kanal 3": "volts"})
     with pytest.raises(InputError, match="at least one log"):
         draft([], tmp_path)
 

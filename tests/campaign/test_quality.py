@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swashplate import Campaign
-from swashplate.campaign.quality import Quality, examine
+from swashplate.campaign import Quality, examine
 
 Edit = Callable[..., Path]
 
@@ -44,7 +44,7 @@ def test_a_good_log_has_no_findings(campaign_folder: Path) -> None:
 def test_gaps(campaign_folder: Path) -> None:
     path = rewrite(campaign_folder / "campaign.toml", lambda t: np.delete(t, range(20, 30), axis=0))
     found = qualities(path)
-    assert found["current"].gap_time == pytest.approx(0.11)
+    assert found["current"].stamps.longest == pytest.approx(0.11)
     assert "1 gap, the longest 0.11 s; 10 samples are missing" in found["input"].findings[0]
     assert found["current"].findings == ()
 

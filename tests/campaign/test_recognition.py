@@ -1,7 +1,6 @@
 """Every expected number is the manoeuvre's own: what was put in has to be found again."""
 
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swashplate import InputError, maneuvers
-from swashplate.campaign.recognition import Recognised, Window, recognise
-from swashplate.campaign.recognition.rounding import roundest
+from swashplate.campaign import Recognised, recognise, roundest
 from swashplate.logs import open_log
 from swashplate.maneuvers import Maneuver
 
@@ -49,8 +47,6 @@ def test_tests_of_the_source_are_recognised_through_a_12_bit_readback(
     assert found.name == name
     assert found.kind == name.split()[0]
     assert abs(found.rest - 0.03) < 0.01
-    # noise of 10 mV and the steps of the converter, to which coarse stamps add a little
-    assert found.residual < 0.015
 
 
 @pytest.mark.parametrize(("axis", "name"), SOURCE)
@@ -60,88 +56,30 @@ def test_a_clean_command_gives_its_numbers_exactly(axis: str, name: str) -> None
     found = recognise(time, run.sample())
     assert found.name == name
     expected = [float(word) for word in name.split() if word.strip("+-").replace(".", "").isdigit()]
-    # of the ends of a return alone it is known only to within what the record resolves
-    numbers = {"step": ("level",), "ramp": ("slope",), "sine": ("amplitude", "frequency")}
-    for key, value in zip(numbers[found.kind], expected, strict=True):
-        assert getattr(found, key) == value
-        assert found.fitted[key] == pytest.approx(value, rel=1e-5)
-    assert found.fitted["start"] == pytest.approx(1.0, abs=1e-4)
-
-
-def test_windows_of_a_step() -> None:
-    run = maneuvers.step(-4.0)
-    found = recognise(run.time(), run.sample())
-    assert found.windows == {
-        "before": (Window(0.0, 1.0),),
-        "rise": (Window(1.0, 2.0),),
-        "plateau": (Window(2.0, 6.0),),
-        "fall": (Window(6.0, 7.0),),
-        "after": (Window(7.0, 10.0),),
+    numbers = {
+        "step": found.levels,
+        "ramp": (found.slope,),
+        "sine": (found.amplitude, found.frequency),
     }
-    assert (found.level, found.levels, found.dwell) == (-4.0, (-4.0,), 5.0)
-    shorter = recognise(run.time(), run.sample(), settling=0.2)
-    assert shorter.window("rise") == Window(1.0, 1.2)
-    assert shorter.window("after") == Window(6.2, 10.0)
+    assert numbers[found.kind] == tuple(expected)
 
 
-def test_windows_of_a_ramp_that_its_return_cuts_short() -> None:
-    run = maneuvers.ramp(1.0, settle=4.5)
-    found = recognise(run.time(), readback(run.sample()))
-    assert list(found.windows) == ["before", "rise", "return"]
-    assert found.limit is None
-    assert found.window("rise").start == pytest.approx(1.0, abs=0.03)
-    assert found.window("rise").stop == found.window("return").start
-    # from a crest that has hardly any curvature, the beginning is known to a few samples
-    assert found.window("return").start == pytest.approx(8.5, abs=0.03)
-    assert found.window("return").stop == pytest.approx(13.0, abs=0.03)
-
-
-def test_windows_of_a_ramp_that_is_held() -> None:
+def test_a_ramp_that_is_held() -> None:
     run = maneuvers.ramp(2.0, limit=6.0, length=13.0)
     found = recognise(run.time(), readback(run.sample()))
     assert found.name == "ramp +2 V/s"
     assert found.limit == 6.0
-    assert found.window("hold") == Window(4.0, 10.5)
-    assert found.window("return") == Window(10.5, 13.0)
 
 
-def test_windows_of_a_sine() -> None:
-    run = maneuvers.sine(6.5, 0.3, length=20.0)
-    found = recognise(run.time(), readback(run.sample()))
-    assert found.window("before") == Window(0.0, 1.0)
-    # 16.5 s of 0.3 Hz are 4.95 periods
-    assert found.window("run").start == 1.0
-    assert found.window("run").stop == pytest.approx(17.5, abs=0.01)
-    periods = found.windows["periods"]
-    assert len(periods) == 4
-    assert periods[0].start == 1.0
-    assert all(b == a for (_, b), (a, _) in pairwise(periods))
-    ends = np.array([period.stop for period in periods])
-    np.testing.assert_allclose(ends, 1.0 + np.arange(1, 5) / 0.3, atol=1e-3)
-    crossings = 1.0 + np.arange(1, 10) / 0.6
-    np.testing.assert_allclose(found.zero_crossings, crossings, atol=1e-3)
-
-
-def test_stairs_and_their_windows() -> None:
+def test_stairs() -> None:
     run = maneuvers.stairs([2.0, 4.0, -6.0, 8.0], 3.0)
     found = recognise(run.time(), readback(run.sample()))
     assert found.name == run.name == "stairs 2/4/-6/8 V"
     assert found.levels == (2.0, 4.0, -6.0, 8.0)
-    assert found.dwell == 3.0
-    assert [window.start for window in found.windows["rise"]] == [1.0, 4.0, 7.0, 10.0]
-    assert found.window("return") == Window(13.0, 15.5)
     down = maneuvers.stairs([2.0, 0.0, -3.0, 0.0], 1.5)
     found = recognise(down.time(), readback(down.sample()))
     assert found.name == down.name
     assert found.levels == (2.0, 0.0, -3.0)
-    assert found.window("fall") == Window(5.5, 6.5)
-
-
-def test_stairs_of_unequal_treads_have_no_dwell() -> None:
-    run = maneuvers.stairs([3.0], 2.0, settle=None) + maneuvers.stairs([5.0, 0.0], 4.0, start=0.0)
-    found = recognise(run.time(), readback(run.sample()))
-    assert found.name == "stairs 3/5/0 V"
-    assert found.dwell is None
 
 
 FREE = {
@@ -167,8 +105,6 @@ def test_what_is_no_manoeuvre_is_free(name: str) -> None:
     time = grid(FREE[name].length, 512.0)
     found = recognise(time, readback(FREE[name](time)))
     assert found.kind == found.name == "free"
-    assert not found.windows
-    assert found.reason
 
 
 def test_noise_alone_is_free_unless_it_is_small() -> None:
@@ -177,9 +113,7 @@ def test_noise_alone_is_free_unless_it_is_small() -> None:
     assert recognise(time, 2.0 * noise).kind == "free"
     resting = recognise(time, 0.02 * noise)
     assert resting.kind == resting.name == "rest"
-    assert resting.windows == {"rest": (Window(0.0, 20.0),)}
     assert recognise(time, 0.02 * noise, unit="%").kind == "free"
-    assert recognise(time, 0.02 * noise, unit="%", smallest=0.1).kind == "rest"
 
 
 def test_a_glitch_is_no_part_of_a_manoeuvre() -> None:
@@ -200,7 +134,6 @@ def test_samples_on_the_jump_do_not_hide_a_step() -> None:
         voltage[first] = 0.3 * voltage[first - 1] + 0.7 * voltage[last]
     found = recognise(time, voltage)
     assert found.name == "step +4 V"
-    assert found.window("plateau").stop == 6.0
     voltage[511], voltage[3071] = 0.15, 3.9
     assert recognise(time, voltage).name == "step +4 V"
 
@@ -210,8 +143,6 @@ def test_returns_other_than_the_packages_leave_the_manoeuvre_what_it_is() -> Non
     eased = np.interp(time, [0.0, 1.0, 10.0, 11.0], [0.0, 0.0, 9.0, 0.0])
     found = recognise(time, readback(eased))
     assert found.name == "ramp +1 V/s"
-    assert found.window("return").start == pytest.approx(10.0, abs=0.05)
-    assert "return start" in found.fitted
 
 
 def test_other_units_are_relative_to_rest() -> None:
@@ -219,31 +150,25 @@ def test_other_units_are_relative_to_rest() -> None:
     duty = np.where(time < 2.5, 7.4745, 10.01)
     found = recognise(time, duty, unit="%")
     assert found.name == "step +2.54 %"  # 2.5355, rounded within 0.2 %
-    assert found.fitted["level"] == pytest.approx(2.5355)
     assert found.rest == pytest.approx(7.4745)
-    known = recognise(time, duty[::-1], unit="%", rest=7.4745)
-    assert known.levels == (2.54,)
-    assert recognise(time, duty[::-1], unit="%").level == -2.54
+    assert recognise(time, duty[::-1], unit="%").levels == (-2.54,)
 
 
 def test_stamps_may_begin_anywhere() -> None:
     run = maneuvers.sine(4.0, 0.2, length=15.0)
     found = recognise(run.time() + 1234.5, readback(run.sample()))
     assert found.name == "sine 4 V 0.2 Hz"
-    assert found.window("before") == Window(1234.5, 1235.5)
 
 
 def test_what_a_log_begins_and_ends_within() -> None:
     run = maneuvers.sine(4.0, 0.2, length=30.0)
     time, voltage = run.time(), run.sample()
-    inside = (time > 3.3) & (time < 21.0)
-    found = recognise(time[inside], voltage[inside], rest=0.0)
-    assert found.name.endswith("4 V 0.2 Hz")
-    assert list(found.windows) == ["run", "periods"]
+    inside = (time > 3.5) & (time < 21.0)  # from a crossing of zero
+    found = recognise(time[inside], voltage[inside])
+    assert found.name.endswith("-4 V 0.2 Hz")
     step = maneuvers.step(4.0)
     found = recognise(step.time()[:2000], step.sample()[:2000])
     assert found.name == "step +4 V"
-    assert found.dwell is None
 
 
 REAL = sorted((SHARED / "data" / "excavator").glob("*.csv"))
@@ -262,14 +187,6 @@ def test_a_joystick_is_free_and_a_step_a_step() -> None:
                 assert found.name == "step -5.07 %"
             else:
                 assert found.kind == "rest"
-
-
-def check(found: Recognised, kind: str, **numbers: float) -> None:
-    """Of the kind, fitted to 0.5 % and rounded no farther than said from what was fitted."""
-    assert found.kind == kind
-    for name, value in numbers.items():
-        assert found.fitted[name] == pytest.approx(value, rel=5e-3)
-        assert getattr(found, name) == pytest.approx(found.fitted[name], rel=4e-3)
 
 
 amplitudes = st.floats(1.0, 10.0)
@@ -293,7 +210,10 @@ def test_any_sine(
     length = 1.0 + max(1.2 / frequency, 2.0) + settle
     run = maneuvers.sine(sign * amplitude, frequency, settle=settle, length=length)
     found = seen(run, rate, noise)
-    check(found, "sine", amplitude=sign * amplitude, frequency=frequency)
+    assert found.kind == "sine"
+    # fitted to 0.5 % and rounded by 0.4 % more at most
+    assert found.amplitude == pytest.approx(sign * amplitude, rel=9e-3)
+    assert found.frequency == pytest.approx(frequency, rel=9e-3)
 
 
 @given(amplitudes, signs, noises, rates, st.floats(0.2, 2.0), st.floats(0.5, 5.0))
@@ -303,10 +223,9 @@ def test_any_step(
 ) -> None:
     run = maneuvers.step(sign * amplitude, start=start, stop=start + dwell, length=10.0)
     found = seen(run, rate, noise)
+    assert found.kind == "step"
     # the converter's step is 0.5 % of 1 V
-    check(found, "step", level=sign * amplitude)
-    assert found.window("rise").start == pytest.approx(start, abs=1.001 / rate)
-    assert found.window("fall").start == pytest.approx(start + dwell, abs=1.001 / rate)
+    assert found.levels == (pytest.approx(sign * amplitude, rel=9e-3),)
 
 
 @given(st.floats(0.3, 20.0), signs, noises, rates, st.floats(1.0, 9.0))
@@ -337,16 +256,14 @@ def test_any_ramp(slope: float, sign: float, noise: float, rate: float, limit: f
     ),
 )
 @settings(max_examples=100)
-def test_any_record_has_an_answer_within_itself(
+def test_any_record_has_an_answer(
     size: int, seed: int, make: Callable[[np.random.Generator, int], np.ndarray]
 ) -> None:
     random = np.random.default_rng(seed)
     time = np.cumsum(random.uniform(0.001, 0.1, size))
     found = recognise(time, make(random, size))
-    assert np.isfinite(found.residual)
-    for windows in found.windows.values():
-        for window in windows:
-            assert time[0] - 1e-9 <= window.start <= window.stop <= time[-1] + 1e-9
+    assert found.name.split(" ")[0] == found.kind
+    assert np.isfinite(found.rest)
 
 
 @pytest.mark.parametrize(
@@ -384,9 +301,3 @@ def test_bad_records_are_refused(time: list, voltage: list, sentence: str) -> No
     with pytest.raises(InputError) as error:
         recognise(time, voltage)
     assert sentence in str(error.value)
-
-
-def test_a_window_that_is_not_there_is_refused() -> None:
-    found = recognise(grid(5.0, 50.0), np.zeros(251))
-    with pytest.raises(InputError, match="has no window 'plateau'; its windows are: rest"):
-        found.window("plateau")

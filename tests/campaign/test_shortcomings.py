@@ -4,14 +4,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 from swashplate import Campaign
-from swashplate.campaign.shortcomings import beyond_the_card, without_motion
+from swashplate.campaign import beyond_the_card, campaign_findings
 
 Edit = Callable[..., Path]
 
 
 def test_a_campaign_that_lacks_nothing(campaign_folder: Path) -> None:
     tests = Campaign.from_toml(campaign_folder / "campaign.toml")
-    assert without_motion(tests) == ()
+    assert campaign_findings(tests) == ()
     assert [beyond_the_card(each) for each in tests] == [(), ()]
 
 
@@ -19,7 +19,7 @@ def test_no_channel_measures_the_motion(campaign_folder: Path) -> None:
     path = campaign_folder / "campaign.toml"
     head, _, rest = path.read_text("utf-8").partition("[axes.winch.channels.counts]")
     path.write_text(head + rest[rest.index("[[runs]]") :], "utf-8")
-    (said,) = without_motion(Campaign.from_toml(path))
+    (said,) = campaign_findings(Campaign.from_toml(path))
     assert said.startswith("axis 'winch': no channel measures its motion")
 
 

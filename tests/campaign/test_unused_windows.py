@@ -6,14 +6,14 @@ from pathlib import Path
 import pytest
 
 from swashplate import Campaign, InputError
-from swashplate.campaign.unused_windows import unused_windows
+from swashplate.campaign import campaign_findings
 
 Edit = Callable[..., Path]
 GEAR = "gear_ratio = 2.0\n"
 
 
 def sentences(path: Path) -> tuple[str, ...]:
-    return unused_windows(Campaign.from_toml(path))
+    return campaign_findings(Campaign.from_toml(path))
 
 
 def test_windows_that_are_taken(edited: Edit) -> None:

@@ -9,7 +9,9 @@ def test_two_axes(done, number):
     text = done("compare", "hoist", "neutral")
     assert "hoist and neutral, step 9 V" in text
     assert number(text, "peak speed, positive") == 196.00
-    assert number(text, "peak speed, positive", 1) == pytest.approx(np.degrees(9.0), abs=0.02)
+    assert number(text, "peak speed, positive", 1) == pytest.approx(
+        np.degrees(100.0 * np.arctan(0.09)), abs=0.02
+    )
     assert number(text, "settled speed at 9 V") == 196.00
     # the neutral drive: a lag of 0.1 s and the card's two milliseconds twice
     lag = 0.1 * np.log(10.0) + 2.0 / 512.0

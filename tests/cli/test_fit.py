@@ -1,4 +1,5 @@
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -52,6 +53,15 @@ def test_a_campaign_becomes_a_drive(done: Words, campaign: Path, tmp_path: Path)
     fitted = Drive.from_toml(tmp_path / "fitted" / "drive.toml")
     assert fitted["Z16"].value == pytest.approx((1.3e-4, 1.3e-4), rel=2e-3)
     assert fitted["J"].value == pytest.approx((0.26, 0.31), rel=2e-3)
+    # what is fitted says so, with campaign, date and interval; what is fixed, where it is from
+    parameters = fitted.parameters
+    assert (parameters["Z16"].status, parameters["Z9"].status) == ("fitted", "fixed")
+    assert re.fullmatch(
+        r"campaign\.toml, \d\d \w+ \d{4}; 95 %: plus \S+ to \S+; minus \S+ to \S+",
+        parameters["Z16"].source,
+    )
+    assert parameters["Z9"].source.startswith("hoist: ")
+    assert parameters.title.startswith("Virtual tests")
     assert "speed at the end" in done("simulate", "fitted/drive.toml", "step:4")
     header, *rows = (tmp_path / "fitted" / "estimates.csv").read_text("utf-8").splitlines()
     assert header.startswith("stage,unknown,unit,nominal,estimate")
@@ -84,6 +94,46 @@ def test_starts_are_resumed_after_a_kill(campaign: Path, tmp_path: Path) -> None
     assert (tmp_path / "fitted" / "drive.toml").read_text("utf-8") == (
         tmp_path / "whole" / "drive.toml"
     ).read_text("utf-8")
+
+
+def test_ctrl_c_stops_the_whole_search_and_resume_goes_on(campaign: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "swashplate", "fit", "virtual/campaign.toml", "--no-report"]
+    command += ["--setup", "setup.toml", "--starts", "12", "--jobs", "2", "--out"]
+    store = tmp_path / "fitted" / "starts"
+    running = subprocess.Popen(
+        [*command, "fitted"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 120.0
+    while not list(store.glob("card/start-*.json")):
+        assert running.poll() is None, "it ended before it could be interrupted"
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    os.killpg(running.pid, signal.SIGINT)  # as a terminal does
+    said, _ = running.communicate(timeout=60.0)
+    assert running.returncode == 130
+    assert "Interrupted in the stage 'card': interrupted after " in said
+    assert "--resume goes on" in said
+    assert "Usable" not in said
+    assert not (store / "pump").exists()
+    assert not (tmp_path / "fitted" / "drive.toml").exists()
+    for words in ([*command, "fitted", "--resume"], [*command, "whole"]):
+        subprocess.run(words, cwd=tmp_path, capture_output=True, check=True)
+    resumed, whole = ((tmp_path / name / "drive.toml").read_text() for name in ("fitted", "whole"))
+    assert resumed == whole
+
+
+def test_a_folder_that_cannot_be_written_is_said_before_the_fit(
+    refused: Words, campaign: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("", "utf-8")
+    said = refused("fit", "virtual/campaign.toml", "--setup", "setup.toml", "--out", "file/fitted")
+    assert "file/fitted cannot be made" in said
+    assert not list(tmp_path.glob("fitted*"))
 
 
 def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path: Path) -> None:

@@ -164,7 +164,7 @@ def test_a_solver_agrees_with_the_march(done, number):
             ("hoist", "--physical", "oil_volume=nan"),
             "at the stroking piston) is nan m^3, but must be above 0",
         ),
-        (("hoist", "--physical", "oil_volume=1e-4/2e-4"), "oil_volume takes one value, not 2"),
+        (("hoist", "--physical", "oil_volume=1e-4/2e-4"), "oil_volume has one value, not a plus"),
         (("hoist", "--physical", "oil_volume=1kg"), "in 'kg', which does not measure the same"),
         (("hoist", "--physical", "oil_volume=1 glug"), "the unknown unit 'glug'"),
         (("hoist", "--physical", "oil_volume=-1"), "is -1 m^3, but must be above 0"),

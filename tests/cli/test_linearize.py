@@ -49,9 +49,9 @@ def test_a_speed_and_a_loop(done, number):
 def test_notes(done):
     assert "The card's Coulomb term C is left out" in done("linearize", "slew", "--at", "2")
     assert "left out" not in done("linearize", "slew", "--at", "2", "--coulomb", "tangent")
-    text = done("linearize", "neutral", "--at", "0", "--set", "G1=2")
+    text = done("linearize", "neutral", "--at", "0", "--set", "G1=0.03")
     assert "One-sided at the card at 0 V: the side of positive voltage." in text
-    assert ": 1/1 -> 2/2 A/V" in text
+    assert ": 0.015/0.015 -> 0.03/0.03 A/V" in text
 
 
 def test_files(done, tmp_path):

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from swashplate import Campaign, Drive
-from swashplate.identification.fit import Fit, fit
+from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Setup
 from swashplate.identification.storing import save_fit
 
@@ -34,7 +34,7 @@ def fitted(done: Words, tmp_path: Path) -> Fit:
     path.write_text(f'{before}role = "validate"{after}', "utf-8")
     campaign = Campaign.from_toml(path)
     runs = campaign.select(role="fit")
-    found = fit(runs, Drive.preset("hoist").parameters, SETUP)
+    found = fit(Drive.preset("hoist").parameters, runs, SETUP)
     (tmp_path / "fitted").mkdir()
     Drive(found.parameters).to_toml(tmp_path / "fitted" / "drive.toml")
     save_fit(found, runs, tmp_path / "fitted" / "fit.json", campaign=path, notes={"seed": "7"})

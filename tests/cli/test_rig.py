@@ -1,8 +1,6 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-
 from swashplate import Campaign, Drive
 
 Words = Callable[..., str]
@@ -16,14 +14,6 @@ def test_a_virtual_campaign_can_be_checked(done: Words, tmp_path: Path) -> None:
     assert tests.virtual
     assert next(iter(tests)).maneuver == "step +4 V"
     assert "virtual" in done("campaign", "check", "virtual/campaign.toml")
-
-
-@pytest.mark.parametrize("format_", ["csv", "mat", "parquet"])
-def test_formats(done: Words, tmp_path: Path, format_: str) -> None:
-    done("rig", "slew", "--out", "v", "--format", format_, "--severity", "clean", *SHORT)
-    experiment = next(iter(Campaign.from_toml(tmp_path / "v" / "campaign.toml")))
-    assert experiment.input.values.max() == 4.0
-    assert experiment.input.time.size == 1025
 
 
 def test_refinements_and_backlash_change_the_logs(done: Words, tmp_path: Path) -> None:

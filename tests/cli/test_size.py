@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from swashplate import Drive
-from swashplate.analysis.levers import pulled
-from swashplate.analysis.performance import performance
+from swashplate.analysis.outcomes import performance
+from swashplate.analysis.whatif import pulled
 
 
 def test_speed_and_acceleration(done, number, tmp_path):

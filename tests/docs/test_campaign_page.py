@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from swashplate.campaign.kinds import CHANNEL_KINDS
-from swashplate.campaign.schema import CampaignFile
+from swashplate.campaign import CHANNEL_KINDS, CampaignFile
 from swashplate.logs import SUFFIXES
 
 PAGE = (Path(__file__).parents[2] / "docs" / "campaign.md").read_text("utf-8")

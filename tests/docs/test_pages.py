@@ -2,7 +2,8 @@
 
 A page is run from top to bottom in an empty folder:
 
-- ``python`` blocks in one namespace; a ``text`` block right after one is what it printed;
+- ``python`` blocks in one namespace; a ``text`` block right after one is what it printed; one that
+  begins with ``# name.py`` is that file, too;
 - ``console`` blocks line by line: ``$ swashplate ...`` is run, 80 columns wide, and the lines below
   it must be what it printed, ``...`` standing for lines left out;
 - ``toml`` and ``csv`` blocks that begin with ``# name`` are that file, other ``toml`` a fragment;
@@ -208,6 +209,8 @@ def test_a_page_does_what_it_shows(
             case "python":
                 file = f"<{page.name}, block {len(linecache.cache)}>"  # equations read their source
                 linecache.cache[file] = (len(content), None, content.splitlines(True), file)
+                if re.match(r"# \w+\.py\n", content):
+                    write_file(language, content)
                 with redirect_stdout(io.StringIO()) as out:
                     exec(compile(content, file, "exec"), names)
                 printed = out.getvalue()

@@ -9,9 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from swashplate import Drive
-from swashplate.analysis.levers import LEVERS
-from swashplate.analysis.outcomes import OUTCOMES
-from swashplate.analysis.trial import speed_per_volt
+from swashplate.analysis.outcomes import OUTCOMES, speed_per_volt
+from swashplate.analysis.whatif import LEVERS
 from swashplate.cli import app
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, InputError
-from swashplate.equations import Model, Tap, equation, instance_of, join, sensitivities, simulate
+from swashplate.equations import (
+    Model,
+    Tap,
+    equation,
+    instance_of,
+    join,
+    report,
+    sensitivities,
+    simulate,
+)
 from swashplate.equations.marching.jacobian import residuals
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import Record
@@ -198,6 +207,17 @@ def filled(state: Fill, flow: float) -> Fill:
 
 
 @equation
+def swung(state: Fill, flow: float) -> Fill:
+    return Fill(sin(state.level) + flow)
+
+
+@equation
+def unknown_below(state: Fill) -> float:
+    """No number at one level: the difference of two infinities."""
+    return 1.0 if state.level != 2.0 else 1e308 * 10.0 - 1e308 * 10.0
+
+
+@equation
 def nothing(state: Fill, flow: float) -> Fill:
     return None
 
@@ -345,6 +365,25 @@ OUTSIDE = {
 def test_leaving_the_domain_ends_in_its_sentence(options: dict[str, Any], sentence: str) -> None:
     with pytest.raises(DomainError, match=sentence):
         run(**options)
+
+
+@pytest.mark.parametrize("sets", [1, 20])
+def test_a_margin_that_is_no_number_at_one_sample_is_outside(sets: int) -> None:
+    tank = Model("tank", Outlet, Fill, filled, domain=unknown_below)
+    inputs = {"flow": np.ones(9)}
+    if sets == 1:
+        with pytest.raises(DomainError, match="equations do not hold"):
+            simulate(tank, Outlet(1.0), inputs, 1.0)
+        return
+    made = simulate_many(tank, Outlet(1.0), {"width": np.ones(sets)}, inputs, 1.0, output="level")
+    assert len(made.failures) == sets
+
+
+def test_a_report_names_what_is_not_vector_instructions() -> None:
+    assert report(valve) == "Nothing keeps valve from vector instructions."
+    assert report(pump_drive) == "Nothing keeps pump_drive from vector instructions."
+    swinging = Model("swinging", parameters=Outlet, state=Fill, step=swung)
+    assert report(swinging).splitlines()[1:] == ["swung calls sin"]
 
 
 def test_of_two_models_in_series_both_say_what_may_have_happened() -> None:

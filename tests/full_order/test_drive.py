@@ -8,7 +8,7 @@ import pytest
 
 from swashplate import DomainError, InputError, maneuvers
 from swashplate.full_order import FullOrderDrive, FullOrderSimulation
-from swashplate.full_order.result import SIGNALS
+from swashplate.full_order.drive import SIGNALS
 
 
 @pytest.fixture(scope="module")

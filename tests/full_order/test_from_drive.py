@@ -154,6 +154,8 @@ def test_refinements_are_refused() -> None:
     rough = Drive.preset("hoist").replace(spool_friction=1.0)
     with pytest.raises(InputError, match="Full-order drives do not know refinements, but spool_f"):
         FullOrderDrive.from_drive(rough)
+    with pytest.raises(InputError, match="hoist: Full-order drives .* spool_friction is on; take"):
+        FullOrderDrive(rough, PhysicalSet.preset("hoist"))
     assert FullOrderDrive.from_drive(rough.plain).drive == Drive.preset("hoist")
 
 

@@ -73,15 +73,24 @@ def test_gravity_moves_the_pressures_reference_and_nothing_else() -> None:
     assert {k for k in before if before[k] != after[k]} == {"Z9", "Z11", "Z12"}
 
 
+def check_lumps(physical: PhysicalSet, drive: Drive) -> None:
+    """The lumps at the drive's own Z6 are the drive's."""
+    numbers = drive.parameters.numbers
+    for symbol, lump in physical.to_lumped(numbers["Z6"]).items():
+        values = lump if isinstance(lump, tuple) else (lump,)
+        for column, value in zip(drive[symbol].definition.columns, values, strict=False):
+            assert value == pytest.approx(numbers[column], rel=1e-9, abs=0.0), column
+
+
 def test_completing_keeps_leakages() -> None:
     drive = Drive.preset("hoist").replace(Z7=0.5, Z11=0.01, Z12=0.03)
     load = {"load_torque": 2e3, "load_inertia": 0.03 / 12.396 / (0.01 / 2e3)}
     physical = from_lumped(drive.parameters, **load)
-    physical.check_lumps(drive.parameters)
+    check_lumps(physical, drive)
     with pytest.raises(ParameterError, match="Z11 makes motor_leakage 5e-06 .* but Z12 makes"):
         from_lumped(drive.parameters, **{**load, "load_inertia": 100.0})
     with pytest.raises(ParameterError, match="Z12 is 0.03, but without load_inertia"):
-        from_lumped(drive.parameters, load_torque=2e3)
+        from_lumped(drive.parameters, load_torque=2e3, load_inertia=0.0)
 
 
 def test_completing_with_inertias_in_place_of_frequencies() -> None:
@@ -114,7 +123,7 @@ def test_completing_with_inertias_in_place_of_frequencies() -> None:
         ({"control_arm": 0.2}, "control_arm is given as 0.2 m, but 0.127914042 follows from Z3"),
         ({"load_torque": 1e9}, "the load holds a stroker pressure of .* Pa at rest"),
         ({"valve_gain": 1.0}, r"no quantity 'valve_gain' \(did you mean valve_flow_gain\?\)"),
-        ({"oil_volume": (1e-4, 2e-4)}, "oil_volume takes one value, not 2"),
+        ({"oil_volume": (1e-4, 2e-4)}, "oil_volume has one value, not a plus and a minus one"),
         ({"oil_volume": "big"}, r"oil_volume must be a number in m\^3"),
     ],
 )
@@ -129,10 +138,6 @@ def test_lumps_that_no_machine_has() -> None:
         from_lumped(hoist.replace(Z2=0.01).parameters)
     with pytest.raises(ParameterError, match="spool_stroke .* is inf m, but must be above 0"):
         from_lumped(hoist.replace(Z14=inf).parameters)
-    with pytest.raises(ParameterError, match="its quantities make Z3 = 0.62542, but slew has"):
-        PhysicalSet.preset("hoist").replace(**{"feedback_spring_arm": 0.03}).check_lumps(
-            hoist.replace(Z3=0.5).renamed("slew").parameters
-        )
 
 
 def test_changes() -> None:
@@ -194,4 +199,4 @@ def test_files(tmp_path: Path) -> None:
     )
     mine = PhysicalSet.from_toml(own)
     assert mine.numbers["oil_volume"] == pytest.approx(1e-4)
-    mine.check_lumps(Drive.preset("hoist").parameters)
+    check_lumps(mine, Drive.preset("hoist"))

@@ -8,7 +8,7 @@ from swashplate.errors import InputError
 from swashplate.identification.bootstrap import Bootstrap, Resampling, refit_bootstrap
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import spectral_covariance
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 N, RUNS = 2048, 4
 TIME = np.arange(N) / 512.0
@@ -25,7 +25,7 @@ def fit(rho: float, seed: int, **more: object) -> tuple[LinearisedFit, np.ndarra
         LinearisedRun(f"run {k}", "speed", TIME, each + DESIGN @ estimate, DESIGN)
         for k, each in enumerate(noise)
     ]
-    variables = Variables.of("abc", [2.0, 1.0, 1.0], **more)
+    variables = Unknowns.of("abc", [2.0, 1.0, 1.0], **more)
     return LinearisedFit.of(runs, variables), estimate
 
 
@@ -106,7 +106,7 @@ def test_any_pool_may_map() -> None:
 
 
 def test_quantiles_by_hand() -> None:
-    variables = Variables.of(["a"], [1.0])
+    variables = Unknowns.of(["a"], [1.0])
     found = Bootstrap(variables, np.arange(101.0)[:, None], np.ones(1, bool), 0, (0.1,), 0)
     assert found.intervals(0.9)[0] == pytest.approx((5.0, 95.0))
 

@@ -10,25 +10,24 @@ import pytest
 from swashplate import Campaign, Channel, Drive, Experiment, InputError, maneuvers
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.identification.advice import Candidate, advise
 from swashplate.identification.assessment import assess
-from swashplate.identification.bench import bench
-from swashplate.identification.candidates import (
+from swashplate.identification.experiment_design import (
+    MEMORY,
+    Candidate,
+    Sensor,
+    advise,
+    assumed_sensors,
+    bench,
     best_for_each,
     default_maneuvers,
+    default_sensors,
     in_turn,
     judge_sensors,
-)
-from swashplate.identification.fit import fit, smooth
-from swashplate.identification.sensors import (
-    MEMORY,
-    Sensor,
-    assumed_sensors,
-    default_sensors,
     measurable,
 )
+from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import Free, GivenPrior, Setup, Stage, load_setup
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 HOIST = Drive(smooth(Drive.preset("hoist").parameters))
 SOURCE = Source(Path("log.csv"), "speed")
@@ -110,7 +109,7 @@ def test_a_plan_takes_both_stops_in_turn() -> None:
 
 def test_a_plan_by_hand() -> None:
     """After the first choice its like is worth little: the plan turns to the other unknown."""
-    variables = Variables.of("ab", np.ones(2))
+    variables = Unknowns.of("ab", np.ones(2))
     rows = {"a": [[10.0, 0.0]], "a again": [[9.0, 0.0]], "b": [[0.0, 1.0]], "rest": [[0.0, 0.0]]}
     candidates = [Candidate(name, np.array(row)) for name, row in rows.items()]
     plan = in_turn(np.diag([1.0, 1.0]), candidates, variables, 4)
@@ -173,8 +172,8 @@ def test_residuals_of_a_fit_tell_the_noise() -> None:
     assert stated.sensors[0].noise == 0.01
     assert stated.sensors[0].memory == MEMORY
     assert fitted.sensors[0].noise == pytest.approx(0.04, rel=0.05)
-    # white: each sample counts
-    assert fitted.sensors[0].memory == pytest.approx(1.0 / 512.0)
+    # white: each sample counts, or nearly, as the larger of two estimates of the error is quoted
+    assert 1.0 / 512.0 <= fitted.sensors[0].memory < 2.0 / 512.0
     with pytest.raises(InputError, match="residuals of 'speed' are as good as zero"):
         bench(HOIST.parameters, setup("Z10"), [run("exact", 5.0)], fitted=True)
 
@@ -183,7 +182,7 @@ def test_what_is_known_is_what_a_fit_of_the_same_tests_knows(hoist_tests: Campai
     """Coloured residuals and free zeros of the encoder: neither makes the errors another story."""
     setup = load_setup("hoist")
     runs = hoist_tests.select(role="fit")
-    found = fit(runs, Drive.preset("hoist").parameters, setup)
+    found = fit(Drive.preset("hoist").parameters, runs, setup)
     known = bench(found.parameters, setup, runs, fitted=True)
     now = np.sqrt(np.diag(np.linalg.inv(known.present.T @ known.present)))
     errors = {}

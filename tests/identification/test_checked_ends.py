@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swashplate import Experiment
-from swashplate.identification.linearising import linearised_fit
+from swashplate.identification.linearised import linearised_fit
 from swashplate.identification.problem import Problem
 from swashplate.identification.profile import checked_ends, minimiser
 from swashplate.identification.solving import solve
@@ -45,7 +45,7 @@ def test_a_stop_that_is_just_touched_has_no_upper_end(
     noise = 0.02 * np.random.default_rng(2).normal(size=TIME.size)
     noise[-2:] = -0.012  # less than one standard deviation
     found = problem(experiment, TIME + noise)
-    best = solve(found, found.unknowns.vector({"stop": 3.9})).vector
+    best = solve(found, found.unknowns.vector_of({"stop": 3.9})).vector
     values = found.unknowns.values(best)
     assert 3.9 < values["stop"] < 4.0
     linearised = linearised_fit(found, best)

@@ -6,7 +6,7 @@ import pytest
 from swashplate.errors import InputError
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import white_noise_covariance
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 RNG = np.random.default_rng(3)
 
@@ -19,7 +19,7 @@ def run(name: str, n: int, columns: int = 2, time: np.ndarray | None = None) -> 
 def fit(*runs: LinearisedRun, **more: object) -> LinearisedFit:
     count = runs[0].jacobian.shape[1]
     return LinearisedFit.of(
-        runs, Variables.of([f"p{k}" for k in range(count)], np.ones(count)), **more
+        runs, Unknowns.of([f"p{k}" for k in range(count)], np.ones(count)), **more
     )
 
 
@@ -39,7 +39,7 @@ def test_white_noise_errors_are_the_textbooks() -> None:
 def test_undetermined_and_bounded_unknowns_have_no_number() -> None:
     base = run("a", 60, columns=4)
     base.jacobian[:, 1] = base.jacobian[:, 0]
-    variables = Variables.of("abcd", np.ones(4), at_bound=[0, 0, 1, 0])
+    variables = Unknowns.of("abcd", np.ones(4), at_bound=[0, 0, 1, 0])
     found = white_noise_covariance(LinearisedFit.of([base], variables))
     assert np.isinf(found.standard_errors[:2]).all()
     assert found.standard_errors[2] == 0.0

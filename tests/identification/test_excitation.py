@@ -10,10 +10,10 @@ import pytest
 from swashplate import Channel, Drive, Experiment, maneuvers
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.identification.excitation import Outlook, excitation, outlook
-from swashplate.identification.fit import smooth
+from swashplate.identification.fitting import smooth
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.setup import Free, GivenForces, Stage
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 HOIST = Drive(smooth(Drive.preset("hoist").parameters))
 SOURCE = Source(Path("log.csv"), "speed")
@@ -55,7 +55,7 @@ def test_shares_by_hand() -> None:
         LinearisedRun("ramp", "speed", np.arange(2.0), np.zeros(2), first),
         LinearisedRun("step", "speed", np.arange(1.0), np.zeros(1), second),
     ]
-    found = excitation(LinearisedFit.of(runs, Variables.of(["Z8", "Z13", "Z14"], np.ones(3))))
+    found = excitation(LinearisedFit.of(runs, Unknowns.of(["Z8", "Z13", "Z14"], np.ones(3))))
     np.testing.assert_allclose(found.share, [[0.9, 1.0, 0.0], [0.1, 0.0, 0.0]])
     np.testing.assert_allclose(found.sensitivity[0], [0.03 / np.sqrt(2.0), 0.01 / np.sqrt(2.0), 0])
     assert found.sentences() == (

@@ -23,7 +23,7 @@ from swashplate.identification.cross_validation import (
     cross_validate,
     deal,
 )
-from swashplate.identification.fit import fit
+from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Setup
 from swashplate.identification.validation import pooled, predict
 
@@ -164,7 +164,7 @@ def test_each_fold_is_predicted_by_a_fit_to_the_others(
     )
     fold = found.folds[0]
     others = [each for each in campaign if each.name not in fold.held]
-    alone = fit(others, Drive.preset("hoist").parameters, SETUP)
+    alone = fit(Drive.preset("hoist").parameters, others, SETUP)
     (held,) = fold.held
     predicted = {each.channel: each for each in predict(alone.parameters, [campaign[held]])}
     for run in fold.runs:
@@ -227,7 +227,7 @@ def test_pooled_measures_match_those_of_the_predictions(
     qualities = []
     for fold in found.folds:
         others = [each for each in campaign if each.name not in fold.held]
-        parameters = fit(others, Drive.preset("hoist").parameters, SETUP).parameters
+        parameters = fit(Drive.preset("hoist").parameters, others, SETUP).parameters
         qualities += predict(parameters, [campaign[name] for name in fold.held])
     for name, expected in pooled(qualities).items():
         assert found.measures[name].rmse == pytest.approx(expected.rmse, rel=1e-9)

@@ -5,7 +5,7 @@ import pytest
 
 from swashplate import Drive, maneuvers
 from swashplate.identification.identifiability import GAUGES, Gauge, symbol_of
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 BY_NAME = {gauge.name: gauge for gauge in GAUGES}
 EXACT = ("scale of pressure", "zero of pressure", "scale of spool travel", "scale of force")
@@ -45,7 +45,7 @@ def test_speeds_hardly_tell_the_others(hoist: Drive, name: str) -> None:
 def test_tangents_by_hand() -> None:
     names = ["Z1", "Z8", "Z9", "Z6", "Z2", "Z16_plus", "force_minus_2"]
     values = np.array([4e-7, 1.6e6, 1e7, 0.25, 0.0, 1e-4, 2.0])
-    variables = Variables.of(
+    variables = Unknowns.of(
         names, values, scales=[1e-7, 1.0, 1e7, 0.5, 0.1, 1e-4, 4.0],
         logarithmic=[False, True, False, False, False, False, False],
     )  # fmt: skip
@@ -61,7 +61,7 @@ def test_tangents_by_hand() -> None:
 
 
 def test_a_gauge_that_needs_a_held_value_is_told_it() -> None:
-    variables = Variables.of(["Z2", "Z9"], [0.0, 2.0], scales=[1.0, 2.0])
+    variables = Unknowns.of(["Z2", "Z9"], [0.0, 2.0], scales=[1.0, 2.0])
     gauge = BY_NAME["zero of pressure"]
     assert not gauge.tangent(variables).any()
     np.testing.assert_allclose(gauge.tangent(variables, {"Z1": 0.5}), [1.0, 1.0], atol=1e-11)

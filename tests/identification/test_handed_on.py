@@ -9,13 +9,13 @@ from swashplate import Drive
 from swashplate.campaign import rig
 from swashplate.campaign.campaign import Campaign
 from swashplate.identification.assessment import assess
-from swashplate.identification.fit import Fit, fit
+from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.noise import Covariance
 from swashplate.identification.setup import load_setup
 from swashplate.identification.solving import solve
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.uncertainty import Handed, slopes_by_earlier, with_handed
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 from swashplate.maneuvers import source_tests
 
 
@@ -27,7 +27,7 @@ def staged(tmp_path_factory: pytest.TempPathFactory) -> tuple[Campaign, Fit]:
     virtual = rig.run("hoist", {name: tests[name] for name in names}, seed=3, perturb=0.05)
     campaign = Campaign.from_toml(rig.write(virtual, tmp_path_factory.mktemp("t") / "virtual"))
     return campaign, fit(
-        campaign.experiments, Drive.preset("hoist").parameters, load_setup("hoist")
+        Drive.preset("hoist").parameters, campaign.experiments, load_setup("hoist")
     )
 
 
@@ -76,11 +76,11 @@ def test_variances_add_up_and_so_do_degrees_of_freedom() -> None:
     """By hand: 4 + (0.5² 9 + 1² 1) = 7.25, each part with 8 degrees of freedom."""
     known = np.ones(1, dtype=bool)
     own = Covariance(
-        "coloured", Variables.of(["p"], [1.0]), np.array([[4.0]]), known, np.array([8.0])
+        "coloured", Unknowns.of(["p"], [1.0]), np.array([[4.0]]), known, np.array([8.0])
     )
     earlier = Covariance(
         "coloured",
-        Variables.of(["a", "b"], [1.0, 1.0]),
+        Unknowns.of(["a", "b"], [1.0, 1.0]),
         np.diag([9.0, 1.0]),
         np.ones(2, dtype=bool),
         np.array([8.0, 8.0]),

@@ -6,7 +6,7 @@ import pytest
 from swashplate import Drive
 from swashplate.errors import InputError
 from swashplate.identification.identifiability import Identifiability, identifiability
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 from swashplate.maneuvers import sine, step
 
 RNG = np.random.default_rng(4)
@@ -21,7 +21,7 @@ def columns(*null: tuple[float, ...], rows: int = 50) -> np.ndarray:
 
 
 def judged(derivatives: np.ndarray, names: str | list[str], **more: object) -> Identifiability:
-    return identifiability(derivatives, Variables.of(list(names), np.ones(len(names))), **more)
+    return identifiability(derivatives, Unknowns.of(list(names), np.ones(len(names))), **more)
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def hoist(parts: tuple, leave: set[str], **more: object) -> Identifiability:
     names, values, derivatives = parts
     kept = [k for k, name in enumerate(names) if name not in leave]
     scales = np.where(values == 0.0, 1.0, np.abs(values))[kept]
-    variables = Variables.of([names[k] for k in kept], values[kept], scales=scales)
+    variables = Unknowns.of([names[k] for k in kept], values[kept], scales=scales)
     return identifiability(derivatives[:, kept] * scales, variables, **more)
 
 
@@ -108,7 +108,7 @@ def test_nothing_at_all_is_a_verdict() -> None:
 
 
 def test_all_at_bounds_is_a_verdict() -> None:
-    variables = Variables.of("ab", np.ones(2), at_bound=[1, -1])
+    variables = Unknowns.of("ab", np.ones(2), at_bound=[1, -1])
     found = identifiability(RNG.normal(size=(5, 2)), variables)
     assert found.sentences()[0].startswith("All unknowns stand at a bound")
 
@@ -150,7 +150,7 @@ def test_correlations_of_a_given_covariance() -> None:
 
 
 def test_an_unknown_at_its_bound_is_flagged_and_held() -> None:
-    variables = Variables.of(["Z17", "Z18"], [0.25, 1.0], at_bound=[-1, 0])
+    variables = Unknowns.of(["Z17", "Z18"], [0.25, 1.0], at_bound=[-1, 0])
     found = identifiability(np.ones((5, 2)), variables)
     assert found.at_bounds == {"Z17": "lower"}
     assert found.complete  # the two columns are alike, but one is held

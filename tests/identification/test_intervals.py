@@ -1,16 +1,18 @@
 """Intervals in the unknowns' own units."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from swashplate.errors import InputError
 from swashplate.identification.noise import Covariance
 from swashplate.identification.uncertainty import Estimate, estimates
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 
 def covariance(freedom: float = np.inf, **more: object) -> Covariance:
-    variables = Variables.of(
+    variables = Unknowns.of(
         ["plain", "positive"], [3.0, 2.0], scales=[10.0, 1.0], logarithmic=[False, True], **more
     )
     matrix = np.diag([0.01, 0.04])
@@ -50,6 +52,15 @@ def test_undetermined_there_is_none_either() -> None:
     assert found[0].status == "undetermined"
     assert found[0].standard_error is None
     assert found[1].status == "estimated"
+
+
+def test_an_interval_beyond_a_hundredfold_is_none() -> None:
+    """A standard error of 4 of the logarithm: its 95 % interval spans a factor of 2540 each way."""
+    base = covariance()
+    vast = np.diag([base.matrix[0, 0], 4.0**2])
+    plain, positive = estimates(replace(base, matrix=vast))
+    assert plain.status == "estimated"
+    assert (positive.status, positive.lower, positive.upper) == ("undetermined", None, None)
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0, 95.0])

@@ -11,7 +11,7 @@ from swashplate import Campaign, Drive
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import Experiment
 from swashplate.identification.assessment import Assessment, assess
-from swashplate.identification.fit import fit
+from swashplate.identification.fitting import fit
 from swashplate.identification.lack_of_fit import clipped_channels, lack_of_fit
 from swashplate.identification.setup import load_setup
 from swashplate.identification.validation import predict
@@ -45,7 +45,7 @@ def fitted(
             logs(columns)
         runs[name] = replace(made.runs[name], columns=columns)
     campaign = Campaign.from_toml(rig.write(replace(made, runs=runs), folder / "virtual"))
-    result = fit(campaign.select(role="fit"), nominal.parameters, load_setup("slew"))
+    result = fit(nominal.parameters, campaign.select(role="fit"), load_setup("slew"))
     assessments = list(assess(result.stages))
     predicted = predict(result.parameters, campaign.select(role="validate"))
     return assessments, verdict(assessments, predicted)

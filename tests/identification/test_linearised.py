@@ -5,7 +5,7 @@ import pytest
 
 from swashplate.errors import InputError
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun, whitening
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 RNG = np.random.default_rng(1)
 
@@ -19,7 +19,7 @@ def run(n: int, columns: int, **more: object) -> LinearisedRun:
 
 def fit(runs: list, columns: int, **more: object) -> LinearisedFit:
     names = [f"p{k}" for k in range(columns)]
-    return LinearisedFit.of(runs, Variables.of(names, np.ones(columns)), **more)
+    return LinearisedFit.of(runs, Unknowns.of(names, np.ones(columns)), **more)
 
 
 def test_the_inverse_is_that_of_the_normal_equations() -> None:
@@ -49,7 +49,7 @@ def test_an_undetermined_unknown_does_not_spoil_the_others() -> None:
 
 def test_an_unknown_at_its_bound_is_held() -> None:
     base = run(40, 3)
-    variables = Variables.of("abc", np.ones(3), at_bound=[0, 1, 0])
+    variables = Unknowns.of("abc", np.ones(3), at_bound=[0, 1, 0])
     made = LinearisedFit.of([base], variables)
     free = base.jacobian[:, [0, 2]]
     np.testing.assert_allclose(

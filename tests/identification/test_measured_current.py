@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from swashplate import Channel, Experiment
+from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.campaign.kinds import ChannelKind
 from swashplate.errors import InputError
-from swashplate.identification.measured_current import measured_current
+from swashplate.identification.drive_model import measured_current
 
 RATE = 512.0
 TIME = np.arange(1025) / RATE

@@ -10,7 +10,7 @@ from swashplate.identification.identifiability import (
     faint_directions,
     null_directions,
 )
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 
 def space(derivatives: np.ndarray) -> Space:
@@ -54,7 +54,7 @@ def test_the_largest_change_is_one_per_cent() -> None:
     """Columns 1 and -4 of one shape: the first must move four times as far."""
     shape = np.random.default_rng(0).normal(size=(20, 1))
     (found,) = null_directions(
-        space(shape * [1.0, -4.0]), Variables.of("ab", np.ones(2)), [], {}, 1e-10
+        space(shape * [1.0, -4.0]), Unknowns.of("ab", np.ones(2)), [], {}, 1e-10
     )
     assert found.changes["a"] == pytest.approx(1.0)
     assert found.changes["b"] == pytest.approx(0.25)
@@ -65,11 +65,11 @@ def test_of_a_faint_direction_the_cheaper_unknown_is_held() -> None:
     rng = np.random.default_rng(1)
     shape, other, third = rng.normal(size=(3, 200))
     columns = np.column_stack([4.0 * shape, shape + 1e-5 * other, third])
-    (found,) = faint_directions(space(columns), Variables.of("abc", np.ones(3)), [], {}, 1e-3)
+    (found,) = faint_directions(space(columns), Unknowns.of("abc", np.ones(3)), [], {}, 1e-3)
     assert found.hold == "b"
     assert 1e-6 < found.sharpness < 1e-4
 
 
 def test_an_empty_space_has_no_directions() -> None:
     empty = Space(np.zeros((3, 0)), np.zeros(0), np.zeros(0, np.intp))
-    assert faint_directions(empty, Variables.of("a", [1.0]), [], {}, 1e-3) == []
+    assert faint_directions(empty, Unknowns.of("a", [1.0]), [], {}, 1e-3) == []

@@ -228,7 +228,7 @@ def test_the_domain_takes_a_step_back_and_ends_in_its_sentence() -> None:
     made = replace(made, fixed={"lag": 0.4, "delay": 0.13})
     assert found(made)["gain"] == pytest.approx(1.5)
     with pytest.raises(DomainError, match=r"^valve: the valve has no such gain under this "):
-        solve(made, made.unknowns.vector({"gain": 6.0}))
+        solve(made, made.unknowns.vector_of({"gain": 6.0}))
 
 
 def renamed(run: Experiment, name: str) -> Experiment:

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from swashplate import Experiment
 from swashplate.campaign.experiment import Channel, InputSignal, Source
-from swashplate.identification.linearising import linearised_fit
+from swashplate.identification.linearised import linearised_fit
 from swashplate.identification.problem import Problem
 from swashplate.identification.solving import solve
 from swashplate.identification.uncertainty import estimates, prior_sentences, uncertainty, weighed

@@ -10,7 +10,7 @@ from swashplate.errors import InputError
 from swashplate.executors import Serial
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.bootstrap import bootstraps_of, profiles_of
-from swashplate.identification.fit import StageFit
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Free, Stage
 from swashplate.identification.solving import solve

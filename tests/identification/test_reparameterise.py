@@ -8,15 +8,14 @@ import pytest
 
 from swashplate import Channel, Drive, Experiment, InputError, maneuvers
 from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.identification.excitation import outlook
-from swashplate.identification.fit import smooth
-from swashplate.identification.reparameterise import (
+from swashplate.identification.excitation import (
     Proposal,
+    outlook,
     propose,
     proposed_setup,
-    setup_text,
 )
-from swashplate.identification.setup import Free, GivenForces, Setup, Stage, load_setup
+from swashplate.identification.fitting import smooth
+from swashplate.identification.setup import Free, GivenForces, Setup, Stage, load_setup, setup_text
 
 HOIST = Drive(smooth(Drive.preset("hoist").parameters))
 SOURCE = Source(Path("log.csv"), "speed")
@@ -97,7 +96,7 @@ def test_a_set_up_is_written_as_it_will_be_read(tmp_path: Path) -> None:
         for stage in setup.stages
     ]
     made = proposed_setup(setup, proposals)
-    text = setup_text(made, proposals)
+    text = setup_text(made, {each.stage.name: each.comments() for each in proposals})
     (tmp_path / "mine.toml").write_text(text, "utf-8")
     assert load_setup(tmp_path / "mine.toml") == made
     assert "# V_dz_minus, J_minus, G1_minus" in text

@@ -8,7 +8,7 @@ from swashplate.errors import InputError
 from swashplate.identification.bootstrap import Resampling, politis_white_length
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import NoiseColour
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 N = 4000
 TIME = np.arange(N) / 512.0
@@ -24,7 +24,7 @@ def fit(residuals: np.ndarray, **more: object) -> LinearisedFit:
         LinearisedRun(f"run {k}", "speed", TIME, each, np.ones((N, 1)))._replace(**more)
         for k, each in enumerate(residuals)
     ]
-    return LinearisedFit.of(runs, Variables.of(["p"], [1.0]))
+    return LinearisedFit.of(runs, Unknowns.of(["p"], [1.0]))
 
 
 def test_a_draw_is_the_same_whenever_it_is_drawn() -> None:
@@ -74,7 +74,7 @@ def test_gaps_stay_gaps() -> None:
         LinearisedRun("a", "speed", TIME[kept], each[kept], np.ones((kept.sum(), 1)))
         for each in noise(0.95, 5)
     ]
-    drawn = Resampling(LinearisedFit.of(runs, Variables.of(["p"], [1.0]))).differences(0)[0]
+    drawn = Resampling(LinearisedFit.of(runs, Unknowns.of(["p"], [1.0]))).differences(0)[0]
     assert drawn.size == 3000
     # neighbours over the gap are a second apart: hardly related, unlike others
     jumps = np.abs(np.diff(drawn))
@@ -94,7 +94,7 @@ def test_a_given_block_is_taken() -> None:
 def test_a_run_too_short_for_its_own_borrows_innovations() -> None:
     long = LinearisedRun("long", "speed", TIME, noise(0.9, 7)[0], np.ones((N, 1)))
     short = LinearisedRun("short", "speed", TIME[:5], np.ones(5), np.ones((5, 1)))
-    made = LinearisedFit.of([long, short], Variables.of(["p"], [1.0]))
+    made = LinearisedFit.of([long, short], Unknowns.of(["p"], [1.0]))
     drawn = [Resampling(made).differences(k)[1] for k in range(3)]
     assert np.isfinite(drawn).all()
     assert not np.array_equal(drawn[0], drawn[1])

@@ -9,18 +9,18 @@ import pytest
 from typer.testing import CliRunner
 
 from swashplate import Channel, Drive, Experiment, InputError, maneuvers
-from swashplate.campaign import rig
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.campaign import Campaign, InputSignal, Source, rig
 from swashplate.cli import app
 from swashplate.identification.data_checks import (
     Finding,
     check_runs,
     check_sound,
+    contradictions,
     refuse_unsound,
     time_constant,
 )
-from swashplate.identification.fit import smooth
+from swashplate.identification.fitting import smooth
+from swashplate.identification.motion import Motion
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
 
 NOMINAL = smooth(Drive.preset("hoist").parameters)
@@ -359,3 +359,29 @@ def test_a_position_that_freezes_while_the_drive_runs() -> None:
     assert 1.2 <= first <= 1.4
     assert 2.4 <= last <= 2.6
     assert said.startswith("up: 'angle' stands still from ")
+
+
+def test_runs_are_compared_by_their_number_and_not_by_their_pairs() -> None:
+    """Each command is looked at once, however many runs there are; the odd one is found."""
+    looked = []
+
+    class Counted(InputSignal):
+        def at(self, time: np.ndarray) -> np.ndarray:
+            looked.append(1)
+            return super().at(time)
+
+    time = np.arange(0.0, 4.0, 0.02)
+    source, found = Source(Path("log.csv"), "u"), []
+    for number in range(120):
+        command = float(number % 3 + 2) * (time > 1.0)
+        speed = command * (2.0 if number == 77 else 0.5)
+        channel = Channel("speed", "shaft_speed", "rad/s", time, speed, np.ones(time.size), source)
+        signal = Counted("voltage", "V", time, command, "linear", source)
+        name = f"run {number}"
+        experiment = Experiment(
+            name, "winch", name, "fit", "rest", None, signal, {"speed": channel}
+        )
+        found.append(Motion(experiment, channel, time, speed, 0.5 * command))
+    (odd,) = contradictions({"speed": found})
+    assert odd.run == "run 77"
+    assert len(looked) == 120

@@ -10,7 +10,7 @@ from swashplate.identification.spectral_lines import (
     without_lines,
 )
 from swashplate.identification.uncertainty import uncertainty
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 RUNS, N, RATE = 4, 4096, 512.0
 TIME = np.arange(N) / RATE
@@ -28,7 +28,7 @@ def fitted(noise: np.ndarray, weight: np.ndarray | None = None) -> tuple[Lineari
         LinearisedRun(f"run {k}", "current", TIME, w * (e + DESIGN @ estimate), rows, weight)
         for k, e in enumerate(noise)
     ]
-    return LinearisedFit.of(runs, Variables.of("abc", np.ones(3))), estimate
+    return LinearisedFit.of(runs, Unknowns.of("abc", np.ones(3))), estimate
 
 
 def ripple(rng: np.random.Generator, level: np.ndarray | float = 1.0) -> np.ndarray:
@@ -78,7 +78,7 @@ def test_white_noise_and_short_runs_have_no_lines() -> None:
     # one campaign in a hundred may have one by chance
     assert sum(len(each) for each in found) <= 1
     short = LinearisedRun("short", "current", TIME[:100], np.ones(100), DESIGN[:100])
-    assert without_lines(LinearisedFit.of([short], Variables.of("abc", np.ones(3))))[1] == ()
+    assert without_lines(LinearisedFit.of([short], Unknowns.of("abc", np.ones(3))))[1] == ()
 
 
 def test_errors_are_those_of_the_noise_under_a_ripple() -> None:

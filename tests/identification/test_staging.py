@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 from swashplate import Campaign, Channel, Drive, Experiment
-from swashplate.campaign import rig
-from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.drives import at_rate_of
-from swashplate.identification.fit import fit, smooth
+from swashplate.campaign import InputSignal, Source, rig
+from swashplate.identification.drive_model import DriveModel, at_rate_of
+from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import Free, Setup, Stage, load_setup, setup_names
 from swashplate.identification.staging import stage_problem
 from swashplate.maneuvers import source_tests
@@ -78,7 +76,7 @@ def test_a_clock_that_is_late_is_found(campaign: Campaign) -> None:
         free={"Z8": Free(relative=(0.5, 2.0), log=True)},
         clock_offsets={"shaft_speed": 0.05},
     )
-    found = fit(late, Drive.preset("hoist").parameters, Setup(stages=(stage,))).stages[-1].values
+    found = fit(Drive.preset("hoist").parameters, late, Setup(stages=(stage,))).stages[-1].values
     (offset,) = [value for name, value in found.items() if name.startswith("clock")]
     assert abs(offset) == pytest.approx(0.02, abs=2e-4)
 
@@ -120,7 +118,7 @@ def test_a_recursion_of_another_rate_gives_way_to_its_equation() -> None:
     names = ("zeta_plus", "omega_plus")
     free = {name: Free(relative=(0.5, 2.0)) for name in names}
     setup = Setup(stages=(Stage(name="card", part="card", free=free),))
-    found = fit([run], Drive.preset("hoist").parameters, setup, tolerance=1e-12)
+    found = fit(Drive.preset("hoist").parameters, [run], setup, tolerance=1e-12)
     assert found.parameters.rate is found.nominal.rate is None
     for name in names:
         assert found.parameters.numbers[name] == pytest.approx(truth.parameters.numbers[name])
@@ -130,3 +128,40 @@ def test_a_recursion_of_another_rate_gives_way_to_its_equation() -> None:
     )
     own = Drive.preset("neutral").parameters
     assert at_rate_of([run], own) == (own, ())
+
+
+def test_a_held_command_acts_half_a_sample_later_than_a_straight_one() -> None:
+    """At the logger's own rate: the same samples, of a sine that hardly curves between two."""
+    time = np.arange(0.0, 8.0, 1.0 / 512.0)
+    command = 5.0 * np.sin(2.0 * np.pi * 0.4 * time)
+    source = Source(Path("log.csv"), "u")
+    channel = Channel(
+        "current", "signed_current", "A", time, np.zeros(time.size), np.ones(time.size), source
+    )
+    model = DriveModel(Drive.preset("hoist").parameters, "card")
+    found = {}
+    for way in ("linear", "previous"):
+        signal = InputSignal("voltage", "V", time, command, way, source)
+        run = Experiment("run", "hoist", "run", "fit", "rest", None, signal, {"current": channel})
+        found[way] = model.simulate({}, run)["current"]
+    late = np.interp(time - 0.5 / 512.0, time, found["linear"])
+    assert np.abs(found["previous"] - late).max() < 1e-3 * np.abs(late).max()
+    assert np.abs(found["previous"] - found["linear"]).max() > 1e-3 * np.abs(late).max()
+
+
+def test_a_run_cut_out_of_a_motion_begins_with_a_settled_card() -> None:
+    """Cut at 3 s out of a sine whose command then is 8.6 V: at rest its card would be far off."""
+    hoist = Drive.preset("hoist")
+    whole = hoist.simulate(9.0 * np.sin(2.0 * np.pi * 0.1 * np.arange(0.0, 8.0, 1.0 / 512.0)))
+    cut = slice(1536, None)
+    source = Source(Path("log.csv"), "u")
+    assert whole.voltage is not None
+    signal = InputSignal("voltage", "V", whole.time[cut], whole.voltage[cut], "linear", source)
+    time, true = whole.time[cut], whole.current[cut]
+    channel = Channel("current", "signed_current", "A", time, true, np.ones(time.size), source)
+    model, off = DriveModel(hoist.parameters, "card"), {}
+    for start in ("rest", "estimated"):
+        run = Experiment("run", "hoist", "run", "fit", start, None, signal, {"current": channel})
+        off[start] = np.abs(model.simulate({}, run)["current"] - true).max()
+    assert off["rest"] > 0.1
+    assert off["estimated"] < 0.005

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 from swashplate.errors import DomainError, InputError
-from swashplate.identification.rising import by_increments
 from swashplate.identification.solving import Evaluation, Progress, longest_left
 from swashplate.identification.starts import sobol_starts, solve_from, time_left
 
 
 @dataclass(frozen=True)
 class Forces:
-    """Three logarithms of numbers that rise, and a number; quadratic about a truth."""
+    """Three logarithms and a number; quadratic about a truth."""
 
-    rising: tuple[tuple[int, ...], ...] = ((0, 1, 2),)
     forbidden: float = np.inf
 
     @property
@@ -43,19 +41,13 @@ def test_the_same_seed_gives_the_same_starts_however_many() -> None:
     assert not np.array_equal(few, np.array(list(sobol_starts(Forces(), 5, seed=4))))
 
 
-def test_starts_rise_and_lie_within_the_bounds() -> None:
+def test_starts_are_spread_over_the_bounds() -> None:
     starts = np.array(list(sobol_starts(Forces(), 64, seed=0)))
     low, high = Forces().bounds
     assert ((starts >= low) & (starts <= high)).all()
-    assert (np.diff(starts[:, :3], axis=1) > 0.0).all()
-    # spread over the bounds: a 64 point Sobol set is in every eighth of an interval
-    share = (starts[:, 3] - low[3]) / (high[3] - low[3])
-    assert set(np.floor(8.0 * share).astype(int)) == set(range(8))
-
-
-def test_what_is_not_known_to_rise_may_cross() -> None:
-    starts = np.array(list(sobol_starts(Forces(rising=()), 64, seed=0)))
-    assert (np.diff(starts[:, :3], axis=1) < 0.0).any()
+    # a 64 point Sobol set is in every eighth of an interval
+    share = (starts - low) / (high - low)
+    assert all(set(np.floor(8.0 * each).astype(int)) == set(range(8)) for each in share.T)
 
 
 def test_points_outside_the_domain_are_drawn_again() -> None:
@@ -64,18 +56,6 @@ def test_points_outside_the_domain_are_drawn_again() -> None:
     assert (starts[:, 3] <= 0.6).all()
     with pytest.raises(InputError, match="narrow the bounds"):
         list(sobol_starts(Forces(forbidden=0.1001), 8, seed=0))
-
-
-def test_increments_and_their_derivatives() -> None:
-    """ln(d1 + d2) by ln d2 is d2 over the sum; checked by differences of the residuals."""
-    form = by_increments(Forces())
-    at = form.to_search(np.array([np.log(1.1), np.log(2.4), np.log(3.0), 0.4]))
-    np.testing.assert_allclose(np.exp(at[:3]), [1.1, 1.3, 0.6])
-    found = form.evaluate(at).jacobian
-    for k in range(4):
-        step = 1e-6 * np.eye(4)[k]
-        above, below = (form.evaluate(at + sign * step).residuals for sign in (1.0, -1.0))
-        np.testing.assert_allclose(found[:, k], (above - below) / 2e-6, atol=1e-8)
 
 
 def test_every_start_finds_the_truth() -> None:
@@ -90,3 +70,59 @@ def test_time_left_by_hand() -> None:
     assert time_left(4, 6, 8.0) == 12.0
     assert longest_left(Progress(1, 5.0, np.zeros(1), 2.0, 4, 20)) == 8.0
     assert longest_left(Progress(0, 5.0, np.zeros(1), 0.0)) is None
+
+
+BOUNDS = (np.array([-20.0]), np.array([20.0]))
+
+
+@dataclass(frozen=True)
+class Ridge:
+    """x - 10, with a ridge over (0, 1) that a short step from 0 only climbs."""
+
+    height: float = 5.0
+    bounds: tuple[np.ndarray, np.ndarray] = BOUNDS
+    forbidden: float = np.inf
+    start = np.zeros(1)
+
+    def evaluate(self, vector: np.ndarray, *, compressed: bool = True) -> Evaluation:
+        x = float(vector[0])
+        if x > self.forbidden:
+            raise DomainError("too far")
+        ridge = self.height if 0.0 < x < 1.0 else 0.0
+        return Evaluation(np.array([x - 10.0 - ridge]), np.eye(1))
+
+    def cost(self, vector: np.ndarray) -> float:
+        return 0.5 * float(self.evaluate(vector).residuals[0] ** 2)
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A speed of 2 that a stop at x cuts off where x is below it; 1.5 was measured."""
+
+    bounds: tuple[np.ndarray, np.ndarray] = (np.array([0.5]), np.array([6.0]))
+    start = np.ones(1)
+
+    def evaluate(self, vector: np.ndarray, *, compressed: bool = True) -> Evaluation:
+        x = float(vector[0])
+        return Evaluation(np.array([min(2.0, x) - 1.5]), np.array([[1.0 if x < 2.0 else 0.0]]))
+
+    def cost(self, vector: np.ndarray) -> float:
+        return 0.5 * float(self.evaluate(vector).residuals[0] ** 2)
+
+
+def test_the_step_past_an_edge_is_cut_at_the_bounds_and_stays_in_the_domain() -> None:
+    (cut,) = solve_from(Ridge(bounds=(np.zeros(1), np.full(1, 4.0))), [np.zeros(1)])
+    np.testing.assert_allclose(cut.vector, [4.0])
+    (kept,) = solve_from(Ridge(forbidden=4.9), [np.zeros(1)])
+    assert 2.5 <= kept.vector[0] <= 4.9
+
+
+def test_a_search_from_before_the_ridge_ends_behind_it() -> None:
+    (result,) = solve_from(Ridge(), [np.zeros(1)])
+    assert result.cost < 1e-20
+    np.testing.assert_allclose(result.vector, [10.0])
+
+
+def test_a_search_that_lost_the_stop_finds_it_again() -> None:
+    (result,) = solve_from(Stop(), [np.full(1, 5.0)])
+    np.testing.assert_allclose(result.vector, [1.5])

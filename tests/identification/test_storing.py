@@ -1,6 +1,7 @@
 """A fit on disk is the fit, and is refused where it no longer belongs to its campaign."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,12 +12,11 @@ from swashplate import Campaign, Drive, FileError, InputError, ParameterError, m
 from swashplate.campaign import rig
 from swashplate.identification.assessment import Measures, assess
 from swashplate.identification.cross_validation import CrossValidation, Fold, FoldEstimate, HeldRun
-from swashplate.identification.fit import Fit, fit
-from swashplate.identification.fit_file import StageProfile
+from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profile import Point, Profile, Threshold
 from swashplate.identification.setup import Setup
 from swashplate.identification.starts import StartResult
-from swashplate.identification.storing import fingerprint, load_fit, save_fit
+from swashplate.identification.storing import StageProfile, fingerprint, load_fit, save_fit
 
 SETUP = Setup.model_validate(
     {
@@ -58,7 +58,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
 
 @pytest.fixture(scope="module")
 def fitted(campaign: Campaign) -> Fit:
-    found = fit(campaign.experiments, Drive.preset("hoist").parameters, SETUP)
+    found = fit(Drive.preset("hoist").parameters, campaign.experiments, SETUP)
     first, second = found.stages
     return replace(found, stages=(replace(first, starts=STARTS), second))
 
@@ -155,7 +155,7 @@ def test_a_damaged_file_is_refused(path: Path, campaign: Campaign, tmp_path: Pat
     with pytest.raises(FileError, match="There is no file"):
         load_fit(tmp_path / "none.json", campaign)
     path.write_text(text[:-100], "utf-8")
-    with pytest.raises(FileError, match="is no stored fit"):
+    with pytest.raises(FileError, match="is not JSON"):
         load_fit(path, campaign)
     path.write_text(text.replace('"axis"', '"ax"'), "utf-8")
     with pytest.raises(ParameterError, match="fit.json"):
@@ -163,3 +163,38 @@ def test_a_damaged_file_is_refused(path: Path, campaign: Campaign, tmp_path: Pat
     path.write_text(text.replace('"Z10"', '"Z9"', 1), "utf-8")
     with pytest.raises(FileError, match="stage pump has other unknowns .* fit again"):
         load_fit(path, campaign)
+
+
+POISON = {
+    "nested": (lambda text: "[" * 100_000, "not JSON: recursion limit"),
+    "other version": (
+        lambda text: re.sub('"swashplate": "[^"]*"', '"swashplate": "9.9"', text),
+        "9.9",
+    ),
+    "many digits": (
+        lambda text: re.sub('"cost": [0-9.e+-]+', '"cost": 1' + 5000 * "0", text),
+        "number out of range",
+    ),
+    "text for a vector": (
+        lambda text: re.sub(r'"vector": \[[^]]+\]', '"vector": "abc"', text),
+        "list of finite numbers",
+    ),
+    "wrong length": (
+        lambda text: re.sub(r'"vector": \[[^]]+\]', '"vector": [1.0]', text, count=1),
+        "stage card has other unknowns",
+    ),
+    "a number for the drive": (
+        lambda text: text.replace('"nominal": ', '"nominal": 3, "was": '),
+        "nominal",
+    ),
+}
+
+
+@pytest.mark.parametrize(("poison", "sentence"), POISON.values(), ids=POISON)
+def test_a_poisoned_file_ends_in_a_sentence(
+    path: Path, campaign: Campaign, poison, sentence: str
+) -> None:
+    path.write_text(poison(path.read_text("utf-8")), "utf-8")
+    with pytest.raises((FileError, ParameterError), match=f"fit.json.*{sentence}") as caught:
+        load_fit(path, campaign)
+    assert len(str(caught.value)) < 500

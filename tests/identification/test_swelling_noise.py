@@ -4,7 +4,7 @@ import numpy as np
 
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import Covariance, band_score_covariance
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 RUNS, N = 6, 5120
 TIME = np.arange(N) / 512.0
@@ -21,7 +21,7 @@ def fitted(noise: np.ndarray, pulses: np.ndarray) -> tuple[LinearisedFit, np.nda
         LinearisedRun(f"run {k}", "current", TIME, e + design @ estimate, design)
         for k, e in enumerate(noise)
     ]
-    return LinearisedFit.of(runs, Variables.of("ab", np.ones(2))), estimate
+    return LinearisedFit.of(runs, Unknowns.of("ab", np.ones(2))), estimate
 
 
 def scattered(

@@ -10,7 +10,7 @@ from swashplate import Drive, Experiment
 from swashplate.campaign.experiment import InputSignal
 from swashplate.identification.assessment import Assessment, RunQuality, compared
 from swashplate.identification.criteria import Criterion, listed, part_of_range, percent
-from swashplate.identification.fit import StageFit
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.identifiability import Direction
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage

@@ -191,13 +191,17 @@ def test_catalogue_has_the_models_parameters() -> None:
 
 
 def test_neutral_set_is_a_straight_line_with_one_lag() -> None:
-    """Unit gain each way; the step answer is 1 - exp(-t/T), T = 1/Z8."""
+    """Unit gain each way; the step answer is 1 - exp(-t/T), T = 208333 s/Z8.
+
+    Straight are the tangents of the plate's angle, 0.01 a volt: the speed is 100 of its angles.
+    """
     import numpy as np
 
-    neutral = Drive.preset("neutral").replace(Z8=1 / 0.3)
-    np.testing.assert_allclose(
-        neutral.steady_speed([-10.0, 0.0, 0.1, 7.0]), [-10, 0, 0.1, 7], rtol=1e-6
-    )
+    neutral = Drive.preset("neutral").replace(Z8=1e6 / 4.8 / 0.3)
+    volts = np.array([-10.0, 0.0, 0.1, 7.0])
+    expected = 100.0 * np.arctan(0.01 * volts)
+    np.testing.assert_allclose(neutral.steady_speed(volts), expected, rtol=1e-6)
+    np.testing.assert_allclose(expected, volts, rtol=4e-3)
     voltage = np.full(1024, 2.0)
     t = np.arange(1024) / 512.0
     ideal = 2.0 * (1.0 - np.exp(-t / 0.3))

@@ -11,8 +11,7 @@ from swashplate.equations.marching.observation import Observation, ObservedRecor
 from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.triangle import combine
 from swashplate.maneuvers import source_tests
-from swashplate.simulation.residuals import triangle
-from swashplate.simulation.sensitivities import ALL_COLUMNS, PUMP_COLUMNS
+from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS, triangle
 
 CARD = tuple(name for name in ALL_COLUMNS if name not in PUMP_COLUMNS and not name.startswith("C_"))
 

@@ -9,7 +9,7 @@ from swashplate import Drive
 from swashplate.campaign import rig
 from swashplate.campaign.campaign import Campaign
 from swashplate.identification.assessment import Assessment, assess
-from swashplate.identification.fit import Fit, fit
+from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Setup, load_setup
 from swashplate.parameters.definitions import columns_of
 
@@ -62,7 +62,7 @@ def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Pat
     campaign = measured(axis, truth, tmp_path / "virtual")
     plan = setup.joint() if joint else setup
     # at 1e-14 the cost of slew, seed 4, 6e-15 already, creeps on along a stop that is not reached
-    result = fit(campaign.experiments, campaign.drive(axis).parameters, plan, tolerance=1e-12)
+    result = fit(campaign.drive(axis).parameters, campaign.experiments, plan, tolerance=1e-12)
     expected = dict(truth.parameters.numbers)
     for stage in result.stages:
         forces = stage.problem.model.forces
@@ -81,7 +81,7 @@ def test_counts_and_noise_leave_small_errors(tmp_path: Path) -> None:
     truth = drawn("hoist", setup, seed=5)
     tests = rig.run("hoist", severity="realistic", truth=truth, seed=2)
     campaign = Campaign.from_toml(rig.write(tests, tmp_path / "virtual"))
-    result = fit(campaign.select(role="fit"), campaign.drive("hoist").parameters, setup)
+    result = fit(campaign.drive("hoist").parameters, campaign.select(role="fit"), setup)
     fitted, true = Drive(result.parameters), truth
     for volts in (-9.0, -6.5, -2.0, 2.0, 4.0, 9.0):
         assert fitted.steady_speed(volts) == pytest.approx(true.steady_speed(volts), rel=2e-3)

@@ -13,7 +13,7 @@ from swashplate.equations.marching.jacobian import jacobian
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
 from swashplate.full_order.drive import path_of
-from swashplate.identification.linearising import linearised_fit
+from swashplate.identification.linearised import linearised_fit
 from swashplate.identification.model import Linearised
 from swashplate.identification.problem import Problem
 from swashplate.identification.solving import solve

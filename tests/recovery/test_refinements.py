@@ -9,10 +9,9 @@ from pathlib import Path
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.campaign import rig
+from swashplate.campaign import ChannelKind, rig
 from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.kinds import ChannelKind
-from swashplate.identification.fit import StageFit, fit
+from swashplate.identification.fitting import StageFit, fit
 from swashplate.identification.setup import Free, Setup, Stage
 from swashplate.parameters.definitions import OPTIONS, REFINEMENTS
 
@@ -55,7 +54,7 @@ def measured(truth: Drive, path: Path, channel: ChannelKind) -> Campaign:
 
 def fitted(campaign: Campaign, start: Drive, stage: Stage) -> StageFit:
     setup = Setup(stages=(stage,))
-    (found,) = fit(campaign.experiments, start.parameters, setup, tolerance=1e-12).stages
+    (found,) = fit(start.parameters, campaign.experiments, setup, tolerance=1e-12).stages
     assert found.solution.converged
     return found
 

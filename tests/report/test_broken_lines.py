@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
@@ -7,7 +6,6 @@ from matplotlib.figure import Figure
 from swashplate.report.broken_lines import (
     alone,
     broken,
-    draw_band,
     draw_broken,
     gap_rows,
     thinned,
@@ -115,12 +113,3 @@ def test_nothing_to_show_draws_nothing() -> None:
     ax = Figure().subplots()
     draw_broken(ax, np.arange(3.0), np.ones(3), "k", shown=np.zeros(3, dtype=bool))
     assert not ax.lines
-
-
-def test_a_band_lies_between_its_signals_and_is_open_at_a_gap() -> None:
-    ax = Figure().subplots()
-    time = np.array([0.0, 1.0, 2.0, 30.0, 31.0])
-    draw_band(ax, time, time - 1.0, time + 2.0, "k", 1.0)
-    first, second = ax.collections[0].get_paths()
-    assert first.get_extents().bounds == pytest.approx((0.0, -1.0, 2.0, 5.0))
-    assert second.get_extents().bounds == pytest.approx((30.0, 29.0, 1.0, 4.0))

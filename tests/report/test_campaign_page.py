@@ -9,9 +9,9 @@ from matplotlib.colors import to_hex
 from matplotlib.offsetbox import TextArea
 
 from swashplate import InputError
-from swashplate.campaign.experiment import Channel, Encoder, Experiment, InputSignal, Source
+from swashplate.campaign import Channel, Encoder, Experiment, InputSignal, Source
 from swashplate.report.figures import plot_campaign
-from swashplate.report.style import BLUE, GREY, INK
+from swashplate.report.style import BLUE, INK
 
 SOURCE = Source(Path("run.csv"), "a column")
 TIME = np.arange(513) / 64.0
@@ -110,7 +110,7 @@ def test_the_heading_says_what_run_it_is() -> None:
     runs = [
         experiment(),
         experiment(slow, run="run2", role="validate"),
-        experiment(run="run3", role="ignore", input=command(late)),
+        experiment(run="run3", input=command(late)),
         experiment(
             slow,
             channel(name="b", time=TIME[::64]),
@@ -122,7 +122,7 @@ def test_the_heading_says_what_run_it_is() -> None:
     assert headings(figure) == [
         "run1 | step +4 V  ·  for the fit  ·  64 Hz",
         "run2 | step +4 V  ·  for validation  ·  input 64 Hz  ·  speed 16 Hz",
-        "run3 | step +4 V  ·  ignored  ·  64 Hz  ·  a gap of 2.52 s",
+        "run3 | step +4 V  ·  for the fit  ·  64 Hz  ·  a gap of 2.52 s",
         "run4 | step +4 V  ·  for the fit  ·  1 to 64 Hz",
     ]
 
@@ -231,17 +231,22 @@ def test_eight_runs_fit_on_a_page_and_every_axis_has_its_own() -> None:
     assert [len(headings(figure)) for figure in figures] == [8, 5, 1]
 
 
-def test_commands_are_staircases_and_ignored_runs_grey() -> None:
-    runs = [
-        experiment(),
-        experiment(role="ignore", input=command(interpolation="linear")),
-    ]
-    (figure,) = plot_campaign(runs)
-    used, grey = figure.axes[:2], figure.axes[2:]
-    assert [to_hex(line(ax).get_color()) for ax in used] == [INK.lower(), BLUE.lower()]
-    assert [to_hex(line(ax).get_color()) for ax in grey] == [GREY.lower()] * 2
-    assert line(used[0]).get_drawstyle() == "steps-post"
-    assert line(grey[0]).get_drawstyle() == line(used[1]).get_drawstyle() == "default"
+def test_commands_are_staircases_where_they_are_held() -> None:
+    (figure,) = plot_campaign([experiment(), experiment(input=command(interpolation="linear"))])
+    held, straight = figure.axes[:2], figure.axes[2:]
+    assert [to_hex(line(ax).get_color()) for ax in held] == [INK.lower(), BLUE.lower()]
+    assert line(held[0]).get_drawstyle() == "steps-post"
+    assert line(straight[0]).get_drawstyle() == line(held[1]).get_drawstyle() == "default"
+
+
+def test_an_ignored_spike_leaves_the_scale_to_the_rest() -> None:
+    """A channel of 1 rad/s and one sample of 100 rad/s, ignored in one run and not in the other."""
+    values, weight = np.where(TIME > 2.0, 1.0, 0.0), np.ones(TIME.size)
+    values[50], weight[50] = 100.0, 0.0
+    (figure,) = plot_campaign([experiment(channel(values=values, weight=weight))])
+    assert figure.axes[1].get_ylim()[1] < 1.2 * np.degrees(1.0)
+    (figure,) = plot_campaign([experiment(channel(values=values))])
+    assert figure.axes[1].get_ylim()[1] > np.degrees(100.0)
 
 
 def test_a_long_record_is_light_and_keeps_its_extremes() -> None:

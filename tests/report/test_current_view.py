@@ -5,7 +5,7 @@ import pytest
 from matplotlib.colors import to_hex
 
 from swashplate import Drive, InputError, Simulation, maneuvers
-from swashplate.campaign.experiment import Channel, Source
+from swashplate.campaign import Channel, Source
 from swashplate.report.campaign_marks import IGNORED, MASKED
 from swashplate.report.figures import plot_current
 from swashplate.report.style import FAINT, INK

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate import InputError
-from swashplate.campaign.experiment import Channel, Encoder, Source
-from swashplate.campaign.speed import Speed
+from swashplate.campaign import Channel, Encoder, Source, Speed
 from swashplate.report.display_units import display_unit
 from swashplate.report.figures import plot_encoder
 from swashplate.report.speed_lines import cut, reach_of, speed_handles, usable_methods
@@ -73,9 +72,9 @@ def test_speeds_of_every_method_that_512_hz_allow() -> None:
     figure = plot_encoder(encoder())
     lower = figure.axes[1]
     drawn = lines(lower)
-    assert {"difference", "source", "savitzky_golay", "kalman"} <= drawn.keys()
+    assert {"difference", "source", "savitzky_golay"} <= drawn.keys()
     late = (TIME > 1.2) & (TIME < 1.7)
-    for method in ("source", "savitzky_golay", "kalman"):
+    for method in ("source", "savitzky_golay"):
         x, y = drawn[method]
         np.testing.assert_array_equal(x, TIME)
         assert np.mean(y[late]) == pytest.approx(20.0, abs=0.3)
@@ -89,24 +88,8 @@ def test_speeds_of_every_method_that_512_hz_allow() -> None:
             "plain difference, from 0 to 512 deg/s",
             "10 and 30 Hz filters, 20.2 ms late",
             "Savitzky-Golay",
-            "Kalman smoother",
-            "± 2 standard deviations",
         ],
     ]
-
-
-def test_the_band_is_two_standard_deviations_wide() -> None:
-    lower = plot_encoder(encoder(), methods=("kalman",), window=(1.0, 1.5)).axes[1]
-    (band,) = lower.collections
-    x, y = band.get_paths()[0].vertices.T
-    from swashplate.campaign.speed import speed_of
-
-    found = speed_of(encoder(), "kalman")
-    at = int(np.searchsorted(TIME, 1.25))
-    low, high = y[x == TIME[at]].min(), y[x == TIME[at]].max()
-    assert found.deviation is not None
-    assert high - low == pytest.approx(4.0 * DEGREES * found.deviation[at])
-    assert 0.5 * (high + low) == pytest.approx(DEGREES * found.speed[at])
 
 
 def test_a_window_shows_a_part_of_what_the_whole_record_gives() -> None:
@@ -124,24 +107,21 @@ def test_uneven_stamps_have_the_exact_filters_and_no_moving_polynomial() -> None
     time = TIME + 4e-4 * np.sin(np.arange(TIME.size))
     figure = plot_encoder(encoder(time))
     assert legends(figure)[1][1].startswith("10 and 30 Hz filters, exact form, 21.")
-    assert usable_methods(encoder(time)) == ("difference", "exact", "kalman")
+    assert usable_methods(encoder(time)) == ("difference", "exact")
     assert usable_methods(encoder(TIME[::2])) == (
         "difference",
         "exact",
         "savitzky_golay",
-        "kalman",
     )
 
 
-def test_a_position_has_no_counts_and_a_smoother_only_with_its_noise() -> None:
+def test_a_position_has_no_counts() -> None:
     figure = plot_encoder(position())
     upper, lower = figure.axes
     assert upper.get_ylabel() == "position (mm)"
     assert lower.get_ylabel() == "speed (mm/s)"
     assert not upper.child_axes
     assert legends(figure)[0] == ["position"]
-    assert "kalman" not in usable_methods(position())
-    assert "kalman" in usable_methods(position(noise=1e-4))
 
 
 def test_lines_are_open_at_gaps() -> None:
@@ -149,22 +129,22 @@ def test_lines_are_open_at_gaps() -> None:
     upper, lower = plot_encoder(encoder(time)).axes
     for ax in (upper, lower):
         for label, (_, y) in lines(ax).items():
-            if label in ("raw", "interpolated", "exact", "kalman"):
+            if label in ("raw", "interpolated", "exact"):
                 assert np.flatnonzero(np.isnan(y)).tolist() == [300], label
     assert "gap" in lines(upper)
 
 
 def test_the_scale_is_that_of_the_difference_only_where_it_is_alone() -> None:
     time = np.array([0.0, 1.0])
-    smooth = Speed(time, np.array([1.0, 2.0]), None, 0.02)
-    rough = Speed(time, np.array([-9.0, 9.0]), None, 0.0)
+    smooth = Speed(time, np.array([1.0, 2.0]), 0.02)
+    rough = Speed(time, np.array([-9.0, 9.0]), 0.0)
     assert reach_of({"difference": rough, "exact": smooth}) == (1.0, 2.0)
     assert reach_of({"difference": rough}) == (-9.0, 9.0)
     unit = display_unit("m/s", 2.0)
     words = [each.get_label() for each in speed_handles({"difference": rough}, unit, (1.0, 2.0))]
     assert words == ["plain difference, from −9000 to 9000 mm/s"]
-    both = cut(Speed(np.arange(5.0), np.arange(5.0), np.arange(5.0), 0.0), np.array([1.0, 3.0]))
-    assert both.speed.tolist() == [1.0, 2.0, 3.0] == list(both.deviation)
+    both = cut(Speed(np.arange(5.0), np.arange(5.0), 0.0), np.array([1.0, 3.0]))
+    assert both.speed.tolist() == both.time.tolist() == [1.0, 2.0, 3.0]
 
 
 def test_what_is_no_position_is_refused() -> None:

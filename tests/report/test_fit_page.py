@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swashplate import Campaign, Drive, FileError, InputError, maneuvers
-from swashplate.campaign import rig
+from swashplate import Campaign, Channel, Drive, FileError, InputError, maneuvers
+from swashplate.campaign import Source, rig
 from swashplate.identification.assessment import Measures, assess, run_qualities
 from swashplate.identification.cross_validation import CrossValidation, Fold, FoldEstimate, HeldRun
-from swashplate.identification.fit import Fit, fit
+from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profile import Point, Profile, Threshold
 from swashplate.identification.setup import Setup
 from swashplate.identification.staging import stage_problem
@@ -32,7 +32,7 @@ from swashplate.report.fit_page import (
 from swashplate.report.fit_page.files import plot_overlay
 from swashplate.report.fit_page.numbers import percent, plain, spread, unit_text
 from swashplate.report.fit_page.page import StageProfile
-from swashplate.report.fit_page.runs import Shown, ignored_words, shown_runs
+from swashplate.report.fit_page.runs import Shown, ignored_words, off_scale, shown_runs
 from swashplate.report.fit_page.truth import in_the_fits_scales
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
@@ -82,7 +82,7 @@ def fitted(campaign: Campaign) -> Fit:
         channels={**first.channels, "current": replace(channel, weight=weight)},
         ignored=((0.0, 0.5, "the dither starts"),),
     )
-    return fit([first, *runs[1:]], campaign.drive("hoist").parameters, SETUP, threads=1)
+    return fit(campaign.drive("hoist").parameters, [first, *runs[1:]], SETUP, threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -269,6 +269,17 @@ def test_every_sample_is_in_the_file(read: Page, fitted: Fit) -> None:
     assert (np.diff(time) >= 0.0).all()
 
 
+def test_ignored_spikes_leave_the_scale_to_what_counts() -> None:
+    values, weight = np.linspace(0.0, 1.0, 50), np.ones(50)
+    values[[10, 20]], weight[[10, 30]] = 99.0, 0.0
+    source = Source(Path("log.csv"), "x")
+    channel = Channel("speed", "shaft_speed", "rad/s", np.arange(50.0), values, weight, source)
+    # the other spike counts, so that its size is the scale
+    assert not off_scale(channel, values).any()
+    values[20] = 0.4
+    assert np.flatnonzero(off_scale(channel, values)).tolist() == [10]
+
+
 def test_the_page_needs_no_network(read: Page) -> None:
     for tag, attributes in read.tags:
         for key in ("src", "href", "action", "data"):
@@ -339,8 +350,8 @@ def test_truth_is_moved_to_the_scales_that_the_fit_held(campaign: Campaign) -> N
     stages = [{"name": "pump", "part": "pump", "free": free}]
     nominal = Drive.preset("hoist")
     begun = fit(
-        campaign.select(role="fit"),
         nominal.parameters,
+        campaign.select(role="fit"),
         Setup.model_validate({"stages": stages}),
         max_evaluations=1,
     )

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from swashplate import Channel, Experiment
-from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.campaign import InputSignal, Source
 from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment
-from swashplate.identification.fit import StageFit
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Free, Stage
 from swashplate.identification.solving import solve

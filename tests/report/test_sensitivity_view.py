@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 
 from swashplate import InputError, maneuvers
-from swashplate.analysis.sensitivity import one_at_a_time, ranges_of
-from swashplate.analysis.sobol import sobol
-from swashplate.analysis.trial import trial
+from swashplate.analysis.outcomes import trial
+from swashplate.analysis.sensitivity import one_at_a_time, ranges_of, sobol
 from swashplate.report.sensitivity_view import plot_sobol, plot_tornado
 
 LEVERS = ("orifice", "pump", "relief")

@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 
 from swashplate import maneuvers
-from swashplate.analysis.bands import bands
-from swashplate.analysis.draws import independent_drives
-from swashplate.analysis.trial import trial
+from swashplate.analysis.monte_carlo import bands, independent_drives
+from swashplate.analysis.outcomes import trial
 from swashplate.analysis.whatif import what_if
 from swashplate.report.bands_view import plot_bands
 from swashplate.report.whatif_view import plot_whatif

@@ -1,8 +1,7 @@
 import pytest
-
-from swashplate.reproduction.build import reproduce
-from swashplate.reproduction.catalogue import ERROR_TABLES
-from swashplate.reproduction.content import Reproduction
+from reproduction.build import reproduce
+from reproduction.catalogue import ERROR_TABLES
+from reproduction.content import Reproduction
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

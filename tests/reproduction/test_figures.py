@@ -5,16 +5,16 @@ import re
 import numpy as np
 import pytest
 from matplotlib.patches import FancyBboxPatch
+from reproduction.bench import BELOW_STOP, ON_CURRENT, with_stand_in_card
+from reproduction.build import ALL, reproduce
+from reproduction.catalogue import FIGURES
+from reproduction.content import Curve, Diagram, Figure, Reproduction
+from reproduction.diagrams import DIAGRAMS
+from reproduction.drawing import own_canvas
+from reproduction.errata import ERRATA
 
 from swashplate import Drive, maneuvers
 from swashplate.errors import InputError
-from swashplate.report.reproduction.drawing import own_canvas
-from swashplate.reproduction.bench import BELOW_STOP, ON_CURRENT, with_stand_in_card
-from swashplate.reproduction.build import ALL, reproduce
-from swashplate.reproduction.catalogue import FIGURES
-from swashplate.reproduction.content import Curve, Diagram, Figure, Reproduction
-from swashplate.reproduction.diagrams import DIAGRAMS
-from swashplate.reproduction.errata import ERRATA
 
 
 @pytest.fixture

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import pytest
 from matplotlib.text import Text
+from reproduction.content import Cell, Curve, Figure, Panel, Reproduction, Table
+from reproduction.drawing import own_canvas
+from reproduction.page import write_page
+from reproduction.printed import write_pdf
+from reproduction.wording import as_html, as_mathtext, length_of
 
 from swashplate.errors import FileError
-from swashplate.report.reproduction import write_page, write_pdf
-from swashplate.report.reproduction.drawing import own_canvas
-from swashplate.report.reproduction.wording import as_html, as_mathtext, length_of
-from swashplate.reproduction.content import Cell, Curve, Figure, Panel, Reproduction, Table
 
 
 class Page(HTMLParser):

@@ -3,11 +3,10 @@
 import re
 
 import pytest
-
-from swashplate.reproduction.build import reproduce
-from swashplate.reproduction.catalogue import ERROR_TABLES, TABLES
-from swashplate.reproduction.content import Cell, Reproduction, Table
-from swashplate.reproduction.virtual_errors import thesis_errors
+from reproduction.build import reproduce
+from reproduction.catalogue import ERROR_TABLES, TABLES
+from reproduction.content import Cell, Reproduction, Table
+from reproduction.virtual_errors import thesis_errors
 
 PARAMETER_TABLES = [number for number in TABLES if number not in (*ERROR_TABLES, "7.1")]
 NUMBER = re.compile(r"-?\d+\.?\d*(?:[eE][-+]?\d+)?")

@@ -173,11 +173,12 @@ def test_refinements_give_the_same_bits_every_way(hoist: Drive, case: str) -> No
     """March, stepper and lanes, over every option of the pump."""
     changes, form = REFINED[case]
     drive = variant(hoist.replace(**changes), form)
-    voltage = command()[:900]
-    run = drive.simulate(voltage)
-    samples = stepped(drive, voltage, 512.0)
-    for name in SIGNALS:
-        assert np.array_equal(samples[name], getattr(run, name)), name
+    for rate, start, held in ((200.0, "steady", "previous"), (512.0, "rest", "linear")):
+        voltage = command(rate)[:900] + (0.5 if start == "steady" else 0.0)
+        run = drive.simulate(voltage, rate, start=start, interpolation=held)
+        samples = stepped(drive, voltage, rate, start=start, interpolation=held)
+        for name in SIGNALS:
+            assert np.array_equal(samples[name], getattr(run, name)), name
     factors = np.linspace(0.9, 1.1, 17)
     varied = {"Z16_plus": 1.2e-4 * factors, "Z10": 12.0 * factors}
     last = drive.replace(**{name: float(values[16]) for name, values in varied.items()})

@@ -81,7 +81,7 @@ def test_overflow_fails_only_its_set(hoist: Drive) -> None:
         (
             {"Z10": [3.0]},
             {"voltage": [0.0, 1.0], "cost": SquaredError([0.0])},
-            "2 samples, but 1 were measured",
+            "2 stamps for 1 values",
         ),
         (
             {"Z10": [3.0]},

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from swashplate import InputError
+from swashplate import Drive, InputError, maneuvers
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import Record, record_of
+from swashplate.simulation.residuals import Own as DriveOwn
+from swashplate.simulation.residuals import residuals
 
 pytestmark = pytest.mark.traced
 
@@ -53,61 +55,31 @@ def record(samples: int = 11, rate: float = 100.0, substeps: int = 6) -> Record:
     return record_of(np.zeros(samples), rate, what="voltage", substeps=substeps)
 
 
-def test_stamps_on_the_grid() -> None:
-    # 11 samples at 100 Hz, six steps each: 61 points, 1/600 s apart; 0.07 is no binary number
-    time = [-1.0, 0.0, 0.07, 0.07 + 0.25 / 600.0, 0.1, 5.0]
-    observed = ObservedRecord(
-        record(), [speed(time=time, values=np.zeros(6), unknown=["clock_offset"])]
-    )
-    plan = observed.plan(Own(), 7)
-    assert plan.cell.tolist() == [0, 0, 42, 42, 60, 60]
-    np.testing.assert_allclose(plan.fraction, [0, 0, 0, 0.25, 0, 0], rtol=0.0, atol=1e-9)
-    assert (plan.fraction[[0, 1, 2, 4, 5]] == 0.0).all()
-    # held outside, half of one side's slope at the ends, the mean of both on the grid
-    np.testing.assert_allclose(plan.back / 600.0, [0, 0, 0.5, 0, 0.5, 0], atol=1e-12)
-    np.testing.assert_allclose(plan.ahead / 600.0, [0, 0.5, 0.5, 1, 0, 0], atol=1e-12)
-    assert (plan.offset_column.tolist(), plan.clock_column.tolist()) == ([-1], [7])
-    assert not plan.regular[0]
-
-
-def test_successive_points_are_noticed() -> None:
-    grid = record_of(np.zeros(50), 512.0, what="voltage")
-    time = np.arange(10, 40) / 512.0
-    plain = speed(time=time, values=time)
-    gap = speed(time=np.delete(time, 5), values=np.delete(time, 5))
-    late = speed(time=time, values=time, delay=0.5 / 512.0)
-    whole = speed(time=time, values=time, delay=3.0 / 512.0)
-    plan = ObservedRecord(grid, [plain, gap, late, whole]).plan(Own(), 0)
-    assert plan.regular.tolist() == [True, False, False, True]
-    assert plan.cell[[0, 30 + 29 + 30]].tolist() == [10, 7]
-    assert plan.kept.shape == (4, 0)
-    assert plan.back.size == 0
-
-
-def test_offsets_of_values_and_clocks() -> None:
+def test_residuals_at_any_stamps(hoist: Drive) -> None:
+    """On the grid, between its points, and outside the record, where the ends are held."""
+    command = maneuvers.step(4.0, start=0.1, stop=0.6, length=1.0).sample(100.0)
+    run = hoist.simulate(command, 100.0)
+    fine = hoist.simulate_current(run.fine("current"), 600.0)
+    time = np.array([-1.0, 0.0, 0.07, 0.07 + 0.25 / 600.0, 0.5, 0.5, 5.0])
     both = ("clock_offset", "offset")
     observed = ObservedRecord(
-        record_of(np.zeros(2000), 512.0, what="voltage"),
+        record_of(command, 100.0, what="voltage"),
         [
-            speed(),
-            speed(unknown=both, poles=(10.0, 20.0)),
-            speed(unknown=("offset",), poles=(5.0,)),
+            speed(time=time, values=np.arange(7.0), weight=2.0, delay=0.003, unknown=both),
+            speed(time=time, values=np.zeros(7), unknown=("offset",)),
         ],
     )
     assert observed.own_columns == (
+        "offset of shaft_speed [0]",
+        "clock_offset of shaft_speed [0]",
         "offset of shaft_speed [1]",
-        "clock_offset of shaft_speed [1]",
-        "offset of shaft_speed [2]",
     )
-    plan = observed.plan(Own(offsets=(0.0, 0.5, 0.0), clock_offsets=(0.0, 0.0, 0.25)), 4)
-    assert plan.measured.tolist() == [1.0, 2.0, 3.0, 0.5, 1.5, 2.5, 1.0, 2.0, 3.0]
-    assert plan.cell.tolist() == [0, 512, 1024, 0, 512, 1024, 128, 640, 1152]
-    assert plan.offset_column.tolist() == [-1, 4, 6]
-    assert plan.clock_column.tolist() == [-1, 5, -1]
-    expected = np.exp(-np.array([[np.inf, np.inf], [10.0, 20.0], [5.0, np.inf]]) / 512.0)
-    np.testing.assert_allclose(plan.kept, expected, rtol=1e-15)
-    assert observed.rows == 9
-    assert observed.rows_of(1) == slice(3, 6)
+    assert observed.rows_of(1) == slice(7, 14)
+    found = residuals(hoist.parameters, observed, DriveOwn(None, (0.5, 0.0), (0.0, 0.25)))
+    late = np.interp(time - 0.003, fine.time, fine.shaft_speed) + 0.5 - np.arange(7.0)
+    ahead = np.interp(time + 0.25, fine.time, fine.shaft_speed)
+    np.testing.assert_allclose(found[:7], 2.0 * late, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(found[7:], ahead, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(

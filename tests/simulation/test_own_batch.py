@@ -78,6 +78,31 @@ def many(**options):
     return simulate_many(valve, P, SETS, INPUTS, RATE, given=STROKE, **options)
 
 
+def test_sets_begin_where_they_are_told_to() -> None:
+    """A set's own state at the first sample, as `simulate` takes it, to the last bit."""
+    begins = np.linspace(-0.04, 0.2, COUNT)
+    changes = {"start.position": begins, "gain": np.linspace(0.1, 0.9, COUNT)}
+    batch = simulate_many(
+        valve, P, changes, INPUTS, RATE, given=STROKE, output="position", executor=Serial()
+    )
+    assert not batch.failures
+    for k in (0, 17, COUNT - 1):
+        p = P._replace(gain=changes["gain"][k])
+        begin = {"position": begins[k]}
+        run = simulate(valve, p, INPUTS, RATE, given=STROKE, begin=begin)
+        assert np.array_equal(batch.output[k], run["position"])
+    many = {"pump.Z10": np.full(3, 12.0), "start.pump.pressure": np.array([0.0, 2e5, 4e5])}
+    parts = instance_of(Drive.preset("hoist").parameters, by_voltage=False).parts
+    p = pump_drive.parameters(*(part.p for part in parts))
+    options = pump_drive.options(parts[1].options)
+    record = {"current": np.full(200, 0.45)}
+    found = simulate_many(pump_drive, p, many, record, 512.0, output="shaft_speed", options=options)
+    begin = {"pump.pressure": 4e5}
+    p = p._replace(pump=p.pump._replace(Z10=12.0))
+    run = simulate(pump_drive, p, record, 512.0, options=options, begin=begin)
+    assert np.array_equal(found.output[2], run["shaft_speed"])
+
+
 def test_each_set_is_what_it_is_alone_to_the_last_bit() -> None:
     found = many(output="position")
     assert found.output.shape == (COUNT, COMMAND.size)
@@ -177,7 +202,7 @@ REFUSED = {
     "cost": ({"cost": SquaredError(COMMAND)}, "valve has no signal 'shaft_speed'"),
     "measured": (
         {"cost": SquaredError([1.0], output="position")},
-        "400 samples, but 1 were measured",
+        "400 stamps for 1 values",
     ),
     "given": ({"given": None}, "its given must be a Stroke, not None"),
     "input": ({"inputs": {"voltage": COMMAND}}, "valve has no input 'voltage'; it has command"),

@@ -156,23 +156,6 @@ def test_a_soft_line_swings_at_its_frequency(hoist: Drive) -> None:
     assert RATE / np.diff(rising).mean() == pytest.approx(np.sqrt(1e6 / 5e3) / (2 * np.pi), rel=0.1)
 
 
-def test_the_stepper_gives_the_same_numbers(hoist: Drive) -> None:
-    drive = hoist.replace(**ALL)
-    for rate, start, held in ((512.0, "rest", "linear"), (200.0, "steady", "previous")):
-        command = maneuvers.step(6.5, start=0.2, stop=0.7, length=1.25).sample(rate) + 0.5
-        run = drive.simulate(command, rate, start=start, interpolation=held)
-        stepper = drive.stepper(1.0 / rate, interpolation=held, start=start)
-        half = command.size // 2
-        samples = [stepper.step(each) for each in command[:half]]
-        kept = stepper.state
-        stepper.step(-3.0)
-        stepper.state = kept
-        samples += [stepper.step(each) for each in command[half:]]
-        for name in SIGNALS:
-            made = [getattr(each, name) for each in samples]
-            np.testing.assert_array_equal(made, getattr(run, name), err_msg=name)
-
-
 def test_limits_are_those_of_what_really_moves(hoist: Drive) -> None:
     run = hoist.replace(**ALL).simulate(maneuvers.step(9.0).sample(RATE))
     assert run.active(Limit.ORIFICE).any()

@@ -15,9 +15,16 @@ from swashplate import DomainError, Drive, InputError, Limit, ParameterError, ma
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.triangle import combine
-from swashplate.simulation.residuals import OBSERVABLE, Own, jacobian, residuals, triangle
+from swashplate.simulation.residuals import (
+    ALL_COLUMNS,
+    OBSERVABLE,
+    PUMP_COLUMNS,
+    Own,
+    jacobian,
+    residuals,
+    triangle,
+)
 from swashplate.simulation.run import simulate_drive
-from swashplate.simulation.sensitivities import ALL_COLUMNS, PUMP_COLUMNS
 
 RATE = 512.0
 SWING = maneuvers.sine(3.0, 0.8, start=0.05, length=3.0, settle=0.4).sample(RATE)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError, Limit, Simulation, maneuvers
-from swashplate.simulation.sensitivities import ALL_COLUMNS, PUMP_COLUMNS
+from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS
 
 RATE = 512.0
 

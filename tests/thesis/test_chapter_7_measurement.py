@@ -5,12 +5,13 @@ import pytest
 import sympy as sp
 
 from swashplate import Drive, maneuvers
-from swashplate.campaign.encoder import interpolate_counts, radians_per_count
-from swashplate.campaign.filters import (
+from swashplate.campaign import (
     DIFFERENTIATOR,
     LOW_PASS,
+    interpolate_counts,
     matched_speed,
     path_delay,
+    radians_per_count,
     speed_from_angle,
 )
 from swashplate.simulation.batch import SquaredError

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.campaign.kinds import CHANNEL_KINDS
+from swashplate.campaign import CHANNEL_KINDS
 from swashplate.full_order import FullOrderDrive
 
 

@@ -1,18 +1,147 @@
-"""Outcomes: what a drive made of a command, one number each."""
+"""Outcomes of a command: what a drive made of it, one number each, for one drive or many."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import cached_property, partial
+from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from swashplate.analysis.trial import Trial
+from swashplate.drive import Drive
+from swashplate.equations.marching.lanes import LANES
 from swashplate.errors import InputError
+from swashplate.executors import Serial, available_cores
+from swashplate.parameters.rules import FULL_VOLTAGE
+
+# --- trial ----------------------------------------------------------------------------------------
+
 
 Array = NDArray[np.float64]
+
+REST = 0.5
+"""A command that rests at 0 V this long lets the drive settle at its creep. [s]"""
+STOPPED = 1.0 - 1e-9
+"""Part of the speed limit from which the plate counts as at its stop."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A command, and the speed that a perfect drive would make of it. Make it with `trial`."""
+
+    voltage: Array
+    """(n,) [V]"""
+    rate: float
+    """Samples a second. [Hz]"""
+    wanted: Array
+    """(n,) speed of the shaft. [rad/s]"""
+
+    @property
+    def time(self) -> Array:
+        """(n,) time stamps. [s]"""
+        return np.arange(self.voltage.size) / self.rate
+
+    @cached_property
+    def begin(self) -> int:
+        """Sample from which on the command leaves its first value: the last one before it."""
+        return max(int(np.argmax(self.voltage != self.voltage[0])) - 1, 0)
+
+    @cached_property
+    def held(self) -> int:
+        """The last sample at which the command is at its largest, either way."""
+        size = np.abs(self.voltage)
+        return int(np.flatnonzero(size >= size.max() - 1e-9)[-1])
+
+    @property
+    def rests(self) -> bool:
+        """Whether the command begins at 0 V and stays there long enough to see the drive creep."""
+        return bool(self.voltage[0] == 0.0 and self.begin >= REST * self.rate)
+
+
+def trial(
+    drive: Drive,
+    voltage: ArrayLike,
+    rate: float = 512.0,
+    *,
+    wanted: ArrayLike | None = None,
+) -> Trial:
+    """A command to judge drives by.
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive as it is.
+    voltage : (n,) array_like
+        Command. [V]
+    rate : float
+        Samples a second. [Hz]
+    wanted : (n,) array_like, optional
+        Speed that a perfect drive would have; by default `proportional_speed` of this drive,
+        which stays what is wanted of its variants. [rad/s]
+
+    Raises
+    ------
+    InputError
+        If the command is no row of at least two numbers within ±10 V that changes, or the wanted
+        speed is not as long.
+    """
+    volts = np.array(voltage, dtype=np.float64)
+    if volts.ndim != 1 or volts.size < 2 or not (np.abs(volts) <= FULL_VOLTAGE).all():
+        raise InputError("A command needs two samples or more, in one row, within ±10 V.")
+    if (volts == volts[0]).all():
+        raise InputError(f"The command stays at {volts[0]:g} V; to judge a drive it has to change.")
+    if wanted is None:
+        speed = proportional_speed(drive, volts)
+    else:
+        speed = np.array(wanted, dtype=np.float64)
+        if speed.shape != volts.shape or not np.isfinite(speed).all():
+            raise InputError(
+                f"The wanted speed must be {volts.size} finite numbers, one a sample of the "
+                "command."
+            )
+    return Trial(volts, float(rate), speed)
+
+
+def proportional_speed(drive: Drive, voltage: ArrayLike) -> Array:
+    """Speed in proportion to the command, each way at the drive's own ratio. [rad/s]
+
+    Parameters
+    ----------
+    drive : Drive
+        Its speed limit by the voltage that first reaches it is the ratio, beyond the limit, too.
+    voltage : (n,) array_like
+        Command. [V]
+    """
+    volts = np.asarray(voltage, dtype=np.float64)
+    plus, minus = speed_per_volt(drive, 1.0), speed_per_volt(drive, -1.0)
+    return np.where(volts >= 0.0, plus, minus) * volts
+
+
+def speed_per_volt(drive: Drive, sign: float) -> float:
+    """Speed limit by the voltage that first reaches it. [(rad/s)/V]
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive.
+    sign : float
+        Positive or negative direction.
+    """
+    low, high = 0.0, FULL_VOLTAGE
+    limit = abs(drive.steady_speed(float(np.copysign(FULL_VOLTAGE, sign))))
+    for _ in range(4):  # each pass narrows the place a hundredfold
+        volts = np.linspace(low, high, 101)
+        stopped = np.abs(drive.steady_speed(np.copysign(volts, sign))) >= STOPPED * limit
+        first = max(int(np.argmax(stopped)), 1)
+        low, high = float(volts[first - 1]), float(volts[first])
+    return limit / high
+
+
+# --- outcomes -------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -193,3 +322,197 @@ _ALL = (
 
 OUTCOMES: Mapping[str, Outcome] = {each.name: each for each in _ALL}
 """Outcomes by name."""
+
+
+# --- performance ----------------------------------------------------------------------------------
+
+
+Direction = Literal["both", "positive", "negative"]
+
+SIGNS: Mapping[Direction, tuple[float, ...]] = {
+    "both": (1.0, -1.0),
+    "positive": (1.0,),
+    "negative": (-1.0,),
+}
+STEP_LENGTH = 2.0
+"""Of the full step that shows the largest acceleration. [s]"""
+STEP_RATE = 512.0
+
+
+class Performance(NamedTuple):
+    """What a drive can do; of two directions the worse one."""
+
+    speed: float
+    """That the largest command settles at. [rad/s]"""
+    acceleration: float
+    """Largest one after a full step from rest. [rad/s²]"""
+    tracking_error: float | None
+    """RMS difference from the wanted speed, None where none is wanted. [rad/s]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """A speed to follow. Make it with `wanted`, which checks."""
+
+    speed: Array
+    """(n,) [rad/s]"""
+    rate: float
+    """Samples a second. [Hz]"""
+
+
+def wanted(speed: ArrayLike, rate: float = 512.0) -> Wanted:
+    """A speed to follow.
+
+    Parameters
+    ----------
+    speed : (n,) array_like
+        [rad/s]
+    rate : float
+        Samples a second. [Hz]
+
+    Raises
+    ------
+    InputError
+        If it is no row of two finite numbers or more.
+    """
+    profile = np.array(speed, dtype=np.float64)
+    if profile.ndim != 1 or profile.size < 2 or not np.isfinite(profile).all():
+        raise InputError("The wanted speed must be two finite numbers or more, in one row.")
+    return Wanted(profile, float(rate))
+
+
+def performance(
+    drive: Drive, follow: Wanted | None = None, *, direction: Direction = "both"
+) -> Performance:
+    """What a drive can do.
+
+    Parameters
+    ----------
+    drive : Drive
+        From rest.
+    follow : Wanted, optional
+        A speed to follow. The command is in proportion to it, by the drive's own ratio (see
+        `trial.speed_per_volt`), and ends at ±10 V: a larger pump is given less voltage.
+    direction : {"both", "positive", "negative"}
+        Which speed and acceleration count.
+
+    Raises
+    ------
+    DomainError
+        If the drive leaves the model's domain.
+    """
+    signs = SIGNS[direction]
+    speed = min(abs(drive.steady_speed(sign * FULL_VOLTAGE)) for sign in signs)
+    acceleration = min(_acceleration(drive, sign) for sign in signs)
+    error = None
+    if follow is not None:
+        run = drive.simulate(command_for(drive, follow), follow.rate)
+        error = float(np.sqrt(np.mean((run.shaft_speed - follow.speed) ** 2)))
+    return Performance(float(speed), acceleration, error)
+
+
+def command_for(drive: Drive, follow: Wanted) -> Array:
+    """Voltage in proportion to a wanted speed, by the drive's own ratio, within ±10 V. [V]"""
+    ratio = np.where(
+        follow.speed >= 0.0,
+        max(speed_per_volt(drive, 1.0), 1e-300),
+        max(speed_per_volt(drive, -1.0), 1e-300),
+    )
+    return np.clip(follow.speed / ratio, -FULL_VOLTAGE, FULL_VOLTAGE)
+
+
+def _acceleration(drive: Drive, sign: float) -> float:
+    """Largest acceleration in a direction after a full step. [rad/s²]"""
+    voltage = np.full(int(STEP_LENGTH * STEP_RATE) + 1, sign * FULL_VOLTAGE)
+    voltage[0] = 0.0
+    change = np.diff(drive.simulate(voltage, STEP_RATE).shaft_speed)
+    return float((sign * change).max() * STEP_RATE)
+
+
+# --- outcome batch --------------------------------------------------------------------------------
+
+
+SAMPLES_AT_ONCE = 2**20
+"""Samples of speed that a block of drives holds: 8 MB, whatever the number of drives."""
+
+
+@dataclass(frozen=True, eq=False)
+class BatchOutcomes:
+    """Outcomes of many drives over one command."""
+
+    outcomes: tuple[Outcome, ...]
+    values: Array
+    """(m, K); NaN where a drive has no such outcome, and in all of a drive that failed."""
+    failures: Mapping[int, str]
+    """Why a drive could not be simulated, by its number."""
+
+    def undefined(self, number: int) -> int:
+        """How many of the drives that ran have no such outcome."""
+        failed = np.zeros(len(self.values), dtype=bool)
+        failed[list(self.failures)] = True
+        return int((np.isnan(self.values[:, number]) & ~failed).sum())
+
+
+def batch_outcomes(
+    drive: Drive,
+    columns: Mapping[str, Array],
+    trial: Trial,
+    outcomes: Sequence[Outcome],
+    *,
+    threads: int | None = None,
+) -> BatchOutcomes:
+    """Simulate many variants of a drive over one command and keep only their outcomes.
+
+    Parameters
+    ----------
+    drive : Drive
+        What is not varied.
+    columns : mapping of str to (m,) array
+        Values by symbol or column, one a variant, as `Drive.simulate_many` takes them. [SI]
+    trial : Trial
+        The command, from rest.
+    outcomes : sequence of Outcome
+        What to keep.
+    threads : int, optional
+        Blocks at once, one a core by default. The numbers do not depend on it.
+
+    Raises
+    ------
+    InputError
+        If the columns do not fit the drive or each other.
+
+    Notes
+    -----
+    Speeds are made block by block and dropped, so that memory grows with the outcomes alone.
+    """
+    count = len(next(iter(columns.values())))
+
+    def block(first: int, size: int) -> tuple[Array, dict[int, str]]:
+        part = {name: values[first : first + size] for name, values in columns.items()}
+        run = drive.simulate_many(part, voltage=trial.voltage, rate=trial.rate, executor=Serial())
+        assert run.output is not None
+        ran = np.ones(len(run.output), dtype=bool)
+        ran[list(run.failures)] = False
+        kept = np.full((ran.size, len(outcomes)), np.nan)
+        kept[ran] = outcome_matrix(run.output[ran], trial, outcomes)
+        return kept, {first + k: why for k, why in run.failures.items()}
+
+    # whole blocks of what the batch marches side by side
+    size = max(SAMPLES_AT_ONCE // trial.voltage.size // LANES * LANES, LANES)
+    with ThreadPoolExecutor(threads or available_cores()) as pool:
+        done = list(pool.map(partial(block, size=size), range(0, count, size)))
+    return BatchOutcomes(
+        tuple(outcomes),
+        np.concatenate([kept for kept, _ in done]),
+        {k: why for _, failures in done for k, why in failures.items()},
+    )
+
+
+def undefined_sentences(found: BatchOutcomes) -> Iterator[str]:
+    """What some of the drives have not, and why."""
+    for number, each in enumerate(found.outcomes):
+        missing = found.undefined(number)
+        if missing:
+            yield (
+                f"{missing} of {len(found.values)} variants have no {each.name}: {each.undefined}."
+            )

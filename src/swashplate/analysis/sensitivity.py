@@ -1,19 +1,29 @@
-"""Sensitivities of outcomes to levers, one lever at a time."""
+"""Sensitivities of outcomes to levers: one at a time, and Sobol's indices."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.analysis.levers import find_lever, pulled_columns
-from swashplate.analysis.outcome_batch import batch_outcomes, undefined_sentences
-from swashplate.analysis.outcomes import Outcome, find_outcomes
-from swashplate.analysis.trial import Trial
+from swashplate.analysis.outcomes import (
+    BatchOutcomes,
+    Outcome,
+    Trial,
+    batch_outcomes,
+    find_outcomes,
+    undefined_sentences,
+)
+from swashplate.analysis.whatif import find_lever, pulled_columns
 from swashplate.drive import Drive
 from swashplate.errors import InputError
+
+# --- sensitivity ----------------------------------------------------------------------------------
+
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
@@ -125,3 +135,140 @@ def check_ranges(ranges: Mapping[str, Range]) -> None:
             raise InputError(
                 f"The factors on {name} must rise from 0 or more, not {low:g} to {high:g}."
             )
+
+
+# --- sobol ----------------------------------------------------------------------------------------
+
+
+FEWEST, MOST = 16, 2**20
+"""Base samples of Sobol's sequence."""
+
+
+@dataclass(frozen=True, eq=False)
+class SobolIndices:
+    """Shares of the outcomes' variances that levers are the cause of."""
+
+    levers: tuple[str, ...]
+    outcomes: tuple[Outcome, ...]
+    ranges: Mapping[str, Range]
+    """Factors by lever; all values between are equally likely."""
+    first: Array
+    """(L, K) share that a lever causes by itself; NaN where an outcome has no indices."""
+    total: Array
+    """(L, K) share with all that it does together with others."""
+    first_error: Array
+    """(L, K) half width of the 95 % interval, from resampling."""
+    total_error: Array
+    """(L, K) as `first_error`."""
+    mean: Array
+    """(K,) of the outcomes. [their units]"""
+    deviation: Array
+    """(K,) standard deviation of the outcomes. [their units]"""
+    runs: int
+    """Simulations in all."""
+    sentences: tuple[str, ...]
+    """Which outcomes have no indices, and why."""
+
+
+def sobol(
+    drive: Drive,
+    ranges: Mapping[str, Range],
+    trial: Trial,
+    *,
+    outcomes: Sequence[str],
+    samples: int = 1024,
+    seed: int = 0,
+    threads: int | None = None,
+) -> SobolIndices:
+    """Sobol's indices of first order and in total.
+
+    Parameters
+    ----------
+    drive, ranges, trial, outcomes, threads :
+        As of `sensitivity.one_at_a_time`; factors are equally likely between the two ends.
+    samples : int
+        Base samples N, a power of 2; L levers take N (L + 2) simulations.
+    seed : int
+        Of the scrambled sequence and of the resampling for the errors.
+
+    Raises
+    ------
+    InputError
+        If SALib is not installed, the samples are no power of 2, a variant cannot be simulated, or
+        as of `sensitivity.one_at_a_time`.
+
+    Notes
+    -----
+    Saltelli's scheme over Sobol's sequence, the estimators of SALib (Saltelli et al. 2010).
+    """
+    check_ranges(ranges)
+    if not FEWEST <= samples <= MOST or samples & (samples - 1):
+        raise InputError(
+            f"The base samples of Sobol's indices are {samples}, but must be a power of 2 from "
+            f"{FEWEST} to {MOST}."
+        )
+    sampling, analysis = _salib("sample"), _salib("analyze")
+    problem = {
+        "num_vars": len(ranges),
+        "names": list(ranges),
+        "bounds": [list(pair) for pair in ranges.values()],
+    }
+    drawn = sampling.sample(problem, samples, calc_second_order=False, seed=seed)
+    columns = pulled_columns(
+        drive.parameters.numbers, {name: drawn[:, k] for k, name in enumerate(ranges)}
+    )
+    found = batch_outcomes(drive, columns, trial, find_outcomes(outcomes), threads=threads)
+    if found.failures:
+        raise InputError(
+            f"{len(found.failures)} of {len(drawn)} variants cannot be simulated, the first "
+            f"because: {next(iter(found.failures.values())).rstrip('.')}; narrow the ranges."
+        )
+    return _indices(found, analysis, problem, dict(ranges), seed)
+
+
+def _indices(
+    found: BatchOutcomes,
+    analysis: Any,
+    problem: dict[str, Any],
+    ranges: dict[str, Range],
+    seed: int,
+) -> SobolIndices:
+    values = found.values
+    shape = (len(ranges), len(found.outcomes))
+    parts = {key: np.full(shape, np.nan) for key in ("S1", "ST", "S1_conf", "ST_conf")}
+    sentences = list(undefined_sentences(found))
+    for k, each in enumerate(found.outcomes):
+        column = values[:, k]
+        if np.isnan(column).any():
+            continue
+        if np.ptp(column) <= 1e-12 * np.abs(column).max():
+            sentences.append(f"None of the levers moves {each.name}.")
+            continue
+        made = analysis.analyze(
+            problem, column, calc_second_order=False, seed=seed, print_to_console=False
+        )
+        for key, into in parts.items():
+            into[:, k] = made[key]
+    return SobolIndices(
+        tuple(ranges),
+        found.outcomes,
+        ranges,
+        parts["S1"],
+        parts["ST"],
+        parts["S1_conf"],
+        parts["ST_conf"],
+        values.mean(axis=0),
+        values.std(axis=0),
+        len(values),
+        tuple(sentences),
+    )
+
+
+def _salib(part: str) -> Any:
+    try:
+        return import_module(f"SALib.{part}.sobol")
+    except ImportError:
+        raise InputError(
+            "Sobol's indices need SALib, which is not installed: pip install "
+            "'swashplate[sensitivity]'."
+        ) from None

@@ -1,22 +1,204 @@
-"""What if: a drive before and after its levers are moved, over one command."""
+"""What if: levers of a machine, and a drive before and after they are moved."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from swashplate.analysis.levers import pulled
-from swashplate.analysis.outcomes import OUTCOMES, Outcome, find_outcomes, outcome_matrix
-from swashplate.analysis.trial import Trial
+from swashplate.analysis.outcomes import OUTCOMES, Outcome, Trial, find_outcomes, outcome_matrix
 from swashplate.drive import Drive
 from swashplate.errors import InputError
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.result import Simulation
 
+# --- levers ---------------------------------------------------------------------------------------
+
+
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Lever:
+    """Something on the machine that a factor can be put on."""
+
+    name: str
+    powers: Mapping[str, float]
+    """By symbol or column: the parameter is multiplied by the factor to this power."""
+    meaning: str
+    """What it is, and what the model takes it for."""
+
+
+def _both_ways(name: str, symbols: Mapping[str, float], meaning: str) -> list[Lever]:
+    """A lever for both directions, and one for each."""
+    levers = [Lever(name, symbols, meaning)]
+    for side, way in (("plus", "positive"), ("minus", "negative")):
+        powers = {f"{symbol}_{side}": power for symbol, power in symbols.items()}
+        levers.append(Lever(f"{name}_{side}", powers, f"The same, {way} direction only."))
+    return levers
+
+
+_LEVERS = (
+    *_both_ways(
+        "orifice",
+        {"Z16": 1.0},
+        "Opening area of the in-line orifices, as the spool displacement of equal area: the "
+        "acceleration limit.",
+    ),
+    *_both_ways(
+        "orifice_diameter",
+        {"Z16": 2.0},
+        "Bore of the in-line orifices; their area, and with it the opening, goes with its square.",
+    ),
+    Lever(
+        "pump",
+        {"Z10": 1.0, "Z12": 1.0},
+        "Displacement of the pump: flow, and speed of the shaft, at the same swash angle.",
+    ),
+    Lever(
+        "drive_speed",
+        {"Z10": 1.0, "Z12": 1.0},
+        "Speed of the motor that turns the pump. Flow goes with it as with the displacement; the "
+        "control pressure does not, a relief valve holds it.",
+    ),
+    Lever(
+        "supply_pressure",
+        {"Z9": 1.0},
+        "Control pressure that moves the stroking piston: its flow goes with the root.",
+    ),
+    *_both_ways("rate_limits", {"lim1": 1.0, "lim2": 1.0}, "Both rate limits of the card's ramps."),
+    *_both_ways("rate_limit_up", {"lim1": 1.0}, "Rate limit of the current away from zero."),
+    *_both_ways("rate_limit_down", {"lim2": 1.0}, "Rate limit of the current towards zero."),
+    *_both_ways(
+        "dead_zone",
+        {"V_dz": 1.0},
+        "Dead zone of the card's input; 0 is a dead zone compensated in full.",
+    ),
+    Lever("spool_stroke", {"Z14": 1.0}, "Stroke of the spool: what is left without orifices."),
+    Lever("relief", {"Z15": 1.0}, "Relief pressure of the stroking piston."),
+    Lever(
+        "plussing", {"Z18": 1.0}, "Displacement of the spool at rest, which makes the shaft creep."
+    ),
+)
+
+LEVERS: Mapping[str, Lever] = {each.name: each for each in _LEVERS}
+"""Levers by name."""
+
+
+def find_lever(name: str) -> Lever:
+    """A lever by name; a parameter's symbol or column is one, too.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    if name in LEVERS:
+        return LEVERS[name]
+    if name in CATALOGUE or name in COLUMNS:
+        symbol = COLUMNS.get(name, name)
+        return Lever(name, {name: 1.0}, f"Parameter {name}: {CATALOGUE[symbol].name}.")
+    close = get_close_matches(name, [*LEVERS, *CATALOGUE, *COLUMNS], n=1)
+    hint = f" (did you mean {close[0]}?)" if close else ""
+    main = [each for each in LEVERS if not each.endswith(("_plus", "_minus"))]
+    raise InputError(
+        f"There is no lever '{name}'{hint}; the levers are {', '.join(main)}, those with two "
+        "directions also as e.g. orifice_plus, and every parameter by its symbol."
+    )
+
+
+def column_factors(factors: Mapping[str, ArrayLike]) -> dict[str, Array]:
+    """Factors on single parameters that factors on levers come to.
+
+    Parameters
+    ----------
+    factors : mapping of str to float or (m,) array_like
+        By lever. Levers that move the same parameter multiply. [1]
+
+    Returns
+    -------
+    dict of str to array
+        By column such as ``Z16_plus``. [1]
+
+    Raises
+    ------
+    InputError
+        For an unknown lever or a factor that is negative or NaN.
+    """
+    columns: dict[str, Array] = {}
+    for name, given in factors.items():
+        lever, factor = find_lever(name), np.asarray(given, dtype=np.float64)
+        if not (factor >= 0.0).all():
+            bad = factor[~(factor >= 0.0)].flat[0]
+            raise InputError(f"The factor on {name} is {bad:g}, but must be 0 or more.")
+        for symbol, power in lever.powers.items():
+            for column in columns_of([symbol]):
+                columns[column] = columns.get(column, np.ones(())) * factor**power
+    return columns
+
+
+def pulled(drive: Drive, factors: Mapping[str, float]) -> Drive:
+    """The drive with its levers moved.
+
+    Parameters
+    ----------
+    drive : Drive
+        As it is.
+    factors : mapping of str to float
+        By lever, e.g. ``{"orifice": 1.5, "pump": 1.5}``. [1]
+
+    Raises
+    ------
+    InputError
+        For an unknown lever or an impossible factor.
+    ParameterError
+        If what comes out breaks a rule.
+    """
+    numbers = drive.parameters.numbers
+    return drive.replace(
+        **{
+            column: _product(column, numbers[column], float(factor))
+            for column, factor in column_factors(factors).items()
+        }
+    )
+
+
+def pulled_columns(
+    numbers: Mapping[str, float], factors: Mapping[str, ArrayLike]
+) -> dict[str, Array]:
+    """Values of the parameters that levers move, one for each of many settings.
+
+    Parameters
+    ----------
+    numbers : mapping of str to float
+        Every value of the drive by column.
+    factors : mapping of str to (m,) array_like
+        By lever. [1]
+
+    Returns
+    -------
+    dict of str to (m,) array
+        As `Drive.simulate_many` takes them. [the columns' units]
+    """
+    return {
+        column: np.asarray(numbers[column] * factor)
+        for column, factor in column_factors(factors).items()
+    }
+
+
+def _product(column: str, value: float, factor: float) -> float:
+    product = value * factor
+    if np.isnan(product):  # 0 times inf
+        raise InputError(f"{column} is {value:g}, which the factor {factor:g} cannot change.")
+    return product
+
+
+# --- whatif ---------------------------------------------------------------------------------------
+
 
 AS_IS, CHANGED = "as it is", "changed"
 

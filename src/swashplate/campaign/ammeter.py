@@ -1,7 +1,7 @@
 """One ammeter around both solenoid leads: what it reads, and where it cannot be trusted.
 
-It reads the sum of magnitudes, never negative. Compare it with the same of the simulation
-(`rectified_current`), and leave out what lies around the zero crossings. A sign that is put back is
+It reads the sum of magnitudes, never negative. Compare it with the same of the simulation, and
+leave out what lies around the zero crossings. A sign that is put back is
 a guess there: never take derivatives through it.
 """
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from swashplate.campaign.stamps import Array, Mask, increasing, signal
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import not_negative, positive
+from swashplate.maneuvers.pieces import not_negative, positive
 
 
 class ZeroCrossings(NamedTuple):
@@ -22,8 +22,6 @@ class ZeroCrossings(NamedTuple):
     """Instants of the crossings; of a stay at zero, when it begins and ends. [s]"""
     masked: Mask
     """True for samples within half the width of an instant: leave them out."""
-    fraction: float
-    """Share of samples masked, 0 to 1."""
 
 
 class SignedCurrent(NamedTuple):
@@ -33,41 +31,6 @@ class SignedCurrent(NamedTuple):
     """Positive where the command is. [A]"""
     masked: Mask
     """True where the sign is a guess: leave these samples out."""
-    fraction: float
-    """Share of samples masked, 0 to 1."""
-
-
-def rectified_current(positive_current: ArrayLike, negative_current: ArrayLike) -> Array:
-    """What the ammeter reads of the currents in both solenoids.
-
-    Parameters
-    ----------
-    positive_current, negative_current : array_like, shape (n,) or (n, k)
-        Currents of the two channels, whatever the signs given to them. [A]
-
-    Returns
-    -------
-    array, same shape
-        ``|I₊| + |I₋|``, never negative. [A]
-
-    Raises
-    ------
-    InputError
-        If the shapes differ or a number is not finite.
-    """
-    plus, minus = (np.atleast_1d(each) for each in (positive_current, negative_current))
-    if plus.shape != minus.shape:
-        raise InputError(
-            "positive_current and negative_current must have the same shape, not "
-            f"{plus.shape} and {minus.shape}."
-        )
-    total = np.abs(plus) + np.abs(minus)
-    wrong = np.argwhere(~np.isfinite(total))
-    if wrong.size:
-        raise InputError(
-            f"The currents must be finite, but row {wrong[0][0]} (the first is 0) is not."
-        )
-    return np.asarray(total, dtype=np.float64)
 
 
 def zero_crossings(
@@ -117,7 +80,7 @@ def zero_crossings(
         strict=True,
     ):
         masked[first:last] = True
-    return ZeroCrossings(instants, masked, float(masked.mean()))
+    return ZeroCrossings(instants, masked)
 
 
 def signed_by_command(
@@ -174,4 +137,4 @@ def signed_by_command(
     last = np.maximum.accumulate(np.where(known, np.arange(rows), -1))
     sign = np.where(last < 0, 1.0, np.sign(drive[last]))
     masked = crossings.masked | (last < 0)
-    return SignedCurrent(sign * reading, masked, float(masked.mean()))
+    return SignedCurrent(sign * reading, masked)

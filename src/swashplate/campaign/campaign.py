@@ -1,24 +1,37 @@
-"""A campaign: the tests of a machine, read from their logs."""
+"""Campaigns: a file that says what logs hold, and the experiments that are read from them."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.loading import read_campaign_file, read_experiments
-from swashplate.campaign.schema import Axis, CampaignFile, Role
-from swashplate.errors import InputError
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.campaign import schema
+from swashplate.campaign.encoder import CounterRangeError, ambiguous_gaps, unwrap_counts
+from swashplate.campaign.experiment import Channel, Encoder, Experiment, InputSignal, Source
+from swashplate.campaign.recognition import recognise
+from swashplate.campaign.schema import applying, conversion, inside
+from swashplate.documents import parse_toml, read_text, validated
+from swashplate.errors import FileError, InputError
+from swashplate.logs import Column, Log, check_stamps, open_log, unit_of
+from swashplate.units import to_si
 
 if TYPE_CHECKING:
     from swashplate.drive import Drive
 
-_LISTED = 12
+Array = NDArray[np.float64]
+
+LISTED = 12
 """Runs that a sentence names."""
+SINCE_1970 = 1e8
+"""Stamps that begin beyond this are seconds of a calendar and are counted from the first. [s]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +49,10 @@ class Campaign:
     title: str
     virtual: bool
     """Whether the tests are simulated."""
-    axes: Mapping[str, Axis]
+    axes: Mapping[str, schema.Axis]
     experiments: tuple[Experiment, ...]
+    ignored: tuple[str, ...] = ()
+    """Runs with the role ``"ignore"``, whose logs were not opened."""
 
     @classmethod
     def from_toml(cls, path: str | Path, *, logs: str | Path | None = None) -> Campaign:
@@ -60,15 +75,26 @@ class Campaign:
             If a column is missing, a unit wrong or a name taken twice.
         """
         file = read_campaign_file(path)
-        experiments = tuple(read_experiments(path, file, logs))
+        folder = Path(path).parent if logs is None else Path(logs)
+        experiments, ignored, names = [], [], run_names(path, file)
+        for number, (name, run) in enumerate(zip(names, file.runs, strict=True), 1):
+            if run.role == "ignore":
+                ignored.append(name)
+                continue
+            place = f"{path}: run {number} ({run.file})"
+            log = open_log(folder / run.file, options=file.format)
+            experiments += read_run(place, name, run, file.axes, log)
         title = file.title or Path(path).resolve().parent.name
-        return cls(Path(path), title, file.virtual, file.axes, experiments)
+        return cls(Path(path), title, file.virtual, file.axes, tuple(experiments), tuple(ignored))
 
     def __iter__(self) -> Iterator[Experiment]:
         return iter(self.experiments)
 
     def __len__(self) -> int:
         return len(self.experiments)
+
+    def __repr__(self) -> str:
+        return f"Campaign({self.title!r}, {len(self)} experiments on {', '.join(self.axes)})"
 
     def __getitem__(self, name: str) -> Experiment:
         """An experiment by its name.
@@ -81,15 +107,17 @@ class Campaign:
         for each in self.experiments:
             if each.name == name:
                 return each
+        if any(name == run or name.startswith(f"{run} ") for run in self.ignored):
+            raise InputError(f"{self.path}: the run '{name}' has the role 'ignore'.")
         names = [each.name for each in self.experiments]
         near = get_close_matches(name, names, 1)
         meant = f" (did you mean {near[0]}?)" if near else ""
-        known = ", ".join(names[:_LISTED])
-        more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+        known = ", ".join(names[:LISTED])
+        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
         raise InputError(f"{self.path} has no run '{name}'{meant}; it has {known}{more}.")
 
     def select(
-        self, *, axis: str | None = None, role: Role | None = None
+        self, *, axis: str | None = None, role: schema.Role | None = None
     ) -> tuple[Experiment, ...]:
         """Its experiments of an axis, of a role, or both.
 
@@ -129,7 +157,385 @@ class Campaign:
 
 def json_schema() -> str:
     """JSON Schema of a campaign file, for editors that complete and check while one writes."""
-    schema = CampaignFile.model_json_schema(by_alias=True)
-    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
-    schema["title"] = "swashplate campaign"
-    return json.dumps(schema, indent=2) + "\n"
+    made = schema.CampaignFile.model_json_schema(by_alias=True)
+    made["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    made["title"] = "swashplate campaign"
+    return json.dumps(made, indent=2) + "\n"
+
+
+def read_campaign_file(path: str | Path) -> schema.CampaignFile:
+    """Contents of a campaign file, without its logs.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read or is not TOML.
+    ParameterError
+        If an entry is wrong; the sentence names it.
+    """
+    origin = str(path)
+    return validated(parse_toml(read_text(path), origin), schema.CampaignFile, origin)
+
+
+def run_names(path: str | Path, file: schema.CampaignFile) -> list[str]:
+    """Names of the runs in their order, each its own.
+
+    Raises
+    ------
+    InputError
+        If two are the same.
+    """
+    names = [run.name or Path(run.file).stem for run in file.runs]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{path}: two runs are called '{name}'; give each a name of its own.")
+    return names
+
+
+# --- a run ----------------------------------------------------------------------------------------
+
+
+def read_run(
+    place: str, name: str, run: schema.Run, axes: Mapping[str, schema.Axis], log: Log
+) -> list[Experiment]:
+    """Experiments of a run, one for each axis that it tests, and one more for each split.
+
+    Parameters
+    ----------
+    place : str
+        The run, for sentences about the campaign file.
+    name : str
+        Its name.
+    run, axes : schema.Run, mapping of str to schema.Axis
+        Its entry, and the axes of the campaign.
+    log : Log
+        Its log.
+
+    Raises
+    ------
+    FileError, InputError, ParameterError
+        For the first thing that is wrong; the sentence names file, column and row.
+    """
+    tested = _axes_of(place, run, axes)
+    columns = _Columns(log, [each for axis in tested.values() for each in _wanted(axis)])
+    return [
+        each
+        for key, axis in tested.items()
+        for each in _experiments(
+            f"{name} {key}" if len(axes) > 1 else name, name, key, run, axis, columns
+        )
+    ]
+
+
+def _axes_of(
+    place: str, run: schema.Run, axes: Mapping[str, schema.Axis]
+) -> dict[str, schema.Axis]:
+    """The axes that a run tests, with what differs in it."""
+    for name in (*run.only, *run.axes):
+        if name not in axes:
+            raise InputError(
+                f"{place} names the axis '{name}', but the axes are {', '.join(axes)}."
+            )
+    tested = {}
+    for name in run.only or axes:
+        axis, origin = axes[name], f"{place}: axes.{name}"
+        changes = dict(run.axes.get(name, {}))
+        given = changes.get("channels")
+        for key, change in given.items() if isinstance(given, Mapping) else ():
+            new = isinstance(change, Mapping) and "kind" in change
+            if key not in axis.channels and not new:
+                raise InputError(
+                    f"{origin} changes the channel '{key}', but the axis has "
+                    f"{', '.join(axis.channels)}; a new channel needs its kind and column."
+                )
+        if changes:
+            content = _merged(axis.model_dump(by_alias=True, exclude_unset=True), changes)
+            if not content["channels"]:
+                raise InputError(f'{origin} has no channel left; say role = "ignore" instead.')
+            axis = validated(content, schema.Axis, origin)
+        tested[name] = axis
+    return tested
+
+
+def _merged(content: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """A table with some entries replaced, tables within it merged in turn.
+
+    Ignored windows are added to those that there are; false takes a channel out.
+    """
+    merged = dict(content)
+    for key, value in changes.items():
+        old = merged.get(key)
+        if isinstance(old, dict) and isinstance(value, Mapping):
+            merged[key] = _merged(old, value)
+        elif isinstance(old, dict) and value is False:
+            del merged[key]
+        elif key == "ignore" and isinstance(old, (list, tuple)) and isinstance(value, list):
+            merged[key] = [*old, *value]
+        else:
+            merged[key] = value
+    return merged
+
+
+def _experiments(
+    name: str, run_name: str, key: str, run: schema.Run, axis: schema.Axis, columns: _Columns
+) -> Iterator[Experiment]:
+    """One experiment, or several where a counter's position across a gap is not known."""
+    drive = _read("the input", axis.input, axis, columns, run.span)
+    assert drive is not None  # an input without samples is refused
+    signals, notes, cuts = {}, [], dict[float, str]()
+    for channel, entry in axis.channels.items():
+        read = _read(f"channel '{channel}'", entry, axis, columns, run.span)
+        if read is None:
+            notes.append(f"'{channel}' has no sample here and is left out of this run")
+            continue
+        signals[channel] = read
+        if entry.rolls_over_at is not None:
+            for row in ambiguous_gaps(read.time, read.values, entry.rolls_over_at):
+                gap = read.time[row] - read.time[row - 1]
+                cuts[float(read.time[row])] = (
+                    f"within the gap of {gap:.3g} s the counter '{channel}', which begins anew "
+                    f"after {entry.rolls_over_at}, may have gone round once more or less"
+                )
+    if not signals:
+        raise InputError(
+            f"{columns.log.path}: its channels have 0 samples that can be used; leave the run out "
+            'with role = "ignore".'
+        )
+    edges = [-np.inf, *sorted(cuts), np.inf]
+    for part, (begin, end) in enumerate(pairwise(edges)):
+        piece = drive.within(begin, end)
+        kept = {each: read.within(begin, end) for each, read in signals.items()}
+        kept = {each: read for each, read in kept.items() if read.time.size > 1}
+        if piece.time.size < 2 or not kept:
+            continue
+        said = list(notes) if part == 0 else []
+        if np.isfinite(end):
+            said.append(f"split at {end:.4g} s, from where it is a run of its own: {cuts[end]}")
+        yield _experiment(
+            name if part == 0 else f"{name} from {begin:.4g} s",
+            (run_name, key, run, axis),
+            piece,
+            kept,
+            tuple(said),
+            split=part > 0,
+        )
+
+
+def _experiment(
+    name: str,
+    of: tuple[str, str, schema.Run, schema.Axis],
+    drive: _Read,
+    signals: Mapping[str, _Read],
+    notes: tuple[str, ...],
+    *,
+    split: bool,
+) -> Experiment:
+    run_name, key, run, axis = of
+    given = InputSignal(
+        axis.input.kind,
+        drive.unit,
+        drive.time,
+        drive.values,
+        axis.input.interpolation,
+        drive.source,
+        drive.limits,
+        drive.dropped,
+    )
+    unit = {"voltage": "V", "current": "A"}.get(given.kind, given.unit)
+    recognised = recognise(given.time, given.values, unit=unit)
+    maneuver = run.maneuver or recognised.name
+    ignored = applying((*axis.ignore, *run.ignore), maneuver)
+    channels = {}
+    for channel, read in signals.items():
+        entry = axis.channels[channel]
+        values, counts, encoder = read.values, None, None
+        if entry.counts_per_turn is not None:
+            encoder = Encoder(
+                entry.counts_per_turn, entry.gear_ratio, entry.sign, entry.rolls_over_at
+            )
+            counts = _unwrapped(read, entry.rolls_over_at)
+            values = counts * encoder.angle_per_count
+        weighted = applying((*entry.weights, *run.weights), maneuver)
+        left_out = (*ignored, *applying(entry.ignore, maneuver))
+        channels[channel] = Channel(
+            channel,
+            entry.kind,
+            read.unit,
+            read.time,
+            values,
+            _weights(entry, read.time, given, left_out, weighted, run.weight),
+            read.source,
+            None if entry.noise is None else read.factor * entry.noise,
+            read.limits,
+            read.dropped,
+            encoder,
+            counts,
+        )
+    return Experiment(
+        name,
+        key,
+        run_name,
+        run.role,
+        "estimated" if split else run.start or axis.start,
+        None if split else run.start_pressure,
+        given,
+        channels,
+        run.maneuver,
+        recognised,
+        tuple(
+            (
+                -np.inf if each.start is None else each.start,
+                np.inf if each.stop is None else each.stop,
+                each.why,
+            )
+            for each in ignored
+        ),
+        notes,
+    )
+
+
+def _unwrapped(read: _Read, modulus: int | None) -> Array:
+    if modulus is None:
+        return read.values
+    try:
+        return unwrap_counts(read.values, modulus=modulus).counts
+    except CounterRangeError as error:
+        raise InputError(f"{read.source}: {error.said}; give the right rolls_over_at.") from None
+    except InputError as error:
+        raise InputError(f"{read.source}: {error}") from None
+
+
+def _weights(
+    channel: schema.Channel,
+    time: Array,
+    drive: InputSignal,
+    ignored: Sequence[schema.Window],
+    weighted: Sequence[schema.Weight],
+    factor: float,
+) -> Array:
+    """(m,) products of all factors on the squared errors that apply; 0 where ignored."""
+    product = np.full(time.shape, factor * channel.weight)
+    if channel.weight_by_input:
+        levels, factors = np.transpose(channel.weight_by_input)
+        product *= np.interp(np.abs(drive.at(time)), levels, factors)
+    for each in weighted:
+        product[inside(each, time)] *= each.factor
+    for window in ignored:
+        product[inside(window, time)] = 0.0
+    return product
+
+
+# --- the signals of a log -------------------------------------------------------------------------
+
+
+class _Columns:
+    """The wanted columns of one log, read together."""
+
+    def __init__(self, log: Log, wanted: list[tuple[str, str]]) -> None:
+        self.log = log
+        self.found: dict[str, Column] = {}
+        for name, what in wanted:
+            try:
+                self.found[name] = log.find(name)
+            except InputError as error:
+                raise InputError(f"For {what}: {error}") from None
+        self.values = log.read(list(self.found))
+
+
+def _wanted(axis: schema.Axis) -> Iterator[tuple[str, str]]:
+    """Columns that an axis needs, and what for."""
+    signals: dict[str, schema.Signal] = {"the input": axis.input}
+    signals |= {f"channel '{name}'": channel for name, channel in axis.channels.items()}
+    for what, signal in signals.items():
+        yield signal.column, what
+        for clock in (signal.time, axis.time):
+            if clock is not None and clock.column is not None:
+                yield clock.column, f"the time of {what}"
+
+
+class _Read(NamedTuple):
+    """A signal out of the log, in SI, on its stamps."""
+
+    unit: str
+    time: Array
+    values: Array
+    source: Source
+    factor: float
+    """Size of one of the signal's units in SI."""
+    limits: tuple[float, float] | None
+    dropped: int
+
+    def within(self, begin: float, end: float) -> _Read:
+        """The part from one instant to before another [s]."""
+        kept = (self.time >= begin) & (self.time < end)
+        return self._replace(time=self.time[kept], values=self.values[kept])
+
+
+def _read(
+    what: str,
+    signal: schema.Input | schema.Channel,
+    axis: schema.Axis,
+    columns: _Columns,
+    span: schema.Window | None,
+) -> _Read | None:
+    """A signal as the campaign file says; None for a channel all of whose samples are missing."""
+    column, numbers = columns.found[signal.column], columns.values[signal.column]
+    said = f"{columns.log.path}: column '{column.name}' ({what})"
+    time = _stamps(signal.time or axis.time, axis.time, columns, numbers.size)
+    if time.size != numbers.size:
+        raise FileError(f"{said} has {numbers.size} samples, but its time {time.size}.")
+    kept = np.ones(numbers.size, dtype=np.bool_) if span is None else inside(span, time)
+    missing = kept & ~np.isfinite(numbers)
+    if missing.any() and signal.missing == "refuse":
+        rows = np.flatnonzero(missing) + 1
+        others = f" and {rows.size - 1} others" if rows.size > 1 else ""
+        raise FileError(
+            f"{said} has no finite number in data row {rows[0]}{others}; mend the log, or say "
+            "missing = 'drop' to leave such samples out."
+        )
+    if isinstance(signal, schema.Channel) and missing.any() and missing.sum() == kept.sum():
+        return None
+    kept &= ~missing
+    if np.count_nonzero(kept) < 2:
+        raise FileError(
+            f"{said} has {np.count_nonzero(kept)} samples that can be used, but needs two at least."
+        )
+    first = schema.KINDS[signal.kind].units[:1] or ("1",)
+    unit = signal.unit or unit_of(column, signal.column, first[0])
+    si, factor, zero = conversion(signal.kind, unit, said)
+    # an encoder's sign belongs to the scale of its counts, see `Encoder`
+    sign = 1 if signal.kind == "encoder_counts" else signal.sign
+    written = sign * (signal.scale * numbers[kept] + signal.offset)
+    limits = signal.limits
+    return _Read(
+        si,
+        np.ascontiguousarray(time[kept]),
+        factor * written + zero,
+        Source(columns.log.path, column.name),
+        factor,
+        None if limits is None else (factor * limits[0] + zero, factor * limits[1] + zero),
+        int(np.count_nonzero(missing)),
+    )
+
+
+def _stamps(clock: schema.Clock, main: schema.Clock, columns: _Columns, size: int) -> Array:
+    """Increasing time stamps of a signal; those of a calendar from the axis's first one on. [s]"""
+    if clock.rate is not None:
+        return clock.offset + np.arange(size) / clock.rate
+    numbers, factor = _clock(clock, columns)
+    check_stamps(columns.log, columns.found[clock.column or ""].name, numbers)
+    begin, of_main = _clock(main, columns) if main.column is not None else (numbers, factor)
+    if of_main * begin[0] < SINCE_1970:
+        return factor * numbers + clock.offset
+    # the difference first: a float64 keeps a thousandth of a millisecond of such a stamp
+    since: Array = numbers - begin[0] * of_main / factor
+    return factor * since + clock.offset
+
+
+def _clock(clock: schema.Clock, columns: _Columns) -> tuple[Array, float]:
+    """Numbers of a column of time, and the size of their unit [s]."""
+    assert clock.column is not None  # the schema sees to a column or a rate
+    column, numbers = columns.found[clock.column], columns.values[clock.column]
+    unit = clock.unit or unit_of(column, clock.column, "s")
+    factor = to_si(1.0, unit, "s", f"{columns.log.path}: column '{column.name}' (the time)")
+    return numbers, factor

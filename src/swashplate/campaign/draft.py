@@ -1,34 +1,143 @@
-"""A first draft of a campaign file, from the headers of its logs."""
+"""First drafts of a campaign file: what each column of some logs may be, and a file that says so.
+
+What is not known for sure is marked "guessed"; what cannot be told stays open in a line "FIXME".
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.guesses import Guess, by_axis, guess, refined
-from swashplate.campaign.kinds import KINDS
+from swashplate.campaign.campaign import read_run
+from swashplate.campaign.encoder import rolls_over_at
+from swashplate.campaign.quality import signed
 from swashplate.campaign.recognition import recognise
+from swashplate.campaign.schema import KINDS, CampaignFile, ChannelKind, InputKind, conversion
+from swashplate.documents import parse_toml, validated
 from swashplate.errors import FileError, InputError
-from swashplate.logs import Log, open_log
+from swashplate.logs import Column, Log, open_log
+from swashplate.units import speed_unit
 
 Array = NDArray[np.float64]
 
 HEADER = """\
-# A draft, made from the headers of the logs: check each line that says "guessed".
-# What a signal is: sign * (scale * number + offset), in its unit.
+# A draft, made from the headers of the logs: check each line that says "guessed", and fill in each
+# that says "FIXME". What a signal is: sign * (scale * number + offset), in its unit.
 # Every entry is explained by `swashplate campaign schema`; `swashplate campaign check` reads
 # all logs and says what is wrong with them.
 """
-
-
 UNUSED = "# Columns that are not used"
 NO_ENCODER = "# No column looks like an encoder's counts"
-"""How the lines begin that say what the draft leaves out."""
+FIXME = "FIXME"
+"""What the lines hold that say what the draft leaves out or open."""
+
+TIME = r"time|zeit|uhrzeit|stamp|timestamp|time stamp|datetime|date time|clock|t|seconds?|exp time"
+VOLTAGE = r"volts?|voltage|joystick voltage|u|spannung"
+COMMAND = r"cmd|command|duty|setpoint|valve|stick|joystick|stellgröße|stellgroesse|sollwert"
+ROD = r"ms|displacement|stroke|cylinder|rod|extension|hub|weg"
+CHANNELS: tuple[tuple[ChannelKind, str], ...] = (
+    ("encoder_counts", r"counts?|encoder|enc|ticks|pulses"),
+    ("current_plus", r"current (?:plus|positive|a|up)|(?:i|strom) (?:plus|a)"),
+    ("current_minus", r"current (?:minus|negative|b|down)|(?:i|strom) (?:minus|b)"),
+    ("rectified_current", r"currents?|amps?|ammeter|strom|i"),
+    ("stroker_pressure", r"stroker pressure|delta p|dp|servo pressure"),
+    ("swash_angle", r"swash angle|swash|alpha"),
+    ("spool_position", r"spool position|spool"),
+    ("shaft_speed", r"speed|rpm|omega|velocity|drehzahl|n|n \w+"),
+    ("position", r"position|pos|angle|pos fb"),
+    ("position", ROD),
+)
+UNITS: Mapping[str, ChannelKind] = {
+    "A": "rectified_current",
+    "mA": "rectified_current",
+    "counts": "encoder_counts",
+    "count": "encoder_counts",
+    "rad/s": "shaft_speed",
+    "deg/s": "shaft_speed",
+    "rpm": "shaft_speed",
+    "m/s": "shaft_speed",
+    "mm/s": "shaft_speed",
+}
+MANY = 4
+"""Runs from which on one is held back for validation."""
+
+
+class Guess(NamedTuple):
+    """What a column may be."""
+
+    column: Column
+    role: str
+    """``"time"``, ``"input"``, ``"channel"`` or ``"unknown"``."""
+    kind: InputKind | ChannelKind | None = None
+    axis: str = ""
+    """What stands before the word in its name, such as the "boom" of "Boom Cmd", or empty."""
+    linear: bool = False
+    """Whether its name is that of a rod's displacement and not of a shaft's angle."""
+    unit: str | None = None
+    """From the header, or from the end of its name as in ``time_ms``."""
+    rolls_over_at: int | None = None
+    """Counts after which an encoder's counter begins anew, where its numbers show it."""
+    empty: int = 0
+    """Cells without a number, in all logs."""
+
+
+def guess(column: Column) -> Guess:
+    """What a column's name and unit say."""
+    name = re.sub(r"[\[(].*[\])]", "", column.name).strip()
+    stem, _, ending = name.rpartition("_")
+    if column.unit is None and stem:
+        found = _by_name(column, stem)._replace(unit=ending)
+        si = "s" if found.role == "time" else None
+        if found.kind is not None or si:
+            try:
+                conversion(found.kind or "other", ending, "")
+                if si is None or _seconds(ending):
+                    return found
+            except InputError:
+                pass
+    found = _by_name(column, name)._replace(unit=column.unit)
+    unit = found.unit or ("rpm" if re.search(r"rpm|drehzahl", name.lower()) else None)
+    if found.kind == "shaft_speed":
+        return found._replace(unit=unit)
+    if found.role == "unknown" and unit is not None and speed_unit(unit) in UNITS:
+        return found._replace(role="channel", kind=UNITS[speed_unit(unit)])
+    return found
+
+
+def _by_name(column: Column, name: str) -> Guess:
+    name = re.sub(r"(?<=[a-z])(?=[A-Z])|[_./\-\s]+", " ", name).strip().lower()
+
+    def before(words: str) -> str | None:
+        match = re.fullmatch(rf"(?:(.*) )?(?:{words})", name)
+        return (match[1] or "") if match else None
+
+    if re.fullmatch(TIME, name):
+        return Guess(column, "time")
+    if column.unit in ("V", "mV") or before(VOLTAGE) is not None:
+        return Guess(column, "input", "voltage", before(f"{VOLTAGE}|{COMMAND}") or "")
+    axis = before(COMMAND)
+    if axis is not None:
+        return Guess(column, "input", "other", axis)
+    for kind, words in CHANNELS:
+        axis = before(words)
+        if axis is not None:
+            return Guess(column, "channel", kind, axis, words == ROD)
+    return Guess(column, "unknown")
+
+
+def _seconds(unit: str) -> float | None:
+    """Size of a unit of time [s], None where it is none."""
+    from swashplate.units import to_si
+
+    try:
+        return to_si(1.0, unit, "s", "")
+    except InputError:
+        return None
 
 
 class _Look(NamedTuple):
@@ -43,13 +152,16 @@ class _Look(NamedTuple):
         return next((each for each in self.guesses if each.role == "time"), None)
 
 
-def draft(
+def draft_campaign(
     logs: Sequence[str | Path],
     folder: str | Path,
     drive: str | None = None,
     counts_per_turn: float | None = None,
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
 ) -> str:
-    """The text of a campaign file for some logs.
+    """Text of a campaign file for some logs.
 
     Parameters
     ----------
@@ -58,33 +170,46 @@ def draft(
     folder : path
         Where the campaign file will lie; the logs are named from there.
     drive : str, optional
-        A packaged drive or a parameter file for all axes.
+        A packaged drive or a parameter file for all axes; an axis that is called like a packaged
+        drive has that one.
     counts_per_turn : float, optional
         Of all encoders. Without it the entry is left to be filled in, and the file is refused
         until it is.
+    columns : mapping of str to str, optional
+        What some columns are, by column: ``"time"`` or a kind such as ``"voltage"``.
+    units : mapping of str to str, optional
+        Units of some columns.
 
     Returns
     -------
     str
-        Commented TOML that `Campaign.from_toml` reads, guesses marked as such.
+        Commented TOML that `Campaign.from_toml` reads, guesses marked as such. A run that could
+        not be read has the role ``"ignore"``, with the reason. Where no column looks like an input
+        or like a measurement the line says FIXME, and the file is refused until it is mended.
 
     Raises
     ------
     FileError
-        If a log cannot be read.
+        If a log cannot be opened.
     InputError
-        If no column of the first log looks like an input, or none like a measurement.
+        If there is no log, or none has a column that is named.
     """
     if not logs:
         raise InputError("A draft needs at least one log.")
-    looks = [_look(open_log(path), counts_per_turn) for path in logs]
+    given = dict(columns or {})
+    for name, what in given.items():
+        if what != "time" and what not in KINDS:
+            raise InputError(f"'{name}' cannot be a '{what}': it is time, {', '.join(KINDS)}.")
+    looks = [_look(open_log(path), given, dict(units or {})) for path in logs]
+    met = {column.name for look in looks for column in look.log.columns}
+    unmet = sorted({*given, *(units or {})} - met)
+    if unmet:
+        raise InputError(f"No log has a column '{unmet[0]}'; there are {', '.join(sorted(met))}.")
     first = looks[0]
-    axes = by_axis(_with_counters(looks))
+    axes = _by_axis(_refined(looks, counts_per_turn, given))
     plain = Path(drive).stem if drive is not None else "drive"
     named = {prefix or plain: guesses for prefix, guesses in axes.items()}
-    for guesses in named.values():
-        _demand(first.log, guesses)
-    lines = [HEADER, f'title = "{_quoted(Path(folder).resolve().name)}"', ""]
+    lines = [HEADER, f"title = {_string(Path(folder).resolve().name)}", ""]
     for name, guesses in named.items():
         lines += _axis(name, guesses, first, drive, counts_per_turn)
     taken = {each.column.name for guesses in named.values() for each in guesses}
@@ -99,23 +224,38 @@ def draft(
     if counts_per_turn is not None and "encoder_counts" not in kinds:
         among = f" among {', '.join(left)}" if left else ""
         lines += [f"{NO_ENCODER}{among}; counts_per_turn = {counts_per_turn:.12g} is left out", ""]
-    for number, look in enumerate(looks):
-        held_back = len(looks) >= 4 and number == len(looks) - 1
-        lines += _run(look, named, Path(folder), held_back)
+    runs = [_run(look, named, Path(folder)) for look in looks]
+    _mark_unreadable(lines, runs, looks)
+    _hold_back(runs)
+    for each in runs:
+        lines += [*each.lines[:2], f'role = "{each.role}"{each.why}', *each.lines[2:], ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _look(log: Log, counts_per_turn: float | None) -> _Look:
-    guesses = [guess(column) for column in log.columns]
-    unknown = [each.column.name for each in guesses if each.role == "unknown"]
-    wanted = [each.column.name for each in guesses if each.role != "unknown"]
-    values = {**_numbers(log, unknown), **log.read(wanted)}
-    none = np.zeros(0)
-    return _Look(
-        log,
-        [refined(each, values.get(each.column.name, none), counts_per_turn) for each in guesses],
-        values,
-    )
+def _look(log: Log, given: Mapping[str, str], units: Mapping[str, str]) -> _Look:
+    guesses = []
+    for column in log.columns:
+        guessed = guess(column)
+        what = given.get(column.name)
+        if what is not None:
+            role = "time" if what == "time" else "channel"
+            role = "input" if what in ("voltage", "current", "other") else role
+            kind = None if what == "time" else what
+            guessed = guessed._replace(role=role, kind=kind)  # type: ignore[arg-type]
+        elif given and guessed.role in ("time", "input") and guessed.role in _given_roles(given):
+            guessed = guessed._replace(role="unknown", kind=None)
+        if column.name in units:
+            guessed = guessed._replace(unit=units[column.name])
+        guesses.append(guessed)
+    return _Look(log, guesses, _numbers(log, [each.column.name for each in guesses]))
+
+
+def _given_roles(given: Mapping[str, str]) -> set[str]:
+    return {
+        "time" if what == "time" else "input"
+        for what in given.values()
+        if what in ("time", "voltage", "current")
+    }
 
 
 def _numbers(log: Log, names: list[str]) -> dict[str, Array]:
@@ -125,29 +265,64 @@ def _numbers(log: Log, names: list[str]) -> dict[str, Array]:
     except FileError:
         if len(names) == 1:
             return {}
-        return {key: each for name in names for key, each in _numbers(log, [name]).items()}
+        half = len(names) // 2
+        return {**_numbers(log, names[:half]), **_numbers(log, names[half:])}
 
 
-def _with_counters(looks: list[_Look]) -> list[Guess]:
-    """Guesses of the first log; whether a counter begins anew, any of the logs may show."""
-    rolled = {
-        each.column.name: each
-        for look in reversed(looks)
-        for each in look.guesses
-        if each.rolls_over_at is not None
-    }
-    return [rolled.get(each.column.name, each) for each in looks[0].guesses]
+def _refined(
+    looks: Sequence[_Look], counts_per_turn: float | None, given: Mapping[str, str]
+) -> list[Guess]:
+    """Guesses of all logs' columns with what their numbers say, each column once.
+
+    A current has a sign if it goes to minus its peak in any log; two of them are plus and minus;
+    whole numbers that begin anew at their end are an encoder's, whatever their name.
+    """
+    met: dict[str, Guess] = {}
+    for look in looks:
+        for each in look.guesses:
+            met.setdefault(each.column.name, each)
+    for name, each in met.items():
+        values = [look.values[name] for look in looks if look.values.get(name, np.zeros(0)).size]
+        empty = sum(int(np.count_nonzero(~np.isfinite(part))) for part in values)
+        met[name] = each = each._replace(empty=empty)
+        if each.kind == "encoder_counts" or (each.role == "unknown" and each.unit is None):
+            sizes = [rolls_over_at(part, counts_per_turn) for part in values]
+            size = max((size for size in sizes if size is not None), default=None)
+            if size is not None:
+                met[name] = each._replace(role="channel", kind="encoder_counts", rolls_over_at=size)
+        known = name in given
+        if each.kind == "rectified_current" and values and not known and signed(values):
+            met[name] = each._replace(kind="signed_current")
+    for one, other in (("A", "B"), ("a", "b"), ("1", "2")):
+        for name, each in met.items():
+            twin = met.get(f"{name[:-1]}{other}")
+            if name.endswith(f"_{one}") and twin is not None and "current" in str(each.kind):
+                met[name] = each._replace(kind="current_plus")
+                met[twin.column.name] = twin._replace(
+                    role="channel", kind="current_minus", axis=each.axis, unit=each.unit
+                )
+    kinds = {each.kind for each in met.values()}
+    if not {"current_plus", "current_minus"} <= kinds:
+        for name, each in met.items():
+            if each.kind in ("current_plus", "current_minus") and name not in given:
+                met[name] = each._replace(kind="rectified_current", axis="")
+    return list(met.values())
 
 
-def _demand(log: Log, guesses: list[Guess]) -> None:
-    for role, what in (("input", "a command or voltage"), ("channel", "a measured signal")):
-        if not any(each.role == role for each in guesses):
-            names = ", ".join(repr(each.name) for each in log.columns)
-            raise InputError(
-                f"{log.path}: no column looks like {what} among {names}; name the columns "
-                "'voltage [V]', 'current [A]', 'counts' or the like, or write the campaign file "
-                "by hand."
-            )
+def _by_axis(guesses: Iterable[Guess]) -> dict[str, list[Guess]]:
+    """Inputs and channels under the axis that their names begin with.
+
+    An axis needs an input and a channel; columns without a prefix belong to the only axis.
+    """
+    useful = [each for each in guesses if each.role in ("input", "channel")]
+    prefixes = dict.fromkeys(each.axis for each in useful if each.role == "input")
+    named = [p for p in prefixes if p and any(c.axis == p and c.role == "channel" for c in useful)]
+    if len(named) > 1:
+        return {axis: [each for each in useful if each.axis == axis] for axis in named}
+    return {"": useful}
+
+
+# --- axes -----------------------------------------------------------------------------------------
 
 
 def _axis(
@@ -157,58 +332,81 @@ def _axis(
     drive: str | None,
     counts_per_turn: float | None,
 ) -> list[str]:
+    from swashplate.parameters.files import preset_names
+
     lines = [f"[axes.{_key(name)}]"]
     if drive is not None:
-        lines.append(f'drive = "{_quoted(drive)}"')
+        lines.append(f"drive = {_string(name if name in preset_names() else drive)}")
     else:
         lines.append('# drive = "hoist"    # a packaged drive or a parameter file, to be fitted')
     lines += [
         _clock(look),
         'start = "rest"    # at the first sample: rest, steady or estimated',
         "",
+        f"[axes.{_key(name)}.input]",
     ]
+    names = ", ".join(repr(each.name) for each in look.log.columns)
     drives = [each for each in guesses if each.role == "input"]
-    lines += [f"[axes.{_key(name)}.input]"]
-    lines += _signal(drives[0], look, None)
+    if drives:
+        lines += _signal(drives[0], look, None)
+    else:
+        lines += [f'kind = "voltage"    # {FIXME}: or current, or other', _open("commands", names)]
     lines += ['interpolation = "previous"    # guessed: held between samples; or "linear"', ""]
-    for each in drives[1:]:
-        lines += [f"# another input? '{each.column.name}'"]
+    lines += [f"# another input? '{each.column.name}'" for each in drives[1:]]
     used: set[str] = set()
     for each in guesses:
         if each.role != "channel":
             continue
         channel = str(each.kind)
+        number = 2
         while channel in used:
-            channel += "_2"
+            channel, number = f"{each.kind}_{number}", number + 1
         used.add(channel)
         lines += [
             f"[axes.{_key(name)}.channels.{channel}]",
             *_signal(each, look, counts_per_turn),
             "",
         ]
+    if not used:
+        lines += [
+            f"[axes.{_key(name)}.channels.measured]",
+            f'kind = "shaft_speed"    # {FIXME}: or position, encoder_counts ...',
+            _open("was measured", names),
+            "",
+        ]
     return lines
+
+
+def _open(what: str, names: str) -> str:
+    return f'column = "{FIXME}"    # which of {names} {what}?'
 
 
 def _clock(look: _Look) -> str:
     if look.time is None:
-        return "time = { rate = 512 }    # guessed: no column of time found; samples a second"
+        return f"time = {{ rate = 512 }}    # {FIXME}: no column of time found; samples a second"
     column = look.time.column
-    unit = "" if column.unit else ', unit = "s"'
-    return f'time = {{ column = "{_quoted(column.name)}"{unit} }}'
+    unit = f', unit = "{look.time.unit or "s"}"' if column.unit is None else ""
+    return f"time = {{ column = {_string(column.name)}{unit} }}"
 
 
 def _signal(guessed: Guess, look: _Look, counts_per_turn: float | None) -> list[str]:
     column, kind = guessed.column, str(guessed.kind)
+    percent = kind == "other" and guessed.unit == "%"
+    kind = "voltage" if percent else kind
     lines = [
         f'kind = "{kind}"    # guessed: {KINDS[kind].meaning}',
-        f'column = "{_quoted(column.name)}"',
+        f"column = {_string(column.name)}",
     ]
-    if kind == "encoder_counts":
+    scale = 1.0
+    if percent:
+        scale = 0.1
+        lines += ['unit = "V"', "scale = 0.1    # guessed: 100 % stand for the 10 V of a card"]
+    elif kind == "encoder_counts":
         given = "" if counts_per_turn is None else f"{counts_per_turn:.12g}"
         lines += [
             f"counts_per_turn = {given}"
             if given
-            else "# counts_per_turn = 1000    # fill in: for one turn, quadrature included",
+            else f"# counts_per_turn = 1000    # {FIXME}: for one turn, quadrature included",
             "gear_ratio = 1.0    # turns of the encoder for one turn of the shaft",
         ]
         if guessed.rolls_over_at is not None:
@@ -216,47 +414,119 @@ def _signal(guessed: Guess, look: _Look, counts_per_turn: float | None) -> list[
             lines.append(f"rolls_over_at = {size}    # guessed: begins anew after {size} counts")
     elif column.unit is None:
         unit = "mm" if guessed.linear else next(iter(KINDS[kind].units), "1")
-        lines.append(f'unit = "{unit}"    # guessed: the header gives none')
-    if guessed.role == "input" and kind == "other":
-        neutral = float(look.values[column.name][0])
+        why = "from its name" if guessed.unit else "guessed: the header gives none"
+        lines.append(f"unit = {_string(guessed.unit or unit)}    # {why}")
+    if guessed.empty:
+        lines.append(f'missing = "drop"    # guessed: {guessed.empty} cells are empty')
+    if guessed.role == "input" and str(guessed.kind) == "other":
+        values = look.values.get(column.name, np.zeros(0))
+        neutral = float(values[np.isfinite(values)][0]) if np.isfinite(values).any() else 0.0
         if neutral:
-            lines.append(f"offset = {-neutral:.9g}    # guessed: the first sample is neutral")
+            lines.append(
+                f"offset = {-scale * neutral:.9g}    # guessed: the first sample is neutral"
+            )
     return lines
 
 
-def _run(look: _Look, axes: dict[str, list[Guess]], folder: Path, held_back: bool) -> list[str]:
-    path = look.log.path.resolve()
-    root = folder.resolve()
+# --- runs -----------------------------------------------------------------------------------------
+
+
+class _Draft:
+    """A run's lines, its role, and kind and direction, and the size, of its manoeuvre."""
+
+    def __init__(self, lines: list[str], stratum: str, peak: float, *, testable: bool) -> None:
+        self.lines, self.stratum, self.peak = lines, stratum, peak
+        self.role, self.why = ("fit", "") if testable else ("ignore", "    # it has no input")
+
+
+def _run(look: _Look, axes: Mapping[str, list[Guess]], folder: Path) -> _Draft:
+    path, root = look.log.path.resolve(), folder.resolve()
     file = path.relative_to(root) if path.is_relative_to(root) else path
-    lines = ["[[runs]]", f'file = "{_quoted(file.as_posix())}"    # {_seen(look, axes)}']
-    lines.append('role = "validate"' if held_back else 'role = "fit"')
+    seen, stratum, peak = _seen(look, axes)
+    lines = ["[[runs]]", f"file = {_string(file.as_posix())}    # {seen}"]
     names = {column.name for column in look.log.columns}
-    missing = {
-        axis: [each.column.name for each in guesses if each.column.name not in names]
-        for axis, guesses in axes.items()
-    }
-    complete = [axis for axis in axes if not missing[axis]]
-    if len(complete) < len(axes):
-        absent = sorted({name for each in missing.values() for name in each})
-        lines.append(f"# without the columns {', '.join(absent)}")
-        lines.append(f"only = [{', '.join(_string(axis) for axis in complete)}]")
-    return [*lines, ""]
+    tested = []
+    without: list[str] = []
+    for axis, guesses in axes.items():
+        drives = [each for each in guesses if each.role == "input"][:1]
+        counts: dict[str, int] = {}
+        missing, channels = [], 0
+        for each in guesses:
+            if each.role != "channel":
+                continue
+            counts[str(each.kind)] = number = counts.get(str(each.kind), 0) + 1
+            channels += 1
+            if each.column.name not in names:
+                key = f"{each.kind}_{number}" if number > 1 else str(each.kind)
+                missing.append(
+                    f"axes.{_key(axis)}.channels.{key} = false    # no column "
+                    f"{_string(each.column.name)}"
+                )
+        if all(each.column.name in names for each in drives) and len(missing) < max(channels, 1):
+            tested.append(axis)
+            without += missing
+    if tested and len(tested) < len(axes):
+        lines.append(f"only = [{', '.join(_string(axis) for axis in tested)}]")
+    return _Draft([*lines, *without], stratum, peak, testable=bool(tested))
 
 
-def _seen(look: _Look, axes: dict[str, list[Guess]]) -> str:
-    """Length, rate and manoeuvres of a run, for a comment."""
-    if look.time is None or look.values[look.time.column.name].size < 2:
-        return f"{len(next(iter(look.values.values())))} samples"
-    time = look.values[look.time.column.name]
+def _seen(look: _Look, axes: Mapping[str, list[Guess]]) -> tuple[str, str, float]:
+    """Length, rate and manoeuvres of a run for a comment; their kind, direction and size."""
+    time = None if look.time is None else look.values.get(look.time.column.name)
+    if look.time is None or time is None or time.size < 2:
+        return f"{len(next(iter(look.values.values()), []))} samples", "", 0.0
+    factor = _seconds(look.time.unit or "s")
     seen = [f"{time.size} samples"]
-    if np.all(np.diff(time) > 0.0) and look.time.column.unit in (None, "s"):
-        seen.append(f"{np.ptp(time):.4g} s at {1.0 / np.median(np.diff(time)):.4g} Hz")
-        for guesses in axes.values():
-            drive = next(each for each in guesses if each.role == "input")
+    if factor is None or not np.all(np.diff(time) > 0.0):
+        return seen[0], "", 0.0
+    time = factor * (time - time[0])
+    seen.append(f"{np.ptp(time):.4g} s at {1.0 / np.median(np.diff(time)):.4g} Hz")
+    strata, peak = [], 0.0
+    for guesses in axes.values():
+        for drive in [each for each in guesses if each.role == "input"][:1]:
             values = look.values.get(drive.column.name)
-            if drive.kind == "voltage" and values is not None and np.isfinite(values).all():
-                seen.append(recognise(time, values).name)
-    return ", ".join(seen)
+            if values is None or not np.isfinite(values).all():
+                continue
+            unit, size = drive.unit or "V", 1.0
+            if drive.kind == "voltage":
+                unit, size, _ = conversion("voltage", unit, drive.column.name)
+            found = recognise(time, size * values, unit=unit)
+            if drive.kind == "voltage":
+                seen.append(found.name)
+            away = values - values[0]
+            low, high = -float(away.min()), float(away.max())
+            both = min(low, high) > 0.25 * max(low, high)
+            strata.append(f"{found.kind} {'both' if both else 'up' if high > low else 'down'}")
+            peak = max(peak, low, high)
+    return ", ".join(seen), ", ".join(strata), peak
+
+
+def _mark_unreadable(lines: list[str], runs: list[_Draft], looks: Sequence[_Look]) -> None:
+    """Give the role "ignore" to runs that the file, as it stands, could not be read with."""
+    text = "\n".join(lines).replace("# counts_per_turn = 1000", "counts_per_turn = 1000")
+    if f'column = "{FIXME}"' in text:
+        return
+    for each, look in zip(runs, looks, strict=True):
+        if each.role == "ignore":
+            continue
+        one = "\n".join([text, *each.lines])
+        try:
+            file = validated(parse_toml(one, "the draft"), CampaignFile, "the draft")
+            read_run("the draft", "run", file.runs[0], file.axes, look.log)
+        except (FileError, InputError) as error:
+            each.role, each.why = "ignore", f"    # {FIXME}: {error}"
+
+
+def _hold_back(runs: list[_Draft]) -> None:
+    """Hold one run back for validation, of which the others have kind, direction and size."""
+    fitted = [each for each in runs if each.role == "fit"]
+    largest: dict[str, _Draft] = {}
+    for each in fitted:
+        if each.peak > largest.setdefault(each.stratum, each).peak:
+            largest[each.stratum] = each
+    others = [each for each in fitted if each is not largest[each.stratum]]
+    if len(fitted) >= MANY and others:
+        others[-1].role = "validate"
 
 
 def _key(name: str) -> str:
@@ -264,8 +534,6 @@ def _key(name: str) -> str:
 
 
 def _string(text: str) -> str:
-    return f'"{_quoted(text)}"'
-
-
-def _quoted(text: str) -> str:
-    return text.replace("\\", "\\\\").replace('"', '\\"')
+    """A string of TOML: names with backslashes and quotes escaped."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'

@@ -1,21 +1,37 @@
 """Encoder counts: roll-overs taken out, staircases filled, jumps found, angles made of them."""
 
+from math import ceil, log2
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swashplate.campaign.counters import CounterRangeError
-from swashplate.campaign.stamps import Array, Rows, increasing, signal
+from swashplate.campaign.stamps import GAP, Array, Rows, increasing, signal
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import positive, row, whole
+from swashplate.maneuvers.pieces import positive, row, whole
 
-WIDEST = 53
-"""Widest counter that a float64 holds to the count. [bit]"""
+WIDEST = 2**53
+"""Most readings of a counter that a float64 holds to the count."""
+DOUBTFUL = 0.25
+"""A step larger than this share of a counter may have been another one. [1]"""
 SUSTAINED = 5
 """A speed lasts if the median of this many neighbouring intervals has it."""
 MARGIN = 1.5
 """A jump is this much faster than anything that lasts."""
+FEWEST = 32
+"""Readings that a counter shows at least; fewer may be those of a switch."""
+ORDINARY = 0.998
+"""Share of the steps that are no larger than those about a roll-over; others lead across gaps."""
+NEAR = 1.05
+"""The counts of a turn are the size where they are at most this much more than the range."""
+
+
+class CounterRangeError(InputError):
+    """A reading outside its counter; `said` leaves out what would be right."""
+
+    def __init__(self, said: str) -> None:
+        super().__init__(f"{said}; give the right modulus.")
+        self.said = said
 
 
 class Unwrapped(NamedTuple):
@@ -23,40 +39,19 @@ class Unwrapped(NamedTuple):
 
     counts: Array
     """Position from the first row's reading on. [count]"""
-    rollovers: Rows
-    """Rows at which the counter passed its end, either way."""
     doubtful: Rows
     """Rows whose step is so large that a roll-over more or less may be what happened."""
 
 
-class LostCounts(NamedTuple):
-    """Jumps that no motion explains."""
-
-    rows: Rows
-    """Rows that the jumps lead to."""
-    steps: Array
-    """Change of the count at each of them. [count]"""
-    max_speed: float
-    """The speed above which a change counts as a jump. [count/s]"""
-
-
-def unwrap_counts(
-    counts: ArrayLike,
-    *,
-    bits: int | None = None,
-    modulus: int | None = None,
-    doubtful_share: float = 0.25,
-) -> Unwrapped:
-    """Take the roll-overs out of a counter's readings: each step is the shortest way round.
+def unwrap_counts(counts: ArrayLike, modulus: int) -> Unwrapped:
+    """Counts without the roll-overs of a counter: each step is the shortest way round.
 
     Parameters
     ----------
     counts : array_like, shape (n,)
         Readings, whole numbers from 0 up or, of a signed counter, from -modulus/2 up. [count]
-    bits, modulus : int
-        Width of the counter, or how many readings it has: one of the two.
-    doubtful_share : float
-        Steps larger than this share of the modulus are reported as doubtful. [1]
+    modulus : int
+        How many readings the counter has: 65536 for 16 bits.
 
     Raises
     ------
@@ -64,9 +59,24 @@ def unwrap_counts(
         If a reading is no whole number or outside the counter, or a step is exactly half the
         modulus, so that neither way round is the shorter.
     """
-    readings = _whole_counts(counts)
-    size = _modulus(bits, modulus)
-    _check_range(readings, size)
+    readings = row("counts", counts)
+    broken = np.flatnonzero(np.floor(readings) != readings)
+    if broken.size:
+        raise InputError(
+            f"counts must be whole numbers, but row {broken[0]} (the first is 0) is "
+            f"{readings[broken[0]]}."
+        )
+    size = whole("modulus", modulus)
+    if not 2 <= size <= WIDEST:
+        raise InputError(f"A counter must have from 2 to 2^53 readings, not {size}.")
+    signed = readings.min() < 0.0
+    low, high = (-(size // 2), (size - 1) // 2) if signed else (0, size - 1)
+    outside = np.flatnonzero((readings < low) | (readings > high))
+    if outside.size:
+        raise CounterRangeError(
+            f"counts hold {readings[outside[0]]:.0f} in row {outside[0]} (the first is 0), outside "
+            f"the {low} to {high} of a {'signed ' if signed else ''}counter of {size} readings"
+        )
     steps = np.diff(readings)
     short = steps - size * np.floor(steps / size + 0.5)
     ambiguous = np.flatnonzero(short == -0.5 * size)
@@ -77,51 +87,34 @@ def unwrap_counts(
             f"is 0), half the range of a counter of {size}, which may be up or down; cut the "
             "record there."
         )
-    position = np.empty_like(readings)
-    position[0] = readings[0]
-    np.cumsum(short, out=position[1:])
-    position[1:] += readings[0]
-    return Unwrapped(
-        position,
-        np.flatnonzero(short != steps) + 1,
-        np.flatnonzero(np.abs(short) > positive("doubtful_share", doubtful_share) * size) + 1,
-    )
+    position = readings[0] + np.concatenate([[0.0], np.cumsum(short)])
+    return Unwrapped(position, np.flatnonzero(np.abs(short) > DOUBTFUL * size) + 1)
 
 
-def _whole_counts(counts: ArrayLike) -> Array:
-    readings = row("counts", counts)
-    broken = np.flatnonzero(np.floor(readings) != readings)
-    if broken.size:
-        raise InputError(
-            f"counts must be whole numbers, but row {broken[0]} (the first is 0) is "
-            f"{readings[broken[0]]}."
-        )
-    return readings
+def ambiguous_gaps(time: Array, readings: Array, modulus: int) -> Rows:
+    """Rows after a gap so long that a counter of `modulus` may have gone round in it unseen.
+
+    A shaft that goes on at 1.5 times its greatest lasting speed passes half the counter within the
+    gap: the shortest way round need not be the one that it took. [row]
+    """
+    intervals = np.diff(time)
+    gaps = np.flatnonzero(intervals > GAP * np.median(intervals))
+    if not gaps.size or readings.size < 2 * SUSTAINED or np.any(readings != np.floor(readings)):
+        return np.zeros(0, dtype=np.intp)
+    steps = np.diff(readings)
+    short = steps - modulus * np.floor(steps / modulus + 0.5)
+    usual = np.delete(np.arange(steps.size), gaps)
+    # across a gap the shortest way round says nothing of the speed
+    fastest = MARGIN * _lasting(short[usual], intervals[usual])
+    return gaps[fastest * intervals[gaps] >= 0.5 * modulus] + 1
 
 
-def _modulus(bits: int | None, modulus: int | None) -> int:
-    if (bits is None) == (modulus is None):
-        raise InputError("Give either the bits of the counter or its modulus, one of the two.")
-    size = (
-        2 ** min(whole("bits", bits), WIDEST + 1) if bits is not None else whole("modulus", modulus)
-    )
-    if not 2 <= size <= 2**WIDEST:
-        raise InputError(
-            f"A counter must have from 1 to {WIDEST} bits, not "
-            f"{f'{bits} bits' if bits is not None else f'a modulus of {modulus}'}."
-        )
-    return size
+def _lasting(steps: Array, intervals: Array) -> float:
+    """Greatest speed that lasts: the median over a few neighbouring intervals. [count/s]"""
+    from scipy.ndimage import median_filter
 
-
-def _check_range(readings: Array, size: int) -> None:
-    signed = readings.min() < 0.0
-    low, high = (-(size // 2), (size - 1) // 2) if signed else (0, size - 1)
-    outside = np.flatnonzero((readings < low) | (readings > high))
-    if outside.size:
-        raise CounterRangeError(
-            f"counts hold {readings[outside[0]]:.0f} in row {outside[0]} (the first is 0), outside "
-            f"the {low} to {high} of a {'signed ' if signed else ''}counter of {size} readings"
-        )
+    speeds = np.abs(steps) / intervals
+    return float(median_filter(speeds, size=SUSTAINED, mode="nearest").max())
 
 
 def interpolate_counts(time: ArrayLike, counts: ArrayLike) -> Array:
@@ -193,47 +186,76 @@ def radians_per_count(counts_per_turn: float, gear_ratio: float = 1.0, sign: int
     return sign * 2.0 * np.pi / turn
 
 
-def find_lost_counts(
-    time: ArrayLike, counts: ArrayLike, *, max_speed: float | None = None
-) -> LostCounts:
-    """Find changes of the count that are faster than the shaft can turn.
+def find_lost_counts(time: ArrayLike, counts: ArrayLike) -> Rows:
+    """Rows at which the count changed faster than the shaft can turn.
 
     Parameters
     ----------
     time : array_like, shape (n,)
-        Stamps, even or not. [s]
+        Stamps, even or not, six or more. [s]
     counts : array_like, shape (n,)
         Position without roll-overs. [count]
-    max_speed : float, optional
-        Greatest speed of the encoder. Without it, 1.5 times the greatest speed that lasts: the
-        median over five neighbouring intervals, which isolated jumps do not reach. [count/s]
 
     Returns
     -------
-    LostCounts
-        Rows at which the count changed by more than `max_speed` allows, one count of rounding
+    array of int
+        Rows that jumps lead to: faster than 1.5 times the greatest speed that lasts (the median
+        over five neighbouring intervals, which isolated jumps do not reach), one count of rounding
         granted. A loss that is no larger than the motion within a sample is not seen.
 
     Raises
     ------
     InputError
-        If the stamps do not increase, a number is not finite, or the record is too short for an
-        estimate.
+        If the stamps do not increase, a number is not finite, or the record is too short.
     """
-    from scipy.ndimage import median_filter
-
     stamps = increasing(time)
-    steps = np.diff(signal("counts", counts, stamps.size))
-    intervals = np.diff(stamps)
-    if max_speed is not None:
-        limit = positive("max_speed", max_speed)
-    elif steps.size < SUSTAINED:
-        raise InputError(
-            f"A record of {stamps.size} rows is too short to estimate the greatest speed; give "
-            "max_speed."
-        )
-    else:
-        lasting = median_filter(np.abs(steps) / intervals, size=SUSTAINED, mode="nearest")
-        limit = MARGIN * float(lasting.max())
-    jumps = np.flatnonzero(np.abs(steps) > limit * intervals + 1.0)
-    return LostCounts(jumps + 1, steps[jumps], limit)
+    steps, intervals = np.diff(signal("counts", counts, stamps.size)), np.diff(stamps)
+    if steps.size < SUSTAINED:
+        raise InputError(f"A record of {stamps.size} rows is too short to tell lost counts.")
+    limit = MARGIN * _lasting(steps, intervals)
+    return np.flatnonzero(np.abs(steps) > limit * intervals + 1.0) + 1
+
+
+def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int | None:
+    """Counts after which a counter begins anew, None where the numbers are not such a counter's.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Of a column.
+    counts_per_turn : float, optional
+        Of its encoder: a likely size.
+
+    Notes
+    -----
+    The numbers are whole and many, and some steps go over more than half of their range, which
+    become as small as the others when they are taken the other way round. Numbers that only go up
+    by the same step each time count the samples.
+    """
+    if values.size < 2 or not np.isfinite(values).all() or np.any(values != np.floor(values)):
+        return None
+    if np.unique(values).size < FEWEST:
+        return None
+    low, high = float(values.min()), float(values.max())
+    span = high + 1.0 if low >= 0.0 else 2.0 * max(-low, high + 1.0)
+    steps = np.diff(values)
+    over = np.abs(steps) > 0.5 * span
+    if not over.any() or over.all():
+        return None
+    ordinary = float(np.quantile(np.abs(steps[~over]), ORDINARY))
+    # the steps beside a roll-over are as large as the one across it, taken the other way round
+    beside = np.interp(np.flatnonzero(over), np.flatnonzero(~over), steps[~over])
+    turn = 0.0 if counts_per_turn is None else float(counts_per_turn)
+    sizes = {1 << ceil(log2(span)), 100 * ceil(span / 100.0)}
+    if turn.is_integer() and span <= turn <= NEAR * span:
+        sizes = {int(turn)}
+    best, error = 0, np.inf
+    for size in sorted(sizes):
+        short = steps[over] - size * np.round(steps[over] / size)
+        off = float(np.median(np.abs(short - beside)))
+        if off < error:
+            best, error, across = size, off, short
+    # across a gap any step may be; the counter's size is known to what the largest reading leaves
+    small = np.mean(np.abs(across) <= 2.0 * ordinary + (best - span)) >= 0.5
+    level = np.ptp(np.concatenate([steps[~over], across])) == 0.0
+    return None if level or not small or ordinary >= 0.25 * best else best

@@ -11,9 +11,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.kinds import ChannelKind, InputKind
 from swashplate.campaign.recognition import Recognised
-from swashplate.campaign.schema import InitialState, Role
+from swashplate.campaign.schema import ChannelKind, InitialState, InputKind, Role
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]
@@ -129,6 +128,8 @@ class Experiment:
     recognised: Recognised | None = None
     ignored: tuple[tuple[float, float, str], ...] = ()
     """Windows left out of every channel: first and last instant [s], and why."""
+    notes: tuple[str, ...] = ()
+    """What reading did that nobody asked for, one sentence each: a channel left out, a split."""
 
     def __getitem__(self, channel: str) -> Channel:
         """A channel by its name.
@@ -153,6 +154,11 @@ class Experiment:
         if self.stated_maneuver is not None:
             return self.stated_maneuver
         return self.recognised.name if self.recognised is not None else "free"
+
+    @property
+    def begins(self) -> Literal["rest", "steady"]:
+        """State of what a fit does not estimate: cut out of a motion, a card is settled."""
+        return "steady" if self.start in ("steady", "estimated") else "rest"
 
     @cached_property
     def duration(self) -> float:

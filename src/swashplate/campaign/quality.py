@@ -1,22 +1,29 @@
-"""What measured signals are like: rate, jitter, gaps, range, clipping, stuck and lost samples."""
+"""What measured signals are like, and what someone should look into before a fit.
+
+Rate, jitter, gaps, range, clipping, spikes, stuck and lost samples of each run; of a campaign,
+windows that no run takes and currents that have no sign. What is ignored counts for nothing.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign import schema
+from swashplate.campaign.campaign import Campaign, read_campaign_file
 from swashplate.campaign.encoder import find_lost_counts, unwrap_counts
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
+from swashplate.campaign.schema import applying, inside
 from swashplate.campaign.stamps import StampStatistics, stamp_statistics
+from swashplate.parameters.rules import FULL_VOLTAGE
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-FULL_COMMAND = 10.0
-"""Range of a command where the campaign file gives none. [V]"""
 LONG_GAP = 5.0
 """An interval of more than this many usual ones is worth a look; single lost rows are not."""
 LOST_SHARE = 0.01
@@ -28,11 +35,26 @@ LIVELY = 0.5
 AT_REST = 0.25
 """An input within this share of its largest excursion about its first sample may be at rest, or
 in a dead zone."""
+NEGATIVE = 0.05
+"""Share of its peak below zero that is noise of a rectified current; a signed one goes to about
+minus its peak."""
+SURE = 6.0
+"""Standard deviations that noise does not reach."""
+SPIKE = 8.0
+"""Median absolute deviations from the running median beyond which a sample may be a spike."""
+SPIKE_SHARE = 0.1
+"""A spike is farther than this share of what lasts from it as well, in range or beyond."""
+NEIGHBOURS = 11
+"""Samples of the running median: up to five in a row may be a spike."""
+QUIET = 0.3
+"""So long the input stands still before a spike within the range of what lasts. [s]"""
+NAMED = 6
+"""Windows, or manoeuvres, that a sentence names."""
 
 
 @dataclass(frozen=True)
 class Quality:
-    """What one signal of one experiment is like."""
+    """What one signal of one experiment is like; of a channel what is not ignored."""
 
     experiment: str
     signal: str
@@ -57,46 +79,38 @@ class Quality:
     findings: tuple[str, ...]
     """What someone should look into, one sentence each."""
 
-    @property
-    def gap_time(self) -> float:
-        """The longest interval between samples, gap or not. [s]"""
-        return self.stamps.longest
 
+def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Quality, ...]:
+    """Quality of an experiment's input and channels, in that order.
 
-def examine(experiment: Experiment) -> tuple[Quality, ...]:
-    """Quality of an experiment's input and channels, in that order."""
+    Parameters
+    ----------
+    experiment : Experiment
+        A run.
+    unsigned : collection of str
+        Channels whose sign says nothing, see `unsigned_currents`.
+    """
     drive = experiment.input
-    return (
-        _input_quality(experiment, drive),
-        *(_channel_quality(experiment, drive, each) for each in experiment.channels.values()),
-    )
-
-
-def _counted(number: int, one: str, several: str) -> str:
-    return f"{number} {one if number == 1 else several}"
-
-
-def _input_quality(experiment: Experiment, drive: InputSignal) -> Quality:
     limits = drive.limits
     if limits is None and drive.kind == "voltage":
-        limits = (-FULL_COMMAND, FULL_COMMAND)
-    stamps = stamp_statistics(drive.time)
+        limits = (-FULL_VOLTAGE, FULL_VOLTAGE)
+    stamps, low, high = stamp_statistics(drive.time), drive.values.min(), drive.values.max()
     findings = list(_stamp_findings(stamps))
-    if np.ptp(drive.values) == 0.0:
+    if low == high:
         findings.append("the input never changes: nothing can be identified from this run")
-    if limits is not None and (drive.values.min() < limits[0] or drive.values.max() > limits[1]):
+    if limits is not None and (low < limits[0] or high > limits[1]):
         findings.append(
-            f"goes from {drive.values.min():g} to {drive.values.max():g} {drive.unit}, beyond its "
-            f"range of {limits[0]:g} to {limits[1]:g}: check unit, scale and offset"
+            f"goes from {low:g} to {high:g} {drive.unit}, beyond its range of {limits[0]:g} to "
+            f"{limits[1]:g}: check unit, scale and offset"
         )
-    return Quality(
+    of_input = Quality(
         experiment.name,
         "input",
         drive.kind,
         drive.unit,
         stamps,
-        float(drive.values.min()),
-        float(drive.values.max()),
+        float(low),
+        float(high),
         _share_at(drive.values, limits),
         None,
         None,
@@ -104,57 +118,68 @@ def _input_quality(experiment: Experiment, drive: InputSignal) -> Quality:
         0.0,
         tuple(findings),
     )
+    return of_input, *(
+        _of_channel(experiment, each, signed=each.name not in unsigned)
+        for each in experiment.channels.values()
+    )
 
 
-def _channel_quality(experiment: Experiment, drive: InputSignal, channel: Channel) -> Quality:
-    stamps = stamp_statistics(channel.time)
-    clipped = _share_at(channel.values, channel.limits)
-    stuck = _stuck(channel, _away(drive, channel.time))
-    lost = _lost_counts(channel)
-    ignored = float(np.mean(~channel.used))
+def _of_channel(experiment: Experiment, channel: Channel, *, signed: bool) -> Quality:
+    drive, used = experiment.input, channel.used
+    stamps, findings = stamp_statistics(channel.time), list[str]()
+    time, values = channel.time[used], channel.values[used]
+    clipped, stuck, lost = _share_at(values, channel.limits), None, None
     # the input's stamps are told of once, with the input
-    same = np.array_equal(channel.time, drive.time)
-    findings = [] if same else list(_stamp_findings(stamps))
+    if not np.array_equal(channel.time, drive.time):
+        findings += _stamp_findings(stamps)
     if channel.dropped:
         dropped = channel.dropped
         findings.append(f"{_counted(dropped, 'missing sample is', 'missing samples are')} left out")
     if clipped > 0.0:
         findings.append(f"{100.0 * clipped:.2g} % of the samples are at the end of its range")
-    if np.ptp(channel.values) == 0.0 and np.ptp(drive.values) > 0.0:
-        findings.append("never changes although the input does: is it connected?")
-    elif stuck is not None and stuck > STUCK:
-        findings.append(f"stands still for {stuck:.3g} s while the input is away from rest")
-    if lost:
-        times = "once" if lost == 1 else f"{lost} times"
-        findings.append(f"jumps {times} as no motion does: lost or doubled counts")
-    findings += _rollover_findings(channel)
-    if channel.kind == "rectified_current" and channel.values.min() < -0.02 * np.ptp(
-        channel.values
-    ):
-        findings.append("turns negative, so it is not rectified: should it be signed_current?")
-    if _moves_against(drive, channel):
-        findings.append("moves against the input: should its sign be -1?")
-    if ignored == 1.0:
-        findings.append("all samples are ignored")
-    elif not (drive.time[0] <= channel.time[0] and channel.time[-1] <= drive.time[-1]):
-        outside = (channel.time < drive.time[0]) | (channel.time > drive.time[-1])
-        lie = _counted(int(outside.sum()), "sample lies", "samples lie")
-        findings.append(f"{lie} before or after the input's record")
+    if channel.counts is not None:
+        lost = 0
+    if time.size > 1:
+        stuck = _stuck(channel, _away(drive, channel.time))
+        if np.ptp(values) == 0.0 and np.ptp(drive.values) > 0.0:
+            findings.append("never changes although the input does: is it connected?")
+        elif stuck is not None and stuck > STUCK:
+            findings.append(f"stands still for {stuck:.3g} s while the input is away from rest")
+        if channel.counts is not None and time.size >= 8:
+            lost = int(find_lost_counts(time, channel.counts[used]).size)
+        if lost:
+            times = "once" if lost == 1 else f"{lost} times"
+            findings.append(f"jumps {times} as no motion does: lost or doubled counts")
+        findings += _rollover_findings(channel)
+        findings += _spike_findings(experiment, channel)
+        if channel.kind == "rectified_current" and _has_sign(values):
+            findings.append("turns negative, so it is not rectified: should it be signed_current?")
+        if signed and _moves_against(drive, channel):
+            findings.append("moves against the input: should its sign be -1?")
+        outside = (time < drive.time[0]) | (time > drive.time[-1])
+        if outside.any():
+            lie = _counted(int(outside.sum()), "sample lies", "samples lie")
+            findings.append(f"{lie} before or after the input's record")
+    shown = values if values.size else channel.values
     return Quality(
         experiment.name,
         channel.name,
         channel.kind,
         channel.unit,
         stamps,
-        float(channel.values.min()),
-        float(channel.values.max()),
+        float(shown.min()),
+        float(shown.max()),
         clipped,
         stuck,
         lost,
         channel.dropped,
-        ignored,
+        float(np.mean(~used)),
         tuple(findings),
     )
+
+
+def _counted(number: int, one: str, several: str) -> str:
+    return f"{number} {one if number == 1 else several}"
 
 
 def _stamp_findings(stamps: StampStatistics) -> Iterator[str]:
@@ -171,7 +196,7 @@ def _stamp_findings(stamps: StampStatistics) -> Iterator[str]:
 
 
 def _share_at(values: Array, limits: tuple[float, float] | None) -> float:
-    if limits is None:
+    if limits is None or not values.size:
         return float("nan")
     return float(np.mean((values <= limits[0]) | (values >= limits[1])))
 
@@ -194,7 +219,8 @@ def _stuck(channel: Channel, away: Flags) -> float | None:
         or np.mean(~same[away[1:]] if away.any() else ~same) < LIVELY
     ):
         return None
-    still = same & away[1:] & away[:-1]
+    counted = away & channel.used
+    still = same & counted[1:] & counted[:-1]
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]])))
     starts, stops = edges[::2], edges[1::2]
     if not starts.size:
@@ -202,37 +228,242 @@ def _stuck(channel: Channel, away: Flags) -> float | None:
     return float((channel.time[stops] - channel.time[starts]).max())
 
 
-def _lost_counts(channel: Channel) -> int | None:
-    if channel.counts is None:
-        return None
-    if channel.counts.size < 8:
-        return 0
-    return int(find_lost_counts(channel.time, channel.counts).rows.size)
-
-
 def _rollover_findings(channel: Channel) -> Iterator[str]:
     if channel.encoder is None or channel.encoder.rolls_over_at is None or channel.counts is None:
         return
-    size = channel.encoder.rolls_over_at
-    doubtful = unwrap_counts(np.mod(channel.counts, size), modulus=size).doubtful
-    if doubtful.size:
+    size, used = channel.encoder.rolls_over_at, channel.used
+    rows = unwrap_counts(np.mod(channel.counts, size), modulus=size).doubtful
+    rows = rows[used[rows] & used[rows - 1]]
+    if rows.size:
         yield (
-            f"{_counted(doubtful.size, 'step is', 'steps are')} so large that a roll-over more or "
-            f"less may be what happened, the first at {channel.time[doubtful[0]]:.4g} s"
+            f"{_counted(rows.size, 'step is', 'steps are')} so large that a roll-over more or "
+            f"less may be what happened, the first at {channel.time[rows[0]]:.4g} s: ignore a "
+            "window about it, or cut the run there with two spans"
         )
 
 
 def _moves_against(drive: InputSignal, channel: Channel) -> bool:
     """Whether a signed signal goes down where the input goes up."""
+    time, values = channel.time[channel.used], channel.values[channel.used]
     if channel.is_position:
-        middle = 0.5 * (channel.time[1:] + channel.time[:-1])
-        motion = np.diff(channel.values) / np.diff(channel.time)
+        middle = 0.5 * (time[1:] + time[:-1])
+        motion = np.diff(values) / np.diff(time)
     elif channel.kind in ("signed_current", "shaft_speed", "swash_angle", "spool_position"):
-        middle, motion = channel.time, channel.values
+        middle, motion = time, values
     else:
         return False
     driven = drive.at(middle) - drive.values[0]
     scale = float(np.std(driven) * np.std(motion))
-    if scale == 0.0:
-        return False
-    return float(np.mean(driven * motion)) < -0.5 * scale
+    return scale > 0.0 and float(np.mean(driven * motion)) < -0.5 * scale
+
+
+# --- currents with and without a sign -------------------------------------------------------------
+
+
+def _noise(values: Array) -> float:
+    """Standard deviation from sample to sample."""
+    return float(np.median(np.abs(np.diff(values)))) / (0.6745 * 2.0**0.5) if values.size > 1 else 0
+
+
+def _has_sign(current: Array) -> bool:
+    """Whether a current goes below zero by more than noise; single samples do not count."""
+    low, high = np.quantile(current, (0.002, 0.998))
+    return bool(-low > max(NEGATIVE * high, SURE * _noise(current)))
+
+
+def signed(currents: Sequence[Array]) -> bool:
+    """Whether a current of several runs has a sign: it goes to a quarter of minus its peak."""
+    finite = [each[np.isfinite(each)] for each in currents if np.isfinite(each).any()]
+    ends = np.array([[*np.quantile(each, (0.002, 0.998))] for each in finite] or [[0.0, 0.0]])
+    noise = max((_noise(each) for each in finite), default=0.0)
+    return bool(-ends[:, 0].min() > max(0.25 * ends[:, 1].max(), SURE * noise))
+
+
+def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str], str]:
+    """Currents that are said to have a sign and have none, with a sentence on each.
+
+    Parameters
+    ----------
+    experiments : iterable of Experiment
+        Runs beside each other: of one alone a current that never turns negative may be right.
+
+    Returns
+    -------
+    dict of (str, str) to str
+        By axis and channel.
+    """
+    met: dict[tuple[str, str], list[tuple[Array, float]]] = {}
+    for each in experiments:
+        for channel in each.of_kind("signed_current"):
+            if channel.used.any():
+                driven = each.input.values - each.input.values[0]
+                met.setdefault((each.axis, channel.name), []).append(
+                    (channel.values[channel.used], float(driven.min() / np.abs(driven).max()))
+                    if np.any(driven)
+                    else (channel.values[channel.used], 0.0)
+                )
+    return {
+        (axis, name): (
+            f"'{name}' of the axis '{axis}' never turns negative although the input does: it is "
+            f'rectified; write kind = "rectified_current" in [axes.{axis}.channels.{name}]'
+        )
+        for (axis, name), runs in met.items()
+        if min(down for _, down in runs) < -AT_REST and not signed([values for values, _ in runs])
+    }
+
+
+# --- spikes ---------------------------------------------------------------------------------------
+
+
+def spikes(channel: Channel, drive: InputSignal) -> list[tuple[float, float, float]]:
+    """Single samples, up to five in a row, that no motion explains; an encoder's are lost counts.
+
+    Returns
+    -------
+    list of (float, float, float)
+        Instants before and after each spike, half an interval off [s], and its value farthest from
+        what lasts [unit of the channel].
+
+    Notes
+    -----
+    A sample is one where it lies more than 8 median absolute deviations from the running median of
+    11 samples, and beyond all values of that median by a tenth of their range; or, while the input
+    stands still, by a quarter of the range from the median within it.
+    """
+    from scipy.ndimage import median_filter
+
+    used = np.flatnonzero(channel.used)
+    time, values = channel.time[used], channel.values[used]
+    if channel.kind in ("encoder_counts", "other") or time.size < 4 * NEIGHBOURS:
+        return []
+    lasting = median_filter(values, size=NEIGHBOURS, mode="nearest")
+    low, high = float(lasting.min()), float(lasting.max())
+    off = np.abs(values - lasting)
+    least = SPIKE * float(np.median(off))
+    room = max(SPIKE_SHARE * (high - low), least)
+    found = (values > high + room) | (values < low - room)
+    if (off > max(0.25 * (high - low), least)).any():
+        grid = np.linspace(-QUIET, 0.0, 7)[:, None] + time
+        commands = drive.at(grid.ravel()).reshape(grid.shape)
+        quiet = np.ptp(commands, axis=0) <= 0.02 * np.ptp(drive.values)
+        found |= quiet & (off > max(0.25 * (high - low), least))
+    rows = np.flatnonzero(found & (off > least))
+    half = 0.5 * float(np.median(np.diff(time)))
+    groups = (
+        np.split(rows, np.flatnonzero(np.diff(rows) > NEIGHBOURS // 2) + 1) if rows.size else []
+    )
+    return [
+        (
+            float(time[group[0]] - half),
+            float(time[group[-1]] + half),
+            float(values[group[np.argmax(off[group])]]),
+        )
+        for group in groups
+        if group[-1] - group[0] < NEIGHBOURS // 2
+    ]
+
+
+def _spike_findings(experiment: Experiment, channel: Channel) -> Iterator[str]:
+    found = spikes(channel, experiment.input)
+    if not found:
+        return
+    windows = ", ".join(
+        f'{{ from = {begin:.6g}, to = {end:.6g}, why = "spike" }}'
+        for begin, end, _ in found[:NAMED]
+    )
+    more = "" if len(found) <= NAMED else f" and {len(found) - NAMED} more like these"
+    largest = max((value for _, _, value in found), key=abs)
+    yield (
+        f"{_counted(len(found), 'spike', 'spikes')}, up to {largest:.4g} {channel.unit}{more}: "
+        f"leave out with axes.{experiment.axis}.channels.{channel.name}.ignore = "
+        f"[{windows}] in this run"
+    )
+
+
+# --- the campaign as a whole ----------------------------------------------------------------------
+
+
+def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
+    """Sentences on the campaign file: idle windows, axes without motion, currents without a sign.
+
+    Raises
+    ------
+    FileError, ParameterError
+        If the file, which is read once more, has changed meanwhile and cannot be read.
+    """
+    moving = dict.fromkeys((each.axis for each in campaign), False)
+    for each in campaign:
+        moving[each.axis] |= bool(each.of_kind("shaft_speed", "position", "encoder_counts"))
+    return (
+        *_unused_windows(campaign),
+        *(
+            f"axis '{axis}': no channel measures its motion; a fit of the pump needs one of the "
+            "kind shaft_speed, position or encoder_counts"
+            for axis, seen in moving.items()
+            if not seen
+        ),
+        *unsigned_currents(campaign).values(),
+    )
+
+
+def beyond_the_card(experiment: Experiment) -> tuple[str, ...]:
+    """A sentence if the command goes where no card does, so that nothing can be simulated."""
+    drive = experiment.input
+    far = np.abs(drive.values) > FULL_VOLTAGE
+    if drive.kind != "voltage" or not far.any():
+        return ()
+    first = int(np.argmax(far))
+    return (
+        f"{drive.source}: the voltage is {drive.values[first]:g} V at {drive.time[first]:g} s, but "
+        f"the card takes ±{FULL_VOLTAGE:g} V; check unit, scale and offset of "
+        f"[axes.{experiment.axis}.input]",
+    )
+
+
+def _unused_windows(campaign: Campaign) -> Iterator[str]:
+    """Windows that leave out or weigh no sample of any run: a misspelt manoeuvre, another clock."""
+    file = read_campaign_file(campaign.path)
+    for name, axis in file.axes.items():
+        runs = campaign.select(axis=name)
+        yield from _unused(f"axes.{name}.ignore", axis.ignore, runs)
+        for key, channel in axis.channels.items():
+            where = f"axes.{name}.channels.{key}"
+            yield from _unused(f"{where}.ignore", channel.ignore, runs, key)
+            yield from _unused(f"{where}.weights", channel.weights, runs, key)
+    for number, run in enumerate(file.runs, 1):
+        if run.role != "ignore":
+            ours = [each for each in campaign if each.run == (run.name or Path(run.file).stem)]
+            where = f"run {number} ({run.file})"
+            yield from _unused(f"{where}: ignore", run.ignore, ours)
+            yield from _unused(f"{where}: weights", run.weights, ours)
+
+
+def _unused(
+    where: str,
+    windows: Iterable[schema.Window],
+    runs: Sequence[Experiment],
+    channel: str | None = None,
+) -> Iterator[str]:
+    for window in windows:
+        held = [each for each in runs if applying((window,), each.maneuver)]
+        if not held:
+            names = list(dict.fromkeys(f"'{each.maneuver}'" for each in runs))
+            more = [f"{len(names) - NAMED} others"] if len(names) > NAMED else []
+            yield (
+                f"{where}: no run has the manoeuvre '{window.maneuver}', so that its window does "
+                f"nothing; there are {', '.join([*names[:NAMED], *more])}"
+            )
+        elif not any(
+            inside(window, signal.time).any()
+            for each in held
+            for name, signal in each.channels.items()
+            if channel in (None, name)
+        ):
+            first, last = (
+                "its end" if each is None else f"{each:g} s" for each in (window.start, window.stop)
+            )
+            of = f"any of {len(held)} runs"
+            if len(held) == 1:
+                time = next(iter(held[0].channels.values())).time
+                of = f"{held[0].name}, which goes from {time[0]:.4g} to {time[-1]:.4g} s"
+            yield f"{where}: the window from {first} to {last} holds no sample of {of}"

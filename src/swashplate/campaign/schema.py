@@ -1,19 +1,104 @@
-"""Schema of a campaign's TOML file: what a user may write, and what each entry means."""
+"""Schema of a campaign's TOML file: kinds of signal, entries, and what each of them means."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Iterable
+from fnmatch import fnmatchcase
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, get_args
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, model_validator
 
-from swashplate.campaign.kinds import ChannelKind, InputKind
+from swashplate.errors import InputError
 from swashplate.logs import TextOptions
+from swashplate.units import speed_unit, to_si
+
+InputKind = Literal["voltage", "current", "other"]
+ChannelKind = Literal[
+    "signed_current",
+    "rectified_current",
+    "current_plus",
+    "current_minus",
+    "shaft_speed",
+    "position",
+    "encoder_counts",
+    "stroker_pressure",
+    "swash_angle",
+    "spool_position",
+    "other",
+]
+
+
+class Kind(NamedTuple):
+    """What a kind of signal is."""
+
+    units: tuple[str, ...]
+    """SI units that it may have; the first is meant where none is given. None: as written."""
+    meaning: str
+    """In words, with its sign convention."""
+
+
+KINDS: dict[str, Kind] = {
+    "voltage": Kind(("V",), "the card's command, positive towards positive speed"),
+    "current": Kind(("A",), "signed current that drives the pump without a card"),
+    "signed_current": Kind(("A",), "positive solenoid's current less the negative one's"),
+    "rectified_current": Kind(("A",), "|I+| + |I-|, one ammeter around both leads"),
+    "current_plus": Kind(("A",), "current of the positive solenoid, a magnitude"),
+    "current_minus": Kind(("A",), "current of the negative solenoid, a magnitude"),
+    "shaft_speed": Kind(("rad/s", "m/s"), "speed of the shaft, or of a cylinder's rod"),
+    "position": Kind(("rad", "m"), "integral of the speed from a free zero"),
+    "encoder_counts": Kind(("rad",), "counts of an encoder; an angle from a free zero"),
+    "stroker_pressure": Kind(("Pa",), "stroking pressure about its equilibrium"),
+    "swash_angle": Kind(("rad",), "angle of the swash plate, positive with the speed"),
+    "spool_position": Kind(("m",), "displacement of the spool, positive with the force"),
+    "other": Kind((), "anything else, kept in the unit that it is written in"),
+}
+"""Every kind of input and channel, by its name in a campaign file."""
+
+CHANNEL_KINDS: tuple[ChannelKind, ...] = get_args(ChannelKind)
+
+
+def conversion(kind: str, unit: str | None, what: str) -> tuple[str, float, float]:
+    """The SI unit in which a signal of a kind is kept, with factor and zero: SI = factor x + zero.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    unit : str or None
+        Unit that it comes in; None stands for the kind's first one. Of a shaft's speed, 1/min and
+        the like are turns a minute, 1/s turns a second.
+    what : str
+        The signal, for the error's sentence.
+
+    Raises
+    ------
+    InputError
+        If the unit is unknown or measures something else than the kind.
+    """
+    units = KINDS[kind].units
+    if not units or unit is None or kind == "encoder_counts":
+        return (units[0] if units else unit or "1"), 1.0, 0.0
+    if kind == "shaft_speed":
+        unit = speed_unit(unit)
+    for si in (*units[1:], units[0]):
+        try:
+            zero = to_si(0.0, unit, si, what)
+        except InputError:
+            if si == units[0]:
+                raise
+            continue
+        return si, to_si(1.0, unit, si, what) - zero, zero
+    raise AssertionError
+
 
 Role = Literal["fit", "validate", "ignore"]
 InitialState = Literal["rest", "steady", "given", "estimated"]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+AnyWindow = TypeVar("AnyWindow", bound="Window")
 
 
 class Entry(BaseModel):
@@ -39,6 +124,21 @@ class Window(Entry):
         if self.start is not None and self.stop is not None and self.stop <= self.start:
             raise ValueError(f"a window goes from {self.start} s to {self.stop} s; swap them")
         return self
+
+
+def applying(windows: Iterable[AnyWindow], maneuver: str) -> tuple[AnyWindow, ...]:
+    """The windows that hold in runs of a manoeuvre, such as ``"step +4 V"``."""
+    return tuple(
+        each for each in windows if each.maneuver is None or fnmatchcase(maneuver, each.maneuver)
+    )
+
+
+def inside(window: Window, time: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(m,) whether stamps [s] lie in a window, its ends included."""
+    low = -np.inf if window.start is None else window.start
+    high = np.inf if window.stop is None else window.stop
+    within: NDArray[np.bool_] = (time >= low) & (time <= high)
+    return within
 
 
 class Weight(Window):
@@ -76,7 +176,7 @@ class Signal(Entry):
     missing: Literal["refuse", "drop"] = Field(
         "refuse",
         description="An empty or NaN cell: refuse the log, or leave those samples out (counted "
-        "in the check).",
+        "in the check; a channel without any sample is left out of the run).",
     )
     limits: tuple[Finite, Finite] | None = Field(
         None, description="Range of the instrument in `unit`, to tell clipping."
@@ -155,7 +255,9 @@ class Run(Entry):
 
     file: str = Field(description="The log, beside this file.")
     name: str | None = Field(None, description="For tables; the file's name without its ending.")
-    role: Role = Field("fit", description="fit, validate or ignore.")
+    role: Role = Field(
+        "fit", description="fit, validate or ignore: the log of an ignored run is not opened."
+    )
     start: InitialState | None = Field(None, description="State at the first sample.")
     start_pressure: Finite | None = Field(
         None, description="Stroking pressure at the first sample, with start = 'given' [Pa]."
@@ -167,7 +269,9 @@ class Run(Entry):
     weight: NotNegative = Field(1.0, description="Factor on the run's squared errors.")
     maneuver: str | None = Field(None, description="Name of the manoeuvre, if not recognised.")
     axes: dict[str, dict[str, Any]] = Field(
-        {}, description="Entries of an axis that differ in this run, as in [axes.NAME]."
+        {},
+        description="Entries of an axis that differ in this run, as in [axes.NAME]; "
+        "channels.NAME = false where the run has no such channel; ignored windows are added.",
     )
 
     @model_validator(mode="after")

@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import positive, row
+from swashplate.maneuvers.pieces import row
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
+GAP = 1.5
+"""An interval of more than this many usual ones is a gap."""
 TOLERANCE = 0.05
 """How far off an even grid stamps may lie and still count as even, in sample periods.
 
@@ -39,8 +41,6 @@ class StampStatistics(NamedTuple):
     """Median interval. [s]"""
     jitter: float
     """Standard deviation of the intervals about their median, gaps left out. [s]"""
-    shortest: float
-    """Shortest interval. [s]"""
     longest: float
     """Longest interval, gap or not. [s]"""
     gaps: Rows
@@ -98,34 +98,29 @@ def stamps_of(time: ArrayLike) -> Stamps:
     return Stamps(grid, period)
 
 
-def stamp_statistics(time: ArrayLike, *, gap: float = 1.5) -> StampStatistics:
+def stamp_statistics(time: ArrayLike) -> StampStatistics:
     """Rate, jitter and gaps of stamps.
 
     Parameters
     ----------
     time : array_like, shape (n,)
         Stamps, two or more. [s]
-    gap : float
-        An interval of more than this many medians is a gap.
 
     Raises
     ------
     InputError
-        If the stamps do not increase, a number is not finite, or `gap` is not above 1.
+        If the stamps do not increase or a number is not finite.
     """
     stamps = increasing(time)
-    if positive("gap", gap) <= 1.0:
-        raise InputError(f"gap must be above 1, in median intervals, not {gap:g}.")
     intervals = np.diff(stamps)
     median = float(np.median(intervals))
-    wide = intervals > gap * median
+    wide = intervals > GAP * median
     usual = intervals[~wide]
     return StampStatistics(
         rows=stamps.size,
         rate=1.0 / median,
         period=median,
         jitter=float(np.sqrt(np.mean((usual - median) ** 2))),
-        shortest=float(intervals.min()),
         longest=float(intervals.max()),
         gaps=np.flatnonzero(wide) + 1,
         missing=int(np.sum(np.round(intervals[wide] / median) - 1.0)),
@@ -133,42 +128,15 @@ def stamp_statistics(time: ArrayLike, *, gap: float = 1.5) -> StampStatistics:
     )
 
 
-def even_period(time: ArrayLike, what: str) -> float:
-    """Sample period of even stamps [s].
-
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        Stamps, two or more. [s]
-    what : str
-        Who needs them even, for the error's sentence.
-
-    Raises
-    ------
-    InputError
-        If they are uneven, or as `increasing`.
-    """
-    period = stamps_of(time).period
-    if period is None:
-        steps = np.diff(np.asarray(time, dtype=float))
-        at = int(np.argmax(np.abs(steps - np.median(steps)))) + 1
-        raise InputError(
-            f"{what} needs evenly spaced stamps, but row {at} (the first is 0) comes "
-            f"{steps[at - 1]:.6g} s after the one before it, where {np.median(steps):.6g} s is "
-            "usual; resample the record first."
-        )
-    return period
-
-
-def samples(name: str, values: ArrayLike, rows: int) -> Array:
-    """Values of a record as an array of one row a stamp, all finite; not copied if they are one.
+def signal(name: str, values: ArrayLike, rows: int) -> Array:
+    """Samples of a signal, one a stamp, all finite; not copied if they are an array already.
 
     Parameters
     ----------
     name : str
         What they are, for the error's sentence.
-    values : array_like, shape (rows,) or (rows, k)
-        One or more signals side by side.
+    values : array_like, shape (rows,)
+        The samples.
     rows : int
         Number of stamps.
 
@@ -181,23 +149,14 @@ def samples(name: str, values: ArrayLike, rows: int) -> Array:
         numbers = np.ascontiguousarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError(f"{name} must be numbers, not {values!r}.") from None
-    if numbers.ndim not in (1, 2) or numbers.shape[0] != rows or numbers.size == 0:
+    if numbers.shape != (rows,):
         raise InputError(
-            f"{name} must have one row for each of the {rows} stamps, not the shape "
-            f"{numbers.shape}."
+            f"{name} must be one signal with one row for each of the {rows} stamps, not of the "
+            f"shape {numbers.shape}."
         )
-    if not np.isfinite(numbers).all():
-        at = tuple(int(index) for index in np.argwhere(~np.isfinite(numbers))[0])
-        column = f" of column {at[1]}" if len(at) == 2 else ""
+    wrong = np.flatnonzero(~np.isfinite(numbers))
+    if wrong.size:
         raise InputError(
-            f"{name} must be finite, but row {at[0]}{column} (the first is 0) is {numbers[at]}."
+            f"{name} must be finite, but row {wrong[0]} (the first is 0) is {numbers[wrong[0]]}."
         )
-    return numbers
-
-
-def signal(name: str, values: ArrayLike, rows: int) -> Array:
-    """As `samples`, for one signal alone: shape (rows,)."""
-    numbers = samples(name, values, rows)
-    if numbers.ndim != 1:
-        raise InputError(f"{name} must be one signal, not {numbers.shape[1]} side by side.")
     return numbers

@@ -5,6 +5,7 @@ What takes long to import is imported inside the command that needs it, so that
 """
 
 import io
+import os
 import sys
 from typing import Annotated, Any
 
@@ -23,11 +24,11 @@ from swashplate.cli import (
     excite,
     fit,
     full_order,
+    guess,
     limits,
     linearize,
     parameters,
     report,
-    reproduce,
     rig,
     sensitivity,
     simulate,
@@ -122,9 +123,6 @@ def options(
 
 app.command("demo", epilog=demo.EXAMPLES, rich_help_panel="Everything at once")(demo.demo)
 app.command("tour", epilog=tour.EXAMPLES, rich_help_panel="Everything at once")(tour.tour)
-app.command("reproduce", epilog=reproduce.EXAMPLES, rich_help_panel="Everything at once")(
-    reproduce.reproduce
-)
 app.command("simulate", epilog=simulate.EXAMPLES, rich_help_panel="Simulate")(simulate.simulate)
 app.command("compare", epilog=compare.EXAMPLES, rich_help_panel="Simulate")(compare.compare)
 app.command("axes", epilog=parameters.AXES_EXAMPLES, rich_help_panel="Simulate")(parameters.axes)
@@ -133,6 +131,7 @@ app.command("show", epilog=parameters.SHOW_EXAMPLES, rich_help_panel="Simulate")
 )
 app.command("rig", epilog=rig.EXAMPLES, rich_help_panel="Test")(rig.rig)
 app.add_typer(campaign.app, name="campaign", rich_help_panel="Test")
+app.command("guess", epilog=guess.EXAMPLES, rich_help_panel="Identify")(guess.guess)
 app.command("excitation", epilog=excite.EXAMPLES, rich_help_panel="Identify")(excite.excitation)
 app.command("fit", epilog=fit.EXAMPLES, rich_help_panel="Identify")(fit.fit)
 app.command("validate", epilog=validate.EXAMPLES, rich_help_panel="Identify")(validate.validate)
@@ -159,6 +158,9 @@ app.command("doctor", epilog=doctor.EXAMPLES, rich_help_panel="This installation
 
 def main() -> None:
     """Run the command line."""
+    # the matrices are tall and thin, so that threads of the linear algebra mostly wait for each
+    # other; runs, starts and draws are spread over the cores instead
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal without "±" or "−" shows "?"
     app(prog_name="swashplate")

@@ -12,9 +12,7 @@ from swashplate.cli.terminal import table
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swashplate.identification.advice import Advice, Gain
-    from swashplate.identification.candidates import SensorAdvice
-    from swashplate.identification.sensors import Sensor
+    from swashplate.identification.experiment_design import Advice, Gain, Sensor, SensorAdvice
 
 NAMED = 4
 """Unknowns that a row names."""
@@ -86,7 +84,7 @@ def _percent(error: float) -> str:
 
 def described(sensor: Sensor) -> str:
     """A sensor in a line: its noise, and where that is known from."""
-    from swashplate.campaign.kinds import KINDS
+    from swashplate.campaign import KINDS
 
     unit = KINDS[sensor.kind].units[0]
     return (

@@ -25,9 +25,8 @@ from swashplate.errors import InputError
 from swashplate.tables import TABLE
 
 if TYPE_CHECKING:
-    from swashplate.campaign.kinds import ChannelKind
-    from swashplate.identification.bench import Bench
-    from swashplate.identification.sensors import Sensor
+    from swashplate.campaign import ChannelKind
+    from swashplate.identification.experiment_design import Bench, Sensor
     from swashplate.parameters.parameter_set import ParameterSet
 
 EXAMPLES = """\
@@ -111,14 +110,16 @@ def advise(
     drive that differs from its model is known less well.
     """
     from swashplate.drive import Drive
-    from swashplate.identification.advice import advise as judged
-    from swashplate.identification.candidates import (
+    from swashplate.identification.experiment_design import (
+        ADDED,
+        assumed_sensors,
         best_for_each,
         default_maneuvers,
         in_turn,
         judge_sensors,
+        measurable,
     )
-    from swashplate.identification.sensors import ADDED, assumed_sensors, measurable
+    from swashplate.identification.experiment_design import advise as judged
 
     check_outputs((out, TABLE))
     with working("Judging tests"):
@@ -169,9 +170,9 @@ def _bench(
     free: Sequence[str],
     noise: Sequence[str],
 ) -> Bench:
-    from swashplate.campaign.campaign import Campaign
-    from swashplate.identification.bench import bench
-    from swashplate.identification.fit import smooth
+    from swashplate.campaign import Campaign
+    from swashplate.identification.experiment_design import bench
+    from swashplate.identification.fitting import smooth
     from swashplate.identification.setup import load_setup
     from swashplate.identification.staging import setup_of
 
@@ -212,9 +213,9 @@ def _kind(word: str) -> ChannelKind:
 
 def _noises(words: Sequence[str], fresh: ParameterSet | None = None) -> list[Sensor]:
     """Sensors of stated noise; for a fresh plan the usual ones with what is stated put in."""
-    from swashplate.campaign.kinds import KINDS
+    from swashplate.campaign import KINDS
     from swashplate.drive import Drive
-    from swashplate.identification.sensors import Sensor, default_sensors
+    from swashplate.identification.experiment_design import Sensor, default_sensors
     from swashplate.units import to_si
 
     made: dict[str, Sensor] = {}

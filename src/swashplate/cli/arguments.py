@@ -24,6 +24,15 @@ AxisName = Annotated[
     str | None,
     typer.Option(help="The axis, where the campaign has several.", show_default=False),
 ]
+OwnModel = Annotated[
+    Path | None,
+    typer.Option(
+        "--model",
+        help="A Python file with a model of your own and what is free of it.",
+        metavar="FILE.py",
+        show_default=False,
+    ),
+]
 Values = Annotated[
     list[str] | None,
     typer.Option("--set", help="As in 'swashplate simulate'.", metavar="NAME=VALUE"),

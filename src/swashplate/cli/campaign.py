@@ -18,12 +18,13 @@ from swashplate.tables import FIGURE, write_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
 
 INIT_EXAMPLES = """\
 Examples:
   swashplate campaign init logs/*.csv --drive hoist
   swashplate campaign init trial1.mat trial2.mat --out trials.toml
+  swashplate campaign init log.csv --column voltage=u --column shaft_speed=n --unit n=1/min
 """
 CHECK_EXAMPLES = """\
 Examples:
@@ -79,30 +80,66 @@ def init(
             show_default=False,
         ),
     ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What a column is: time, voltage, shaft_speed or another kind; may be repeated.",
+            metavar="KIND=COLUMN",
+            show_default=False,
+        ),
+    ] = None,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Unit of a column; may be repeated.",
+            metavar="COLUMN=UNIT",
+            show_default=False,
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace an older file.")] = False,
 ) -> None:
     """Write the first draft of a campaign file from the headers of logs.
 
-    What each column is gets guessed from its name and unit, and marked as such:
-    read the file, mend what is wrong, then run 'swashplate campaign check'.
+    What each column is gets guessed from its name and unit, and marked as such;
+    what cannot be told says FIXME. Read the file, mend what is wrong, then run
+    'swashplate campaign check'.
     """
-    from swashplate.campaign.draft import NO_ENCODER, UNUSED, draft
+    from swashplate.campaign.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
 
     target = out or logs[0].parent / "campaign.toml"
     if target.exists() and not force:
         raise InputError(f"{target} exists already; name another with --out, or say --force.")
     check_outputs((target, None))
     with working("Reading"):
-        text = draft(logs, target.parent, _from(target.parent, drive), counts_per_turn)
+        text = draft_campaign(
+            logs,
+            target.parent,
+            _from(target.parent, drive),
+            counts_per_turn,
+            columns={name: kind for kind, name in _pairs("--column", column, "voltage=u")},
+            units=dict(_pairs("--unit", unit, "u=mV")),
+        )
     write_text(text, target)
     note(f"Draft: {target}")
     guessed = text.count("# guessed")
     note(f"{counted(guessed, 'entry is', 'entries are')} guessed: look for '# guessed'.")
     for line in text.splitlines():
-        if line.startswith((UNUSED, NO_ENCODER)) or "# fill in" in line:
+        if (
+            line.startswith((UNUSED, NO_ENCODER))
+            or f"# {FIXME}" in line
+            or f'column = "{FIXME}"' in line
+        ):
             note(f"  {line.lstrip('# ')}")
     note("Then run")
     note(f"  swashplate campaign check {shlex.quote(str(target))}")
+
+
+def _pairs(option: str, given: list[str] | None, example: str) -> list[tuple[str, str]]:
+    """What stands before and behind the equals sign of each."""
+    for each in given or ():
+        if "=" not in each:
+            raise InputError(f"{option} {each} has no equals sign: write {option} {example}.")
+    return [(each.partition("=")[0], each.partition("=")[2]) for each in given or ()]
 
 
 def _from(folder: Path, drive: str | None) -> str | None:
@@ -128,24 +165,20 @@ def check(
     whatever someone should look into: also windows that no run takes, and runs
     that are far from what the axis's drive would do.
     """
-    from swashplate.campaign.campaign import Campaign
-    from swashplate.campaign.quality import examine
-    from swashplate.campaign.shortcomings import without_motion
-    from swashplate.campaign.unused_windows import unused_windows
+    from swashplate.campaign import Campaign, campaign_findings, examine, unsigned_currents
 
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
-        qualities = {each.name: examine(each) for each in campaign}
-        of_file = (
-            *unused_windows(campaign),
-            *without_motion(campaign),
-            *_beside_the_drives(campaign),
-        )
+        unsigned = {name for _, name in unsigned_currents(campaign)}
+        qualities = {each.name: examine(each, unsigned) for each in campaign}
+        of_file = dict.fromkeys((*campaign_findings(campaign), *_beside_the_drives(campaign)))
     note(heading(campaign))
     widths = widths_of(qualities.values())
     for experiment in campaign:
         found = qualities[experiment.name]
         show(quality_table(experiment, found, widths))
+        for text in experiment.notes:
+            say(f"- {text}.")
         for each in found:
             for text in each.findings:
                 say(f"! {each.signal}: {text}{'' if text.endswith('?') else '.'}")
@@ -154,6 +187,8 @@ def check(
         say(f"! {text}.")
     findings = sum(len(each.findings) for found in qualities.values() for each in found)
     findings += len(of_file)
+    if campaign.ignored:
+        note(f"Ignored, and not opened: {', '.join(campaign.ignored)}.")
     if not campaign.select(role="fit"):
         note("No run has the role 'fit'.")
     note(
@@ -167,19 +202,19 @@ def check(
 
 def _beside_the_drives(campaign: Campaign) -> list[str]:
     """What stands out when each axis's drive is simulated under the runs' commands."""
-    from swashplate.campaign.shortcomings import beyond_the_card
+    from swashplate.campaign import beyond_the_card
     from swashplate.identification.data_checks import check_runs
-    from swashplate.identification.fit import smooth
+    from swashplate.identification.fitting import smooth
 
     found = []
     for name, axis in campaign.axes.items():
         if axis.drive is None:
             continue
         nominal = smooth(campaign.drive(name).parameters)
-        runs = [each for each in campaign.select(axis=name) if each.role != "ignore"]
+        runs = campaign.select(axis=name)
         beyond = [said for each in runs for said in beyond_the_card(each)]
         found += [f"{said}; this run is not held against the drive" for said in beyond]
-        runs = [each for each in runs if not beyond_the_card(each)]
+        runs = tuple(each for each in runs if not beyond_the_card(each))
         # a drive that is made up says nothing of what a machine does
         made_up = all(each.status == "assumed" for each in nominal.values())
         if runs and not made_up and all(each.input.kind != "other" for each in runs):
@@ -220,7 +255,7 @@ def plot(
     The overview is one figure for each axis and eight runs, numbered if there
     are several.
     """
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
     from swashplate.report.figures import plot_campaign, save_figure
 
     check_outputs((out, FIGURE))
@@ -277,6 +312,6 @@ def _close_look(
 @app.command("schema", epilog=SCHEMA_EXAMPLES)
 def schema() -> None:
     """Print a campaign file's JSON Schema, for editors that check while one writes."""
-    from swashplate.campaign.campaign import json_schema
+    from swashplate.campaign import json_schema
 
     typer.echo(json_schema(), nl=False)

@@ -32,7 +32,7 @@ from swashplate.tables import FIGURE, Form
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swashplate.analysis.inverse import InverseMap
+    from swashplate.analysis.compensation import InverseMap
     from swashplate.analysis.tracking import Improvement
 
 EXAMPLES = """\

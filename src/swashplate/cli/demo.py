@@ -38,12 +38,11 @@ def demo(
     pump and motor to ten of them, predicts the other three and writes a report.
     Takes less than a minute.
     """
-    from swashplate.campaign import rig
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
-    from swashplate.identification.fit import fit
-    from swashplate.identification.known_truth import drawn
+    from swashplate.identification.fitting import fit
     from swashplate.identification.setup import load_setup
+    from swashplate.identification.staging import drawn
 
     setup = load_setup("hoist")
     nominal = Drive.preset("hoist")
@@ -58,13 +57,13 @@ def demo(
         begun = perf_counter()
         runs = campaign.select(role="fit")
         start = campaign.drive("hoist").parameters
-        result = fit(runs, start, setup)
+        result = fit(start, runs, setup)
         seconds = perf_counter() - begun
         begin("judging what the data tell")
         found = judged_fit(campaign, "hoist", runs, start, setup, result, Wanted(seed=seed))
         shown = [_truth_beside_estimate(each, nominal, truth) for each in found.assessments]
         begin("writing the report")
-        lines = [*written(result, found.assessments, out), found.stored(out)]
+        lines = [*written(result, found.assessments, campaign, out), found.stored(out)]
         lines.append(found.reported(out, truth.parameters))
         lines.append(_drawn(found, truth, out))
     note(f"Campaign:  {path}")
@@ -81,7 +80,7 @@ def demo(
 def _drawn(found: Judged, truth: Drive, out: Path) -> str:
     """Draw a predicted run and the estimates beside the truth; a line that says so."""
     from swashplate.identification.drive_model import DriveModel
-    from swashplate.identification.known_truth import true_value
+    from swashplate.identification.staging import true_value
     from swashplate.identification.validation import with_speeds
     from swashplate.report.figures import plot_fit, save_figure
 
@@ -107,7 +106,7 @@ def _truth_beside_estimate(
 ) -> tuple[Table, int, int]:
     """The table of a stage, how many intervals hold the truth, and of how many."""
     from swashplate.identification.drive_model import DriveModel
-    from swashplate.identification.known_truth import true_value
+    from swashplate.identification.staging import true_value
 
     parts = {"card": "The control card", "pump": "Pump and motor"}
     name = assessment.stage.stage.name

@@ -86,11 +86,11 @@ def excitation(
     reach, how much each unknown changes what was measured, and which unknowns
     can move together unseen. Proposes a set-up in which all is determined.
     """
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
     from swashplate.identification.data_checks import check_sound, refuse_unsound
-    from swashplate.identification.excitation import outlook
-    from swashplate.identification.fit import smooth
-    from swashplate.identification.reparameterise import propose, proposed_setup, setup_text
+    from swashplate.identification.excitation import outlook, propose, proposed_setup
+    from swashplate.identification.fitting import smooth
+    from swashplate.identification.setup import setup_text
     from swashplate.identification.staging import setup_of
     from swashplate.tables import write_text
 
@@ -108,9 +108,9 @@ def excitation(
         looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
         proposals = [propose(each, faint=faint) for each in looks]
         verdicts = [each.identifiability for each in looks]
+    comments = {each.stage.name: each.comments() for each in proposals}
     if write is not None:
-        made = proposed_setup(plan, proposals)
-        write_text(setup_text(made, proposals), write)
+        write_text(setup_text(proposed_setup(plan, proposals), comments), write)
     if out is not None:
         _written(looks, out)
     for sentence in doubts:
@@ -134,7 +134,7 @@ def excitation(
     elif any(each.proposed is not None for each in proposals):
         note("With the starred lines (*) taken, the set-up is (--write FILE keeps it):")
         note("")
-        note(setup_text(proposed_setup(plan, proposals), proposals).rstrip())
+        note(setup_text(proposed_setup(plan, proposals), comments).rstrip())
     if out is not None:
         note(f"Table: {out}")
 

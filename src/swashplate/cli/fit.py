@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from swashplate.cli.arguments import AxisName, CampaignPath
+from swashplate.cli.arguments import AxisName, CampaignPath, OwnModel
 from swashplate.cli.fit_output import (
     estimates_table,
     folds_table,
@@ -18,14 +18,15 @@ from swashplate.cli.fit_output import (
 )
 from swashplate.cli.inputs import parameters_of
 from swashplate.cli.judging import Wanted, judged_fit
-from swashplate.cli.terminal import Shown, long_work, note, say, show, waiting, working
-from swashplate.cli.validate import chosen_axis
+from swashplate.cli.terminal import Shown, Timing, long_work, note, say, show, waiting, working
+from swashplate.cli.validate import check_folder, chosen_axis
 from swashplate.cli.validation_tables import shown_verdict
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
-    from swashplate.identification.fit import Search
+    from swashplate.identification.fitting import Search
     from swashplate.identification.solving import Progress
+    from swashplate.identification.staging import Parameters
     from swashplate.identification.starts import StartResult
 
 EXAMPLES = """\
@@ -34,13 +35,15 @@ Examples:
   swashplate fit virtual/campaign.toml --out fitted
   swashplate fit harbour/campaign.toml --setup mine.toml --starts 50 --seed 1
   swashplate fit harbour/campaign.toml --folds 5 --bootstrap 1000 --profile Z16_plus
+  swashplate fit valve/campaign.toml --model valve.py
   swashplate simulate fitted/drive.toml step:9
 """
 
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as of other programs."""
 FEWEST_DRAWS = 40
 """Of a bootstrap: one beyond each end of a 95 % interval."""
 
-Method = Literal["trf", "slsqp"]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
 Figures = Literal["svg", "pdf"]
 
@@ -60,6 +63,7 @@ def fit(
             show_default=False,
         ),
     ] = None,
+    model: OwnModel = None,
     joint: Annotated[
         bool,
         typer.Option("--joint", help="After the stages all unknowns at once, through the chain."),
@@ -101,9 +105,6 @@ def fit(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the starts that DIR holds already.")
     ] = False,
-    method: Annotated[
-        Method, typer.Option(help="Trust region on exact derivatives, or SQP by differences.")
-    ] = "trf",
     loss: Annotated[Loss, typer.Option(help="Robust losses forgive outliers.")] = "linear",
     require: Annotated[
         float,
@@ -116,35 +117,50 @@ def fit(
         Figures | None,
         typer.Option(help="Figures for print as well, in DIR/figures.", show_default=False),
     ] = None,
+    timing: Annotated[bool, typer.Option("--timing", help="Say how long each part took.")] = False,
 ) -> None:
-    """Identify a drive from its tests.
+    """Identify a drive, or a model of your own, from its tests.
 
     Fits the runs with the role 'fit', stage after stage, predicts those with the
     role 'validate', and says what the data can and cannot tell. Writes the drive
     as a parameter file that 'simulate' takes, the estimates with their intervals,
     and what 'report' needs to write the report again. Ctrl-C keeps the best so
-    far. The exit code is 1 if the result is not usable.
+    far, of several starts those that ended, and the exit code is 130. It is 1 if
+    the result is not usable.
     """
-    from swashplate.campaign.campaign import Campaign
-    from swashplate.executors import Dask, Processes
-    from swashplate.identification.fit import fit as fitted
-    from swashplate.identification.fit import refined
-    from swashplate.identification.solving import longest_left
-    from swashplate.identification.staging import setup_of
-
     if 0 < bootstrap < FEWEST_DRAWS:
         raise InputError(
             f"{bootstrap} draws do not reach the ends of a 95 % interval; take {FEWEST_DRAWS} or "
             "more, 1000 for smooth ones."
         )
+    check_folder(out)
+    clock = Timing()
+    if model is not None and (setup is not None or begin is not None or joint):
+        raise InputError(f"{model} says what is free and where it begins: leave out the others.")
+    with working("Starting"):
+        from swashplate.campaign import Campaign
+        from swashplate.executors import Dask, Processes
+        from swashplate.identification.fitting import fit as fitted
+        from swashplate.identification.fitting import refined
+        from swashplate.identification.own_model import ModelSetup
+        from swashplate.identification.solving import longest_left
+        from swashplate.identification.staging import setup_of
+    clock.ended("start")
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
         chosen = chosen_axis(campaign, axis)
-        plan = setup_of(campaign, chosen, setup)
-        nominal = parameters_of(begin) if begin is not None else campaign.drive(chosen).parameters
         runs = campaign.select(axis=chosen, role="fit")
         if not runs:
             raise InputError(f"{path}: no run of the axis '{chosen}' has the role 'fit'.")
+        nominal: Parameters
+        if model is not None:
+            nominal = ModelSetup.from_file(model).nominal(runs)
+            plan = nominal.setup.setup
+        else:
+            plan = setup_of(campaign, chosen, setup)
+            drive = campaign.drive(chosen) if begin is None else None
+            nominal = parameters_of(begin or "") if drive is None else drive.parameters
+    clock.ended("reading")
     executor = Dask(dask) if dask is not None else Processes(jobs or None)
     begun = perf_counter()
     with long_work("Fitting") as shown:
@@ -156,20 +172,34 @@ def fit(
             )
 
         search = _search(starts, seed, executor, out, resume, shown) if starts else None
-        result = fitted(runs, nominal, plan, method=method, loss=loss, search=search, watch=watch)
+        result = fitted(nominal, runs, plan, loss=loss, search=search, watch=watch)
         if joint and len(plan.stages) > 1 and not result.interrupted:
             result = refined(result, runs, watch=watch)
     seconds = perf_counter() - begun
-    wanted = Wanted(
-        folds, bootstrap, tuple(profile or ()), seed, executor, method, loss, require / 100.0
-    )
+    clock.ended("search, kernels loaded")
+    if result.interrupted and starts:
+        last = result.stages[-1]
+        note(
+            f"Interrupted in the stage '{last.stage.name}': {last.solution.message}. The same "
+            "command with --resume goes on; nothing is written but the starts."
+        )
+        raise typer.Exit(INTERRUPTED)
+    wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, loss, require / 100.0)
     found = judged_fit(campaign, chosen, runs, nominal, plan, result, wanted)
-    lines = [*written(result, found.assessments, out, found.bootstraps), found.stored(out)]
+    clock.ended("judging")
+    lines = [
+        *written(result, found.assessments, campaign, out, found.bootstraps),
+        found.stored(out),
+    ]
     if report:
         lines.append(found.reported(out))
     if figures is not None:
         lines.append(found.drawn(out, figures))
+    clock.ended("report and files")
     note(f"{campaign.title}{' (virtual)' if campaign.virtual else ''}: fitted in {seconds:.2f} s")
+    for each_run in runs:
+        for sentence in each_run.notes:
+            say(f"- {each_run.name}: {sentence}.")
     for sentence in result.doubts:
         say(f"! {sentence}")
     for each in found.assessments:
@@ -194,8 +224,12 @@ def fit(
             say(f"- {sentence}")
     for line in lines:
         note(line)
+    if timing:
+        clock.ended("tables")
+        show(clock.table())
     if result.interrupted:
         note("Interrupted: this is the best so far, not an optimum.")
+        raise typer.Exit(INTERRUPTED)
     shown_verdict(found.verdict)
 
 
@@ -203,7 +237,7 @@ def _search(
     starts: int, seed: int, executor: object, out: Path, resume: bool, shown: Shown
 ) -> Search:
     from swashplate.executors import Dask, Processes
-    from swashplate.identification.fit import Search
+    from swashplate.identification.fitting import Search
     from swashplate.identification.starts import time_left
 
     assert isinstance(executor, Processes | Dask)

@@ -6,17 +6,20 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from swashplate.cli.inputs import DRIVE, NUMBERS
 from swashplate.cli.terminal import table
 from swashplate.cli.validate import made_folder
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from swashplate.campaign import Campaign
     from swashplate.identification.assessment import Assessment, RunQuality
     from swashplate.identification.bootstrap import Bootstrap
     from swashplate.identification.cross_validation import CrossValidation
-    from swashplate.identification.fit import Fit
+    from swashplate.identification.fitting import Fit
     from swashplate.identification.uncertainty import Estimate
+    from swashplate.parameters.parameter_set import ParameterSet
 
 
 def estimates_table(
@@ -110,20 +113,75 @@ def folds_table(found: CrossValidation) -> Table:
     return made
 
 
+def told(fit: Fit, assessments: Sequence[Assessment], campaign: Campaign) -> ParameterSet:
+    """The fitted set, where each number says whether it was fitted or fixed, and where it is from.
+
+    Of a fitted one the source is campaign, date and 95 % interval; of a fixed one that of the set
+    which the fit began from.
+    """
+    from dataclasses import replace
+    from datetime import date
+
+    from swashplate.parameters.definitions import find
+    from swashplate.parameters.parameter_set import ParameterSet
+
+    found, nominal, today = fit.drive.parameters, fit.nominal, f"{date.today():%d %b %Y}"
+    assert isinstance(nominal, ParameterSet)
+    ends: dict[str, list[str]] = {}
+    for each in assessments:
+        unknowns = each.stage.problem.unknowns
+        for estimate, unknown in zip(each.uncertainty.estimates, unknowns, strict=True):
+            if unknown.run is not None:
+                continue
+            if unknown.name.startswith("force_"):
+                for symbol in ("Z19", "Z20", "Z21", "Z22"):
+                    ends[symbol] = ["from the fitted forces"]
+                continue
+            low, high = _ends(estimate)
+            interval = f"{low} to {high}" if high else low
+            for target in unknown.targets:
+                if target in found.numbers:
+                    side = target.rpartition("_")[2]
+                    side = f"{side} " if side in ("plus", "minus") else ""
+                    ends.setdefault(find(target).symbol, []).append(f"{side}{interval}")
+    origin = f"{campaign.path.name}, {today}"
+    parameters = {}
+    for symbol, parameter in found.parameters.items():
+        if symbol in ends:
+            words = "; ".join(ends[symbol])
+            parameter = replace(parameter, status="fitted", source=f"{origin}; 95 %: {words}")
+        elif parameter.status != "inactive":
+            before = nominal.parameters.get(symbol, parameter)
+            source = f"{nominal.name}: {before.source}" if before.source else nominal.name
+            parameter = replace(parameter, status="fixed", source=source)
+        parameters[symbol] = parameter
+    title = f"{campaign.title}: fitted to {len(fit.stages[0].problem.experiments)} runs, {today}"
+    return replace(found, title=title, parameters=parameters)
+
+
 def written(
     fit: Fit,
     assessments: Sequence[Assessment],
+    campaign: Campaign,
     out: Path,
     bootstraps: Mapping[str, Bootstrap] | None = None,
 ) -> list[str]:
     """Write the drive and the estimates; lines that say so."""
     import polars as pl
+    from tomlkit import dumps
 
     from swashplate.drive import Drive
-    from swashplate.tables import write_table
+    from swashplate.identification.own_model import ModelParameters
+    from swashplate.tables import write_table, write_text
 
     made_folder(out)
-    Drive(fit.parameters).to_toml(out / "drive.toml")
+    if isinstance(fit.parameters, ModelParameters):
+        found = {name: float(value) for name, value in fit.parameters.numbers.items()}
+        write_text(dumps({fit.parameters.name: found}), out / NUMBERS)
+        lines = [f"Numbers:   {out / NUMBERS}"]
+    else:
+        Drive(told(fit, assessments, campaign)).to_toml(out / DRIVE)
+        lines = [f"Drive:     {out / DRIVE}"]
     rows = []
     for each in assessments:
         bootstrap = (bootstraps or {}).get(each.stage.stage.name)
@@ -149,4 +207,4 @@ def written(
                 row["bootstrap upper 95 %"] = None if ends is None else ends[1]
             rows.append(row)
     write_table(pl.DataFrame(rows, infer_schema_length=None), out / "estimates.csv")
-    return [f"Drive:     {out / 'drive.toml'}", f"Estimates: {out / 'estimates.csv'}"]
+    return [*lines, f"Estimates: {out / 'estimates.csv'}"]

@@ -123,7 +123,7 @@ def full_order(
     given = physical_values(physical or ())
     with working("Completing the physical values"):
         from swashplate.full_order import FullOrderDrive
-        from swashplate.full_order.completion import nearest_set
+        from swashplate.full_order.physical_set import nearest_set
 
         chosen = drive_of(drive, values or (), factors or ())
         axis = nearest_set(chosen.name) if like is None else like
@@ -138,7 +138,7 @@ def full_order(
         _say_table(full, title, head, tables, rate, out)
     else:
         options = Options(rate, interpolation, start, clip, time_column, column)
-        _say_run(full, title, head, tables, command, options, method, out, plot)
+        _say_run(full, title, head, tables, command, options, method, out=out, plot=plot)
 
 
 def _say_table(
@@ -176,6 +176,7 @@ def _say_run(
     command: str,
     options: Options,
     method: Method,
+    *,
     out: Path | None,
     plot: Path | None,
 ) -> None:

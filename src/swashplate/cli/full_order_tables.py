@@ -45,7 +45,7 @@ def physical_values(words: Sequence[str]) -> dict[str, Change]:
 
 
 def _physical_value(word: str) -> tuple[str, Change]:
-    from swashplate.full_order.completion import chosen_quantity, si_value
+    from swashplate.full_order.physical_set import chosen_quantity, si_value
 
     name, _, given = (part.strip() for part in word.partition("="))
     read = numbers_and_unit(given)
@@ -62,7 +62,7 @@ def _physical_value(word: str) -> tuple[str, Change]:
 
 def chosen_table(axis: str, given: Mapping[str, Change]) -> Table:
     """What the physical set was completed from: assumed values and given ones."""
-    from swashplate.full_order.completion import chosen_over, load_choices
+    from swashplate.full_order.physical_set import chosen_over, load_choices
 
     made = table("What the drive's parameters do not say", "Physical value", ">", "", "")
     for name, entry in chosen_over(load_choices(axis), given).items():
@@ -74,7 +74,7 @@ def chosen_table(axis: str, given: Mapping[str, Change]) -> Table:
 
 def assumed_said(axis: str, given: Mapping[str, Change]) -> str:
     """How much of the physical set is assumed."""
-    from swashplate.full_order.completion import chosen_over, load_choices
+    from swashplate.full_order.physical_set import chosen_over, load_choices
 
     entries = chosen_over(load_choices(axis), given)
     assumed = sum(entry.status != "user" for entry in entries.values())

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
+    from swashplate.campaign import Experiment
     from swashplate.drive import Drive
+    from swashplate.identification.own_model import ModelParameters
     from swashplate.maneuvers import Maneuver
     from swashplate.parameters.parameter_set import Change, ParameterSet
     from swashplate.simulation.result import Simulation
@@ -23,6 +25,8 @@ _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
 DRIVE = "drive.toml"
 """The drive in a folder that a fit wrote."""
+NUMBERS = "parameters.toml"
+"""What a fit of a model of one's own writes in the place of a drive."""
 _ENDING = re.compile(r"\.[A-Za-z]\w*$")
 
 
@@ -63,6 +67,31 @@ def parameters_of(word: str) -> ParameterSet:
 
     file = drive_file(word)
     return load_preset(word) if file is None else load_set(file)
+
+
+def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelParameters:
+    """A model of one's own with the numbers that a fit wrote into its folder.
+
+    Raises
+    ------
+    InputError
+        If the folder has none of this model.
+    """
+    from dataclasses import replace
+
+    from swashplate.documents import parse_toml, read_text
+    from swashplate.identification.own_model import ModelSetup
+
+    setup = ModelSetup.from_file(file)
+    place = Path(folder) / NUMBERS if Path(folder).is_dir() else Path(folder)
+    table = parse_toml(read_text(place), str(place)).get(setup.name)
+    nominal = setup.nominal(runs)
+    if not isinstance(table, dict) or table.keys() != nominal.numbers.keys():
+        raise InputError(
+            f"{place} has no table [{setup.name}] with {', '.join(nominal.numbers)}: give the "
+            f"folder that 'swashplate fit --model {file}' wrote."
+        )
+    return replace(nominal, numbers={name: float(value) for name, value in table.items()})
 
 
 def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:

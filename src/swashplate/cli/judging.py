@@ -11,16 +11,16 @@ from swashplate.cli.terminal import working
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
-    from swashplate.campaign.campaign import Campaign
-    from swashplate.campaign.experiment import Experiment
+    from swashplate.campaign import Campaign, Experiment
     from swashplate.executors import Executor
     from swashplate.identification.assessment import Assessment, RunQuality
     from swashplate.identification.bootstrap import Bootstrap
     from swashplate.identification.cross_validation import CrossValidation
-    from swashplate.identification.fit import Fit
-    from swashplate.identification.fit_file import StageProfile
+    from swashplate.identification.fitting import Fit
     from swashplate.identification.setup import Setup
-    from swashplate.identification.solving import Loss, Method
+    from swashplate.identification.solving import Loss
+    from swashplate.identification.staging import Parameters
+    from swashplate.identification.storing import StageProfile
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -35,7 +35,6 @@ class Wanted:
     """Unknowns by name, or ``"all"``."""
     seed: int = 0
     executor: Executor | None = None
-    method: Method = "trf"
     loss: Loss = "linear"
     required: float = 0.1
     """Largest error of held-out runs over their range."""
@@ -130,7 +129,7 @@ def judged_fit(
     campaign: Campaign,
     axis: str,
     runs: Sequence[Experiment],
-    nominal: ParameterSet,
+    nominal: Parameters,
     plan: Setup,
     result: Fit,
     wanted: Wanted,
@@ -157,7 +156,6 @@ def judged_fit(
                 folds=wanted.folds,
                 seed=wanted.seed,
                 executor=wanted.executor,
-                method=wanted.method,
                 loss=wanted.loss,
                 watch=lambda _, done: status.update(f"{done} of {wanted.folds} folds"),
             )
@@ -199,7 +197,7 @@ def _profiles(
     assessment: Assessment, wanted: Wanted, show: Callable[[str], None]
 ) -> list[StageProfile]:
     from swashplate.identification.bootstrap import profiles_of
-    from swashplate.identification.fit_file import StageProfile
+    from swashplate.identification.storing import StageProfile
 
     name = assessment.stage.stage.name
     names = None

@@ -13,15 +13,15 @@ from swashplate.cli.terminal import show, table
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
+    from swashplate.analysis.outcomes import Trial
     from swashplate.analysis.sensitivity import Range
-    from swashplate.analysis.trial import Trial
     from swashplate.drive import Drive
 
 
 def list_levers(asked: bool) -> None:
     """Print the levers and end, if that is asked for."""
     if asked:
-        from swashplate.analysis.levers import LEVERS
+        from swashplate.analysis.whatif import LEVERS
 
         made = table(None, "lever", "multiplies", "what it is", wrap="what it is")
         for lever in LEVERS.values():
@@ -39,7 +39,7 @@ def list_levers(asked: bool) -> None:
 
 def factors_of(words: Sequence[str]) -> dict[str, float]:
     """Factors by lever from words such as ``orifice=1.5``."""
-    from swashplate.analysis.levers import find_lever
+    from swashplate.analysis.whatif import find_lever
 
     factors: dict[str, float] = {}
     for word in words:
@@ -57,7 +57,7 @@ def factors_of(words: Sequence[str]) -> dict[str, float]:
 
 def trial_of(drive: Drive, command: str, options: Options) -> tuple[str, Trial]:
     """Name of a command, a manoeuvre or a log, and the trial that it makes."""
-    from swashplate.analysis.trial import trial
+    from swashplate.analysis.outcomes import trial
 
     name, run = simulated(drive, command, options)
     assert run.voltage is not None  # the command line simulates voltages only
@@ -66,7 +66,7 @@ def trial_of(drive: Drive, command: str, options: Options) -> tuple[str, Trial]:
 
 def ranges_from(words: Sequence[str], usual: Range) -> dict[str, Range]:
     """Ranges of factors by lever from words such as ``pump`` or ``pump=0.8/1.5``."""
-    from swashplate.analysis.levers import find_lever
+    from swashplate.analysis.whatif import find_lever
 
     ranges: dict[str, Range] = {}
     for word in words:

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from swashplate.analysis.envelope import Envelope, Way
-    from swashplate.analysis.largest_sine import LargestSine
     from swashplate.analysis.limits import LimitShares
+    from swashplate.analysis.tracking import LargestSine
 
 
 def envelope_table(found: Envelope) -> Table:

@@ -136,7 +136,7 @@ def _say_envelope(
 ) -> None:
     with working("Measuring"):
         from swashplate.analysis.envelope import envelope
-        from swashplate.analysis.largest_sine import largest_sine
+        from swashplate.analysis.tracking import largest_sine
 
         found, refusal = envelope(drive), ""
         tables = [envelope_table(found)]

@@ -11,9 +11,7 @@ from swashplate.cli.terminal import table
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swashplate.campaign.campaign import Campaign
-    from swashplate.campaign.experiment import Experiment
-    from swashplate.campaign.quality import Quality
+    from swashplate.campaign import Campaign, Experiment, Quality
 
 LINE, BETWEEN = 80, 2
 """Characters of a line, and those between two columns."""

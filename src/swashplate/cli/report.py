@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from swashplate.cli.arguments import OwnModel
 from swashplate.cli.inputs import parameters_of
 from swashplate.cli.terminal import note, say, working
 from swashplate.cli.validate import made_folder
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
+    from swashplate.identification.own_model import ModelSetup
     from swashplate.identification.storing import StoredFit
 
 EXAMPLES = """\
@@ -40,6 +42,7 @@ def report(
     path: Annotated[
         Path, typer.Argument(metavar="CAMPAIGN.toml", help="The campaign that was fitted.")
     ] = Path("campaign.toml"),
+    model: OwnModel = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -67,8 +70,9 @@ def report(
     Nothing is fitted. The campaign must be the one that was fitted: if its
     samples, weights or ignored windows have changed, the report is refused.
     """
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
     from swashplate.identification.assessment import assess
+    from swashplate.identification.own_model import ModelSetup
     from swashplate.identification.validation import predict
     from swashplate.identification.verdict import verdict
     from swashplate.report.fit_page import save_fit_figures, write_fit_report
@@ -78,7 +82,8 @@ def report(
         campaign = Campaign.from_toml(path)
         if true is not None and not campaign.virtual:
             raise InputError(f"{path} is not virtual: nobody knows its truth, leave out --truth.")
-        stored = _stored(fitted, campaign)
+        own = None if model is None else ModelSetup.from_file(model)
+        stored = _stored(fitted, campaign, own)
     with working("Judging"):
         assessments = assess(stored.fit.stages)
         names = {each.name for each in stored.experiments}
@@ -123,7 +128,7 @@ def _folder(fitted: Path) -> Path:
     return fitted if fitted.is_dir() else fitted.parent
 
 
-def _stored(fitted: Path, campaign: Campaign) -> StoredFit:
+def _stored(fitted: Path, campaign: Campaign, model: ModelSetup | None) -> StoredFit:
     """The stored fit; of a drive that is named, the one beside it that found it."""
     from swashplate.identification.storing import load_fit
 
@@ -133,7 +138,7 @@ def _stored(fitted: Path, campaign: Campaign) -> StoredFit:
             f"There is no {STORED} in {_folder(fitted)}: give a folder that 'swashplate fit' "
             "wrote, or judge a drive alone with 'swashplate validate'."
         )
-    stored = load_fit(place, campaign)
+    stored = load_fit(place, campaign, model=model)
     if fitted.suffix.lower() == ".toml":
         given = parameters_of(str(fitted)).numbers
         other = [

@@ -23,7 +23,6 @@ Examples:
 """
 
 Severity = Literal["clean", "realistic", "harsh"]
-Format = Literal["csv", "mat", "parquet"]
 
 
 def rig(
@@ -61,7 +60,6 @@ def rig(
             metavar="MANEUVER",
         ),
     ] = None,
-    format_: Annotated[Format, typer.Option("--format", help="Of the logs.")] = "csv",
     force: Annotated[
         bool, typer.Option("--force", help="Write into a folder that is not empty.")
     ] = False,
@@ -87,12 +85,12 @@ def rig(
             perturb=perturb,
         )
     with working("Writing"):
-        path = bench.write(tests, out, format_, overwrite=force)
+        path = bench.write(tests, out, overwrite=force)
     made = table(None, "log", "manoeuvre", "role", ">rows", ">s", wrap="manoeuvre")
     for run in tests.runs.values():
         time = run.columns["time"]
         made.add_row(
-            f"{run.stem}.{format_}",
+            f"{run.stem}.csv",
             run.name,
             run.role,
             f"{time.size}",

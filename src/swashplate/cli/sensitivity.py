@@ -18,8 +18,7 @@ from swashplate.tables import FIGURE, TABLE
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swashplate.analysis.sensitivity import OneAtATime
-    from swashplate.analysis.sobol import SobolIndices
+    from swashplate.analysis.sensitivity import OneAtATime, SobolIndices
 
 EXAMPLES = """\
 Examples:
@@ -106,8 +105,7 @@ def sensitivity(
     and the variance of each outcome is shared out among them: by itself, and in
     total with what a lever does together with others.
     """
-    from swashplate.analysis.sensitivity import one_at_a_time
-    from swashplate.analysis.sobol import sobol
+    from swashplate.analysis.sensitivity import one_at_a_time, sobol
 
     check_outputs((out, TABLE), (plot, FIGURE))
     wanted = tuple(outcomes) if outcomes else OUTCOMES

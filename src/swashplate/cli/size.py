@@ -19,7 +19,7 @@ from swashplate.errors import InputError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swashplate.analysis.performance import Wanted
+    from swashplate.analysis.outcomes import Wanted
     from swashplate.analysis.sizing import Requirements, Sizing
     from swashplate.drive import Drive
 
@@ -89,10 +89,9 @@ def size(
     Smallest is the least sum of squares of the changes, each in per cent. What
     cannot be met is refused, with what can be reached.
     """
-    from swashplate.analysis.performance import wanted
+    from swashplate.analysis.outcomes import proportional_speed, wanted
     from swashplate.analysis.sizing import WIDEST, Requirements
     from swashplate.analysis.sizing import size as sized
-    from swashplate.analysis.trial import proportional_speed
 
     check_outputs((out, None))
     if (tracking_deg_s is None) != (maneuver is None):
@@ -131,8 +130,8 @@ def _rounded(
 
     Each is rounded away from 1, to as few decimals, four or more, as meet what is required.
     """
-    from swashplate.analysis.levers import pulled
-    from swashplate.analysis.performance import performance
+    from swashplate.analysis.outcomes import performance
+    from swashplate.analysis.whatif import pulled
 
     moved = {name: factor for name, factor in found.factors.items() if factor != 1.0}
     for decimals in range(4, 9):

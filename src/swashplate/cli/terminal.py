@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from time import perf_counter
 from typing import Protocol
 
 from rich import box
@@ -9,6 +10,7 @@ from rich.console import Console
 from rich.status import Status
 from rich.table import Table
 
+BEGUN = perf_counter()
 # names of files and manoeuvres are printed as they are, whatever brackets and colons they hold
 output = Console(markup=False, highlight=False, emoji=False)
 side = Console(stderr=True, markup=False, highlight=False, emoji=False)
@@ -88,6 +90,26 @@ def progress(steps: int) -> Iterator[Callable[[str], None]]:
             begun += 1
 
         yield begin
+
+
+class Timing:
+    """Wall time of the parts of a command, from the start of the program on."""
+
+    def __init__(self) -> None:
+        self._last = BEGUN
+        self.parts: dict[str, float] = {}
+
+    def ended(self, part: str) -> None:
+        """A part ends now, which began where the one before ended. [s]"""
+        now = perf_counter()
+        self.parts[part], self._last = now - self._last, now
+
+    def table(self) -> Table:
+        """The parts, and all together."""
+        made = table("Wall time", "part", ">s")
+        for part, seconds in {**self.parts, "all": sum(self.parts.values())}.items():
+            made.add_row(part, f"{seconds:.2f}")
+        return made
 
 
 class Shown(Protocol):

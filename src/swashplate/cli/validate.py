@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from swashplate.cli.arguments import AxisName, CampaignPath
-from swashplate.cli.inputs import parameters_of
+from swashplate.cli.arguments import AxisName, CampaignPath, OwnModel
+from swashplate.cli.inputs import model_parameters_of, parameters_of
 from swashplate.cli.terminal import note, say, show, working
 from swashplate.cli.validation_tables import (
     MEASURES,
@@ -24,10 +25,10 @@ from swashplate.cli.validation_tables import (
 from swashplate.errors import FileError, InputError
 
 if TYPE_CHECKING:
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
     from swashplate.identification.assessment import RunQuality
+    from swashplate.identification.staging import Parameters
     from swashplate.identification.verdict import Verdict
-    from swashplate.parameters.parameter_set import ParameterSet
 
 EXAMPLES = """\
 Examples:
@@ -50,6 +51,7 @@ def validate(
     ],
     path: CampaignPath = Path("campaign.toml"),
     axis: AxisName = None,
+    model: OwnModel = None,
     role: Annotated[
         Role, typer.Option(help="Runs that were held back, those to fit, or both.")
     ] = "validate",
@@ -71,7 +73,7 @@ def validate(
     what is left in the residuals, and a verdict. The exit code is 1 if the drive
     is not usable for these runs.
     """
-    from swashplate.campaign.campaign import Campaign
+    from swashplate.campaign import Campaign
     from swashplate.identification.validation import (
         channel_errors,
         predict,
@@ -83,7 +85,7 @@ def validate(
     if figures is not None and out is None:
         raise InputError("--figures needs a folder to write them to: give --out DIR.")
     with working(f"Reading {path}"):
-        parameters = parameters_of(drive)
+        parameters: Parameters | None = None if model else parameters_of(drive)
         campaign = Campaign.from_toml(path)
         chosen = chosen_axis(campaign, axis)
         wanted = ("fit", "validate") if role == "all" else (role,)
@@ -94,6 +96,9 @@ def validate(
             "another one is asked for with --role."
         )
     with working("Predicting"):
+        if parameters is None:
+            assert model is not None
+            parameters = model_parameters_of(drive, model, runs)
         predicted = predict(parameters, runs)
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
@@ -141,8 +146,23 @@ def made_folder(folder: Path) -> Path:
     return folder
 
 
+def check_folder(folder: Path) -> None:
+    """See to it, before long work, that a folder can be made and written to; nothing is made yet.
+
+    Raises
+    ------
+    FileError
+        If it cannot.
+    """
+    there = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
+    if not there.is_dir():
+        raise FileError(f"{folder} cannot be made: {there} is no folder.")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise FileError(f"{folder} cannot be written to: {there} is read-only or another user's.")
+
+
 def _written(
-    parameters: ParameterSet,
+    parameters: Parameters,
     campaign: Campaign,
     predicted: Sequence[RunQuality],
     judged: Verdict,

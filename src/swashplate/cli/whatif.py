@@ -27,8 +27,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from rich.table import Table
 
-    from swashplate.analysis.bands import Bands
-    from swashplate.analysis.draws import Draws
+    from swashplate.analysis.monte_carlo import Bands, Draws
     from swashplate.analysis.outcomes import Outcome
     from swashplate.analysis.whatif import WhatIf
 
@@ -118,7 +117,7 @@ def whatif(
     drawn: Mapping[str, Draws] = {}
     if uncertainty is not None:
         with working("Drawing drives"):
-            from swashplate.analysis.stored_draws import stored_draws
+            from swashplate.analysis.monte_carlo import stored_draws
             from swashplate.analysis.whatif import AS_IS, CHANGED
 
             before = stored_draws(
@@ -193,7 +192,7 @@ def _change(before: float, after: float) -> str:
 
 def _half_widths(result: WhatIf, draws: Draws) -> list[str]:
     """Half of the interval that holds most of the drives, for each outcome."""
-    from swashplate.analysis.outcome_batch import batch_outcomes
+    from swashplate.analysis.outcomes import batch_outcomes
     from swashplate.report.outcome_units import outcome_text
 
     found = batch_outcomes(draws.drives[0], draws.columns, result.trial, result.outcomes)
@@ -222,7 +221,7 @@ def _half_width(values: NDArray[Any]) -> float:
 
 
 def _bands(result: WhatIf, drawn: Mapping[str, Draws]) -> dict[str, Bands]:
-    from swashplate.analysis.bands import bands
+    from swashplate.analysis.monte_carlo import bands
 
     trial = result.trial
     return {

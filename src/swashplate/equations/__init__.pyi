@@ -15,6 +15,7 @@ from .loops import interpolate as interpolate
 from .loops import repeated as repeated
 from .loops import root as root
 from .marching.jacobian import state_paths as state_paths
+from .marching.lanes import report as report
 from .marching.use import Run as Run
 from .marching.use import instance_of as instance_of
 from .marching.use import parameter_paths as parameter_paths

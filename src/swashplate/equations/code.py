@@ -264,6 +264,8 @@ class Code:
         self.ruled = ruled
         self.names: dict[str, Function] = {}
         """Generated functions that texts of it call."""
+        self.origins: dict[str, str] = {}
+        """Equation that each name comes from."""
         self.under_way: list[Parsed] = []
         """Equations that are being read."""
 
@@ -282,6 +284,8 @@ class Code:
             times += 1
             name = f"{stem}_{times}"
         self.taken.add(name)
+        if self.under_way:
+            self.origins[name] = self.under_way[-1].name
         return name
 
     def named(self, value: Value, stem: str) -> Value:

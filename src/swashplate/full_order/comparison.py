@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -20,9 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate import maneuvers
 from swashplate.equations.marching.record import SOURCE_RATE, least_substeps
 from swashplate.equations.marching.run import Start
-from swashplate.full_order.drive import FullOrderDrive, Method
-from swashplate.full_order.result import FullOrderSimulation
+from swashplate.full_order.drive import FullOrderDrive, FullOrderSimulation, Method
 from swashplate.simulation.result import read_only
+from swashplate.tables import Tabular
 
 if TYPE_CHECKING:
     import polars
@@ -104,14 +103,12 @@ class Difference:
 class Lag(NamedTuple):
     """How much later the full-order model's speed comes, as if that were all the difference."""
 
-    time: float
-    """Positive where the full-order model comes later. [s]"""
-    share: float
-    """Share of the mean squared difference that it explains. [1]"""
+    time: float  # Positive where the full-order model comes later. [s]
+    share: float  # Share of the mean squared difference that it explains. [1]
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Tabular):
     """Both models over one command, driven by the same current."""
 
     full: FullOrderSimulation
@@ -159,32 +156,14 @@ class Comparison:
             made.insert_column(1, pl.Series("voltage", self.voltage))
         return made
 
-    def write(self, path: str | Path) -> None:
-        """Write the table of `to_polars` as CSV or Parquet, by the path's ending.
-
-        Raises
-        ------
-        FileError
-            For another ending, or a folder that cannot be written.
-        """
-        from swashplate.tables import write_table
-
-        write_table(self.to_polars(), path)
-
 
 def compare(
     full: FullOrderDrive, run: Simulation, *, start: Start = "rest", method: Method = "march"
 ) -> Comparison:
-    """Simulate both models over the current of a run.
+    """Simulate both models over the current of a run of ``full.drive``.
 
-    Parameters
-    ----------
-    full : FullOrderDrive
-        The full-order model; the reduced one has its lumps.
-    run : Simulation
-        Of ``full.drive`` over a command; its current drives both models.
-    start, method :
-        As in `FullOrderDrive.simulate_current`.
+    The reduced model has the lumps of the full-order one. `start` and `method` as in
+    `FullOrderDrive.simulate_current`.
     """
     followed = full.follow(run, method=method, start=start)
     reference, record = followed.shaft_speed, followed.record
@@ -223,16 +202,7 @@ def convergence(
 ) -> list[tuple[float, Difference]]:
     """Differences as inertias shrink with ε and dampings with √ε: they shrink like √ε.
 
-    Parameters
-    ----------
-    epsilons : sequence of float
-        Each above 0.
-    full : FullOrderDrive
-        The full-order model; the reduced one has its lumps.
-    voltage : (n,) array_like
-        Command. [V]
-    rate : float
-        Samples a second. [Hz]
+    Under a command [V] at a rate [Hz], for some ε above 0.
     """
     drives = [full.scaled(epsilon) for epsilon in epsilons]
     found = [compare(each, each.drive.simulate(voltage, rate)).difference for each in drives]
@@ -240,26 +210,13 @@ def convergence(
 
 
 def validity(
-    full: FullOrderDrive,
-    rate: float = SOURCE_RATE,
-    *,
-    begin: Callable[[str], object] | None = None,
+    full: FullOrderDrive, rate: float = SOURCE_RATE, *, begin: Callable[[str], object] | None = None
 ) -> polars.DataFrame:
     """For which of `TABLE_MANEUVERS` the one-state model is within 1 % and 0.1 %, for one drive.
 
-    Parameters
-    ----------
-    full : FullOrderDrive
-        The full-order model; the reduced one has its lumps.
-    begin : callable, optional
-        Called with the name of each manoeuvre before it is simulated.
-
-    Returns
-    -------
-    polars.DataFrame
-        A row for each manoeuvre: top speed, largest and rms difference and step error in percent
-        of it, and whether the largest difference is within 1 % and 0.1 %; null where the drive
-        does not move.
+    A row for each manoeuvre: top speed, largest and rms difference and step error in percent of it,
+    and whether the largest difference is within 1 % and 0.1 %; null where the drive does not move.
+    `begin` is called with the name of each manoeuvre before it is simulated.
     """
     import polars as pl
 

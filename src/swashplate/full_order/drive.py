@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, floor
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.drive import Drive
+from swashplate.equations.cache import kernel
 from swashplate.equations.equation import interpreted
 from swashplate.equations.marching.jacobian import jacobian
 from swashplate.equations.marching.march import Stored
@@ -19,22 +20,24 @@ from swashplate.equations.marching.observation import Observation, ObservedRecor
 from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, Record, record_of
 from swashplate.equations.marching.run import Instance, Part, Start, check_start, marched
 from swashplate.errors import DomainError, InputError
-from swashplate.full_order.completion import chosen_over, from_lumped, load_choices, nearest_set
-from swashplate.full_order.modes import Modes, modes_of, state_matrix
-from swashplate.full_order.physical_set import PhysicalSet
-from swashplate.full_order.result import FullOrderSimulation
-from swashplate.full_order.stiff import Case, Feed, solve
+from swashplate.full_order.continuous import Case, Feed, Modes, modes_of, solve, state_matrix
+from swashplate.full_order.physical_set import PhysicalSet, from_lumped
 from swashplate.models import full_order as model
 from swashplate.models.drive import Source
+from swashplate.models.full_order import Motion, PlantSignals, plant_signals
 from swashplate.models.machine import Machine, fastest_rate
 from swashplate.models.pump import Solenoids, solenoid_force
 from swashplate.parameters.parameter_set import Change
 from swashplate.simulation.instance import PATHS, card_of, card_options, check_filter_stability
+from swashplate.simulation.result import Named, Signals, signal
 
 if TYPE_CHECKING:
+    import polars
+
     from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.int8]
 Method = Literal["march", "radau"]
 
 RESOLUTION = 1.0
@@ -47,17 +50,21 @@ MOST_SUBSTEPS = 20_000
 """Sub-steps a sample, beyond which the solver is the better way."""
 LOOSEST = 1e-3
 """Largest relative tolerance."""
+
+
+class Integration(TypedDict, total=False):
+    """How a run is integrated, see `FullOrderDrive.simulate_current`."""
+
+    method: Method
+    substeps: int | None
+    tolerance: float
+
+
 STATES = tuple(Stored(1, "signals", name) for name in model.Motion._fields)
 
 
 def path_of(name: str) -> str:
-    """Path in the model of a quantity, or of a parameter of card or solenoids, by its column.
-
-    Raises
-    ------
-    InputError
-        If there is none of that name.
-    """
+    """Path in the model of a quantity, or of a parameter of card or solenoids, by its column."""
     if name in Machine._fields:
         return f"plant.machine.{name}"
     if name in Solenoids._fields:
@@ -70,9 +77,131 @@ def path_of(name: str) -> str:
     )
 
 
+SIGNALS = (
+    "current",
+    "solenoid_force",
+    "spool_position",
+    "spool_velocity",
+    "orifice_opening",
+    "valve_flow",
+    "stroker_pressure",
+    "swash_angle",
+    "swash_rate",
+    "shaft_speed",
+    "shaft_position",
+    "motor_pressure_drop",
+    "pump_flow",
+)
+"""Signals in the order of the chain."""
+
+
+@kernel
+def observe(states: Array, current: Array, case: Case, out: Array) -> None:
+    """Every signal of `PlantSignals`, a column each, at known states (n, 5)."""
+    for n in range(current.size):
+        motion = Motion(states[n, 0], states[n, 1], states[n, 2], states[n, 3], states[n, 4])
+        found = plant_signals(motion, current[n], case.p, case.k, case.options)
+        for c in range(len(found)):
+            out[n, c] = found[c]
+
+
+@dataclass(frozen=True, eq=False)
+class FullOrderSimulation(Signals):
+    """Signals of one record, read-only arrays of the record's length, all SI.
+
+    Signs are those of `swashplate.Simulation`. The record is the signed current. The motor's
+    pressure drop is positive where the load resists positive speed.
+    """
+
+    method: str
+    """How it was integrated: ``"march"`` or ``"radau"``."""
+    case: Case
+    """The machine."""
+    states: Array
+    """(n, 5) the states on that grid, in the order of `swashplate.models.full_order.Motion`."""
+
+    def __repr__(self) -> str:
+        return f"FullOrderSimulation({self.name!r}, {self.time.size} samples, {self.method})"
+
+    @cached_property
+    def _fine(self) -> dict[str, Array]:
+        """All signals on the grid that was marched."""
+        out = np.empty((len(PlantSignals._fields), self.states.shape[0]))
+        observe(self.states, self.record.values, self.case, out.T)
+        return {"current": self.record.values, **dict(zip(PlantSignals._fields, out, strict=True))}
+
+    def fine(self, signal: str) -> Array:
+        """A signal on the march's grid: one of `SIGNALS`, or the ``"piston_pressure"``."""
+        return self.turned() if signal == "shaft_position" else self._fine[signal]
+
+    current = Named(signal)
+    """Signed current. [A]"""
+    solenoid_force = Named(signal)
+    """Net force of both solenoids on the spool. [N]"""
+    spool_position = Named(signal)
+    """Displacement of the spool. [m]"""
+    spool_velocity = Named(signal)
+    """Velocity of the spool. [m/s]"""
+    orifice_opening = Named(signal)
+    """Effective opening, what the orifices leave of the spool's displacement. [m]"""
+    valve_flow = Named(signal)
+    """Flow through the valve towards the stroking piston. [m³/s]"""
+    stroker_pressure = Named(signal)
+    """Stroking pressure δP about the one that holds the load at rest. [Pa]"""
+    swash_angle = Named(signal)
+    """Angle of the swash plate. [rad]"""
+    swash_rate = Named(signal)
+    """Rate of the swash plate. [rad/s]"""
+    shaft_speed = Named(signal)
+    """Speed of the shaft, of the turret for slew. [rad/s]"""
+    shaft_position = Named(signal)
+    """Angle of the shaft, zero at the start: the trapezoidal integral of its speed. [rad]"""
+    motor_pressure_drop = Named(signal)
+    """Pressure drop across the motor, P_hi - P_lo, under load inertia and gravity. [Pa]"""
+    pump_flow = Named(signal)
+    """Flow of the pump to the motor. [m³/s]"""
+
+    @property
+    def spool_hold(self) -> Flags:
+        """1 or -1 where the spool is at its stroke."""
+        stroke = self.case.p.machine.spool_stroke
+        return _beyond(self.spool_position, -stroke, stroke)
+
+    @property
+    def relief_hold(self) -> Flags:
+        """1 or -1 where the relief valve holds the stroker pressure."""
+        pressure = self.sampled(self.fine("piston_pressure"))
+        return _beyond(pressure, self.case.k.lower, self.case.k.upper)
+
+    @property
+    def plate_hold(self) -> Flags:
+        """1 or -1 where the swash plate rests on a stop."""
+        m = self.case.p.machine
+        return _beyond(self.swash_angle, -m.swash_stop_minus, m.swash_stop_plus)
+
+    def to_polars(self) -> polars.DataFrame:
+        """Table of time, all signals and the limits that hold."""
+        import polars as pl
+
+        columns: dict[str, NDArray[np.generic]] = {"time": self.time}
+        columns.update((signal, getattr(self, signal)) for signal in SIGNALS)
+        columns.update((limit, getattr(self, limit)) for limit in HOLDS)
+        return pl.DataFrame(columns)
+
+
+HOLDS = ("spool_hold", "relief_hold", "plate_hold")
+"""Limits that can hold."""
+
+
+def _beyond(values: Array, lower: float, upper: float) -> Flags:
+    return (values >= upper).astype(np.int8) - (values <= lower).astype(np.int8)
+
+
 @dataclass(frozen=True)
 class FullOrderDrive:
     """A drive whose spool and swash plate have mass. Immutable.
+
+    One with refinements, which the five states do not know, is refused in an `InputError`.
 
     Examples
     --------
@@ -86,15 +215,12 @@ class FullOrderDrive:
     physical: PhysicalSet
     """Everything behind the solenoids."""
 
+    def __post_init__(self) -> None:
+        self.drive.parameters.refuse_refinements("Full-order drives")
+
     @classmethod
     def preset(cls, name: str) -> FullOrderDrive:
-        """One of the source's axes with its assumed physical set.
-
-        Raises
-        ------
-        ParameterError
-            For a name other than ``"hoist"``, ``"slew"``, ``"luff"``.
-        """
+        """The ``"hoist"``, ``"slew"`` or ``"luff"`` of the source with its assumed physical set."""
         physical = PhysicalSet.preset(name)
         return cls(Drive.preset(name), physical)
 
@@ -102,35 +228,17 @@ class FullOrderDrive:
     def from_drive(cls, drive: Drive, like: str | None = None, **chosen: Change) -> FullOrderDrive:
         """A full-order drive for any parameters, a fitted set's for example.
 
-        Parameters
-        ----------
-        drive : Drive
-            Card, solenoids and the lumps that the machine shall have, Z6 apart.
-        like : str, optional
-            ``"hoist"``, ``"slew"`` or ``"luff"``: the packaged set whose assumed values count
-            where nothing is chosen; by default that of the drive's name, or else ``"hoist"``.
-        **chosen : float or (float, float)
-            Values in SI, e.g. ``oil_volume=1e-4``, by the names that
-            `swashplate.full_order.completion.from_lumped` takes.
-
-        Returns
-        -------
-        FullOrderDrive
-            Its physical set is completed from lumps and choices; what is chosen here is marked as
-            the user's, all the rest as assumed.
+        The drive gives card, solenoids and the lumps that the machine shall have, Z6 apart; the
+        physical set is completed from them and what is chosen in SI, e.g. ``oil_volume=1e-4``, as
+        `swashplate.full_order.from_lumped` says.
 
         Raises
         ------
         ParameterError
             For an unknown name, or if lumps contradict each other or a choice.
-        InputError
-            If the drive has refinements, which the full-order model does not know.
         """
-        drive.parameters.refuse_refinements("Full-order drives")
-        assumed = load_choices(nearest_set(drive.name) if like is None else like)
-        entries = chosen_over(assumed, chosen)
         title = drive.parameters.title
-        return cls(drive, from_lumped(drive.parameters, title=title, entries=entries))
+        return cls(drive, from_lumped(drive.parameters, like, title=title, entries=chosen))
 
     def replace(self, **changes: Change) -> FullOrderDrive:
         """With other physical values in SI, e.g. ``replace(load_torque=2e3)``."""
@@ -166,16 +274,7 @@ class FullOrderDrive:
     ) -> Instance:
         """The model with numbers, for the engine: behind a voltage, or without a card a current.
 
-        Parameters
-        ----------
-        step : float
-            Distance of the samples. [s]
-        substeps : int, optional
-            As in `simulate_current`.
-        card : bool, optional
-            False for `swashplate.models.full_order.full_machine`.
-        held : bool, optional
-            As in `options`.
+        At a distance of the samples [s]; `substeps` as in `simulate_current`, `held` in `options`.
         """
         behind = self._machine(self.substeps(step, substeps), held)
         if not card:
@@ -191,14 +290,9 @@ class FullOrderDrive:
         return Instance(model.full_machine, (Part(Source()), plant), self.physical.name)
 
     def substeps(self, step: float, wanted: int | None = None) -> int:
-        """Sub-steps that a step of the record takes.
+        """Sub-steps that a step [s] of the record takes.
 
-        Parameters
-        ----------
-        step : float
-            Step of the record. [s]
-        wanted : int, optional
-            By default 8, or so many that the fastest mode takes six a turn.
+        By default 8, or so many that the fastest mode takes six a turn.
 
         Raises
         ------
@@ -230,61 +324,42 @@ class FullOrderDrive:
         voltage: ArrayLike,
         rate: float = SOURCE_RATE,
         *,
-        method: Method = "march",
         time: ArrayLike | None = None,
         interpolation: Interpolation | None = None,
         start: Start = "rest",
         clip: bool = False,
-        substeps: int | None = None,
-        tolerance: float = 1e-6,
+        **how: Unpack[Integration],
     ) -> FullOrderSimulation:
         """Simulate card and machine over a command [V]; arguments as `Drive.simulate`.
 
         The card's current at its own steps drives the machine, a straight line between them.
-
-        Parameters
-        ----------
-        method, substeps, tolerance :
-            As in `simulate_current`.
+        `method`, `substeps` and `tolerance` as in `simulate_current`.
         """
         run = self.drive.simulate(
             voltage, rate, time=time, interpolation=interpolation, start=start, clip=clip
         )
-        return self.follow(run, method=method, start=start, substeps=substeps, tolerance=tolerance)
+        return self.follow(run, start=start, **how)
 
     def follow(
-        self,
-        run: Simulation,
-        *,
-        method: Method = "march",
-        start: Start = "rest",
-        substeps: int | None = None,
-        tolerance: float = 1e-6,
+        self, run: Simulation, *, start: Start = "rest", **how: Unpack[Integration]
     ) -> FullOrderSimulation:
         """Simulate the machine over the current of a run that there is.
 
-        Parameters
-        ----------
-        run : Simulation
-            By voltage or by current; its current at the march's own steps counts, a straight line
-            between them.
-        method, start, substeps, tolerance :
-            As in `simulate_current`.
+        The run is by voltage or by current; its current at the march's own steps counts, a
+        straight line between them. Other arguments as in `simulate_current`.
         """
         record = Record(run.fine("current"), run.record.start, run.record.rate, run.record.substeps)
-        return self._integrate(record, False, method, start, substeps, tolerance)
+        return self._integrate(record, False, start, **how)
 
     def simulate_current(
         self,
         current: ArrayLike,
         rate: float = SOURCE_RATE,
         *,
-        method: Method = "march",
         time: ArrayLike | None = None,
         interpolation: Interpolation | None = None,
         start: Start = "rest",
-        substeps: int | None = None,
-        tolerance: float = 1e-6,
+        **how: Unpack[Integration],
     ) -> FullOrderSimulation:
         """Simulate the machine over a signed current.
 
@@ -301,12 +376,7 @@ class FullOrderDrive:
             Sub-steps of the march a sample, at least 512 samples a second; by default 8, or so
             many that the fastest mode takes six steps a turn.
         tolerance : float
-            Relative tolerance of the solver.
-
-        Returns
-        -------
-        FullOrderSimulation
-            The five states and all that follows from them.
+            Relative tolerance of the solver, by default 1e-6.
 
         Raises
         ------
@@ -316,18 +386,10 @@ class FullOrderDrive:
             If the solver gives up or the machine is too stiff for the march.
         """
         record = record_of(current, rate, what="current", time=time, interpolation=interpolation)
-        return self._integrate(
-            record, interpolation == "previous", method, start, substeps, tolerance
-        )
+        return self._integrate(record, interpolation == "previous", start, **how)
 
     def modes(self, current: float = 0.0) -> Modes:
-        """Natural modes about the equilibrium under a constant signed current. [A]
-
-        Raises
-        ------
-        InputError
-            If the current is no finite number.
-        """
+        """Natural modes about the equilibrium under a constant signed current. [A]"""
         if not np.isfinite(current):
             raise InputError(f"The current is {current}, but must be a finite number of amperes.")
         first = {"current": float(current)}
@@ -352,15 +414,10 @@ class FullOrderDrive:
     ) -> Array:
         """(n, k) exact derivatives of a signal by parameters, those of the march's own steps.
 
-        Parameters
-        ----------
-        voltage, rate, start, substeps :
-            As in `simulate`.
-        parameters : sequence of str
-            Columns of physical quantities (``"swash_inertia"``, ``"swash_stop_plus"``), of the
-            solenoids (``"Z19_plus"``) and of the card (``"omega_plus"``, ``"tau"``).
-        signal : str
-            Of `swashplate.models.full_order.PlantSignals`, ``"shaft_position"`` or a current.
+        Parameters are columns of physical quantities (``"swash_inertia"``, ``"swash_stop_plus"``),
+        of the solenoids (``"Z19_plus"``) and of the card (``"omega_plus"``, ``"tau"``); the signal
+        is of `swashplate.models.full_order.PlantSignals`, ``"shaft_position"`` or a current. Other
+        arguments as in `simulate`.
         """
         record = record_of(voltage, rate, what="voltage")
         columns = [path_of(name) for name in parameters]
@@ -374,10 +431,10 @@ class FullOrderDrive:
         self,
         record: Record,
         held: bool,
-        method: Method,
         start: Start,
-        substeps: int | None,
-        tolerance: float,
+        method: Method = "march",
+        substeps: int | None = None,
+        tolerance: float = 1e-6,
     ) -> FullOrderSimulation:
         check_start(start)
         if method not in ("march", "radau"):
@@ -397,4 +454,4 @@ class FullOrderDrive:
         else:
             feed = Feed(records["current"], held, step)
             states = solve(feed, case, started.states[1].motion, tolerance)
-        return FullOrderSimulation(self.physical.name, method, record, case, states)
+        return FullOrderSimulation(self.physical.name, record, method, case, states)

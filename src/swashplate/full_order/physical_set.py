@@ -1,6 +1,7 @@
-"""A physical set: arms, springs, masses, areas, oil and load of one machine, always valid.
+"""Physical sets: arms, springs, masses, areas, oil and load of one machine, always valid.
 
-The quantities are those that `swashplate.models.machine.Machine` declares.
+The quantities are those that `swashplate.models.machine.Machine` declares. A set is given whole, or
+completed from lumped parameters and a few chosen values; TOML files have either.
 """
 
 from __future__ import annotations
@@ -8,86 +9,69 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
-from math import inf, isnan, sqrt, tan
+from functools import cache
+from importlib.resources import files
+from math import sqrt, tan
 from pathlib import Path
 from types import MappingProxyType
+from typing import Literal
 
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from swashplate.documents import parse_toml, read_text, validated
 from swashplate.equations.equation import interpreted
-from swashplate.equations.fields import Declared, Definition, Flag, declared_by
-from swashplate.errors import ParameterError
+from swashplate.equations.fields import Flag, declared_by
+from swashplate.errors import InputError, ParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine
-from swashplate.parameters.parameter_set import Change, Pair, ParameterSet, Status, Value
+from swashplate.parameters.definitions import Definition, definition_of
+from swashplate.parameters.files import AXES, written
+from swashplate.parameters.files import load_preset as load_parameters
+from swashplate.parameters.parameter_set import (
+    Change,
+    Pair,
+    Parameter,
+    ParameterSet,
+    Value,
+    value_of,
+)
+from swashplate.parameters.rules import out_of_range, range_sentence
+from swashplate.parameters.schema import Entry
+from swashplate.units import to_si
 
-QUANTITIES: Mapping[str, Declared] = {each.symbol: each for each in declared_by(Machine)}
+QUANTITIES: Mapping[str, Definition] = {
+    each.symbol: definition_of(each, "physical") for each in declared_by(Machine)
+}
 """Quantities by name, from the spool to the load."""
-
-
-def _choice(name: str, symbol: str, meaning: str, unit: str, above: float | None) -> Declared:
-    return Declared(name, Definition(meaning, unit, 0.0, above=above, stands_for=symbol), (name,))
-
-
-CHOICES: Mapping[str, Declared] = {
-    each.symbol: each
-    for each in (
-        _choice("spool_frequency", "ω_sp", "natural frequency of the spool", "rad/s", 0.0),
-        _choice("spool_damping_ratio", "ζ_sp", "damping ratio of the spool", "1", None),
-        _choice(
-            "swash_frequency",
-            "ω_sw",
-            "natural frequency of the swash plate at held pressure",
-            "rad/s",
-            0.0,
+CHOICES: Mapping[str, Definition] = {
+    name: Definition(
+        meaning, unit, 0.0, above=above, stands_for=stands_for, symbol=name, block="physical"
+    )
+    for name, stands_for, meaning, unit, above in (
+        ("spool_frequency", "ω_sp", "natural frequency of the spool", "rad/s", 0.0),
+        ("spool_damping_ratio", "ζ_sp", "damping ratio of the spool", "1", None),
+        (
+            *("swash_frequency", "ω_sw"),
+            *("natural frequency of the swash plate at held pressure", "rad/s", 0.0),
         ),
-        _choice("swash_damping_ratio", "ζ_sw", "damping ratio of the swash plate", "1", None),
+        ("swash_damping_ratio", "ζ_sw", "damping ratio of the swash plate", "1", None),
     )
 }
 """What may be chosen in place of inertias and dampings when a set is completed."""
+IN_PLACE_OF: Mapping[str, str] = {
+    "feedback_arm_inertia": "spool_frequency",
+    "spool_damping": "spool_damping_ratio",
+    "swash_inertia": "swash_frequency",
+    "piston_damping": "swash_damping_ratio",
+}
+"""Quantities that may be chosen in place of a frequency or a damping ratio."""
 AGREES = 1e-9
 """Relative difference up to which a given value agrees with the one that follows."""
 
 
 @dataclass(frozen=True)
-class PhysicalValue:
-    """One quantity of a set."""
-
-    quantity: Declared
-    value: Value
-    source: str = ""
-    status: Status = "user"
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """Its one or two numbers, in the order of ``quantity.columns``."""
-        return tuple(self.value) if isinstance(self.value, Pair) else (self.value,)
-
-    @property
-    def unit(self) -> str:
-        """SI unit of the value."""
-        return self.quantity.definition.unit
-
-    def check(self, owner: str) -> None:
-        """Refuse a value out of range.
-
-        Raises
-        ------
-        ParameterError
-            Naming owner, quantity, value and range.
-        """
-        definition = self.quantity.definition
-        for column, value in zip(self.quantity.columns, self.values, strict=True):
-            low = value < definition.lower or value == definition.above
-            high = value >= definition.upper and not (value == inf and definition.can_be_off)
-            if low or high or isnan(value) or value == -inf:
-                unit = "" if definition.unit == "1" else f" {definition.unit}"
-                raise ParameterError(
-                    f"{owner}: {column} ({definition.name}) is {value:g}{unit}, but must be "
-                    f"{definition.range}."
-                )
-
-
-@dataclass(frozen=True)
-class PhysicalSet(Mapping[str, PhysicalValue]):
+class PhysicalSet(Mapping[str, Parameter]):
     """All physical quantities of a drive, by name; one that has a default may be left out.
 
     Raises
@@ -98,7 +82,7 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
 
     name: str
     title: str
-    entries: Mapping[str, PhysicalValue]
+    entries: Mapping[str, Parameter]
     numbers: Mapping[str, float] = field(init=False, repr=False, compare=False)
     """Every single value by column, e.g. ``swash_stop_plus``."""
 
@@ -106,9 +90,9 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         for name in self.entries:
             quantity_of(name)
         entries = {
-            name: PhysicalValue(each, each.definition.default, status="assumed")
+            name: Parameter(each, each.default, status="assumed")
             for name, each in QUANTITIES.items()
-            if each.definition.default is not None
+            if each.default is not None
         } | dict(self.entries)
         missing = [name for name in QUANTITIES if name not in entries]
         if missing:
@@ -116,50 +100,27 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         ordered = {name: entries[name] for name in QUANTITIES}
         numbers: dict[str, float] = {}
         for entry in ordered.values():
-            entry.check(self.name)
-            numbers |= zip(entry.quantity.columns, entry.values, strict=True)
+            _check_range(self.name, entry)
+            numbers |= zip(entry.definition.columns, entry.values, strict=True)
         _check_together(self.name, numbers)
         object.__setattr__(self, "entries", MappingProxyType(ordered))
         object.__setattr__(self, "numbers", MappingProxyType(numbers))
 
     @classmethod
     def preset(cls, name: str) -> PhysicalSet:
-        """An assumed set of one of the source's axes: ``"hoist"``, ``"slew"``, ``"luff"``.
-
-        Raises
-        ------
-        ParameterError
-            For another name.
-        """
-        from swashplate.full_order.completion import load_preset
-
+        """An assumed set of one of the source's axes: ``"hoist"``, ``"slew"``, ``"luff"``."""
         return load_preset(name)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> PhysicalSet:
-        """A set from a file.
-
-        Raises
-        ------
-        FileError
-            If the file cannot be read.
-        ParameterError
-            If an entry is wrong; the sentence names file, quantity and rule.
-        """
-        from swashplate.documents import read_text
-        from swashplate.full_order.completion import read_set
-
+        """A set from a file; a `ParameterError` names file, quantity and rule."""
         return read_set(read_text(path), str(path))
 
     def to_toml(self, path: str | Path) -> None:
         """Store all quantities; `from_toml` gives an equal set back.
 
-        Raises
-        ------
-        FileError
-            If the file cannot be written; an older file of that name then stays as it was.
+        If the file cannot be written (`FileError`), an older one stays as it was.
         """
-        from swashplate.full_order.completion import dump_set
         from swashplate.tables import write_text
 
         write_text(dump_set(self), path)
@@ -175,20 +136,12 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         return air_in(self.numbers)
 
     def to_lumped(self, Z6: float | None = None) -> dict[str, Change]:
-        """Lumped parameters that the set stands for.
+        """Lumped parameters that the set stands for; Kruse eqs. 6.56-6.70 and table 6.1.
 
-        Parameters
-        ----------
-        Z6 : float, optional
-            Value to move to along the gauge Z6↔Z8: away from the stops only Z7/(1+Z6) and
-            Z8/(1+Z6) count. By default the physical A_s²B/(k_r V), of a bulk modulus at rest.
-
-        Returns
-        -------
-        dict
-            Z1 to Z16 and Z18 by symbol, pairs (plus, minus) where the directions differ; Kruse
-            eqs. 6.56-6.70 and table 6.1. The solenoids' Z17 and Z19 to Z22 are not the pump's
-            geometry.
+        Z1 to Z16 and Z18 by symbol, pairs (plus, minus) where the directions differ; the solenoids'
+        Z17 and Z19 to Z22 are not the pump's geometry. `Z6` is where to move to along the gauge
+        Z6↔Z8: away from the stops only Z7/(1+Z6) and Z8/(1+Z6) count; by default the physical
+        A_s²B/(k_r V).
         """
         n, P0 = self.numbers, rest_pressure(self.numbers)
         stiffness = rest_modulus(n) / n["oil_volume"]
@@ -217,28 +170,10 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
             "Z18": n["plussing"],
         }
 
-    def check_lumps(self, parameters: ParameterSet, tolerance: float = AGREES) -> None:
-        """Refuse to stand for a drive with other lumps.
-
-        Raises
-        ------
-        ParameterError
-            For the first lump that differs by more than the tolerance, taken at the drive's Z6.
-        """
-        for symbol, lump in self.to_lumped(parameters.numbers["Z6"]).items():
-            values = lump if isinstance(lump, tuple) else (lump,)
-            for column, value in zip(parameters[symbol].definition.columns, values, strict=False):
-                wanted = parameters.numbers[column]
-                if value != wanted and not abs(value - wanted) <= tolerance * abs(wanted):
-                    raise ParameterError(
-                        f"{self.name}: its quantities make {column} = {value:.9g}, but "
-                        f"{parameters.name} has {wanted:.9g} {parameters[symbol].unit}."
-                    )
-
     def __repr__(self) -> str:
         return f"PhysicalSet({self.name!r}, {len(self)} quantities)"
 
-    def __getitem__(self, name: str) -> PhysicalValue:
+    def __getitem__(self, name: str) -> Parameter:
         quantity_of(name)
         return self.entries[name]
 
@@ -259,29 +194,18 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         return PhysicalSet, (self.name, self.title, dict(self.entries))
 
     def replace(self, **changes: Change) -> PhysicalSet:
-        """A set with other values in SI, e.g. ``replace(load_torque=2e3)``, marked as the user's.
-
-        Raises
-        ------
-        ParameterError
-            For an unknown name or a value that breaks a rule.
-        """
+        """A set with other values in SI, ``replace(load_torque=2e3)``, marked as the user's."""
         entries = dict(self.entries)
         for name, change in changes.items():
             quantity = quantity_of(name)
-            entries[name] = PhysicalValue(quantity, value_of(quantity, change))
+            entries[name] = Parameter(quantity, value_of(name, quantity, change))
         return replace(self, entries=entries)
 
     def scaled(self, epsilon: float) -> PhysicalSet:
-        """The set with inertias times ε and dampings times √ε: the way to the reduced model.
+        """The set with inertias times ε > 0 and dampings times √ε: the way to the reduced model.
 
         The frequencies rise by 1/√ε and the damping ratios stay. The load's inertia acts on the
         swash plate's rate, as a damping does, and is scaled like one.
-
-        Raises
-        ------
-        ParameterError
-            Unless ε is above 0.
         """
         if not epsilon > 0.0:
             raise ParameterError(f"epsilon is {epsilon:g}, but must be above 0.")
@@ -294,14 +218,8 @@ class PhysicalSet(Mapping[str, PhysicalValue]):
         )
 
 
-def quantity_of(name: str) -> Declared:
-    """What a quantity is.
-
-    Raises
-    ------
-    ParameterError
-        If there is none of that name.
-    """
+def quantity_of(name: str) -> Definition:
+    """What a quantity is; a name that none has is refused."""
     if name in QUANTITIES:
         return QUANTITIES[name]
     close = get_close_matches(name, QUANTITIES, n=1)
@@ -312,22 +230,6 @@ def quantity_of(name: str) -> Declared:
         else f"{hint}; the quantities are {', '.join(QUANTITIES)}"
     )
     raise ParameterError(f"A physical set has no quantity '{name}'{choice}.")
-
-
-def value_of(quantity: Declared, change: Change) -> Value:
-    """A value in the form that the quantity has: one number or a pair."""
-    name, several = quantity.symbol, len(quantity.fields) > 1
-    try:
-        numbers = [float(each) for each in (change if isinstance(change, tuple) else (change,))]
-    except (TypeError, ValueError):
-        raise ParameterError(
-            f"{name} must be a number in {quantity.definition.unit}, or a pair of them, not "
-            f"{change!r}."
-        ) from None
-    if len(numbers) > (2 if several else 1):
-        kind = "one value or two (plus, minus)" if several else "one value"
-        raise ParameterError(f"{name} takes {kind}, not {len(numbers)}.")
-    return Pair(numbers[0], numbers[-1]) if several else numbers[0]
 
 
 def air_in(numbers: Mapping[str, float]) -> Flag:
@@ -351,6 +253,13 @@ def _known(numbers: Mapping[str, float]) -> Machine:
     return Machine(*(numbers.get(name, 0.0) for name in Machine._fields))
 
 
+def _check_range(owner: str, entry: Parameter) -> None:
+    for column, value in zip(entry.definition.columns, entry.values, strict=True):
+        if out_of_range(entry.definition, np.array([value]))[0]:
+            said = range_sentence(column, entry.definition, np.array([value]), 0)
+            raise ParameterError(f"{owner}: {said}")
+
+
 def _check_together(owner: str, numbers: Mapping[str, float]) -> None:
     """What quantities must satisfy together."""
     for side in ("plus", "minus"):
@@ -369,3 +278,288 @@ def _check_together(owner: str, numbers: Mapping[str, float]) -> None:
             f"stay below {ceiling:.4g} Pa, the smaller of supply_pressure and relief_pressure; "
             "check load_torque, pumping_area and pumping_arm."
         )
+
+
+# --- completed from lumps -------------------------------------------------------------------------
+
+
+def chosen_over(
+    assumed: Mapping[str, Parameter], chosen: Mapping[str, Change | Parameter]
+) -> dict[str, Parameter]:
+    """What a set is completed from: assumed values, and the user's in SI in their place.
+
+    Names are those of quantities and of `CHOICES`. An inertia or damping also takes the place of
+    the frequency or damping ratio that it would otherwise follow from.
+    """
+    entries = dict(assumed)
+    for name, change in chosen.items():
+        if not isinstance(change, Parameter):
+            quantity = chosen_quantity(name)
+            change = Parameter(quantity, value_of(name, quantity, change))
+        entries[name] = change
+        instead = IN_PLACE_OF.get(name)
+        if instead is not None and instead not in chosen:
+            entries.pop(instead, None)
+    return entries
+
+
+def chosen_quantity(name: str) -> Definition:
+    """What may be chosen by a name: a quantity, or one of `CHOICES`."""
+    return CHOICES[name] if name in CHOICES else quantity_of(name)
+
+
+def from_lumped(
+    parameters: ParameterSet,
+    like: str | None = None,
+    *,
+    name: str | None = None,
+    title: str = "",
+    entries: Mapping[str, Change | Parameter] | None = None,
+    **chosen: Change,
+) -> PhysicalSet:
+    """Complete a physical set from lumped parameters and a few chosen values.
+
+    Parameters
+    ----------
+    parameters : ParameterSet
+        The lumped parameters that the set shall have, Z6 apart.
+    like : str, optional
+        Packaged set whose assumed values count where nothing is chosen; by default see
+        `nearest_set`.
+    name, title : str, optional
+        Of the set; by default the parameters' name.
+    **chosen : float or (float, float)
+        Chosen values in SI: those that packaged sets assume, or any other quantity: an inertia or
+        damping in place of a frequency or damping ratio, or one that follows from the lumps, which
+        must then agree with them.
+    entries : mapping, optional
+        The same, also with source and status.
+
+    Returns
+    -------
+    PhysicalSet
+        Everything but what the user chose is marked as assumed.
+
+    Raises
+    ------
+    ParameterError
+        If lumps contradict each other or a chosen value; the sentence names them.
+    """
+    owner = parameters.name if name is None else name
+    assumed = load_choices(nearest_set(parameters.name) if like is None else like)
+    given = chosen_over(assumed, {**(entries or {}), **chosen})
+    for made_from, choice in IN_PLACE_OF.items():
+        if made_from in given and choice in given:
+            raise ParameterError(
+                f"{owner}: {made_from} and {choice} are both given, but either follows from the "
+                "other; leave one out."
+            )
+    numbers: dict[str, float] = {}
+    for entry in given.values():
+        _check_range(owner, entry)
+        numbers |= zip(entry.definition.columns, entry.values, strict=True)
+    following = _completed(owner, parameters.numbers, numbers, set(given))
+    complete = {}
+    for symbol, (follows, origin) in following.items():
+        made = Parameter(QUANTITIES[symbol], follows, f"from {origin}", "assumed")
+        if symbol in given:
+            _check_agreement(owner, given[symbol], made)
+        complete[symbol] = given.get(symbol, made)
+    rest = {symbol: entry for symbol, entry in given.items() if symbol in QUANTITIES}
+    return PhysicalSet(owner, title, {**rest, **complete})
+
+
+def _completed(
+    owner: str, Z: Mapping[str, float], chosen: dict[str, float], given: set[str]
+) -> dict[str, tuple[Value, str]]:
+    """Quantities that follow from the lumps and what is chosen, and from which."""
+    if Z["Z2"] != 0.0:
+        raise ParameterError(
+            f"{owner}: Z2 is {Z['Z2']:g}, but a physical set has Z2 = 0, because the pressure is "
+            "counted from the one that holds the load (eq. 6.56)."
+        )
+    arm, area = chosen["swash_arm"], chosen["piston_area"]
+    supply = Z["Z9"] + rest_pressure(chosen)
+    stiffness = rest_modulus({**chosen, "supply_pressure": supply}) / chosen["oil_volume"]
+    spring_rate = area / (Z["Z1"] * arm)
+    gauge = (1.0 + area**2 * stiffness / spring_rate) / (1.0 + Z["Z6"]) / stiffness
+    spring_moment, oil = Z["Z4"] ** 0.5, "oil_volume and bulk_modulus"
+    made: dict[str, tuple[Value, str]] = {
+        "spool_arm": (Z["Z5"], "Z5"),
+        "feedback_spring_rate": (
+            spring_moment / chosen["feedback_spring_arm"] ** 2,
+            "√Z4 and feedback_spring_arm",
+        ),
+        "control_arm": (arm / Z["Z3"], "Z3 and swash_arm"),
+        "plussing": (Z["Z18"], "Z18"),
+        "spool_stroke": (Z["Z14"], "Z14"),
+        "orifice_opening": (Pair(Z["Z16_plus"], Z["Z16_minus"]), "Z16"),
+        "valve_flow_gain": (Z["Z8"] * gauge, f"Z8/(1+Z6), {oil}"),
+        "piston_leakage": (Z["Z7"] * gauge, f"Z7/(1+Z6), {oil}"),
+        "supply_pressure": (supply, "Z9 and load_torque"),
+        "relief_pressure": (Z["Z15"], "Z15"),
+        "return_spring_rate": (spring_rate, "Z1, piston_area and swash_arm"),
+        "swash_stop": (Pair(Z["Z13_plus"], Z["Z13_minus"]), "Z13"),
+        "pump_flow_gain": (Z["Z10"] / chosen["motor_constant"], "Z10 and motor_constant"),
+        "motor_leakage": (
+            _motor_leakage(owner, Z, chosen),
+            "Z11 and Z12, load_torque and load_inertia",
+        ),
+    }
+    # of both modes: inertia, damping, mass at an arm, stiffness of the spring in the angle
+    for inertia, damping, mass, at, spring, origin in (
+        (
+            *("feedback_arm_inertia", "spool_damping", "spool_mass on spool_arm"),
+            *(Z["Z5"], spring_moment, "Z4, Z5, spool_frequency and spool_mass"),
+        ),
+        (
+            *("swash_inertia", "piston_damping", "piston_mass on swash_arm"),
+            *(arm, spring_rate * arm**2),
+            "Z1, swash_frequency, piston_area, swash_arm and piston_mass",
+        ),
+    ):
+        lever = chosen[mass.partition(" ")[0]] * at**2
+        if inertia not in given:
+            frequency = IN_PLACE_OF[inertia]
+            total = spring / chosen[frequency] ** 2
+            if lever > total:
+                raise ParameterError(
+                    f"{owner}: {mass} alone has {lever:.4g} kg m², but {frequency} leaves "
+                    f"{total:.4g} kg m² for everything that swings with it; choose a smaller mass "
+                    "or a lower frequency."
+                )
+            chosen[inertia] = total - lever
+            made[inertia] = total - lever, origin
+        if damping not in given:
+            swinging = sqrt(spring * (chosen[inertia] + lever))
+            ratio = IN_PLACE_OF[damping]
+            made[damping] = 2.0 * chosen[ratio] * swinging / at**2, ratio
+    return made
+
+
+def _motor_leakage(owner: str, Z: Mapping[str, float], chosen: Mapping[str, float]) -> float:
+    """K_mL from Z11 = K_mL C_g and Z12 = K_mL Z10 C_i, which must agree."""
+    losses = {
+        "Z11": (Z["Z11"], chosen["load_torque"], "load_torque"),
+        "Z12": (Z["Z12"], Z["Z10"] * chosen["load_inertia"], "load_inertia"),
+    }
+    leakages = []
+    for symbol, (loss, load, cause) in losses.items():
+        if load != 0.0:
+            leakages.append(loss / load)
+        elif loss != 0.0:
+            raise ParameterError(
+                f"{owner}: {symbol} is {loss:g}, but without {cause} no speed is lost to it; "
+                f"choose {cause}, or set {symbol} to 0."
+            )
+    if len(leakages) == 2 and abs(leakages[0] - leakages[1]) > AGREES * abs(leakages[0]):
+        raise ParameterError(
+            f"{owner}: Z11 makes motor_leakage {leakages[0]:.6g} 1/(N m s), but Z12 makes it "
+            f"{leakages[1]:.6g}; choose load_torque and load_inertia so that both agree, for "
+            f"example load_inertia = {Z['Z12'] / (Z['Z10'] * leakages[0]):.12g} kg m²."
+        )
+    return leakages[0] if leakages else 0.0
+
+
+def _check_agreement(owner: str, entry: Parameter, made: Parameter) -> None:
+    columns = entry.definition.columns
+    for column, value, follows in zip(columns, entry.values, made.values, strict=True):
+        if value != follows and not abs(value - follows) <= AGREES * abs(follows):
+            raise ParameterError(
+                f"{owner}: {column} is given as {value:.9g} {entry.unit}, but "
+                f"{follows:.9g} follows {made.source}; leave it out or change one of these."
+            )
+
+
+# --- files ----------------------------------------------------------------------------------------
+
+
+class PhysicalFile(BaseModel):
+    """A physical set; with `lumps`, what is not given follows from a packaged parameter set."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    format: Literal[1] = 1
+    name: str
+    title: str = ""
+    lumps: str | None = None
+    physical: dict[str, Entry]
+
+
+@cache
+def load_preset(name: str) -> PhysicalSet:
+    """A packaged set."""
+    return read_set(_packaged(name), f"{name}.toml")
+
+
+@cache
+def load_choices(name: str) -> Mapping[str, Parameter]:
+    """What a packaged set assumes; everything else in it follows from the lumps."""
+    origin = f"{name}.toml"
+    contents = validated(parse_toml(_packaged(name), origin), PhysicalFile, origin)
+    return MappingProxyType(_entries(contents))
+
+
+def nearest_set(name: str) -> str:
+    """Name of the packaged set that a drive of this name is taken to be like: its own, or hoist."""
+    return name if name in AXES else AXES[0]
+
+
+def _packaged(name: str) -> str:
+    if name not in AXES:
+        raise ParameterError(
+            f"There is no packaged physical set '{name}'; there are {', '.join(AXES)}."
+        )
+    return files("swashplate.full_order").joinpath("sets", f"{name}.toml").read_text("utf-8")
+
+
+def read_set(text: str, origin: str) -> PhysicalSet:
+    """A physical set from TOML text; `origin` names it in errors."""
+    contents = validated(parse_toml(text, origin), PhysicalFile, origin)
+    try:
+        entries = _entries(contents)
+        if contents.lumps is None:
+            return PhysicalSet(contents.name, contents.title, entries)
+        parameters = load_parameters(contents.lumps)
+        return from_lumped(parameters, name=contents.name, title=contents.title, entries=entries)
+    except (ParameterError, InputError) as error:
+        raise ParameterError(f"{origin}: {error}") from None
+
+
+def dump_set(physical: PhysicalSet) -> str:
+    """A physical set as TOML text that `read_set` turns back into an equal set."""
+    from tomlkit import comment, document, dumps, table
+
+    text = document()
+    text.add(comment("swashplate physical set; SI units; [plus, minus] as magnitudes"))
+    text.add("format", 1)
+    text.add("name", physical.name)
+    text.add("title", physical.title)
+    entries = table()
+    for name, each in physical.items():
+        entries.add(name, written(each))
+    text.add("physical", entries)
+    return dumps(text)
+
+
+def si_value(quantity: Definition, number: float, unit: str) -> float:
+    """A quantity's number in SI; a unit that measures something else is refused."""
+    return to_si(number, unit, quantity.unit, f"{quantity.symbol} ({quantity.name})")
+
+
+def _entries(contents: PhysicalFile) -> dict[str, Parameter]:
+    known = quantity_of if contents.lumps is None else chosen_quantity
+    return {name: _value(known(name), entry) for name, entry in contents.physical.items()}
+
+
+def _value(quantity: Definition, entry: Entry) -> Parameter:
+    """One entry of a file, in SI."""
+    if entry.bounds is not None:
+        raise ParameterError(
+            f"{quantity.symbol} has bounds; leave them out, a fit is given its own."
+        )
+    given = entry.value if isinstance(entry.value, list) else [entry.value]
+    first, *second = (si_value(quantity, number, entry.unit) for number in given)
+    change = (first, second[0]) if second else first
+    value = value_of(quantity.symbol, quantity, change)
+    return Parameter(quantity, value, entry.source, entry.status)

@@ -13,10 +13,9 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import InputError
-from swashplate.identification.fit import StageFit
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.identifiability import Identifiability, identifiability
-from swashplate.identification.linearised import LinearisedFit
-from swashplate.identification.linearising import linearised_fit
+from swashplate.identification.linearised import LinearisedFit, linearised_fit
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
 from swashplate.identification.problem import Problem
 from swashplate.identification.profile import checked_ends

@@ -15,9 +15,8 @@ from scipy.signal import lfilter
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Assessment
-from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.drives import simulated_current
-from swashplate.identification.fit import StageFit
+from swashplate.identification.drive_model import DriveModel, simulated_current
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.linearised import LinearisedFit
 from swashplate.identification.noise import (
     Grid,
@@ -32,7 +31,7 @@ from swashplate.identification.problem import Problem
 from swashplate.identification.profile import Profile, Threshold, minimiser, profile, threshold
 from swashplate.identification.solving import solve
 from swashplate.identification.spectral_lines import without_lines
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 from swashplate.parameters.parameter_set import ParameterSet
 
 Array = NDArray[np.float64]
@@ -272,7 +271,7 @@ def politis_white_length(colour: NoiseColour, samples: int) -> float:
 class Bootstrap:
     """Estimates from resampled noise."""
 
-    variables: Variables
+    variables: Unknowns
     vectors: Array
     """(draws, K) solver's vectors; held ones stay."""
     determined: NDArray[np.bool_]

@@ -231,7 +231,7 @@ def consistent(assessments: Sequence[Assessment]) -> Criterion:
     """That no run contradicts the others, by its sign or scale."""
     found = []
     if isinstance(assessments[-1].stage.problem.model, DriveModel):
-        found = contradicting_runs(fitted_runs(assessments), assessments[-1].stage.parameters)
+        found = contradicting_runs(fitted_runs(assessments), assessments[-1].stage.drive.parameters)
     names = list(dict.fromkeys(str(each.run) for each in found))
     return Criterion(
         "runs contradicting others",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 from typing import NamedTuple
 
@@ -14,12 +14,11 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Measures, RunQuality
-from swashplate.identification.fit import Fit, fit, smooth
+from swashplate.identification.fitting import Fit, fit, smooth
 from swashplate.identification.setup import Setup
-from swashplate.identification.solving import Loss, Method
-from swashplate.identification.staging import stage_problem
+from swashplate.identification.solving import Loss
+from swashplate.identification.staging import Parameters, stage_problem
 from swashplate.identification.validation import predict, with_speeds
-from swashplate.parameters.parameter_set import ParameterSet
 
 Array = NDArray[np.float64]
 
@@ -198,9 +197,8 @@ class _Task:
     """What the fits of all folds share."""
 
     experiments: tuple[Experiment, ...]
-    nominal: ParameterSet
+    nominal: Parameters
     setup: Setup
-    method: Method
     loss: Loss
     tolerance: float
     max_evaluations: int
@@ -214,13 +212,12 @@ class _Item(NamedTuple):
 
 def cross_validate(
     experiments: Sequence[Experiment],
-    nominal: ParameterSet,
+    nominal: Parameters,
     setup: Setup,
     *,
     folds: int = 5,
     seed: int = 0,
     executor: Executor | None = None,
-    method: Method = "trf",
     loss: Loss = "linear",
     tolerance: float = 1e-10,
     max_evaluations: int = 300,
@@ -232,7 +229,7 @@ def cross_validate(
     ----------
     experiments : sequence of Experiment
         The runs of the fit.
-    nominal : ParameterSet
+    nominal : ParameterSet or ModelParameters
         Where each fit begins: not at the fit to all runs, which has seen those that are held out.
     setup : Setup
         Stages and free parameters.
@@ -242,7 +239,7 @@ def cross_validate(
         Of the dealing; the same seed, the same folds.
     executor : Executor, optional
         Where the fits run; here, one after another, by default. The results do not depend on it.
-    method, loss, tolerance, max_evaluations :
+    loss, tolerance, max_evaluations :
         As of `fit.fit`.
     watch : callable, optional
         Told of each fold and how many there are by now. Ctrl-C ends it; folds that are done are
@@ -259,7 +256,6 @@ def cross_validate(
         tuple(experiments),
         nominal,
         setup,
-        method,
         loss,
         tolerance,
         max_evaluations,
@@ -334,10 +330,9 @@ def _fold(task: _Task, item: _Item) -> Fold:
     names = tuple(each.name for each in held)
     try:
         result = fit(
-            others,
             task.nominal,
+            others,
             task.setup,
-            method=task.method,
             loss=task.loss,
             tolerance=task.tolerance,
             max_evaluations=task.max_evaluations,
@@ -370,12 +365,14 @@ def _lost(result: Fit, held: Sequence[Experiment], threads: int | None) -> tuple
     for stage in result.stages:
         try:
             apart = stage_problem(stage.stage, before, held, threads=threads)
+            # in the units of all runs: information in other units cannot be compared
+            apart = replace(apart, scales=stage.problem.scales)
         except InputError:  # none of them has a channel of this stage
             before = stage.parameters
             continue
         before = stage.parameters
         left = _information(stage.problem.evaluate(stage.solution.vector).jacobian)
-        there = _information(apart.evaluate(apart.unknowns.vector(stage.values)).jacobian)
+        there = _information(apart.evaluate(apart.unknowns.vector_of(stage.values)).jacobian)
         told = dict(zip(apart.unknowns.names, there, strict=True))
         lost += [
             unknown.name

@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import chain, combinations
+from itertools import chain
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign.quality import unsigned_currents
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.identification.activation import simulated_run
 from swashplate.identification.drive_model import SIGNALS
+from swashplate.identification.excitation import simulated_run
 from swashplate.identification.identifiability import identifiability
 from swashplate.identification.motion import Motion, motions, rms
 from swashplate.identification.setup import Setup
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.unknowns import Unknowns
-from swashplate.identification.variables import Variables
 from swashplate.parameters.parameter_set import ParameterSet
 
 Array = NDArray[np.float64]
 
 Severity = Literal["refuse", "warn"]
 
-POINTS = 512
+POINTS = 1024
 """Instants at which two runs are compared."""
 SAME_COMMAND = 0.05
 """Difference of two commands, over their size, below which they are the same."""
@@ -98,45 +98,63 @@ def _turned(name: str, turned: Sequence[Motion], runs: int) -> list[Finding]:
 
 
 def _twins(name: str, ours: Sequence[Motion]) -> list[Finding]:
+    """Runs beside the one of the same command that is nearest to what all have in common."""
     middle = float(np.median([each.gain for each in ours])) if ours else 1.0
-    found: dict[str, Finding] = {}
-    for pair in combinations(ours, 2):
-        if not _same_command(*pair):
-            continue
-        # the odd one is that which is further from what the runs have in common
-        good, odd = sorted(pair, key=lambda each: abs(np.log(abs(each.gain / middle) + 1e-12)))
-        if odd.experiment.name in found:
-            continue
-        factor, correlation = _compared(good, odd)
-        both = f"{good.experiment.name} and {odd.experiment.name} have the same command, but"
-        if correlation < ALIKE:
-            sentence = f"{both} '{name}' has nothing in common: one of them belongs to another test"
-            found[odd.experiment.name] = Finding(
-                "refuse", odd.experiment.name, name, f"{sentence}; leave it out."
-            )
-        elif not 1.0 / DOUBTFUL < factor < DOUBTFUL:
-            certain = not 1.0 / FACTOR < factor < FACTOR
-            found[odd.experiment.name] = Finding(
-                "refuse" if certain else "warn",
-                odd.experiment.name,
-                name,
-                f"{both} '{name}' moves {factor:.3g} times as far in the second: both cannot be "
-                f"right; mend scale or unit of '{name}' in one of them, or leave it out."
-                if certain
-                else f"{both} '{name}' moves {factor:.3g} times as far in the second: was the load "
-                "or the oil another?",
-            )
-    return list(found.values())
+    nearest = sorted(ours, key=lambda each: abs(np.log(abs(each.gain / middle) + 1e-12)))
+    found: list[Finding] = []
+    for good, *others in _of_one_command(nearest):
+        for odd in others:
+            factor, correlation = _compared(good, odd)
+            both = f"{good.experiment.name} and {odd.experiment.name} have the same command, but"
+            if correlation < ALIKE:
+                severity: Severity = "refuse"
+                said = (
+                    f"{both} '{name}' has nothing in common: one of them belongs to another test; "
+                    "leave it out."
+                )
+            elif not 1.0 / FACTOR < factor < FACTOR:
+                severity = "refuse"
+                said = (
+                    f"{both} '{name}' moves {factor:.3g} times as far in the second: both cannot "
+                    f"be right; mend scale or unit of '{name}' in one of them, or leave it out."
+                )
+            elif not 1.0 / DOUBTFUL < factor < DOUBTFUL:
+                severity = "warn"
+                said = (
+                    f"{both} '{name}' moves {factor:.3g} times as far in the second: was the load "
+                    "or the oil another?"
+                )
+            else:
+                continue
+            found.append(Finding(severity, odd.experiment.name, name, said))
+    return found
 
 
-def _same_command(first: Motion, second: Motion) -> bool:
-    a, b = first.experiment.input, second.experiment.input
-    if a.kind != b.kind:
-        return False
-    length = min(a.time[-1] - a.time[0], b.time[-1] - b.time[0])
-    since = np.linspace(0.0, length, POINTS)
-    left, right = a.at(a.time[0] + since), b.at(b.time[0] + since)
-    return rms(left - right) <= SAME_COMMAND * max(rms(left), rms(right))
+def _of_one_command(ours: Sequence[Motion]) -> list[list[Motion]]:
+    """Runs in groups of the same command, in their order: each is held against each group once."""
+    inputs = [each.experiment.input for each in ours]
+    longest = max((each.time[-1] - each.time[0] for each in inputs), default=0.0)
+    since = np.linspace(0.0, longest, POINTS)
+    groups: list[list[Motion]] = []
+    heads = np.empty((len(ours), POINTS))
+    for each, drive in zip(ours, inputs, strict=True):
+        within = since <= drive.time[-1] - drive.time[0]
+        command = np.where(within, drive.at(drive.time[0] + since), np.nan)
+        known = heads[: len(groups)]
+        both = np.isfinite(known) & within
+        count = np.maximum(both.sum(axis=1), 1)
+        off, left, right = (
+            np.sqrt(np.sum(np.where(both, part, 0.0) ** 2, axis=1) / count)
+            for part in (known - command, known, np.broadcast_to(command, known.shape))
+        )
+        same = np.flatnonzero(off <= SAME_COMMAND * np.maximum(left, right))
+        kinds = [k for k in same if groups[k][0].experiment.input.kind == drive.kind]
+        if kinds:
+            groups[kinds[0]].append(each)
+        else:
+            heads[len(groups)] = command
+            groups.append([each])
+    return groups
 
 
 def _compared(first: Motion, second: Motion) -> tuple[float, float]:
@@ -434,7 +452,11 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
     DomainError
         If the model does not hold at the nominal values.
     """
-    found = [finding for each in experiments for finding in _samples(each)]
+    found = [
+        Finding("refuse", None, name, f"{said}.")
+        for (_, name), said in unsigned_currents(experiments).items()
+    ]
+    found += [finding for each in experiments for finding in _samples(each)]
     if not _refused(found):
         found += idle_commands(experiments, nominal)
     if _refused(found):
@@ -585,9 +607,9 @@ def _rank(experiments: Sequence[Experiment], nominal: ParameterSet, setup: Setup
     return found
 
 
-def _variables(unknowns: Unknowns) -> Variables:
+def _variables(unknowns: Unknowns) -> Unknowns:
     """The unknowns where a fit begins, as the statistics see them; none counts as at a bound."""
-    return Variables.of(
+    return Unknowns.of(
         unknowns.names,
         [each.start for each in unknowns],
         scales=[each.scale for each in unknowns],

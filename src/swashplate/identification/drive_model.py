@@ -3,26 +3,233 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.kinds import ChannelKind
+from swashplate.campaign import ChannelKind
+from swashplate.campaign.ammeter import signed_by_command
+from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.equations.marching.observation import ObservedRecord
-from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.errors import DomainError, InputError, ParameterError
-from swashplate.identification.drives import voltage_record
-from swashplate.identification.equation_model import EquationModel
-from swashplate.identification.forces import Forces
+from swashplate.identification.model import EquationModel
 from swashplate.parameters.definitions import COLUMNS, REFINEMENTS
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.simulation.instance import START_PRESSURE
+from swashplate.simulation.instance import START_PRESSURE, at_every_rate
 from swashplate.simulation.residuals import Own, Ready, made_ready
+from swashplate.simulation.run import check_voltage, simulate_drive
 
 Array = NDArray[np.float64]
+
+OTHER_RATE = 0.01
+"""Part by which a rate must differ to be another one."""
+
+
+def voltage_record(experiment: Experiment) -> Record:
+    """An experiment's command on the march's grid.
+
+    Raises
+    ------
+    InputError
+        If its input is no voltage, or leaves the card's range.
+    """
+    if experiment.input.kind != "voltage":
+        raise InputError(
+            f"{experiment.name} is driven by a {experiment.input.kind}, not by a voltage: fit the "
+            "pump alone."
+        )
+    return check_voltage(_record(experiment, "voltage"), clip=False)
+
+
+def current_record(experiment: Experiment) -> Record:
+    """An experiment's signed current, measured as its input, on the march's grid."""
+    if experiment.input.kind != "current":
+        raise InputError(f"{experiment.name} is not driven by a current.")
+    return _record(experiment, "current")
+
+
+def simulated_current(experiment: Experiment, parameters: ParameterSet) -> Record:
+    """The signed current that a card makes of an experiment's command."""
+    record = voltage_record(experiment)
+    # refinements begin behind the card
+    run = simulate_drive(parameters.plain, record, experiment.begins)
+    return Record(run.fine("current"), record.start, record.rate, record.substeps)
+
+
+def at_rate_of(
+    experiments: Sequence[Experiment], parameters: ParameterSet
+) -> tuple[ParameterSet, tuple[str, ...]]:
+    """A set whose card's filter holds at the rate of the runs, and what was changed for that.
+
+    Returns
+    -------
+    parameters : ParameterSet
+        With the filter's differential equation, if a run is marched at another rate than the one
+        that its recursion belongs to; otherwise as they are.
+    said : tuple of str
+        A sentence, if they were changed.
+    """
+    if parameters.rate is None:
+        return parameters, ()
+    driven = [each for each in experiments if each.input.kind == "voltage"]
+    rates = {each.name: 1.0 / voltage_record(each).step for each in driven}
+    for name, rate in rates.items():
+        if abs(rate / parameters.rate - 1.0) > OTHER_RATE:
+            return at_every_rate(parameters), (
+                f"{name} is marched at {rate:.4g} Hz, but the card's filter of {parameters.name} "
+                f"is a recursion for {parameters.rate:g} Hz: the fit takes the differential "
+                "equation with the same poles, which holds at every rate.",
+            )
+    return parameters, ()
+
+
+def _record(experiment: Experiment, what: str) -> Record:
+    """The input on a uniform grid, its own where its stamps are even."""
+    time, values = experiment.input.time, experiment.input.values
+    interpolation = experiment.input.interpolation
+    rate = even_rate(time)
+    if rate is not None and rate >= SLOWEST:
+        own = record_of(values, rate, what=what, interpolation=interpolation)
+        # the march joins the points of its grid by straight lines: of a command that is held, each
+        # stands for the step after it
+        held = 0.5 * own.step if interpolation == "previous" else 0.0
+        return Record(own.values, float(time[0]) + held, own.rate, own.substeps)
+    return record_of(values, SOURCE_RATE, what=what, time=time, interpolation=interpolation)
+
+
+SYMBOLS = ("Z19", "Z20", "Z21", "Z22")
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Forces at four effective currents each way, as magnitudes.
+
+    ``"force_plus_1"`` is the force at the first of `plus`; the effective current is what is left
+    of the current beyond the dead zone Z17.
+    """
+
+    plus: tuple[float, float, float, float]
+    """Effective currents of the positive direction, increasing. [A]"""
+    minus: tuple[float, float, float, float]
+    """Of the negative direction, as magnitudes. [A]"""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the eight forces."""
+        return tuple(f"force_{side}_{k}" for side in ("plus", "minus") for k in (1, 2, 3, 4))
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The parameters that they stand for."""
+        return tuple(f"{symbol}_{side}" for side in ("plus", "minus") for symbol in SYMBOLS)
+
+    @cached_property
+    def _maps(self) -> dict[str, Array]:
+        """For each direction the (4, 4) map from forces to coefficients."""
+        signs = {"plus": np.ones(4), "minus": np.array([1.0, -1.0, 1.0, -1.0])}
+        return {
+            side: np.linalg.inv(
+                np.power.outer(np.array(getattr(self, side)), np.arange(1, 5)) * signs[side]
+            )
+            for side in ("plus", "minus")
+        }
+
+    def values(self, parameters: ParameterSet) -> dict[str, float]:
+        """The forces of a parameter set, by name. [N]"""
+        forces = {}
+        for side, map_ in self._maps.items():
+            coefficients = [parameters.numbers[f"{symbol}_{side}"] for symbol in SYMBOLS]
+            for k, force in enumerate(np.linalg.solve(map_, coefficients), start=1):
+                forces[f"force_{side}_{k}"] = float(force)
+        return forces
+
+    def coefficients(
+        self, values: Mapping[str, float], parameters: ParameterSet
+    ) -> dict[str, float]:
+        """Coefficients for some forces; those not named are as in the parameter set. [N/Aᵏ]"""
+        forces = {**self.values(parameters), **{k: v for k, v in values.items() if k in self.names}}
+        made = {}
+        for side, map_ in self._maps.items():
+            of_side = np.array([forces[f"force_{side}_{k}"] for k in (1, 2, 3, 4)])
+            for symbol, coefficient in zip(SYMBOLS, map_ @ of_side, strict=True):
+                made[f"{symbol}_{side}"] = float(coefficient)
+        return made
+
+    def slopes(self, name: str) -> dict[str, float]:
+        """Derivatives of the coefficients by one force. [1/Aᵏ]"""
+        _, side, number = name.split("_")
+        column = self._maps[side][:, int(number) - 1]
+        return {
+            f"{symbol}_{side}": float(slope) for symbol, slope in zip(SYMBOLS, column, strict=True)
+        }
+
+
+SIGN_WIDTH = 0.05
+"""Width that `signed_by_command` masks; the mask is not used to drive a pump. [s]"""
+REST = 0.01
+"""Share of the largest command below which it has no sign of its own. [1]"""
+
+
+def measured_current(experiment: Experiment, scale: float = 1.0) -> Record:
+    """The signed current that was measured, on the march's grid.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Driven by a current, or with a channel of it: signed, of both solenoids, or of one ammeter
+        around both leads, which is given the command's sign.
+    scale : float
+        Factor on it. [1]
+
+    Returns
+    -------
+    Record
+        Positive towards positive speed. [A]
+
+    Raises
+    ------
+    InputError
+        If no current was measured.
+    """
+    drive = experiment.input
+    if drive.kind == "current":
+        signed = replace(drive, values=scale * drive.values)
+    else:
+        channel, values = _signed_channel(experiment)
+        signed = InputSignal("current", "A", channel.time, scale * values, "linear", channel.source)
+    return current_record(replace(experiment, input=signed))
+
+
+def _signed_channel(experiment: Experiment) -> tuple[Channel, Array]:
+    """A measured current and its values with a sign. [A]"""
+    for channel in experiment.of_kind("signed_current"):
+        return channel, channel.values
+    both = zip(
+        experiment.of_kind("current_plus"), experiment.of_kind("current_minus"), strict=False
+    )
+    for plus, minus in both:
+        return plus, plus.values - np.interp(plus.time, minus.time, minus.values)
+    for channel in experiment.of_kind("rectified_current"):
+        command = experiment.input.at(channel.time)
+        # noise about zero leaves readings just below it, and a command at rest without a sign
+        signed = signed_by_command(
+            channel.time,
+            np.maximum(channel.values, 0.0),
+            command,
+            width=SIGN_WIDTH,
+            level=REST * float(np.abs(command).max()),
+        )
+        return channel, signed.current
+    raise InputError(
+        f"{experiment.name} has no measured current to drive the pump: it needs a channel of the "
+        "kind signed_current, current_plus and current_minus, or rectified_current."
+    )
+
+
 Part = Literal["card", "pump", "chain"]
 """What of the drive is simulated: the card alone, pump and motor over a current, or all."""
 

@@ -1,28 +1,224 @@
-"""Which run tells of which unknown: shares of the information, after a fit or before it."""
+"""What the runs can tell, known before a fit: which run tells of which unknown, what to fix."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import exp, isfinite
+from textwrap import wrap
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
-from swashplate.identification.activation import Activation, activation, simulated_run
-from swashplate.identification.drive_model import DriveModel
+from swashplate.errors import InputError
+from swashplate.identification.drive_model import DriveModel, Forces, current_record, voltage_record
+from swashplate.identification.identifiability import NAMED as NAMED_OTHERS
 from swashplate.identification.identifiability import Identifiability, identifiability
-from swashplate.identification.linearised import LinearisedFit
-from swashplate.identification.linearising import linearised_fit
+from swashplate.identification.linearised import LinearisedFit, linearised_fit
 from swashplate.identification.problem import Problem
-from swashplate.identification.setup import Stage
+from swashplate.identification.setup import Free, GivenForces, Setup, Stage
 from swashplate.identification.staging import stage_problem
+from swashplate.identification.unknowns import Unknown
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.simulation.result import Simulation
+from swashplate.simulation.result import Limit, Simulation
+from swashplate.simulation.run import simulate_drive, simulate_pump
 
 Array = NDArray[np.float64]
+
+Mask = NDArray[np.bool_]
+
+SAME = 1e-9
+"""Difference below which two currents are the same. [A]"""
+LEAST_CURRENT = 1e-4
+"""Current from which it is not merely fading. [A]"""
+TILTED = 1e-4
+"""Angle of the swash plate that counts as one. [rad]"""
+
+OTHERS = "a tilted swash plate"
+"""What parameters need that say nothing of it, and single runs' numbers."""
+
+
+def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulation:
+    """An experiment as a parameter set has it, whatever was measured.
+
+    Raises
+    ------
+    InputError
+        If the input is neither a voltage nor a current, or cannot be marched.
+    DomainError
+        If the model does not hold under it.
+    """
+    begins = experiment.begins
+    try:
+        if experiment.input.kind == "current":
+            return simulate_pump(
+                parameters, current_record(experiment), begins, experiment.start_pressure
+            )
+        return simulate_drive(
+            parameters, voltage_record(experiment), begins, experiment.start_pressure
+        )
+    except InputError as error:
+        raise InputError(f"{experiment.input.source}: {error}") from None
+
+
+def acting(simulation: Simulation, parameters: ParameterSet) -> dict[str, float]:
+    """How long what a parameter needs happens in a run, for every column such as ``"Z16_plus"``.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Of the run.
+    parameters : ParameterSet
+        What was simulated.
+
+    Returns
+    -------
+    dict of str to float
+        Durations, 0 where it never happens. Without a card its parameters have 0. [s]
+    """
+    numbers, found = parameters.numbers, dict.fromkeys(COLUMNS, 0.0)
+    for side, sign in (("plus", 1.0), ("minus", -1.0)):
+        for symbol, mask in _of_pump(simulation, sign, numbers["Z17"]).items():
+            found[f"{symbol}_{side}"] = float(np.count_nonzero(mask)) / simulation.record.rate
+        for symbol, mask in _of_channel(simulation, side, numbers).items():
+            found[f"{symbol}_{side}"] = float(np.count_nonzero(mask)) * simulation.record.step
+    found["tau"] = found["V_dz_plus"] + found["V_dz_minus"]
+    found["Z17"] = found["Z19_plus"] + found["Z19_minus"]
+    rest = {"Z14": simulation.active(Limit.SPOOL), "Z15": simulation.active(Limit.RELIEF)}
+    tilted = np.abs(simulation.swash_angle) > TILTED
+    for symbol, definition in CATALOGUE.items():
+        if definition.block == "pump_motor" and not definition.directional and symbol != "Z17":
+            mask = rest.get(symbol, tilted)
+            found[symbol] = float(np.count_nonzero(mask)) / simulation.record.rate
+    return {**found, **dict.fromkeys(REFINEMENTS, found["Z1"])}
+
+
+def _of_pump(simulation: Simulation, sign: float, Z17: float) -> dict[str, Mask]:
+    """Samples at which the pump's parameters of one direction act, by symbol."""
+    driven = sign * simulation.current > Z17
+    return {
+        "Z13": simulation.active(Limit.SWASH_STOP) & (sign * simulation.swash_angle > 0.0),
+        "Z16": simulation.active(Limit.ORIFICE) & (sign * simulation.orifice_opening > 0.0),
+        **dict.fromkeys(("Z19", "Z20", "Z21", "Z22"), driven),
+    }
+
+
+def _of_channel(simulation: Simulation, side: str, numbers: Mapping[str, float]) -> dict[str, Mask]:
+    """Steps of the march at which the card's parameters of one channel act, by symbol."""
+    if not simulation.driven_by_voltage:
+        return {}
+    sign = 1.0 if side == "plus" else -1.0
+    lim1, lim2, I_t1, I_t2, a, V_dz = (
+        numbers[f"{symbol}_{side}"] for symbol in ("lim1", "lim2", "I_t1", "I_t2", "a", "V_dz")
+    )
+    step = simulation.record.step
+    current = simulation.fine("current_positive" if sign > 0.0 else "current_negative")
+    before, after = current[:-1], current[1:]
+    limited = simulation.rate_limited()[1:]
+    # where the current moves as fast as a limit lets it, that limit has set it; in the step in
+    # which it passes I_t1 it does so for a part of the step alone
+    passing = limited & (before <= I_t1) & (after > I_t1)
+    rising = passing | (limited & (before > I_t1) & (after - before >= lim1 * step - SAME))
+    falling = limited & (after >= I_t2) & (before - after >= lim2 * step - SAME)
+    decaying = np.zeros(before.shape, dtype=np.bool_)
+    if isfinite(a) and a > 0.0:
+        left = before * exp(-a * step)
+        decaying = (before <= I_t2) & (before > LEAST_CURRENT) & (np.abs(after - left) <= SAME)
+    beyond = sign * simulation.record.values[1:] > V_dz
+    return {
+        **dict.fromkeys(("V_dz", "J", "G1", "G2", "G3"), beyond),
+        **dict.fromkeys(("zeta", "omega", "C"), np.abs(after - before) > SAME),
+        "lim1": rising,
+        "lim2": falling,
+        "I_t1": passing,
+        "I_t2": (before > I_t2) & (after < I_t2),
+        "a": decaying,
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Activation:
+    """How long each run makes happen what each unknown needs."""
+
+    runs: tuple[str, ...]
+    names: tuple[str, ...]
+    """The unknowns, those of single runs left out."""
+    needs: tuple[str, ...]
+    """What each needs, in words."""
+    seconds: Array
+    """(runs, K) how long it happens. [s]"""
+
+    def __getitem__(self, name: str) -> Array:
+        """(runs,) durations for one unknown. [s]"""
+        return self.seconds[:, self.names.index(name)]
+
+
+def activation(
+    simulations: Mapping[str, Simulation],
+    parameters: ParameterSet,
+    unknowns: Sequence[Unknown],
+    forces: Forces | None = None,
+) -> Activation:
+    """The table of runs and unknowns.
+
+    Parameters
+    ----------
+    simulations : mapping of str to Simulation
+        Of each run by its name, see `simulated_run`.
+    parameters : ParameterSet
+        What was simulated.
+    unknowns : sequence of Unknown
+        Of a fit; those of single runs are left out.
+    forces : Forces, optional
+        Where forces stand for the solenoids' coefficients.
+    """
+    ours = [each for each in unknowns if each.run is None]
+    rows = []
+    for simulation in simulations.values():
+        found = acting(simulation, parameters)
+        row = []
+        for each in ours:
+            if forces is not None and each.name in forces.names:
+                row.append(_near(simulation, each.name, forces, parameters.numbers["Z17"]))
+            else:
+                row.append(max(found[target] for target in each.targets))
+        rows.append(row)
+    return Activation(
+        tuple(simulations),
+        tuple(each.name for each in ours),
+        tuple(need_of(each.name, forces) for each in ours),
+        np.array(rows).reshape(len(rows), len(ours)),
+    )
+
+
+def need_of(name: str, forces: Forces | None = None) -> str:
+    """What an unknown needs, in words."""
+    if forces is not None and name in forces.names:
+        return f"{_current_of(name, forces)[0]:g} A beyond Z17"
+    symbol = COLUMNS.get(name, name)
+    return (CATALOGUE[symbol].needs if symbol in CATALOGUE else "") or OTHERS
+
+
+def _current_of(name: str, forces: Forces) -> tuple[float, float]:
+    """Effective current of a force, and where its neighbourhood begins. [A]"""
+    match = re.fullmatch(r"force_(plus|minus)_(\d)", name)
+    assert match is not None
+    currents = forces.plus if match[1] == "plus" else forces.minus
+    k = int(match[2]) - 1
+    return currents[k], 0.5 * (currents[k] + (currents[k - 1] if k else 0.0))
+
+
+def _near(simulation: Simulation, name: str, forces: Forces, Z17: float) -> float:
+    """How long the effective current is at that of a force or beyond, from half way to it. [s]"""
+    sign = 1.0 if "_plus_" in name else -1.0
+    reached = sign * simulation.current - Z17 >= _current_of(name, forces)[1]
+    return float(np.count_nonzero(reached)) / simulation.record.rate
+
 
 Mark = Literal["most", "some", "unseen", "none"]
 
@@ -210,3 +406,169 @@ def _listed(names: Sequence[str]) -> str:
     if more:
         return f"{', '.join(named)} and {more} more"
     return named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
+
+
+ROOM = 0.98
+"""Part of the largest tested current at which the outermost force is asked for."""
+IDLE = "no run exercises it"
+COMMENT = 96
+"""Letters in a line of a comment."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What to change in one stage so that the runs determine all that is free."""
+
+    stage: Stage
+    """As it was."""
+    proposed: Stage | None
+    """As it could be; None if nothing of it can be determined."""
+    held: Mapping[str, str]
+    """Unknowns to hold, each with the reason."""
+    notes: tuple[str, ...] = ()
+    """What else is changed, or cannot be."""
+
+    @property
+    def changes(self) -> bool:
+        """Whether anything is to be changed."""
+        return self.proposed != self.stage
+
+    def sentences(self) -> tuple[str, ...]:
+        """The offer in words."""
+        said = [f"Hold {', '.join(names)}: {reason}." for names, reason in self._by_reason()]
+        if self.proposed is None:
+            said.append(f"Nothing is then left of the stage '{self.stage.name}'.")
+        return (*said, *self.notes)
+
+    def comments(self) -> tuple[str, ...]:
+        """What is held, as lines for the file."""
+        lines = []
+        for names, reason in self._by_reason():
+            are = "is" if len(names) == 1 else "are"
+            lines += wrap(f"{', '.join(names)} {are} held: {reason}", COMMENT)
+        return tuple(lines)
+
+    def _by_reason(self) -> list[tuple[list[str], str]]:
+        reasons: dict[str, list[str]] = {}
+        for name, reason in self.held.items():
+            reasons.setdefault(reason, []).append(name)
+        return [
+            (names, "no run exercises them" if reason == IDLE and len(names) > 1 else reason)
+            for reason, names in reasons.items()
+        ]
+
+
+def propose(outlook: Outlook, *, faint: bool = False) -> Proposal:
+    """What to hold, or to ask for instead, from what the runs cannot tell.
+
+    Parameters
+    ----------
+    outlook : Outlook
+        Of one stage.
+    faint : bool
+        Hold as well what the runs hardly tell: for values that are known, as they are then taken
+        for exact.
+    """
+    verdict = outlook.identifiability
+    reasons = dict.fromkeys(verdict.unexcited, IDLE)
+    for direction in (*verdict.null, *(verdict.faint if faint else ())):
+        others = [name for name in direction.changes if name != direction.hold]
+        if direction.gauge is not None:
+            reason = direction.gauge.determined
+        elif direction.sharpness > 0.0:
+            more = len(others) - NAMED_OTHERS
+            told = f"{', '.join(others[:NAMED_OTHERS])}{f' and {more} others' if more > 0 else ''}"
+            reason = f"the runs hardly tell it from {told}, but a wrong value shows in them"
+        else:
+            reason = f"the runs cannot tell it from {', '.join(others)}"
+        reasons[direction.hold] = reason
+    own = [each for each in reasons if "(" in each]
+    notes = [f"{name} belongs to one run and stays free." for name in own]
+    reasons = {name: why for name, why in reasons.items() if name not in own}
+    stage = outlook.stage
+    forces, of_forces, said = _forces(outlook, reasons)
+    for name in of_forces:
+        del reasons[name]
+    notes += said
+    free = _without(stage.free, tuple(reasons))
+    proposed = None
+    if free:
+        proposed = stage.model_copy(update={"free": free, "forces": forces})
+    return Proposal(stage, proposed, reasons, tuple(notes))
+
+
+def _without(free: Mapping[str, Free], held: Sequence[str]) -> dict[str, Free]:
+    """Entries of a stage without some unknowns; a direction alone where the other one is held."""
+    kept: dict[str, Free] = {}
+    for name, entry in free.items():
+        if name in held:
+            continue
+        columns = CATALOGUE[name].columns if name in CATALOGUE else (name,)
+        left = [column for column in columns if column not in held]
+        if entry.tied or len(left) == len(columns):
+            kept[name] = entry
+        else:
+            kept |= dict.fromkeys(left, entry)
+    return kept
+
+
+def _forces(
+    outlook: Outlook, reasons: Mapping[str, str]
+) -> tuple[GivenForces | None, list[str], list[str]]:
+    """Forces within the tested currents; names of forces among the reasons, and what to say."""
+    given = outlook.stage.forces
+    if given is None:
+        return None, [], []
+    known = Forces(given.plus, given.minus).names
+    concerned = [name for name in reasons if name in known]
+    changes: dict[str, tuple[float, ...]] = {}
+    notes = []
+    for side, sign in (("plus", 1.0), ("minus", -1.0)):
+        names = [name for name in concerned if f"_{side}_" in name]
+        currents = getattr(given, side)
+        largest = _largest_current(outlook, sign)
+        outermost = outlook.activation[f"force_{side}_{len(currents)}"]
+        if largest <= 0.0 and names:
+            notes.append(
+                f"{', '.join(names)} cannot be left out of [stages.forces]: without a current "
+                f"beyond Z17 ({side}) they stay at their nominal values, and do no harm."
+            )
+        elif largest > 0.0 and not outermost.any():
+            factor = ROOM * largest / currents[-1]
+            changes[side] = tuple(float(f"{factor * current:.3g}") for current in currents)
+            asked = ", ".join(f"{current:g}" for current in changes[side])
+            notes.append(
+                f"Ask for the {side} forces at {asked} A: no run goes further than {largest:.3g} A "
+                "beyond Z17."
+            )
+        elif names:
+            notes.append(
+                f"{', '.join(names)} cannot be held alone in [stages.forces]: add a run that "
+                f"dwells at more levels between {currents[0]:g} and {currents[-1]:g} A ({side})."
+            )
+    return given.model_copy(update=changes), concerned, notes
+
+
+def _largest_current(outlook: Outlook, sign: float) -> float:
+    """Largest current beyond the solenoids' dead zone in any run, one way. [A]"""
+    return max(
+        float(np.max(sign * each.current, initial=0.0)) - each.pump.Z17
+        for each in outlook.simulations.values()
+    )
+
+
+def proposed_setup(setup: Setup, proposals: Sequence[Proposal]) -> Setup:
+    """A set-up with all proposals taken; stages of which nothing is left are left out.
+
+    Raises
+    ------
+    InputError
+        If nothing is left at all.
+    """
+    stages = tuple(each.proposed for each in proposals if each.proposed is not None)
+    if not stages:
+        raise InputError(
+            "The runs determine none of the unknowns, so that there is no set-up to propose: test "
+            "what exercises them first."
+        )
+    return setup.model_copy(update={"stages": stages})

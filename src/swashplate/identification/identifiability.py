@@ -14,7 +14,7 @@ from scipy.linalg import null_space, qr
 
 from swashplate.errors import InputError
 from swashplate.identification.linearised import TOLERANCE, triangular_factor, whitening
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 from swashplate.models.pump import ANGLE, FORCE, MOTION, PRESSURE, TILT, TRAVEL, ZERO
 from swashplate.parameters.definitions import CATALOGUE
 
@@ -47,12 +47,12 @@ class Gauge:
     needs: frozenset[str] = frozenset()
     """Symbols whose values the moves depend on."""
 
-    def tangent(self, variables: Variables, fixed: Known | None = None) -> Array:
+    def tangent(self, variables: Unknowns, fixed: Known | None = None) -> Array:
         """Derivative of the solver's vector along the gauge.
 
         Parameters
         ----------
-        variables : Variables
+        variables : Unknowns
             The unknowns.
         fixed : mapping of str to float, optional
             Values of parameters that are no unknowns, by symbol.
@@ -63,7 +63,8 @@ class Gauge:
             0 for what does not move, and throughout if a value that the gauge needs is not known.
         """
         symbols = [symbol_of(name) for name in variables.names]
-        known = {**(fixed or {}), **dict(zip(symbols, map(float, variables.values), strict=True))}
+        estimates = map(float, variables.estimates)
+        known = {**(fixed or {}), **dict(zip(symbols, estimates, strict=True))}
         slopes = np.zeros(variables.count)
         if not self.needs <= known.keys():
             return slopes
@@ -71,7 +72,7 @@ class Gauge:
             move = self.moves.get(symbol)
             if move is None:
                 continue
-            value = float(variables.values[k])
+            value = float(variables.estimates[k])
 
             def slope(step: float, move: Move = move, value: float = value) -> float:
                 return (move(value, step, known) - move(value, -step, known)) / (2.0 * step)
@@ -229,7 +230,7 @@ class Space(NamedTuple):
 
 def null_directions(
     space: Space,
-    variables: Variables,
+    variables: Unknowns,
     gauges: Sequence[Gauge],
     fixed: Known,
     tolerance: float,
@@ -240,7 +241,7 @@ def null_directions(
     ----------
     space : Space
         Derivatives.
-    variables : Variables
+    variables : Unknowns
         All unknowns.
     gauges : sequence of Gauge
         Those to recognise.
@@ -272,7 +273,7 @@ def null_directions(
 
 def faint_directions(
     space: Space,
-    variables: Variables,
+    variables: Unknowns,
     gauges: Sequence[Gauge],
     fixed: Known,
     faint: float,
@@ -303,7 +304,7 @@ def _faintest(
     space: Space,
     sizes: Array,
     row: Array,
-    variables: Variables,
+    variables: Unknowns,
     gauges: Sequence[Gauge],
     fixed: Known,
     faint: float,
@@ -333,7 +334,7 @@ def _place_to_hold(
     null: Array,
     held: Sequence[int],
     space: Space,
-    variables: Variables,
+    variables: Unknowns,
 ) -> int | None:
     """The unknown that removes a gauge beside those held already; None if none does."""
     symbols = [symbol_of(variables.names[k]) for k in space.places]
@@ -353,7 +354,7 @@ def _direction(
     gauge: Gauge | None,
     place: int,
     space: Space,
-    variables: Variables,
+    variables: Unknowns,
 ) -> Direction:
     # a short column needs a large change for the same effect: judged by effect, not by size
     spoken = np.abs(vector) >= MENTIONED * np.abs(vector).max()
@@ -394,7 +395,7 @@ class Pair(NamedTuple):
 class Identifiability:
     """Verdict on a fit's unknowns, before a fit or after."""
 
-    variables: Variables
+    variables: Unknowns
     sensitivity: Array
     """(K,) length of the change of all weighted residuals for 1 % of each unknown."""
     singular_values: Array
@@ -443,7 +444,7 @@ class Identifiability:
             )
         said += [each.sentence for each in (*self.null, *self.faint)]
         said += [
-            f"{name} = {self.variables.values[self.variables.index(name)]:.4g} stands at its "
+            f"{name} = {self.variables.estimates[self.variables.index(name)]:.4g} stands at its "
             f"{side} bound: no interval is given for it; those of the others let it move."
             for name, side in self.at_bounds.items()
         ]
@@ -479,7 +480,7 @@ class Identifiability:
 
 def identifiability(
     derivatives: Array,
-    variables: Variables,
+    variables: Unknowns,
     *,
     covariance: Array | None = None,
     tolerance: float = TOLERANCE,
@@ -492,7 +493,7 @@ def identifiability(
     ----------
     derivatives : (m, K) array
         Derivatives of all weighted residuals by the solver's vector, or their triangular factor.
-    variables : Variables
+    variables : Unknowns
         The unknowns; those at a bound count as held.
     covariance : (K, K) array, optional
         Of the solver's vector, for the correlations; by default that of white noise.
@@ -553,7 +554,7 @@ def identifiability(
 
 
 def correlated_pairs(
-    space: Space, variables: Variables, covariance: Array | None, tolerance: float
+    space: Space, variables: Unknowns, covariance: Array | None, tolerance: float
 ) -> tuple[Pair, ...]:
     """Pairs of unknowns in `space` with a correlation beyond 0.95, the strongest first."""
     if covariance is None:

@@ -337,7 +337,7 @@ class _StageBlocks:
                 for each in assessments[: assessments.index(assessment)]
                 if each.stage.stage.part == "card"
             ]
-        self.model = DriveModel(self.stage.parameters, part, model.currents, model.forces)
+        self.model = DriveModel(self.stage.drive.parameters, part, model.currents, model.forces)
         self.fixed = self._constants(part, [each.stage.problem for each in assessments])
 
     def _constants(self, part: str, problems: Sequence[Problem]) -> list[str]:

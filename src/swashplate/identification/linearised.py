@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import InputError
-from swashplate.identification.variables import Variables
+from swashplate.identification.model import Differentiable
+from swashplate.identification.problem import Problem
+from swashplate.identification.unknowns import Unknowns
 
 Array = NDArray[np.float64]
 
@@ -49,7 +51,7 @@ class LinearisedFit:
     """All runs of a fit at its optimum. Make it with `of`, which checks and cleans."""
 
     runs: tuple[LinearisedRun, ...]
-    variables: Variables
+    variables: Unknowns
     prior: Array
     """(p, K) rows of the Gaussian priors: derivatives of (number less mean)/deviation, times the
     root of `prior_noise`."""
@@ -61,7 +63,7 @@ class LinearisedFit:
     def of(
         cls,
         runs: Sequence[LinearisedRun],
-        variables: Variables,
+        variables: Unknowns,
         *,
         prior: Array | None = None,
         prior_noise: Array | None = None,
@@ -223,4 +225,45 @@ def _checked(run: LinearisedRun, count: int) -> LinearisedRun:
         residual=run.residual[used],
         jacobian=run.jacobian[used],
         weight=run.weight[used],
+    )
+
+
+BY_DIFFERENCES = 1e-6
+"""Singular values of difference derivatives below this part of the largest count as zero."""
+
+
+def linearised_fit(problem: Problem, vector: Array) -> LinearisedFit:
+    """Residuals and derivatives of every run at a point, ignored samples left out.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was fitted.
+    vector : (K,) array
+        The solver's vector at the optimum.
+    """
+    runs = []
+    for number, experiment in enumerate(problem.experiments):
+        weights = problem.weights[number]
+        for name, part in problem.linearised(vector, number).items():
+            used = weights[name] > 0.0
+            runs.append(
+                LinearisedRun(
+                    experiment.name,
+                    name,
+                    experiment[name].time[used],
+                    part.values[used],
+                    part.by[used],
+                    weights[name][used],
+                )
+            )
+    _, prior = problem.unknowns.prior_rows(vector)
+    worths = [each.prior.worth for each in problem.unknowns if each.prior is not None]
+    exact = isinstance(problem.model, Differentiable)
+    return LinearisedFit.of(
+        runs,
+        problem.unknowns.at(vector),
+        prior=prior,
+        prior_noise=np.array(worths),
+        tolerance=TOLERANCE if exact else BY_DIFFERENCES,
     )

@@ -1,15 +1,26 @@
-"""What a model must do to be fitted: simulate an experiment for given values of its unknowns."""
+"""Models as a fit sees them: what any must do, and models of equations with exact derivatives."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, Protocol, runtime_checkable
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Experiment
+from swashplate.equations import Model as Equations
+from swashplate.equations import instance_of, parameter_paths, state_paths
+from swashplate.equations.fields import made, numbers_of
+from swashplate.equations.marching.jacobian import jacobian, residuals, started_by, triangle
+from swashplate.equations.marching.march import output_of
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.observation import Own as EngineOwn
+from swashplate.equations.marching.record import Record, even_rate, gridded
 from swashplate.errors import DomainError, InputError
+from swashplate.simulation.residuals import Ready
 
 Array = NDArray[np.float64]
 
@@ -68,13 +79,6 @@ class Differentiable(Protocol):
         ...
 
 
-class Reduced(NamedTuple):
-    """An experiment's weighted residuals and derivatives, as a triangular factor."""
-
-    triangle: Array
-    """(k+1, k+1) factor R of [J r], r the weighted residuals simulated less measured."""
-
-
 @runtime_checkable
 class Reducing(Protocol):
     """A model that gives the triangular factor of [J r] without ever holding J."""
@@ -85,8 +89,8 @@ class Reducing(Protocol):
         experiment: Experiment,
         names: Sequence[str],
         weights: Mapping[str, Array],
-    ) -> Reduced:
-        """Triangular factor by some of the unknowns.
+    ) -> Array:
+        """Triangular factor by some of the unknowns: (k+1, k+1) array R of [J r].
 
         Parameters
         ----------
@@ -208,3 +212,313 @@ def _said(made: object) -> str:
     if isinstance(made, np.ndarray):
         return f"an array of {made.dtype.name}"
     return f"a {type(made).__name__}"
+
+
+OFFSET, CLOCK = "offset ", "clock "
+"""What the names begin with of a channel's free zero, and of the time by which the input's clock is
+ahead of the channel's [s]."""
+_Key = tuple[int, tuple[int, ...], tuple[str, ...]]
+
+
+@dataclass(frozen=True, eq=False)
+class EquationModel(ABC):
+    """What every model of equations has in common; see `OwnModel` and `DriveModel`.
+
+    Besides its own names it knows of each channel ``"offset NAME"`` and ``"clock NAME"``.
+    """
+
+    _observed: dict[_Key, tuple[object, ObservedRecord]] = field(
+        default_factory=dict, repr=False, init=False
+    )
+
+    def __getstate__(self) -> dict[str, object]:
+        """Without what can be made again."""
+        return {**self.__dict__, "_observed": {}}
+
+    @abstractmethod
+    def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
+        """Signal of the model for each channel that it gives."""
+
+    @abstractmethod
+    def driven(self, experiment: Experiment) -> tuple[str, Record, Mapping[str, Array]]:
+        """Signal that drives the model, its record, and other external signals on its grid."""
+
+    @abstractmethod
+    def ready(
+        self,
+        values: Mapping[str, float],
+        experiment: Experiment,
+        observed: ObservedRecord,
+        columns: Sequence[str],
+        shifts: tuple[Sequence[float], Sequence[float]],
+    ) -> Ready:
+        """The model with numbers, and columns as the engine names them.
+
+        Parameters
+        ----------
+        shifts : (sequence, sequence)
+            Offsets and clock offsets of the observations.
+        """
+
+    def moves(self, name: str) -> Mapping[str, float]:
+        """Derivatives by a name of the columns that it moves."""
+        return {name: 1.0}
+
+    def simulate(self, values: Mapping[str, float], experiment: Experiment) -> Mapping[str, Array]:
+        """Simulate the measured channels; see `model.Model`."""
+        channels = list(self.signals_of(experiment))
+        observed = self._record(experiment, dict.fromkeys(channels), ())
+        ready = self.ready(values, experiment, observed, (), _shifts(values, channels))
+        flat = residuals(ready.instance, observed, ready.own)
+        return {name: flat[observed.rows_of(k)] for k, name in enumerate(channels)}
+
+    def linearise(
+        self, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
+    ) -> Mapping[str, Linearised]:
+        """Simulate with derivatives; see `model.Differentiable`."""
+        channels = list(self.signals_of(experiment))
+        observed = self._record(experiment, dict.fromkeys(channels), names)
+        columns, chain = self._chain(names, channels, observed)
+        ready = self.ready(values, experiment, observed, columns, _shifts(values, channels))
+        found = jacobian(ready.instance, observed, ready.paths, ready.own, moved=ready.moved)
+        by = found.columns @ chain
+        return {
+            name: Linearised(found.residuals[observed.rows_of(k)], by[observed.rows_of(k)])
+            for k, name in enumerate(channels)
+        }
+
+    def reduce(
+        self,
+        values: Mapping[str, float],
+        experiment: Experiment,
+        names: Sequence[str],
+        weights: Mapping[str, Array],
+    ) -> Array:
+        """Triangular factor of weighted residuals and derivatives; see `model.Reducing`."""
+        known = self.signals_of(experiment)
+        channels = [name for name in weights if name in known]
+        observed = self._record(experiment, {name: weights[name] for name in channels}, names)
+        columns, chain = self._chain(names, channels, observed)
+        shifts = _shifts(values, channels, offsets=True)
+        ready = self.ready(values, experiment, observed, columns, shifts)
+        found = triangle(ready.instance, observed, ready.paths, ready.own, moved=ready.moved)
+        return np.column_stack([found.factor[:, :-1] @ chain, found.factor[:, -1]])
+
+    def _chain(
+        self, names: Sequence[str], channels: Sequence[str], observed: ObservedRecord
+    ) -> tuple[list[str], Array]:
+        """Columns to ask for, and the derivatives of all columns by the names."""
+        moved = [
+            {name: 1.0} if name.startswith((OFFSET, CLOCK)) else self.moves(name) for name in names
+        ]
+        own = [
+            f"{word}{channel}"
+            for channel, each in zip(channels, observed.observations, strict=True)
+            for word, unknown in ((OFFSET, "offset"), (CLOCK, "clock_offset"))
+            if unknown in each.unknown
+        ]
+        asked = list(
+            dict.fromkeys(c for each in moved for c in each if not c.startswith((OFFSET, CLOCK)))
+        )
+        chain = np.array([[each.get(row, 0.0) for each in moved] for row in (*asked, *own)])
+        return asked, chain.reshape(len(asked) + len(own), len(names))
+
+    def _record(
+        self,
+        experiment: Experiment,
+        weights: Mapping[str, Array | None],
+        names: Sequence[str],
+    ) -> ObservedRecord:
+        """The experiment as the march sees it; made once."""
+        own = tuple(name for name in names if name.startswith((OFFSET, CLOCK)))
+        key = (id(experiment), tuple(id(each) for each in weights.values()), own)
+        if key not in self._observed:
+            # both are kept as well, so that no others can have their identity
+            kept = (experiment, dict(weights))
+            self._observed[key] = (kept, self._made(experiment, weights, own))
+        return self._observed[key][1]
+
+    def _made(
+        self, experiment: Experiment, weights: Mapping[str, Array | None], own: Sequence[str]
+    ) -> ObservedRecord:
+        signals, observations = self.signals_of(experiment), []
+        for name, weight in weights.items():
+            channel = experiment[name]
+            unknown: list[Literal["offset", "clock_offset"]] = []
+            if f"{OFFSET}{name}" in own:
+                unknown.append("offset")
+            if f"{CLOCK}{name}" in own:
+                unknown.append("clock_offset")
+            observations.append(
+                Observation(
+                    signals[name],
+                    channel.time,
+                    channel.values if weight is not None else np.zeros_like(channel.values),
+                    1.0 if weight is None else weight,
+                    unknown=tuple(unknown),
+                )
+            )
+            by, record, others = self.driven(experiment)
+        return ObservedRecord(record, observations, by, experiment.begins, others)
+
+
+def _shifts(
+    values: Mapping[str, float], channels: Sequence[str], *, offsets: bool = False
+) -> tuple[Sequence[float], Sequence[float]]:
+    """Offsets, where residuals are made with them, and clock offsets of channels."""
+    return (
+        [values.get(f"{OFFSET}{name}", 0.0) for name in channels] if offsets else (),
+        [values.get(f"{CLOCK}{name}", 0.0) for name in channels],
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class OwnModel(EquationModel):
+    """A model of equations whose parameters, by their paths, are the unknowns.
+
+    ``"start.PATH"`` is a number of the state at the first sample, by its path or as `free_start` of
+    the model has it: an unknown of each run.
+
+    A channel is compared with the signal of its name. Of the model's external signals those that
+    are channels of an experiment are taken from there; the one that is left is its input.
+
+    Examples
+    --------
+    >>> problem = Problem(
+    ...     OwnModel(valve, rate=100.0, begin={"position": "position"}),
+    ...     campaign.experiments,
+    ...     Unknowns((Unknown("lag", 0.06, 0.005, 0.5, "s", log=True), ...)),
+    ...     channels=("position",),
+    ...     scales={"position": 1e-3},
+    ... )
+    """
+
+    model: Equations
+    p: Any = None
+    """Values of what is neither unknown nor fixed by the problem: the model's parameters."""
+    rate: float | None = None
+    """Steps a second; by default the input's samples. Needed where its stamps are not even. [Hz]"""
+    options: Any = None
+    given: Any = None
+    """The model's givens, or a mapping of them by the experiments' names."""
+    signals: Mapping[str, str] = field(default_factory=dict)
+    """The model's signal for a channel of another name."""
+    begin: Mapping[str, str] = field(default_factory=dict)
+    """Channel that says where a number of the state begins, by its path: at the first sample that
+    counts."""
+
+    def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
+        """Signal of the model for each channel that it gives.
+
+        Raises
+        ------
+        InputError
+            If the model has no such signal, or gives none of the channels.
+        """
+        known = [name for part in self.model.parts for name in part.signal_names]
+        known += [*self.model.links, *self.model.integrals]
+        found = {name: self.signals.get(name, name) for name in experiment.channels}
+        found = {k: v for k, v in found.items() if k in self.signals or v in known}
+        for signal in found.values():
+            output_of(self.model, signal)
+        if not found:
+            raise InputError(
+                f"{experiment.name} has the channels {', '.join(experiment.channels)}, of which "
+                f"{self.model.name} gives none; it gives {', '.join(known)}."
+            )
+        return found
+
+    def driven(self, experiment: Experiment) -> tuple[str, Record, Mapping[str, Array]]:
+        """The experiment's input on the grid, and external signals that are channels.
+
+        Raises
+        ------
+        InputError
+            If stamps are uneven and no rate is said, or it is not clear which signal the input is.
+        """
+        external, defaults = self.model.external, set[str]()
+        for part in self.model.parts:
+            defaults |= {part.tap(name).signal for name in part.defaults}
+        others = [name for name in external if name in experiment.channels]
+        left = [name for name in external if name not in others]
+        left = [name for name in left if name not in defaults] or left
+        if len(left) != 1:
+            raise InputError(
+                f"{self.model.name} needs the signals {', '.join(external)}; {experiment.name} has "
+                f"one input, for one of them, and the channels {', '.join(experiment.channels)}."
+            )
+        command = experiment.input
+        even = even_rate(command.time)
+        rate = self.rate or even
+        if rate is None:
+            raise InputError(
+                f"{experiment.name}: the stamps of its input are not even, so the model needs a "
+                f"rate, as in OwnModel({self.model.name}, rate=100.0)."
+            )
+        if rate == even:
+            record = Record(command.values, float(command.time[0]), rate, 1)
+        else:
+            record = gridded(command.values, command.time, rate, command.interpolation)
+        channels = [experiment[name] for name in others]
+        on_grid = {c.name: np.interp(record.time, c.time, c.values) for c in channels}
+        return left[0], record, on_grid
+
+    def ready(
+        self,
+        values: Mapping[str, float],
+        experiment: Experiment,
+        observed: ObservedRecord,
+        columns: Sequence[str],
+        shifts: tuple[Sequence[float], Sequence[float]],
+    ) -> Ready:
+        """The model with numbers; see `EquationModel.ready`.
+
+        Raises
+        ------
+        InputError
+            If a name is not known, or a parameter has no value.
+        """
+        model = self.model
+        paths, states = parameter_paths(model), state_paths(model)
+        numbers = {} if self.p is None else dict(zip(paths, numbers_of(self.p), strict=True))
+        begin = {}
+        for path, channel in self.begin.items():
+            measured = experiment[channel]
+            begin[path] = float(measured.values[int(np.argmax(measured.used))])
+        for name, value in values.items():
+            if name in paths:
+                numbers[name] = value
+            elif name.startswith("start."):
+                begin |= dict.fromkeys(self._started(name), value)
+            elif not name.startswith((OFFSET, CLOCK)):
+                raise InputError(
+                    f"{model.name} has no parameter '{name}'; it has {', '.join(paths)}."
+                )
+        unknown = [path for path in begin if path not in states]
+        if unknown:
+            raise InputError(
+                f"{model.name} has no state '{unknown[0]}' to begin at; it has {', '.join(states)}."
+            )
+        try:
+            p = made(model.parameters, numbers)
+        except KeyError as error:
+            raise InputError(
+                f"{model.name} has no value of {error.args[0]}: let it be an unknown, fix it, or "
+                "give p."
+            ) from None
+        given = self.given
+        if isinstance(given, Mapping):
+            if experiment.name not in given:
+                raise InputError(f"{model.name} has no given numbers for {experiment.name}.")
+            given = given[experiment.name]
+        instance = instance_of(model, p, options=self.options, given=given)
+        return Ready(instance, EngineOwn(begin, *shifts), columns)
+
+    def _started(self, name: str) -> list[str]:
+        """Paths of the states that a name such as ``start.position`` sets."""
+        several = len(self.model.parts) > 1
+        return [
+            f"{part.name}.{path}" if several else path
+            for i, part in enumerate(self.model.parts)
+            for path in started_by(self.model, i, name)
+        ]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
-from swashplate.identification.variables import Variables
+from swashplate.identification.unknowns import Unknowns
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class Covariance:
     """Covariance of the solver's vector under one assumption on the noise."""
 
     noise: Noise
-    variables: Variables
+    variables: Unknowns
     matrix: Array
     """(K, K); rows and columns of unknowns at a bound or undetermined are 0."""
     determined: NDArray[np.bool_]

@@ -13,16 +13,20 @@ from numpy.typing import NDArray
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.equations import Model as OfEquations
 from swashplate.errors import InputError
-from swashplate.identification.equation_model import OwnModel
-from swashplate.identification.model import Linearised, Model, Reducing, linearised, simulated
+from swashplate.identification.model import (
+    OFFSET,
+    Linearised,
+    Model,
+    OwnModel,
+    Reducing,
+    linearised,
+    simulated,
+)
 from swashplate.identification.solving import Evaluation
 from swashplate.identification.unknowns import Unknowns
 
 Array = NDArray[np.float64]
 Part = TypeVar("Part")
-
-OFFSET = "offset"
-"""``"offset counts"`` is the free zero of the channel "counts", in its unit."""
 
 
 @dataclass(frozen=True)
@@ -109,10 +113,10 @@ class Problem:
     def outputs(self, vector: Array, number: int) -> Mapping[str, Array]:
         """Simulated samples of the fitted channels of one experiment, offsets included."""
         experiment = self.experiments[number]
-        values = self._values(vector, number)
-        outputs = simulated(self.model, values, experiment)
+        values, own = self._values(vector, number)
+        outputs = simulated(self.model, own, experiment)
         return {
-            name: self._output(outputs, experiment, name) + values.get(f"{OFFSET} {name}", 0.0)
+            name: self._output(outputs, experiment, name) + values.get(f"{OFFSET}{name}", 0.0)
             for name in self.weights[number]
         }
 
@@ -129,17 +133,17 @@ class Problem:
     def linearised(self, vector: Array, number: int) -> Mapping[str, Linearised]:
         """Weighted residuals of each channel of one experiment and derivatives by the vector."""
         experiment = self.experiments[number]
-        values = self._values(vector, number)
+        values, own = self._values(vector, number)
         names = self._names(number)
-        inner = [name for name in names if not name.startswith(f"{OFFSET} ")]
-        outputs = linearised(self.model, values, experiment, inner)
+        inner = [name for name in names if name in own]
+        outputs = linearised(self.model, own, experiment, inner)
         chain = self.unknowns.chain(vector, names, experiment.name)
         made = {}
         for name, weight in self.weights[number].items():
             output = self._output(outputs, experiment, name)
             by = np.zeros((weight.size, len(names)))
             by[:, [names.index(each) for each in inner]] = output.by
-            offset = f"{OFFSET} {name}"
+            offset = f"{OFFSET}{name}"
             if offset in names:
                 by[:, names.index(offset)] = 1.0
             shifted = output.values + values.get(offset, 0.0) - experiment[name].values
@@ -163,13 +167,16 @@ class Problem:
         names = self._names(number)
         assert isinstance(self.model, Reducing)
         triangle = self.model.reduce(
-            self._values(vector, number), experiment, names, self.weights[number]
-        ).triangle
+            self._values(vector, number)[0], experiment, names, self.weights[number]
+        )
         chain = self.unknowns.chain(vector, names, experiment.name)
         return Evaluation(triangle[:, -1], triangle[:, :-1] @ chain)
 
-    def _values(self, vector: Array, number: int) -> dict[str, float]:
-        return {**self.fixed, **self.unknowns.targets(vector, self.experiments[number].name)}
+    def _values(self, vector: Array, number: int) -> tuple[dict[str, float], dict[str, float]]:
+        """Values by name for one experiment, and those that are the model's: no channel's zero."""
+        values = {**self.fixed, **self.unknowns.targets(vector, self.experiments[number].name)}
+        zeros = {f"{OFFSET}{name}" for name in self.channels}
+        return values, {name: value for name, value in values.items() if name not in zeros}
 
     def _names(self, number: int) -> list[str]:
         """Names in the model that the unknowns of one experiment set."""
@@ -220,7 +227,9 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
             # rounding to whole counts leaves an error between -1/2 and 1/2 of one
             scales[name] = abs(having[0].encoder.angle_per_count) / np.sqrt(12.0)
             continue
-        scales[name] = 0.01 * max(float(np.ptp(each.values)) for each in having)
+        # an ignored spike says nothing of the range
+        used = [each.values[each.used] for each in having if each.used.any()]
+        scales[name] = 0.01 * max((float(np.ptp(each)) for each in used), default=0.0)
         if scales[name] == 0.0:
             raise InputError(f"The channel '{name}' never changes: nothing can be fitted to it.")
     return scales

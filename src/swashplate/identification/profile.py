@@ -13,6 +13,7 @@ from swashplate.errors import DomainError, InputError
 from swashplate.identification.linearised import LinearisedFit
 from swashplate.identification.problem import Problem
 from swashplate.identification.solving import Evaluation, solve
+from swashplate.identification.unknowns import Vector
 
 Array = NDArray[np.float64]
 
@@ -98,7 +99,7 @@ class Point(NamedTuple):
     number: float
     """Of the unknown, in the solver's vector."""
     cost: float
-    vector: Array
+    vector: Vector
 
 
 class ProfileSide:

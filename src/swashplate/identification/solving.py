@@ -1,22 +1,36 @@
-"""Solvers: from a start to the nearest optimum within the bounds."""
+"""Solver: from a start to the nearest optimum within the bounds, by SciPy's trust region."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from time import perf_counter
 from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.errors import DomainError
+from swashplate.identification.unknowns import Vector
+
 Array = NDArray[np.float64]
-Method = Literal["trf", "slsqp"]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
 
 REFUSED = 1e6
 """A point outside the model's domain costs this many times the start: the step is taken back."""
-SPENT = "stopped at the largest number of evaluations; give it more"
-"""Why a search stopped."""
+LEG = 30
+"""Evaluations after which the region is made as wide as at first. Where the cost has an edge, such
+as a step that just reaches the swash plate's stop, it shrinks to nothing."""
+GAINED = 1e-6
+"""Relative gain of a leg from which another one is worth it."""
+UNCHANGED = 2
+_ENDINGS = {
+    0: "stopped at the largest number of evaluations; give it more",
+    1: "the gradient vanished",
+    UNCHANGED: "the cost no longer changed",
+    3: "the parameters no longer changed",
+    4: "neither cost nor parameters changed any more",
+}
 
 
 class Evaluation(NamedTuple):
@@ -89,7 +103,7 @@ def longest_left(progress: Progress) -> float | None:
 class Solution:
     """The optimum that a solver reached."""
 
-    vector: Array
+    vector: Vector
     cost: float
     """Half the weighted sum of squares; with a robust loss, of the loss."""
     start_cost: float
@@ -102,17 +116,50 @@ class Solution:
     seconds: float
 
 
+class _Memory:
+    """Evaluates, remembers the last point and the best one, and refuses what is out of domain."""
+
+    def __init__(self, objective: Objective, compressed: bool) -> None:
+        self.objective, self.compressed = objective, compressed
+        self.evaluations = 0
+        self.best: tuple[float, Array] | None = None
+        self._vector: Array | None = None
+        self._evaluation: Evaluation | None = None
+        self._scale = 1.0
+
+    def __call__(self, vector: Array) -> Evaluation:
+        if self._vector is not None and np.array_equal(vector, self._vector):
+            assert self._evaluation is not None
+            return self._evaluation
+        self.evaluations += 1
+        try:
+            evaluation = self.objective.evaluate(vector, compressed=self.compressed)
+        except DomainError:
+            if self._evaluation is None:
+                raise  # the start itself: there is nothing to go back to
+            evaluation = Evaluation(
+                np.full_like(self._evaluation.residuals, self._scale), self._evaluation.jacobian
+            )
+        else:
+            cost = 0.5 * float(evaluation.residuals @ evaluation.residuals)
+            if self.best is None:
+                self._scale = float(np.sqrt(REFUSED * (2.0 * cost + 1e-300)))
+            if self.best is None or cost < self.best[0]:
+                self.best = (cost, vector.copy())
+        self._vector, self._evaluation = vector.copy(), evaluation
+        return evaluation
+
+
 def solve(
     objective: Objective,
     start: Array | None = None,
     *,
-    method: Method = "trf",
     loss: Loss = "linear",
     tolerance: float = 1e-10,
     max_evaluations: int = 300,
     watch: Callable[[Progress], None] | None = None,
 ) -> Solution:
-    """Minimise half the sum of squares within the bounds.
+    """The optimum next to a start: half the sum of squares minimised within the bounds.
 
     Parameters
     ----------
@@ -120,13 +167,10 @@ def solve(
         What to minimise.
     start : (K,) array, optional
         Where to begin instead of at the objective's start.
-    method : {"trf", "slsqp"}
-        SciPy's trust region for least squares on exact derivatives; or sequential quadratic
-        programming with difference gradients, as the source did it.
     loss : Loss
-        Robust loss on each residual, with ``"trf"`` alone.
+        Robust loss on each residual.
     tolerance : float
-        Relative change of cost and vector, and scaled gradient, at which to stop.
+        Relative change of cost and vector at which to stop.
     max_evaluations : int
         Of the residuals.
     watch : callable, optional
@@ -137,19 +181,55 @@ def solve(
     DomainError
         If the model does not hold at the start.
     """
-    from swashplate.identification.sqp import slsqp
-    from swashplate.identification.trust_region import trust_region
+    from scipy.optimize import least_squares
 
-    run = {"trf": trust_region, "slsqp": slsqp}[method]
-    low, high = objective.bounds
-    first = np.clip(objective.start if start is None else start, low, high)
-    return run(objective, first, loss, tolerance, max_evaluations, watch)
+    begun = perf_counter()
+    # a robust loss looks at each residual, which the triangular factor has mixed
+    memory = _Memory(objective, compressed=loss == "linear")
+    vector = np.clip(objective.start if start is None else start, *objective.bounds)
+    start_cost = objective.cost(vector)
+    iteration = 0
 
+    def told(intermediate_result) -> None:  # type: ignore[no-untyped-def]
+        nonlocal iteration
+        iteration += 1
+        if watch is not None:
+            now, seconds = intermediate_result, perf_counter() - begun
+            spent = memory.evaluations, max_evaluations
+            watch(Progress(iteration, float(now.cost), now.x.copy(), seconds, *spent))
 
-def interrupted(
-    vector: Array, cost: float, start_cost: float, evaluations: int, seconds: float
-) -> Solution:
-    """The solution of a search that was stopped from outside."""
-    return Solution(
-        vector, cost, start_cost, evaluations, False, True, "interrupted: the best so far", seconds
-    )
+    def ended(vector: Array, cost: float, message: str, ending: int) -> Solution:
+        how = memory.evaluations, ending > 0, ending < 0, message, perf_counter() - begun
+        return Solution(np.asarray(vector, dtype=np.float64), float(cost), start_cost, *how)
+
+    before, spent = np.inf, 0
+    try:
+        while True:
+            found = least_squares(
+                lambda vector: memory(vector).residuals,
+                vector,
+                jac=lambda vector: memory(vector).jacobian,
+                bounds=objective.bounds,
+                x_scale="jac",
+                loss=loss,
+                ftol=tolerance,
+                xtol=tolerance,
+                gtol=1e-14,
+                max_nfev=min(LEG, max_evaluations - spent),
+                callback=told,
+            )
+            first, gained = spent == 0, before - found.cost > GAINED * found.cost
+            # steps that round to nothing are counted by SciPy alone
+            spent += int(found.nfev)
+            vector, before, ending = found.x, float(found.cost), int(found.status)
+            if not first and not gained:
+                ending = ending or UNCHANGED
+                break
+            if (first and ending > 0) or spent >= max_evaluations:
+                break
+    except KeyboardInterrupt:
+        if memory.best is None:
+            raise
+        cost, vector = memory.best
+        return ended(vector, cost, "interrupted: the best so far", -1)
+    return ended(found.x, found.cost, _ENDINGS.get(ending, str(found.message)), ending)

@@ -1,49 +1,76 @@
-"""From a set-up's stage and a drive to the problem that it states."""
+"""From a stage of a set-up and a drive to the problem that it states."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from swashplate.campaign import applying, inside
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
+from swashplate.drive import Drive
 from swashplate.errors import InputError, ParameterError
 from swashplate.executors import available_cores
-from swashplate.identification.drive_model import CURRENTS, SIGNALS, DriveModel
-from swashplate.identification.drives import simulated_current
-from swashplate.identification.forces import Forces
-from swashplate.identification.measured_current import measured_current
+from swashplate.identification.drive_model import (
+    CURRENTS,
+    SIGNALS,
+    DriveModel,
+    Forces,
+    measured_current,
+    simulated_current,
+)
+from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
-from swashplate.identification.stage_weights import check_weights, weighted
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
-from swashplate.parameters.definitions import SWITCHES, find
+from swashplate.parameters.definitions import SWITCHES, columns_of, find
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.instance import START_PRESSURE
 
+
+def check_weights(stage: Stage, experiments: Sequence[Experiment], channels: Sequence[str]) -> None:
+    """Refuse weights that no channel takes, which would be lost in silence.
+
+    Raises
+    ------
+    InputError
+        If the stage has weights, but for no kind of channel that it fits.
+    """
+    weighed = [*stage.weights, *stage.weights_by_input]
+    kinds = {c.kind for e in experiments for name, c in e.channels.items() if name in channels}
+    if weighed and not kinds & set(weighed):
+        raise InputError(
+            f"The stage '{stage.name}' weighs {', '.join(dict.fromkeys(weighed))}, but the runs "
+            f"have {', '.join(sorted(kinds))}: add weights for that, or take a set-up without."
+        )
+
+
+def weighted(experiment: Experiment, stage: Stage) -> Experiment:
+    """The experiment with the stage's own weights multiplied in."""
+    if not stage.weights and not stage.weights_by_input:
+        return experiment
+    channels = {}
+    for name, channel in experiment.channels.items():
+        weight = channel.weight.copy()
+        for window in applying(stage.weights.get(channel.kind, ()), experiment.maneuver):
+            weight[inside(window, channel.time)] *= window.factor
+        for sized in applying(stage.weights_by_input.get(channel.kind, ()), experiment.maneuver):
+            levels, factors = np.transpose(sized.factors)
+            within = inside(sized, channel.time)
+            size = np.abs(experiment.input.at(channel.time[within]))
+            weight[within] *= np.interp(size, levels, factors)
+        channels[name] = replace(channel, weight=weight)
+    return replace(experiment, channels=channels)
+
+
+Array = NDArray[np.float64]
+Parameters = ParameterSet | ModelParameters
+"""The numbers of what is fitted: a drive, or a model of one's own."""
 LARGEST_START_PRESSURE = 4e6
 """Bound of a free pressure at the start where the set-up gives none. [Pa]"""
-
-
-@dataclass(frozen=True)
-class DriveProblem(Problem):
-    """The problem of a drive, which knows that more current makes more force."""
-
-    @property
-    def rising(self) -> tuple[tuple[int, ...], ...]:
-        """For each direction the places of the solenoids' forces, where all are unknown."""
-        assert isinstance(self.model, DriveModel)
-        names, known = self.unknowns.names, self.model.forces
-        if known is None:
-            return ()
-        groups = []
-        for side in ("plus", "minus"):
-            forces = [name for name in known.names if f"_{side}_" in name]
-            if all(name in names and self.unknowns[names.index(name)].log for name in forces):
-                groups.append(tuple(names.index(name) for name in forces))
-        return tuple(groups)
 
 
 def setup_of(campaign: Campaign, axis: str, name: str | None = None) -> Setup:
@@ -62,24 +89,24 @@ def setup_of(campaign: Campaign, axis: str, name: str | None = None) -> Setup:
     except ParameterError:
         raise InputError(
             f"There is no packaged set-up for the drive '{drive}': give one of your own, a .toml "
-            "file with stages and free parameters."
+            "file with stages and free parameters; 'swashplate guess' reads one off the logs."
         ) from None
 
 
 def stage_problem(
     stage: Stage,
-    parameters: ParameterSet,
+    parameters: Parameters,
     experiments: Sequence[Experiment],
     *,
     threads: int | None = None,
-) -> DriveProblem:
+) -> Problem:
     """The problem of a stage.
 
     Parameters
     ----------
     stage : Stage
         What is free and what is fitted.
-    parameters : ParameterSet
+    parameters : ParameterSet or ModelParameters
         Nominal values, those of earlier stages already found.
     experiments : sequence of Experiment
         The runs to fit.
@@ -94,6 +121,10 @@ def stage_problem(
     ParameterError
         If a free parameter is unknown or its bounds are wrong.
     """
+    if isinstance(parameters, ModelParameters):
+        return parameters.setup.problem(experiments, threads=threads or available_cores())
+    if stage.part == "model":
+        raise InputError("part = 'model' needs a model of your own, not a drive.")
     channels = _channels(stage, experiments)
     runs = tuple(each for each in experiments if any(name in each.channels for name in channels))
     check_weights(stage, runs, channels)
@@ -115,7 +146,7 @@ def stage_problem(
         *_clocks(stage, runs, channels),
         *_own(stage, runs, channels),
     )
-    return DriveProblem(
+    return Problem(
         DriveModel(_switched_on(parameters, free), stage.part, currents, forces),
         tuple(weighted(each, stage) for each in runs),
         Unknowns(unknowns),
@@ -123,6 +154,22 @@ def stage_problem(
         noise_scales(runs, channels),
         threads=threads or available_cores(),
     )
+
+
+def with_estimates(parameters: Parameters, problem: Problem, vector: Array) -> Parameters:
+    """The parameters with what a stage found, at a point of its problem.
+
+    Raises
+    ------
+    DomainError
+        If a value breaks a rule.
+    """
+    found = problem.unknowns.targets(vector, "")
+    if isinstance(parameters, ModelParameters):
+        numbers = {**parameters.numbers, **found}
+        return ModelParameters(parameters.setup, numbers, problem.scales)
+    assert isinstance(problem.model, DriveModel)
+    return problem.model.parameters_at(found)
 
 
 def _channels(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, ...]:
@@ -140,9 +187,12 @@ def _channels(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, ...
     )
     if not names:
         had = ", ".join(dict.fromkeys(c.kind for e in experiments for c in e.channels.values()))
+        hint = ""
+        if stage.part == "card":
+            hint = "; without a current, let 'swashplate guess' write start and set-up"
         raise InputError(
             f"The stage '{stage.name}' fits {', '.join(kinds)}, but the runs to fit have "
-            f"{had or 'no channel'}."
+            f"{had or 'no channel'}{hint}."
         )
     return tuple(names)
 
@@ -242,3 +292,46 @@ def _own(stage: Stage, experiments: Sequence[Experiment], channels: Sequence[str
             most = stage.start_pressure or LARGEST_START_PRESSURE
             unknowns.append(Unknown(START_PRESSURE, 0.0, -most, most, "Pa", run=each.name))
     return unknowns
+
+
+SPREAD = 0.05
+"""Standard deviation of the logarithm by which a drawn parameter differs from the nominal one."""
+
+OF_FORCES = ("Z19", "Z21")
+"""The solenoids' coefficients that are drawn where a set-up frees forces: those of odd powers."""
+
+
+def drawn(nominal: Drive, setup: Setup, seed: int, *, spread: float = SPREAD) -> Drive:
+    """A drive that differs from a nominal one in what a set-up frees, and in nothing else.
+
+    Parameters
+    ----------
+    nominal : Drive
+        About which it is drawn.
+    setup : Setup
+        Its free parameters are multiplied by log-normal factors, both directions apart.
+    seed : int
+        Not negative.
+    spread : float
+        Standard deviation of the factors' logarithms.
+
+    Raises
+    ------
+    ParameterError
+        If what was drawn breaks a rule: draw with another seed.
+    """
+    random = np.random.default_rng(seed)
+    names = [name for stage in setup.stages for name in columns_of(list(stage.free))]
+    if any(stage.forces is not None for stage in setup.stages):
+        names += columns_of(list(OF_FORCES))
+    numbers = nominal.parameters.numbers
+    factors = {name: float(np.exp(random.normal(0.0, spread))) for name in names}
+    return nominal.replace(**{name: numbers[name] * factor for name, factor in factors.items()})
+
+
+def true_value(unknown: Unknown, model: DriveModel, truth: ParameterSet) -> float | None:
+    """What an unknown of the machine really is; None for one of a single experiment."""
+    if unknown.run is not None:
+        return None
+    forces = model.forces.values(truth) if model.forces is not None else {}
+    return {**truth.numbers, **forces}[unknown.targets[0]]

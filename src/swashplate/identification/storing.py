@@ -3,34 +3,70 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import blake2b
-from json import JSONDecodeError, loads
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict
 
 from swashplate.__about__ import __version__
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
-from swashplate.documents import read_text, validated
+from swashplate.documents import read_json
 from swashplate.errors import FileError, InputError
 from swashplate.identification.cross_validation import CrossValidation
-from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.fit import Fit, StageFit, smooth
-from swashplate.identification.fit_file import (
-    FitFile,
-    StageProfile,
-    StoredSolution,
-    StoredStage,
-    profile_entry,
-    profile_of,
-)
+from swashplate.identification.fitting import Fit, StageFit, smooth
+from swashplate.identification.own_model import ModelParameters, ModelSetup
+from swashplate.identification.profile import Profile
+from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Solution
-from swashplate.identification.staging import stage_problem
-from swashplate.identification.uncertainty import with_worths
+from swashplate.identification.staging import Parameters, stage_problem, with_estimates
+from swashplate.identification.starts import StartResult
+from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.parameters.files import dump_set, read_set
 from swashplate.tables import write_text
+
+
+class StageProfile(NamedTuple):
+    """A profile, and the stage whose unknown it is of."""
+
+    stage: str
+    profile: Profile
+
+
+class Entry(BaseModel):
+    """A table of the file; a key that it does not know is refused."""
+
+    model_config = ConfigDict(extra="forbid", ser_json_inf_nan="strings")
+
+
+class StoredStage(Entry):
+    """How a stage ended, and its starts."""
+
+    name: str
+    unknowns: tuple[Unknown, ...]
+    """With what their priors are worth."""
+    solution: Solution
+    starts: tuple[StartResult, ...]
+
+
+class FitFile(Entry):
+    """The whole file."""
+
+    swashplate: str
+    axis: str
+    campaign: str
+    runs: dict[str, str]
+    """Name to fingerprint of each run that was fitted, in their order."""
+    nominal: str | dict[str, float]
+    """What the fit began from: a drive's parameter file, or the numbers of a model of one's own."""
+    setup: Setup
+    stages: tuple[StoredStage, ...]
+    profiles: tuple[StageProfile, ...]
+    folds: CrossValidation | None
+    notes: dict[str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,38 +119,35 @@ def save_fit(
     stages = tuple(
         StoredStage(
             name=each.stage.name,
-            unknowns=each.problem.unknowns.names,
-            solution=StoredSolution(
-                **{
-                    **{name: getattr(each.solution, name) for name in StoredSolution.model_fields},
-                    "vector": tuple(map(float, each.solution.vector)),
-                }
-            ),
+            unknowns=each.problem.unknowns.items,
+            solution=each.solution,
             starts=each.starts,
-            worths=tuple(
-                unknown.prior.worth
-                for unknown in each.problem.unknowns
-                if unknown.prior is not None
-            ),
         )
         for each in fit.stages
     )
+    start = fit.nominal
     content = FitFile(
         swashplate=__version__,
         axis=experiments[0].axis,
         campaign=str(campaign),
         runs={each.name: fingerprint(each) for each in experiments},
-        nominal=dump_set(fit.nominal),
+        nominal=dict(start.numbers) if isinstance(start, ModelParameters) else dump_set(start),
         setup=fit.setup,
         stages=stages,
-        profiles=tuple(profile_entry(each) for each in profiles),
+        profiles=tuple(profiles),
         folds=folds,
         notes=dict(notes or {}),
     )
     write_text(content.model_dump_json(indent=1, by_alias=True) + "\n", path)
 
 
-def load_fit(path: str | Path, campaign: Campaign, *, threads: int | None = None) -> StoredFit:
+def load_fit(
+    path: str | Path,
+    campaign: Campaign,
+    *,
+    model: ModelSetup | None = None,
+    threads: int | None = None,
+) -> StoredFit:
     """A stored fit with its campaign, without fitting again.
 
     Parameters
@@ -123,44 +156,53 @@ def load_fit(path: str | Path, campaign: Campaign, *, threads: int | None = None
         What `save_fit` wrote.
     campaign : Campaign
         The tests that were fitted.
+    model : ModelSetup, optional
+        The model of one's own that was fitted; the file does not hold it.
     threads : int, optional
-        As of `fit.fit`.
+        As of `fitting.fit`.
 
     Raises
     ------
     FileError, ParameterError
         If the file is none, or was written by another version.
     InputError
-        If the campaign is not the one that was fitted; the sentence names the run.
+        If the campaign is not the one that was fitted, the sentence names the run; or the model is
+        not given, or another one.
     """
-    try:
-        content = loads(read_text(path))
-    except JSONDecodeError as error:
-        raise FileError(f"{path} is no stored fit: {error}.") from None
-    file = validated(content, FitFile, str(path))
+    file = read_json(path, FitFile, strict=False)
+    if file.swashplate != __version__:
+        raise FileError(
+            f"{path} was written by swashplate {file.swashplate}, this is {__version__}: fit again."
+        )
     experiments = tuple(_same(campaign, name, mark, path) for name, mark in file.runs.items())
-    nominal = read_set(file.nominal, str(path))
+    nominal: Parameters
+    if isinstance(file.nominal, str):
+        nominal = read_set(file.nominal, str(path))
+    elif model is None:
+        raise InputError(f"{path} is the fit of a model of your own: give that, with --model FILE.")
+    else:
+        nominal = model.nominal(experiments)
+    if isinstance(nominal, ModelParameters) and nominal.setup.setup != file.setup:
+        raise InputError(f"{path} is the fit of another model, or of other bounds: fit again.")
     parameters, stages = smooth(nominal), list[StageFit]()
     for stage, entry in zip(file.setup.stages, file.stages, strict=False):
         problem = stage_problem(stage, parameters, experiments, threads=threads)
-        if (stage.name, problem.unknowns.names) != (entry.name, entry.unknowns):
+        known, theirs = problem.unknowns.items, entry.unknowns
+        if (stage.name, [(each.name, each.run) for each in known]) != (
+            entry.name,
+            [(each.name, each.run) for each in theirs],
+        ) or entry.solution.vector.size != len(known):
             raise FileError(
-                f"{path}: stage {entry.name} has other unknowns than swashplate {__version__} "
-                f"makes of its set-up; it was written by {file.swashplate}, fit again."
+                f"{path}: stage {entry.name} has other unknowns than its set-up makes: fit again."
             )
-        if entry.worths:
-            problem = with_worths(problem, entry.worths)
-        given = entry.solution.model_dump()
-        solution = Solution(**{**given, "vector": np.array(entry.solution.vector)})
-        model = problem.model
-        assert isinstance(model, DriveModel)
-        parameters = model.parameters_at(problem.unknowns.targets(solution.vector, ""))
-        stages.append(StageFit(stage, problem, solution, parameters, entry.starts))
+        problem = replace(problem, unknowns=Unknowns(theirs))
+        parameters = with_estimates(parameters, problem, entry.solution.vector)
+        stages.append(StageFit(stage, problem, entry.solution, parameters, entry.starts))
     return StoredFit(
         Fit(file.setup, nominal, tuple(stages)),
         file.axis,
         experiments,
-        tuple(profile_of(each) for each in file.profiles),
+        file.profiles,
         file.folds,
         file.notes,
     )

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.linearised import LinearisedFit
-from swashplate.identification.linearising import linearised_fit
+from swashplate.identification.linearised import LinearisedFit, linearised_fit
 from swashplate.identification.noise import (
     Covariance,
     NoiseColour,
@@ -35,7 +34,7 @@ from swashplate.identification.unknowns import Unknowns
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Experiment
     from swashplate.identification.assessment import Assessment
-    from swashplate.identification.fit import StageFit
+    from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
 
@@ -139,7 +138,7 @@ def estimates(
         upper = variables.to_values(variables.vector + distances[True])
     made = []
     for k, name in enumerate(variables.names):
-        value = float(variables.values[k])
+        value = float(variables.estimates[k])
         below, above = bool(open_ended[False][k]), bool(open_ended[True][k])
         if variables.at_bound[k]:
             low = variables.at_bound[k] < 0
@@ -222,7 +221,9 @@ def slopes_by_earlier(
     ]
     if not simulated:
         return None
-    chain = DriveModel(stage.parameters, "chain")
+    chain = DriveModel(
+        model.parameters_at(stage.problem.unknowns.targets(stage.solution.vector, "")), "chain"
+    )
     unknowns, vector = earlier.problem.unknowns, earlier.solution.vector
     names = [name for each in unknowns if each.run is None for name in each.targets]
     products = np.zeros((linearised.rank, len(unknowns)))
@@ -446,8 +447,7 @@ def released(fit: LinearisedFit) -> LinearisedFit:
     """
     if fit.variables.free.all():
         return fit
-    free = replace(fit.variables, at_bound=np.zeros_like(fit.variables.at_bound))
-    return replace(fit, variables=free)
+    return replace(fit, variables=fit.variables.released)
 
 
 P = TypeVar("P", bound=Problem)
@@ -564,7 +564,7 @@ def unbounded_predictions(
         lengths[lengths == 0.0] = 1.0
         # directions that the fitted runs determine, in units of their effect there
         told = np.linalg.qr(lengths[:, None] * each.linearised.whitening)[0]
-        chain = DriveModel(each.stage.parameters, "card" if model.part == "card" else "chain")
+        chain = DriveModel(each.stage.drive.parameters, "card" if model.part == "card" else "chain")
         chain = replace(chain, forces=model.forces)
         for experiment in experiments:
             if experiment.input.kind != "voltage" or not chain.signals_of(experiment):

@@ -3,16 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import exp, isfinite, log, sqrt
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from pydantic import PlainSerializer, PlainValidator
 
-from swashplate.errors import ParameterError
+from swashplate.errors import InputError, ParameterError
 
 Array = NDArray[np.float64]
+
+
+def _numbers(content: object) -> Array:
+    made = np.asarray(content)
+    if made.ndim != 1 or made.dtype.kind not in "fi" or not np.isfinite(made).all():
+        raise ValueError("it must be a list of finite numbers")
+    return made.astype(np.float64)
+
+
+Vector = Annotated[Array, PlainValidator(_numbers), PlainSerializer(np.ndarray.tolist)]
+"""The numbers that a solver moves, (K,); in a file a list."""
+AT_BOUND = 1e-6
+"""Part of the reach between the bounds within which a number is at one of them."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +61,9 @@ class Unknown:
     """Names in the model that take its value; its own if empty. Two names tie two directions."""
     run: str | None = None
     """The experiment that it belongs to, None for one of the machine."""
+    scale: float = field(default=0.0, repr=False)
+    """What one unit of the solver's vector means, of an unknown that is not logarithmic; by default
+    the size of its nominal value."""
 
     def __post_init__(self) -> None:
         if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
@@ -54,9 +72,10 @@ class Unknown:
                 "the lower one first, are needed."
             )
         if not self.low <= self.start <= self.high:
+            hint = "" if isfinite(self.start) else ", as 'swashplate guess' reads one off the logs"
             raise ParameterError(
                 f"{self.name} begins at {self.start:g}, outside its bounds {self.low:g} and "
-                f"{self.high:g}."
+                f"{self.high:g}; give the drive that the fit begins from another value{hint}."
             )
         if self.log and self.low <= 0.0:
             raise ParameterError(
@@ -65,31 +84,21 @@ class Unknown:
             )
         if self.prior is not None and not self.prior.deviation > 0.0:
             raise ParameterError(f"The prior of {self.name} needs a positive standard deviation.")
+        if not self.scale:
+            reach = self.high - self.low
+            # one that begins at next to nothing, or at 0, is known by its bounds alone
+            size = abs(self.start) if abs(self.start) > 1e-6 * reach else 0.25 * reach
+            object.__setattr__(self, "scale", size)
 
     @property
     def targets(self) -> tuple[str, ...]:
         """Names in the model that take its value."""
         return self.sets or (self.name,)
 
-    @property
-    def scale(self) -> float:
-        """What one unit of the solver's vector means, for an unknown that is not logarithmic."""
-        reach = self.high - self.low
-        # one that begins at next to nothing, or at 0, is known by its bounds alone
-        return abs(self.start) if abs(self.start) > 1e-6 * reach else 0.25 * reach
-
-    def to_vector(self, value: float) -> float:
-        """The solver's number for a value."""
-        return log(value) if self.log else value / self.scale
-
     def to_value(self, number: float) -> float:
         """The value for a solver's number, kept within the bounds against rounding."""
         value = exp(number) if self.log else number * self.scale
         return min(max(value, self.low), self.high)
-
-    def slope(self, number: float) -> float:
-        """d value / d number."""
-        return exp(number) if self.log else self.scale
 
 
 def bounded(
@@ -138,11 +147,17 @@ def bounded(
     return Unknown(name, nominal, low, high, **more)  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Unknowns(Sequence[Unknown]):
-    """The unknowns of a fit in the order of the solver's vector."""
+    """The unknowns of a fit in the order of the solver's vector, at a point: nominal or estimated.
+
+    The solver moves ln(value) of a logarithmic one, else value/scale: a change of 0.01 in its
+    vector is one per cent, of the value or of the scale.
+    """
 
     items: tuple[Unknown, ...]
+    point: Array | None = field(default=None, repr=False)
+    """(K,) vector of the point; nominal if None. See `at`."""
 
     def __post_init__(self) -> None:
         taken: set[tuple[str | None, str]] = set()
@@ -151,6 +166,66 @@ class Unknowns(Sequence[Unknown]):
                 if (each.run, target) in taken:
                     raise ParameterError(f"{target} is set by two unknowns; let one set it.")
                 taken.add((each.run, target))
+
+    @classmethod
+    def of(
+        cls,
+        names: Sequence[str],
+        values: ArrayLike,
+        *,
+        scales: ArrayLike | None = None,
+        logarithmic: ArrayLike | None = None,
+        at_bound: ArrayLike | None = None,
+    ) -> Unknowns:
+        """Unknowns of a Jacobian from elsewhere, at their estimates.
+
+        Parameters
+        ----------
+        names : sequence of str
+            K names, all different.
+        values, scales : (K,) array_like
+            Estimates, and what counts as 100 %; by default each estimate's size, 1 for 0.
+        logarithmic : (K,) array_like of bool, optional
+            Which are moved by their logarithms; none by default.
+        at_bound : (K,) array_like of int, optional
+            -1 at the lower bound, 1 at the upper, 0 between; none at a bound by default.
+
+        Raises
+        ------
+        InputError
+            If lengths differ, a name appears twice, a number is not finite, a scale is not
+            positive, or a logarithmic value is not.
+        """
+        count = len(names)
+        number = np.asarray(values, dtype=np.float64)
+        own = np.where(number == 0.0, 1.0, np.abs(number))
+        size = own if scales is None else np.asarray(scales, dtype=np.float64)
+        logs = np.zeros(count, bool) if logarithmic is None else np.asarray(logarithmic, bool)
+        bound = np.zeros(count, np.int8) if at_bound is None else np.asarray(at_bound, np.int8)
+        arrays = {"values": number, "scales": size, "logarithmic": logs, "at_bound": bound}
+        for what, array in arrays.items():
+            if array.shape != (count,):
+                raise InputError(f"{count} unknowns need as many {what}, not {array.shape}.")
+        if len(set(names)) < count:
+            twice = next(name for name in names if list(names).count(name) > 1)
+            raise InputError(f"The unknown {twice} appears twice; name each once.")
+        items = []
+        for name, value, scale, by_log, side in zip(names, number, size, logs, bound, strict=True):
+            if not np.isfinite(value) or not (np.isfinite(scale) and scale > 0.0):
+                raise InputError(
+                    f"{name} = {value:g} with the scale {scale:g}: both must be finite and the "
+                    "scale positive."
+                )
+            if by_log and value <= 0.0:
+                raise InputError(f"{name} = {value:g} has no logarithm; it must be positive.")
+            low, high = (value / 1e9, value * 1e9) if by_log else (value - scale, value + scale)
+            low, high = (value if side < 0 else low), (value if side > 0 else high)
+            items.append(
+                Unknown(name, float(value), low, high, log=bool(by_log), scale=float(scale))
+            )
+        if not items:
+            raise InputError("A fit needs at least one unknown.")
+        return cls(tuple(items))
 
     def __getitem__(self, index):  # type: ignore[no-untyped-def]
         return self.items[index]
@@ -161,6 +236,11 @@ class Unknowns(Sequence[Unknown]):
     def __iter__(self) -> Iterator[Unknown]:
         return iter(self.items)
 
+    @property
+    def count(self) -> int:  # type: ignore[override]
+        """K."""
+        return len(self.items)
+
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names, with the experiment of those that belong to one: ``"offset counts (hoistr6)"``."""
@@ -168,33 +248,112 @@ class Unknowns(Sequence[Unknown]):
             each.name if each.run is None else f"{each.name} ({each.run})" for each in self.items
         )
 
+    def index(self, name: str) -> int:  # type: ignore[override]
+        """Place of an unknown.
+
+        Raises
+        ------
+        InputError
+            If there is none of that name.
+        """
+        if name not in self.names:
+            raise InputError(f"There is no unknown {name}; there are {', '.join(self.names)}.")
+        return self.names.index(name)
+
+    @cached_property
+    def logarithmic(self) -> NDArray[np.bool_]:
+        """(K,) which are moved by their logarithms."""
+        return np.array([each.log for each in self.items], dtype=np.bool_)
+
+    @cached_property
+    def scales(self) -> Array:
+        """(K,) what one unit of the vector means; not used of logarithmic ones. [unit]"""
+        return np.array([each.scale for each in self.items])
+
     @cached_property
     def start(self) -> Array:
         """(K,) vector of the nominal values."""
-        return np.array([each.to_vector(each.start) for each in self.items])
+        return self.to_vector(np.array([each.start for each in self.items]))
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """(K,) lower and upper bounds of the vector."""
-        low = np.array([each.to_vector(each.low) for each in self.items])
-        high = np.array([each.to_vector(each.high) for each in self.items])
-        return low, high
+        low, high = np.array([(each.low, each.high) for each in self.items]).reshape(-1, 2).T
+        return self.to_vector(low), self.to_vector(high)
+
+    def at(self, vector: Array) -> Unknowns:
+        """The same at another point."""
+        return replace(self, point=np.asarray(vector, dtype=np.float64))
+
+    @property
+    def vector(self) -> Array:
+        """(K,) the point."""
+        return self.start if self.point is None else self.point
+
+    @cached_property
+    def estimates(self) -> Array:
+        """(K,) values at the point. [unit]"""
+        return np.array(list(self.values(self.vector).values()))
+
+    @cached_property
+    def at_bound(self) -> NDArray[np.int8]:
+        """(K,) -1 where the point is at the lower bound, 1 at the upper, 0 between."""
+        low, high = self.bounds
+        near = AT_BOUND * (high - low)
+        below, above = self.vector <= low + near, self.vector >= high - near
+        return np.where(below, -1, np.where(above, 1, 0)).astype(np.int8)
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """(K,) unknowns that are not at a bound."""
+        free: NDArray[np.bool_] = self.at_bound == 0
+        return free
+
+    @property
+    def released(self) -> Unknowns:
+        """The same at the same point, with bounds so much wider that none is at one."""
+        items = []
+        for each, side in zip(self.items, self.at_bound, strict=True):
+            low, high, reach = each.low, each.high, each.high - each.low
+            if side < 0:
+                low = low * low / high if each.log else low - reach
+            if side > 0:
+                high = high * high / low if each.log else high + reach
+            items.append(replace(each, low=low, high=high))
+        return replace(self, items=tuple(items), point=self.vector)
+
+    @property
+    def slopes(self) -> Array:
+        """(K,) derivative of each value by its number in the vector."""
+        return self._slopes(self.vector)
+
+    def _slopes(self, vector: Array) -> Array:
+        return np.where(self.logarithmic, self.to_values(vector), self.scales)
+
+    def to_values(self, vector: Array) -> Array:
+        """(..., K) values of vectors; a logarithm beyond any float's becomes inf or 0."""
+        with np.errstate(over="ignore"):
+            return np.where(
+                self.logarithmic,
+                np.exp(np.where(self.logarithmic, vector, 0.0)),
+                np.where(self.logarithmic, 0.0, vector) * self.scales,
+            )
+
+    def to_vector(self, values: Array) -> Array:
+        """(..., K) vectors of values, positive where logarithmic."""
+        logarithms = np.log(np.where(self.logarithmic, values, 1.0))
+        return np.where(self.logarithmic, logarithms, values / self.scales)
 
     def values(self, vector: Array) -> dict[str, float]:
-        """Values by name."""
-        return {
-            name: each.to_value(float(number))
-            for name, each, number in zip(self.names, self.items, vector, strict=True)
-        }
+        """Values by name, within the bounds."""
+        numbers = zip(self.items, vector, strict=True)
+        found = [each.to_value(float(number)) for each, number in numbers]
+        return dict(zip(self.names, found, strict=True))
 
-    def vector(self, values: Mapping[str, float]) -> Array:
-        """The vector of some values by name; those not named stay nominal."""
-        return np.array(
-            [
-                each.to_vector(values.get(name, each.start))
-                for name, each in zip(self.names, self.items, strict=True)
-            ]
-        )
+    def vector_of(self, values: Mapping[str, float]) -> Array:
+        """(K,) vector of some values by name; those not named stay nominal."""
+        named = zip(self.names, self.items, strict=True)
+        return self.to_vector(np.array([values.get(name, each.start) for name, each in named]))
 
     def targets(self, vector: Array, run: str) -> dict[str, float]:
         """Values by the model's names, as one experiment sees them."""
@@ -209,12 +368,11 @@ class Unknowns(Sequence[Unknown]):
         """(len(targets), K) derivatives of the model's numbers by the vector."""
         matrix = np.zeros((len(targets), len(self.items)))
         rows = {target: row for row, target in enumerate(targets)}
-        for column, (each, number) in enumerate(zip(self.items, vector, strict=True)):
-            if each.run not in (None, run):
-                continue
-            for target in each.targets:
+        slopes = self._slopes(vector)
+        for column, each in enumerate(self.items):
+            for target in each.targets if each.run in (None, run) else ():
                 if target in rows:
-                    matrix[rows[target], column] = each.slope(float(number))
+                    matrix[rows[target], column] = slopes[column]
         return matrix
 
     def with_worths(self, worths: Sequence[float] | None) -> Unknowns:
@@ -226,7 +384,7 @@ class Unknowns(Sequence[Unknown]):
             if prior is not None:
                 prior = None if worths is None else replace(prior, worth=next(given))
             items.append(replace(each, prior=prior))
-        return Unknowns(tuple(items))
+        return replace(self, items=tuple(items))
 
     def prior_rows(self, vector: Array) -> tuple[Array, Array]:
         """Residuals (p,) of the priors and their derivatives (p, K) by the vector."""
@@ -244,17 +402,3 @@ class Unknowns(Sequence[Unknown]):
             residuals[row] *= sqrt(each.prior.worth)
             rows[row] *= sqrt(each.prior.worth)
         return residuals, rows
-
-    def at_bounds(self, vector: Array, tolerance: float = 1e-6) -> dict[str, str]:
-        """Unknowns that lie at a bound, by name: ``"lower"`` or ``"upper"``."""
-        low, high = self.bounds
-        near = tolerance * (high - low)
-        sides = {}
-        for name, number, lower, upper, reach in zip(
-            self.names, vector, low, high, near, strict=True
-        ):
-            if number <= lower + reach:
-                sides[name] = "lower"
-            elif number >= upper - reach:
-                sides[name] = "upper"
-        return sides

@@ -19,8 +19,7 @@ from swashplate.identification.assessment import (
     measures,
     pooled_measures,
 )
-from swashplate.identification.drive_model import SIGNALS, DriveModel
-from swashplate.identification.drives import current_record
+from swashplate.identification.drive_model import SIGNALS, DriveModel, current_record
 from swashplate.identification.error_tables import (
     SOURCE_RULES,
     ComparedRun,
@@ -31,20 +30,21 @@ from swashplate.identification.error_tables import (
     WholeKind,
     error_table,
 )
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.identification.own_model import ModelParameters
+from swashplate.identification.staging import Parameters
 
 Array = NDArray[np.float64]
 DITHER_MEAN = 0.1
 """Width of the moving mean over a current's differences, against the dither. [s]"""
 
 
-def predict(parameters: ParameterSet, experiments: Sequence[Experiment]) -> tuple[RunQuality, ...]:
+def predict(parameters: Parameters, experiments: Sequence[Experiment]) -> tuple[RunQuality, ...]:
     """Predict runs from their input alone and compare every channel that the drive has.
 
     Parameters
     ----------
-    parameters : ParameterSet
-        The drive.
+    parameters : ParameterSet or ModelParameters
+        The drive, or a model of one's own with its numbers.
     experiments : sequence of Experiment
         Runs that it was not fitted to. A voltage goes through the whole chain, a current through
         pump and motor.
@@ -61,6 +61,13 @@ def predict(parameters: ParameterSet, experiments: Sequence[Experiment]) -> tupl
     DomainError
         If the model does not hold under a run's input.
     """
+    if isinstance(parameters, ModelParameters):
+        return tuple(
+            compared(each, name, simulated)
+            for each in experiments
+            for name, simulated in parameters.predicted(each).items()
+            if each[name].used.any()
+        )
     made = []
     for experiment in experiments:
         if not any(channel.kind in SIGNALS for channel in experiment.channels.values()):

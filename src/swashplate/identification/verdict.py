@@ -399,12 +399,12 @@ def _manoeuvres(experiments: Sequence[Experiment]) -> str:
 
 def _validity(assessments: Sequence[Assessment]) -> str:
     """What the fit holds for, and what of the drive the fitted runs never reach."""
-    from swashplate.identification.activation import acting, simulated_run
+    from swashplate.identification.excitation import acting, simulated_run
 
     experiments = fitted_runs(assessments)
     said = f"Holds for {_manoeuvres(experiments)}"
     if isinstance(assessments[-1].stage.problem.model, DriveModel):
-        parameters, longest = assessments[-1].stage.parameters, dict[str, float]()
+        parameters, longest = assessments[-1].stage.drive.parameters, dict[str, float]()
         try:
             for each in experiments:
                 for name, seconds in acting(simulated_run(each, parameters), parameters).items():

@@ -1,40 +1,23 @@
 """Small motions: linear models at an operating point, and frequency responses large and small."""
 
-from swashplate.linear.discrete import linearize
-from swashplate.linear.drive import OUTPUTS, linearize_drive, slowest_lag
-from swashplate.linear.export import LINEAR_MODEL, UNITS, pade_polynomials
-from swashplate.linear.frequency_response import (
-    FEWEST_STEPS,
-    SLOWEST_CYCLE,
-    FrequencyResponse,
-    SweptInput,
-    SweptOutput,
-    sweep,
-)
-from swashplate.linear.margins import LoopMargins, loop_margins
-from swashplate.linear.model import Coulomb, LinearDrive, LinearModel
-from swashplate.linear.operating_point import DeadZoneError, Input, OperatingPoint
-
-__all__ = [
-    "FEWEST_STEPS",
-    "LINEAR_MODEL",
-    "OUTPUTS",
-    "SLOWEST_CYCLE",
-    "UNITS",
-    "Coulomb",
-    "DeadZoneError",
-    "FrequencyResponse",
-    "Input",
-    "LinearDrive",
-    "LinearModel",
-    "LoopMargins",
-    "OperatingPoint",
-    "SweptInput",
-    "SweptOutput",
-    "linearize",
-    "linearize_drive",
-    "loop_margins",
-    "pade_polynomials",
-    "slowest_lag",
-    "sweep",
-]
+from swashplate.linear.discrete import linearize as linearize
+from swashplate.linear.drive import OUTPUTS as OUTPUTS
+from swashplate.linear.drive import linearize_drive as linearize_drive
+from swashplate.linear.drive import slowest_lag as slowest_lag
+from swashplate.linear.frequency_response import FEWEST_STEPS as FEWEST_STEPS
+from swashplate.linear.frequency_response import SLOWEST_CYCLE as SLOWEST_CYCLE
+from swashplate.linear.frequency_response import FrequencyResponse as FrequencyResponse
+from swashplate.linear.frequency_response import SweptInput as SweptInput
+from swashplate.linear.frequency_response import SweptOutput as SweptOutput
+from swashplate.linear.frequency_response import sweep as sweep
+from swashplate.linear.margins import LoopMargins as LoopMargins
+from swashplate.linear.margins import loop_margins as loop_margins
+from swashplate.linear.model import LINEAR_MODEL as LINEAR_MODEL
+from swashplate.linear.model import UNITS as UNITS
+from swashplate.linear.model import Coulomb as Coulomb
+from swashplate.linear.model import LinearDrive as LinearDrive
+from swashplate.linear.model import LinearModel as LinearModel
+from swashplate.linear.model import pade_polynomials as pade_polynomials
+from swashplate.linear.operating_point import DeadZoneError as DeadZoneError
+from swashplate.linear.operating_point import Input as Input
+from swashplate.linear.operating_point import OperatingPoint as OperatingPoint

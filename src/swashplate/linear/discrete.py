@@ -51,12 +51,10 @@ def linearize(
 
     Parameters
     ----------
-    instance : Instance
-        The model with its numbers.
+    instance, h : Instance, float
+        The model with its numbers, and its step. [s]
     at : mapping of str to float
         Constant external signals of the operating point.
-    h : float
-        Step. [s]
     states : sequence, optional
         State of each part; by default the one that the model settles at, one sample after the
         start.
@@ -108,30 +106,17 @@ def recurrence(
 ) -> Recurrence:
     """Matrices of a model's step at a point, with every sample that its taps read as a column.
 
-    Parameters
-    ----------
-    instance : Instance
-        The model with its numbers.
-    started : Started
-        The point: states and constant inputs.
-    h : float
-        Step. [s]
-    inputs, outputs : sequence of str
-        External signals that move, and signals that are wanted.
+    The point is given by the states and constant inputs that a march would start with.
     """
-    chain = _Chain(instance, started, h, inputs)
+    chain = _Chain(instance, started, h, tuple(inputs))
     n = len(chain.states)
-    following = np.array([row for rows in chain.following for row in rows.values()])
-    following = following.reshape(n, chain.size)
+    following = np.array(chain.following).reshape(n, chain.size)
     wanted = np.array([chain.output(name) for name in outputs])
-    return Recurrence(
-        following[:, :n],
-        following[:, n:],
-        wanted[:, :n],
-        wanted[:, n:],
-        tuple(chain.states),
-        tuple(chain.columns),
-    )
+    A, B, C, D = following[:, :n], following[:, n:], wanted[:, :n], wanted[:, n:]
+    return Recurrence(A, B, C, D, tuple(chain.states), tuple(chain.columns))
+
+
+_taps = lru_cache(maxsize=256)(taps_of)
 
 
 @lru_cache(maxsize=512)
@@ -146,7 +131,7 @@ class _Chain:
     """Derivatives of all that is known at a sample, by states and samples of the inputs."""
 
     def __init__(
-        self, instance: Instance, started: Started, h: float, inputs: Sequence[str]
+        self, instance: Instance, started: Started, h: float, inputs: tuple[str, ...]
     ) -> None:
         self.instance, self.model, self.started = instance, instance.model, started
         parts = self.model.parts
@@ -157,16 +142,17 @@ class _Chain:
             for path in floats_of(part.state)
         ]
         places = instance.places(inputs, h)
-        self.taps = {(each.part, each.input): each for each in taps_of(self.model, inputs)}
+        self.taps = {(each.part, each.input): each for each in _taps(self.model, inputs)}
         self.whole, self.fraction = places.whole.tolist(), places.fraction.tolist()
         late = {(name, 0): None for name in inputs}
         for tap in self.taps.values():
             whole = self.whole[tap.number]
             late |= {(tap.tap.signal, whole + j): None for j in range(tap.tap.samples)}
-        self.columns = sorted(late, key=lambda each: (tuple(inputs).index(each[0]), each[1]))
+        self.columns = sorted(late, key=lambda each: (inputs.index(each[0]), each[1]))
         self.size = len(self.states) + len(self.columns)
+        self.none = np.zeros(self.size)
         self.rows: list[Rows] = []
-        self.following: list[Rows] = []
+        self.following: list[Array] = []
         for i, part in enumerate(parts):
             self._part(i, part)
 
@@ -177,7 +163,9 @@ class _Chain:
         return row
 
     def sample(self, name: str, late: int) -> Array:
-        """Row of an input some samples ago."""
+        """Row of an input some samples ago, zero if that does not move."""
+        if (name, late) not in self.columns:
+            return self.none
         return self.unit(len(self.states) + self.columns.index((name, late)))
 
     def _part(self, i: int, part: Model) -> None:
@@ -198,7 +186,7 @@ class _Chain:
                 raise DomainError(f"{self.instance.name}: {said}")
         self.rows.append(rows)
         found = self._through(part, part.step, known, rows)
-        self.following.append({path: found.get(path, np.zeros(self.size)) for path in paths})
+        self.following += [found.get(path, self.none) for path in paths]
 
     def _at(self, i: int, part: Model) -> dict[str, Any]:
         """What a part's equations take, its windows read where the taps are."""
@@ -219,9 +207,8 @@ class _Chain:
         tap = self.taps.get((i, name))
         signal = self.model.parts[i].tap(name).signal
         if tap is None:
-            moves = (signal, 0) in self.columns
             if kind is not Window:
-                yield name, self.sample(signal, 0) if moves else np.zeros(self.size)
+                yield name, self.sample(signal, 0)
             return
         whole, samples = self.whole[tap.number], range(tap.tap.samples)
         read = [self.sample(signal, whole + j) for j in samples]
@@ -235,9 +222,8 @@ class _Chain:
         # the window of a hold has as many samples as it reads
         derived = _derived(hold, ("window.s",), None, (("window.s", len(read)),))
         values = derived.python(Window((value,) * len(read), fraction))
-        row = np.zeros(self.size)
-        for (_, j), slope in zip(derived.entries, values[len(derived.outputs) :], strict=True):
-            row += slope * read[int(derived.inputs[j].rpartition(".")[2])]
+        rows = {f"window.s.{j}": each for j, each in enumerate(read)}
+        (row,) = self._chained(derived, values, rows).values()
         yield name, row
 
     def _through(self, part: Model, equation: Any, known: Mapping[str, Any], rows: Rows) -> Rows:
@@ -262,13 +248,13 @@ class _Chain:
         return self._chained(derived, values, rows)
 
     def _chained(self, derived: Derived, values: Sequence[float], rows: Rows) -> Rows:
-        made = {path: np.zeros(self.size) for path in derived.outputs}
-        slopes = values[len(derived.outputs) :]
-        for (o, k), slope in zip(derived.entries, slopes, strict=True):
-            row = rows.get(derived.inputs[k])  # the place of a window does not move
-            if row is not None and slope != 0.0:
-                made[derived.outputs[o]] += slope * row
-        return made
+        slopes = np.zeros((len(derived.outputs), len(derived.inputs)))
+        if derived.entries:
+            slopes[tuple(np.transpose(derived.entries))] = values[len(derived.outputs) :]
+        # the place of a window does not move
+        moving = [k for k, path in enumerate(derived.inputs) if path in rows]
+        into = np.array([rows[derived.inputs[k]] for k in moving]).reshape(-1, self.size)
+        return dict(zip(derived.outputs, slopes[:, moving] @ into, strict=True))
 
     def link(self, link: Link) -> Array:
         """Row of a signal between parts."""
@@ -276,7 +262,7 @@ class _Chain:
         for part, signal in link.sources:
             inside = f"signals.{signal}" in self.rows[part]
             kind = "signals" if inside else "state"
-            rows.append(self.rows[part].get(f"{kind}.{signal}", np.zeros(self.size)))
+            rows.append(self.rows[part].get(f"{kind}.{signal}", self.none))
             values.append(value_at(self.started.arguments[part][kind], signal))
         if link.equation is None:
             return rows[0]
@@ -289,8 +275,7 @@ class _Chain:
         """Row of a signal of any part, of a state, or of a link."""
         for part, rows in zip(reversed(self.model.parts), reversed(self.rows), strict=True):
             if name in part.signal_names:
-                found = rows.get(f"signals.{name}", rows.get(f"state.{name}"))
-                return np.zeros(self.size) if found is None else found
+                return rows.get(f"signals.{name}", rows.get(f"state.{name}", self.none))
         if name in self.model.links:
             return self.link(self.model.links[name])
         if name in self.model.integrals:

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.derivatives import derive
 from swashplate.equations.marching.record import Interpolation, least_substeps
 from swashplate.equations.marching.run import Instance, Started
-from swashplate.equations.model import join
 from swashplate.errors import InputError
 from swashplate.linear.discrete import Recurrence, recurrence
-from swashplate.linear.export import Matrices, with_line
-from swashplate.linear.model import Coulomb, LinearDrive
+from swashplate.linear.model import Coulomb, LinearDrive, Matrices, with_line
 from swashplate.linear.operating_point import (
     COMMANDS,
     INPUTS,
@@ -26,13 +22,17 @@ from swashplate.linear.operating_point import (
     OperatingPoint,
     beyond_dead_zone,
     operating_point,
+)
+from swashplate.models.card import COULOMB_WIDTH, Card
+from swashplate.models.drive import flowing_drive, flowing_pump_drive
+from swashplate.models.pump import PumpState
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.simulation.instance import (
+    card_of,
+    check_filter_stability,
+    instance_of,
     without_ripple,
 )
-from swashplate.models.card import Card, Channel, current_acceleration, steady_current
-from swashplate.models.drive import current_sum, pump, source
-from swashplate.models.pump import PumpState, pump_rates
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.simulation.instance import card_of, check_filter_stability, instance_of
 
 Array = NDArray[np.float64]
 
@@ -48,13 +48,6 @@ OUTPUTS = (
     "motor_pressure_drop",
 )
 """Signals that a linear model can have as outputs."""
-FLOWING = join(
-    "pump_drive",
-    source,
-    replace(pump, step=pump_rates, parts=()),
-    links={"current_sum": current_sum},
-)
-"""Pump and motor behind a signed current, with rates in place of the step."""
 FORCE = {"Z17": 0.0, "Z19_plus": 1.0, "Z19_minus": 1.0} | dict.fromkeys(
     ("Z20_plus", "Z20_minus", "Z21_plus", "Z21_minus", "Z22_plus", "Z22_minus"), 0.0
 )
@@ -63,7 +56,6 @@ FORCE = {"Z17": 0.0, "Z19_plus": 1.0, "Z19_minus": 1.0} | dict.fromkeys(
 
 def linearize_drive(
     parameters: ParameterSet,
-    *,
     voltage: float | None = None,
     current: float | None = None,
     speed: float | None = None,
@@ -84,14 +76,10 @@ def linearize_drive(
         )
     point = operating_point(parameters, inputs[0], voltage=voltage, current=current, speed=speed)
     names = _checked_outputs(outputs, inputs[0])
-    matrices, states = _pump(parameters, point, inputs, names)
-    delay = 0.0
-    if inputs[0] == "voltage":
-        matrices, states = _behind_filter(parameters, point, coulomb, matrices, states)
-        delay = parameters.numbers["tau"]
-    name = parameters.name
+    matrices, states, _, _ = _matrices(parameters, point, inputs, names, coulomb)
+    delay = parameters.numbers["tau"] if inputs[0] == "voltage" else 0.0
     kept = point, coulomb, parameters
-    return LinearDrive(*matrices, states, inputs, names, delay, None, name, (), *kept)
+    return LinearDrive(*matrices, states, inputs, names, delay, None, parameters.name, (), *kept)
 
 
 def _checked_inputs(inputs: tuple[str, ...]) -> tuple[str, ...]:
@@ -131,48 +119,36 @@ class _Known(NamedTuple):
 
     instance: Instance
     started: Started
-    records: tuple[str, ...]
-    """External signals that stand for the inputs."""
-    step: float
-    """0 in continuous time. [s]"""
-
-    @property
-    def friction(self) -> float:
-        """How far friction can hold the spool, by the travel over which it builds up. [1]"""
-        p, k = self.started.arguments[1]["p"], self.started.arguments[1]["k"]
-        return float(k.friction_width / p.spool_presliding)
-
-    def matrices(self, outputs: tuple[str, ...]) -> Recurrence:
-        """Matrices of step or rates."""
-        return recurrence(self.instance, self.started, self.step, self.records, outputs)
+    records: tuple[str, ...]  # external signals that stand for the inputs
+    step: float  # 0 in continuous time [s]
 
 
 def _known(
     parameters: ParameterSet,
     point: OperatingPoint,
     inputs: tuple[str, ...],
+    coulomb: Coulomb,
     step: float,
-    coulomb: Coulomb = "ignored",
 ) -> _Known:
     """The equations at the point, with whatever small motions leave out."""
-    by_voltage = inputs[0] == "voltage" and step > 0.0
+    by_voltage = inputs[0] == "voltage"
     instance = without_ripple(instance_of(parameters, by_voltage))
-    card, machine = instance.parts
-    command = "current"
-    at = {"current": point.current}
+    front, machine = instance.parts
+    command, at = "current", {"current": point.current}
     if by_voltage:
-        command = "voltage"
         assert point.voltage is not None
         if coulomb == "ignored":
-            plus, minus = (each._replace(C=0.0) for each in (card.p.plus, card.p.minus))
-            card = card._replace(p=Card(plus, minus, card.p.tau))
-        at = {"voltage": beyond_dead_zone(point.voltage, card.p)}
+            plus, minus = (each._replace(C=0.0) for each in (front.p.plus, front.p.minus))
+            front = front._replace(p=Card(plus, minus, front.p.tau))
+        command, at = "voltage", {"voltage": beyond_dead_zone(point.voltage, front.p)}
     elif inputs[0] == "solenoid_force":
         options = machine.options._replace(hysteresis=None)
         machine = machine._replace(p=machine.p._replace(**FORCE), options=options)
         at = {"current": point.solenoid_force}
-    model = instance.model if step > 0.0 else FLOWING
-    instance = Instance(model, (card, machine), instance.name)
+    model = instance.model
+    if step == 0.0:
+        model = flowing_drive if by_voltage else flowing_pump_drive
+    instance = Instance(model, (front, machine), instance.name)
     p = machine.p
     at |= {"load_torque": p.load_torque, "pump_speed": p.pump_speed, "supply_pressure": p.Z9}
     records = tuple(command if name in COMMANDS else name for name in inputs)
@@ -230,34 +206,66 @@ def _one_deflection(found: Recurrence, known: _Known) -> Recurrence:
     The next sample knows them only as d e^(-h/T) - x w/x_s: the deflection that would be left if
     the spool came back to where it was balanced. In continuous time it is the state itself.
     """
-    if known.step == 0.0 or known.instance.parts[1].options.friction is None:
+    p, options, _ = known.instance.parts[1]
+    if known.step == 0.0 or options.friction is None:
         return found
+    k = known.started.arguments[1]["k"]
     A, B, C = found.A.copy(), found.B.copy(), found.C.copy()
     spool, deflection = (found.states.index(f"pump.{name}") for name in ("spool", "deflection"))
-    fades = known.started.arguments[1]["k"].dither_factor
+    friction = k.friction_width / p.spool_presliding
     for matrix in (A, C):
-        matrix[:, deflection] = -matrix[:, spool] / known.friction
+        matrix[:, deflection] = -matrix[:, spool] / friction
     for matrix in (A, B):
-        matrix[deflection] = fades * matrix[deflection] - known.friction * matrix[spool]
+        matrix[deflection] = k.dither_factor * matrix[deflection] - friction * matrix[spool]
     return found._replace(A=A, B=B, C=C)
 
 
-def _pump(
+def _matrices(
     parameters: ParameterSet,
     point: OperatingPoint,
     inputs: tuple[str, ...],
     outputs: tuple[str, ...],
+    coulomb: Coulomb = "ignored",
     step: float = 0.0,
-) -> tuple[Matrices, tuple[str, ...]]:
-    """The pump alone; a voltage counts as the current that it gives."""
-    known = _known(parameters, point, inputs, step)
-    found = _one_deflection(known.matrices(outputs), known)
-    names = _pump_states(known)
+) -> tuple[Matrices, tuple[str, ...], tuple[str, ...], int]:
+    """Matrices, states, those of them that are past commands, and whole samples of delay.
+
+    States behind a voltage: the commands since the delay's whole samples (its fraction lies between
+    the last two), what the filter of the channel that is driven remembers, the pump. In continuous
+    time, at a step of 0, the delay stands apart.
+    """
+    known = _known(parameters, point, inputs, coulomb, step)
+    found = recurrence(known.instance, known.started, step, known.records, outputs)
+    found = _one_deflection(found, known)
+    names, sign = _pump_states(known), 1.0
+    if inputs[0] == "voltage":
+        assert point.voltage is not None
+        side, sign = ("plus", 1.0) if point.voltage >= 0.0 else ("minus", -1.0)
+        rate = step == 0.0 or known.instance.parts[0].options.exact is not None
+        names = {
+            f"card.{side}.before": "current_rate" if rate else "current_before",
+            f"card.{side}.now": "current",
+            **names,
+        }
     at = [found.states.index(path) for path in names]
-    return (
-        (found.A[np.ix_(at, at)], found.B[at], found.C[:, at], found.D),
-        tuple(names.values()),
-    )
+    # a channel counts in its own direction, the model in that of the speed
+    signs = np.array([sign if path.startswith("card.") else 1.0 for path in names])
+    A, C = found.A[np.ix_(at, at)] * np.outer(signs, signs), found.C[:, at] * signs
+    B, D = found.B[at] * signs[:, np.newaxis], found.D
+    states = tuple(names.values())
+    if inputs[0] != "voltage" or step == 0.0:
+        return (A, B, C, D), states, (), 0
+    whole = int(known.instance.places(known.records, step).whole[0])
+    late = {late: k for k, (of, late) in enumerate(found.columns) if of == "voltage"}
+    others = [k for k, (of, _) in enumerate(found.columns) if of != "voltage"]
+    read = [k for lag, k in late.items() if lag > whole + 1 and (B[:, k].any() or D[:, k].any())]
+    past, now = [late[whole + 1], *read], [late[whole], *others]
+    count = len(past)
+    memory = ("voltage_before", *(f"voltage_before_{j}" for j in range(2, count + 1)))
+    line = np.block([[np.eye(count, k=-1), np.zeros((count, len(at)))], [B[:, past], A]])
+    into = np.hstack((np.eye(count, 1), np.zeros((count, len(others)))))
+    matrices = line, np.vstack((into, B[:, now])), np.hstack((D[:, past], C)), D[:, now]
+    return matrices, (*memory, *states), memory, whole
 
 
 def slowest_lag(parameters: ParameterSet) -> float:
@@ -267,62 +275,19 @@ def slowest_lag(parameters: ParameterSet) -> float:
     if "spool_friction" in numbers and numbers.get("spool_presliding", 0.0) == 0.0:
         changes["spool_friction"] = 0.0  # it holds the spool fast, for ever
     rest = OperatingPoint(None, 0.0, 0.0, numbers["Z2"] / numbers["Z1"], 0.0, 0.0, 0.0)
-    (A, *_), _ = _pump(parameters.replace(changes), rest, ("solenoid_force",), ("swash_angle",))
+    (A, *_), *_ = _matrices(
+        parameters.replace(changes), rest, ("solenoid_force",), ("swash_angle",)
+    )
     poles = np.linalg.eigvals(A)
     lasting = poles[-poles.real > 1e-6 * np.abs(poles)]
     lag = 1.0 / float(-lasting.real.max())
     card = card_of(parameters)
-    cards = (_slopes(channel, 0.0)[1] / channel.omega**2 for channel in (card.plus, card.minus))
+    # of the filter with the slope that its Coulomb term has at rest
+    cards = (
+        (2.0 * each.zeta * each.omega + each.C / COULOMB_WIDTH) / each.omega**2
+        for each in (card.plus, card.minus)
+    )
     return numbers["tau"] + lag + max(cards)
-
-
-# --- the card before it ---------------------------------------------------------------------------
-
-
-def _slopes(channel: Channel, command: float) -> tuple[float, float]:
-    """dI_ss/dV [A/V] of a channel, and the damping of its filter at rest [1/s]."""
-    steady, moving = _derived_filter()
-    return steady(command, 1.0, channel)[1], -moving(0.0, 0.0, 0.0, channel, None)[1]
-
-
-@cache
-def _derived_filter() -> tuple[Callable[..., Any], Callable[..., Any]]:
-    steady = derive(steady_current, by="command")
-    moving = derive(current_acceleration, by="rate", options={"literal": None})
-    return steady.python, moving.python
-
-
-def _channel(parameters: ParameterSet, point: OperatingPoint, coulomb: Coulomb) -> Channel:
-    assert point.voltage is not None
-    card = card_of(parameters)
-    channel = card.plus if point.voltage >= 0.0 else card.minus
-    return channel._replace(C=0.0) if coulomb == "ignored" else channel
-
-
-def _behind_filter(
-    parameters: ParameterSet,
-    point: OperatingPoint,
-    coulomb: Coulomb,
-    matrices: Matrices,
-    states: tuple[str, ...],
-) -> tuple[Matrices, tuple[str, ...]]:
-    """The pump behind the card's filter, whose rate limits are taken as not active."""
-    assert point.voltage is not None
-    channel = _channel(parameters, point, coulomb)
-    command = abs(beyond_dead_zone(point.voltage, card_of(parameters)))
-    by_voltage, damping = _slopes(channel, command)
-    square = channel.omega * channel.omega
-    A1, B1, C1, D1 = matrices
-    n, k, m = A1.shape[0], B1.shape[1], C1.shape[0]
-    A = np.zeros((n + 2, n + 2))
-    A[:2, :2] = [[-damping, -square], [1.0, 0.0]]
-    A[2:, 1], A[2:, 2:] = B1[:, 0], A1
-    B = np.zeros((n + 2, k))
-    B[0, 0] = square * by_voltage
-    B[2:, 1:] = B1[:, 1:]
-    C = np.hstack((np.zeros((m, 1)), D1[:, :1], C1))
-    D = np.hstack((np.zeros((m, 1)), D1[:, 1:]))
-    return (A, B, C, D), ("current_rate", "current", *states)
 
 
 # --- at a sample time -----------------------------------------------------------------------------
@@ -345,79 +310,23 @@ def sampled(
     rate = 1.0 / sample_time
     substeps = least_substeps(round(rate) if abs(rate - round(rate)) < 1e-9 * rate else rate)
     step = sample_time / substeps
-    inputs, whole = model.inputs, 0
-    memory: tuple[str, ...] = ()
     if model.input == "voltage":
-        matrices, states, memory, whole = _behind_card(model, step)
-    else:
-        matrices, states = _pump(
-            model.parameters, model.operating_point, inputs, model.outputs, step
-        )
+        check_filter_stability(model.parameters, step)
+    matrices, states, memory, whole = _matrices(
+        *(model.parameters, model.operating_point, model.inputs, model.outputs, model.coulomb, step)
+    )
     delay = whole * step
     if substeps > 1:
         before = len(states)
         matrices, states = with_line(matrices, states, model.input, whole)
-        line, last = states[: len(states) - before], tuple(f"{name}_last" for name in inputs)
+        line, last = states[: len(states) - before], tuple(f"{name}_last" for name in model.inputs)
         # what is measured beside the command goes straight from sample to sample
-        held = [interpolation == "previous", *(False for _ in inputs[1:])]
+        held = [interpolation == "previous", *(False for _ in model.inputs[1:])]
         matrices = _lifted(*matrices, substeps, held)
         states, memory, delay = (*states, *last), (*line, *memory, *last), 0.0
     A, B, C, D = matrices
     found = replace(model, A=A, B=B, C=C, D=D, states=states, memory=memory)
     return replace(found, delay=delay, sample_time=sample_time)
-
-
-def _behind_card(
-    model: LinearDrive, step: float
-) -> tuple[Matrices, tuple[str, ...], tuple[str, ...], int]:
-    """One step of the march behind the whole samples of the delay.
-
-    States: the command one sample ago (the delay's fraction lies between it and the present one),
-    what the filter remembers, the pump.
-    """
-    check_filter_stability(model.parameters, step)
-    known = _known(model.parameters, model.operating_point, model.inputs, step, model.coulomb)
-    found = _one_deflection(known.matrices(model.outputs), known)
-    side = _side(model)
-    exact = known.instance.parts[0].options.exact is not None
-    names = {
-        f"card.{side}.before": "current_rate" if exact else "current_before",
-        f"card.{side}.now": "current",
-        **_pump_states(known),
-    }
-    at = [found.states.index(path) for path in names]
-    # a channel counts in its own direction, the model in that of the speed
-    sign = np.ones(len(at))
-    sign[:2] = 1.0 if side == "plus" else -1.0
-    A, C = found.A[np.ix_(at, at)] * np.outer(sign, sign), found.C[:, at] * sign
-    B, D = found.B[at] * sign[:, np.newaxis], found.D
-    whole = int(known.instance.places(known.records, step).whole[0])
-    late = {late: k for k, (of, late) in enumerate(found.columns) if of == "voltage"}
-    others = [k for k, (of, _) in enumerate(found.columns) if of != "voltage"]
-    read = [k for lag, k in late.items() if lag > whole + 1 and (B[:, k].any() or D[:, k].any())]
-    past = [late[whole + 1], *read]
-    count = len(past)
-    memory = ("voltage_before", *(f"voltage_before_{j}" for j in range(2, count + 1)))
-    line = np.eye(count, k=-1)
-    into = np.hstack((np.eye(count, 1), np.zeros((count, len(others)))))
-    now = [late[whole], *others]
-    return (
-        (
-            np.block([[line, np.zeros((count, len(at)))], [B[:, past], A]]),
-            np.vstack((into, B[:, now])),
-            np.hstack((D[:, past], C)),
-            D[:, now],
-        ),
-        (*memory, *names.values()),
-        memory,
-        whole,
-    )
-
-
-def _side(model: LinearDrive) -> str:
-    voltage = model.operating_point.voltage
-    assert voltage is not None
-    return "plus" if voltage >= 0.0 else "minus"
 
 
 def _lifted(

@@ -7,23 +7,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import ceil
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.marching.record import FASTEST, SOURCE_RATE, Record
+from swashplate.equations.marching.march import output_of
+from swashplate.equations.marching.record import FASTEST, SOURCE_RATE
 from swashplate.equations.marching.run import marched
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.drive import slowest_lag
-from swashplate.linear.operating_point import without_ripple
 from swashplate.models.pump import Pump
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.instance import check_filter_stability, instance_of
-from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import kept_of, started_at
+from swashplate.simulation.instance import check_filter_stability, instance_of, without_ripple
+from swashplate.tables import Tabular
 
 if TYPE_CHECKING:
     import polars
@@ -55,7 +53,7 @@ STILL = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyResponse:
+class FrequencyResponse(Tabular):
     """First harmonic of the answer to bias + amplitude · sin(2π f t), once it repeats itself.
 
     A row for each amplitude, a column for each frequency.
@@ -111,13 +109,7 @@ class FrequencyResponse:
         return phase
 
     def at(self, frequency: float) -> FrequencyResponse:
-        """The part at one of the frequencies. [Hz]
-
-        Raises
-        ------
-        InputError
-            If it is none of them; nothing is interpolated.
-        """
+        """The part at one of the frequencies [Hz]; another is refused, nothing is interpolated."""
         k = int(np.argmin(np.abs(self.frequencies - frequency)))
         nearest = float(self.frequencies[k])
         if not abs(nearest - frequency) <= 1e-9 * nearest:
@@ -153,18 +145,6 @@ class FrequencyResponse:
         )
         return table.with_columns(pl.col("phase").fill_nan(None))
 
-    def write(self, path: str | Path) -> None:
-        """Write the table of `to_polars` as CSV or Parquet, by the path's ending.
-
-        Raises
-        ------
-        FileError
-            For another ending or a place that cannot be written.
-        """
-        from swashplate.tables import write_table
-
-        write_table(self.to_polars(), path)
-
 
 # --- sweep ----------------------------------------------------------------------------------------
 
@@ -173,7 +153,6 @@ def sweep(
     parameters: ParameterSet,
     frequencies: ArrayLike,
     amplitudes: ArrayLike,
-    *,
     bias: float = 0.0,
     input: SweptInput = "voltage",
     output: SweptOutput = "shaft_speed",
@@ -246,14 +225,21 @@ def _settled(
     The cycles come in blocks that last long enough for most of a transient to die out. The last
     cycles of the last two blocks must agree, or else the march starts again, twice as long.
     """
-    a_block = max(1, ceil(frequency * block))
-    blocks = 3
+    step, a_block, blocks = 1.0 / (frequency * command.size), max(1, ceil(frequency * block)), 3
+    if input == "voltage":
+        check_filter_stability(parameters, step)
+    instance = without_ripple(instance_of(parameters, input == "voltage"))
+    seen, _ = output_of(instance.model, output)
+    size = _size(instance.parts[1].p, output)
     while True:
         count = blocks * a_block
-        before, last = _march(parameters, command, frequency, count, a_block, input)
-        size = _size(last.pump, output)
-        earlier, _, _ = _harmonic(before.fine(output), size)
-        harmonic, distortion, mean = _harmonic(last.fine(output), size)
+        records: dict[str, Array] = {input: np.tile(command, count)}
+        started = instance.start({input: float(command[0])}, step, "steady")
+        (signal,), _ = marched(instance, records, step, started, (seen,), input)
+        # a cycle has a whole number of steps, so that its first harmonic is exact
+        cycles = signal.reshape(count, command.size)
+        earlier, _, _ = _harmonic(cycles[-1 - a_block], size)
+        harmonic, distortion, mean = _harmonic(cycles[-1], size)
         if abs(harmonic - earlier) <= tolerance * abs(harmonic):
             return harmonic, distortion, mean, count
         if blocks >= MOST_BLOCKS:
@@ -263,44 +249,6 @@ def _settled(
                 f"{count} cycles; allow a larger tolerance, or look at it with a simulation."
             )
         blocks *= 2
-
-
-def _march(
-    parameters: ParameterSet,
-    cycle: Array,
-    frequency: float,
-    count: int,
-    apart: int,
-    input: SweptInput,
-) -> tuple[Simulation, Simulation]:
-    """The last cycle of several, from the steady state at the bias on, and one some cycles before.
-
-    A cycle has a whole number of steps, so that its first harmonic is exact.
-    """
-    n = cycle.size
-    step = 1.0 / (frequency * n)
-    if input == "voltage":
-        check_filter_stability(parameters, step)
-    instance = without_ripple(instance_of(parameters, input == "voltage"))
-    records: dict[str, Array] = {input: np.tile(cycle, count)}
-    kept = kept_of(instance.model, (input,), instance.options)
-    started = started_at(instance, records, step, "steady")
-    out, flags = marched(instance, records, step, started, kept, input)
-    ends = out.shape[1] - apart * n, out.shape[1]
-    record = Record(cycle, 0.0, 1.0 / step, 1)
-    before, last = (
-        Simulation(
-            parameters.name,
-            record,
-            instance,
-            input,
-            kept,
-            np.ascontiguousarray(out[:, end - n : end]),
-            np.ascontiguousarray(flags[:, end - n : end]),
-        )
-        for end in ends
-    )
-    return before, last
 
 
 def _size(pump: Pump, output: SweptOutput) -> float:

@@ -28,21 +28,15 @@ class LoopMargins(NamedTuple):
 
     crossover: float
     """Frequency at which |L| = 1 that leaves the smallest delay margin, 0 where none. [Hz]"""
-    phase_margin: float
-    """Phase of L above -180° there, infinite where there is no crossover. [rad]"""
-    delay_margin: float
-    """Further delay that makes the loop swing. [s]"""
-    gain_margin: float
-    """Factor on L that makes the loop swing. [1]"""
+    phase_margin: float  # Phase of L above -180° there, infinite where there is no crossover. [rad]
+    delay_margin: float  # Further delay that makes the loop swing. [s]
+    gain_margin: float  # Factor on L that makes the loop swing. [1]
 
 
 def bandwidth(response: Response, gain: float, fastest: float) -> float:
     """First frequency at which the response has fallen to gain/√2, infinite if none. [Hz]
 
-    Raises
-    ------
-    DomainError
-        If the steady gain is zero.
+    A response whose steady gain is zero is refused in a `DomainError`.
     """
     grid = _grid(fastest)
     _check_gain(response, gain, grid)
@@ -60,16 +54,8 @@ def bandwidth(response: Response, gain: float, fastest: float) -> float:
 def largest_gain(response: Response, delay: float, fastest: float, gain: float) -> float:
     """Proportional gain that makes the loop swing: 1/|G| where G crosses the negative axis.
 
-    Parameters
-    ----------
-    response : callable
-        G of frequencies [Hz], stable.
-    delay : float
-        The delay within G. [s]
-    fastest : float
-        Highest frequency to look at. [Hz]
-    gain : float
-        G at 0 Hz.
+    Of the stable G of frequencies, its delay [s], the highest frequency to look at [Hz], and G at 0
+    Hz.
     """
     _check_gain(response, gain, _grid(fastest))
     sign = -1.0 if gain < 0.0 else 1.0
@@ -86,10 +72,8 @@ def loop_margins(loop: Response, delay: float, fastest: float, name: str) -> Loo
     ----------
     loop : callable
         L of frequencies [Hz], of parts that are stable or integrate.
-    delay : float
-        The delay within L. [s]
-    fastest : float
-        Highest frequency to look at. [Hz]
+    delay, fastest : float
+        The delay within L [s], and the highest frequency to look at [Hz].
     name : str
         Whose loop, for the sentence.
 

@@ -1,11 +1,12 @@
-"""Linear models: state space with a delay before its input, and what follows from it."""
+"""Linear models: state space with a delay before its input, what follows from it, other forms."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
-from math import log
+from importlib import import_module
+from math import comb, factorial, log
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -17,17 +18,41 @@ from swashplate.errors import DomainError, InputError
 from swashplate.linear.margins import LoopMargins, bandwidth, largest_gain, loop_margins
 from swashplate.linear.operating_point import OperatingPoint
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.tables import Form, ending, write_text
 
 if TYPE_CHECKING:
     from scipy.signal import StateSpace
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+Matrices = tuple[Array, Array, Array, Array]
 Coulomb = Literal["ignored", "tangent"]
 Controller = float | Callable[[Array], ComplexArray]
 
 PLATE_STATES = ("stroker_pressure", "plate_pressure", "spool_deflection")
 """States between current and swash angle."""
+UNITS = {
+    "voltage": "V",
+    "current": "A",
+    "current_rate": "A/s",
+    "solenoid_force": "N",
+    "spool_position": "m",
+    "spool_deflection": "m",
+    "orifice_opening": "m",
+    "stroker_pressure": "Pa",
+    "plate_pressure": "Pa",
+    "swash_angle": "rad",
+    "shaft_speed": "rad/s",
+    "motor_torque": "N m",
+    "motor_pressure_drop": "Pa",
+    "load_torque": "N m",
+    "pump_speed": "1",
+    "supply_pressure": "Pa",
+}
+"""SI unit of each input, output and state of a drive's continuous model."""
+HIGHEST_PADE = 8
+"""Above, the approximant's coefficients span more decades than double precision has digits."""
+LINEAR_MODEL = Form("a linear model", (".toml", ".json"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,20 +133,10 @@ class LinearModel:
         return float(self.gains[0])
 
     def response(self, frequency: ArrayLike, input: str | None = None) -> ComplexArray:
-        """Frequency response of the outputs, with the exact delay.
+        """Frequency response of the outputs to an input, the first by default, with its delay.
 
-        Parameters
-        ----------
-        frequency : float or (f,) array_like
-            At or above 0, of a sampled model at or below 1/(2 h). [Hz]
-        input : str, optional
-            By default the first.
-
-        Returns
-        -------
-        (m,) or (m, f) complex array
-            Amplitude and phase of each output: G e^(-jω delay) with G = C (p - A)⁻¹ B + D, p being
-            jω or, sampled, e^(jωh).
+        At frequencies from 0 on, of a sampled model up to 1/(2 h) [Hz]: (m,) or (m, f) complex G
+        e^(-jω delay) with G = C (p - A)⁻¹ B + D, p being jω or, sampled, e^(jωh).
         """
         f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
         h = self.sample_time
@@ -188,12 +203,9 @@ class LinearModel:
     def margins(self, controller: Controller) -> LoopMargins:
         """Margins of the loop u = K (r - y) closed over the first output.
 
-        Parameters
-        ----------
-        controller : float or callable
-            A proportional gain K, e.g. in V/(rad/s), or a controller's frequency response: a
-            function of frequencies [Hz] that returns complex numbers. It must not be unstable by
-            itself; one that integrates is fine.
+        The controller is a proportional gain K, e.g. in V/(rad/s), or its frequency response: a
+        function of frequencies [Hz] that returns complex numbers. It must not be unstable by
+        itself; one that integrates is fine.
 
         Raises
         ------
@@ -217,14 +229,54 @@ class LinearModel:
     ) -> tuple[Array, Array]:
         """Numerator and denominator, highest power first, without the delay.
 
-        Parameters
-        ----------
-        output, input : str, optional
-            By default the first.
+        Of an output by an input, by default the first. With the Markov parameters m₀ = D,
+        mₖ = C Aᵏ⁻¹ B the numerator is the polynomial part of denominator · Σ mₖ s⁻ᵏ. Those that the
+        structure makes zero are exactly zero, so no leading coefficients are left by rounding.
         """
-        from swashplate.linear.export import polynomials
+        output = self.outputs[0] if output is None else output
+        if output not in self.outputs:
+            raise InputError(
+                f"The model of {self.name} has no output '{output}'; it has "
+                f"{', '.join(self.outputs)}."
+            )
+        row, column = self.outputs.index(output), self.index_of_input(input)
+        n = self.A.shape[0]
+        denominator = np.zeros(n + 1)
+        moving = np.real(np.poly(self.poles))
+        denominator[: moving.size] = moving
+        markov = np.empty(n + 1)
+        markov[0] = self.D[row, column]
+        into = self.B[:, column]
+        for k in range(1, n + 1):
+            markov[k] = self.C[row] @ into
+            into = self.A @ into
+        numerator = np.convolve(denominator, markov)[: n + 1]
+        first = int(np.argmax(numerator != 0.0)) if numerator.any() else n
+        return numerator[first:], denominator
 
-        return polynomials(self, self.outputs[0] if output is None else output, input)
+    def _with_delay(self, order: int | None) -> tuple[Matrices, tuple[str, ...]]:
+        """Matrices and names of the states, with the delay inside; `order` as in `to_scipy`."""
+        matrices = self.A, self.B, self.C, self.D
+        if self.sample_time is not None:
+            if order is not None:
+                raise InputError(
+                    "A sampled model has its delay exactly, as states; leave pade out."
+                )
+            return with_line(matrices, self.states, self.input, self._late)
+        if self.delay == 0.0 or order == 0:
+            return matrices, self.states
+        if order is None:
+            raise InputError(
+                f"The model has a delay of {self.delay:g} s, which no state space holds exactly; "
+                "say pade=2 for an approximant of that order, or pade=0 to leave the delay out."
+            )
+        names = tuple(f"delay_{k}" for k in range(1, order + 1))
+        return in_series(_pade_states(self.delay, order), matrices), (*names, *self.states)
+
+    @property
+    def _late(self) -> int:
+        """Whole samples of delay."""
+        return round(self.delay / self.sample_time) if self.sample_time is not None else 0
 
     def to_scipy(self, pade: int | None = None) -> StateSpace:
         """The model as `scipy.signal.StateSpace`, continuous or sampled.
@@ -235,37 +287,77 @@ class LinearModel:
             Order of the Padé approximant for a continuous model's delay, 0 to leave the delay
             out; must be said where there is one. A sampled model's delay is exact, as states.
         """
-        from swashplate.linear.export import to_scipy
+        from scipy.signal import StateSpace
 
-        return to_scipy(self, pade)
+        matrices, _ = self._with_delay(pade)
+        sampled = {} if self.sample_time is None else {"dt": self.sample_time}
+        return StateSpace(*matrices, **sampled)
 
     def to_control(
         self,
         form: Literal["state_space", "transfer_function"] = "state_space",
         pade: int | None = None,
     ) -> Any:
-        """The model as python-control's StateSpace or TransferFunction; `pade` as in `to_scipy`.
+        """The model as python-control's StateSpace or TransferFunction; `pade` as in `to_scipy`."""
+        if form not in ("state_space", "transfer_function"):
+            raise InputError(f"form is '{form}'; it is 'state_space' or 'transfer_function'.")
+        matrices, states = self._with_delay(pade)
+        try:
+            control = import_module("control")
+        except ImportError:
+            raise InputError(
+                "python-control is not installed: pip install swashplate[control]; to_scipy needs "
+                "nothing more."
+            ) from None
+        dt = self.sample_time or 0
+        named = {"inputs": list(self.inputs), "outputs": list(self.outputs), "name": self.name}
+        if form == "state_space":
+            return control.ss(*matrices, dt, states=list(states), **named)
+        one = np.ones(1)
+        before, after = one, one
+        if self.sample_time is not None:
+            after = np.eye(1, self._late + 1)[0]
+        elif self.delay != 0.0 and pade:
+            before, after = pade_polynomials(self.delay, pade)
+        numerators: list[Any] = []
+        denominators: list[Any] = []
+        for output in self.outputs:
+            own = [self.transfer_function(output, name) for name in self.inputs]
+            late = [(before, after), *((one, one) for _ in self.inputs[1:])]
+            pairs = list(zip(own, late, strict=True))
+            numerators.append([np.polymul(a, b) for (a, _), (b, _) in pairs])
+            denominators.append([np.polymul(a, b) for (_, a), (_, b) in pairs])
+        return control.tf(numerators, denominators, dt, **named)
 
-        Raises
-        ------
-        InputError
-            If python-control is not installed.
-        """
-        from swashplate.linear.export import to_control
-
-        return to_control(self, form, pade)
+    def content(self) -> dict[str, Any]:
+        """What is written of a model, as plain numbers, strings and lists; SI."""
+        time = {} if self.sample_time is None else {"sample_time": self.sample_time}
+        return {
+            "format": 1,
+            "drive": self.name,
+            "kind": "continuous" if self.sample_time is None else "sampled",
+            "delay": self.delay,
+            **time,
+            "input": self.input,
+            "inputs": list(self.inputs),
+            "outputs": list(self.outputs),
+            "states": list(self.states),
+            "input_unit": UNITS.get(self.input, ""),
+            "input_units": [UNITS.get(name, "") for name in self.inputs],
+            "output_units": [UNITS.get(name, "") for name in self.outputs],
+            **{name: getattr(self, name).tolist() for name in ("A", "B", "C", "D")},
+        }
 
     def write(self, path: str | Path) -> None:
-        """Write matrices, names, units, delay and operating point as .toml or .json, in SI.
+        """Write matrices, names, units, delay and operating point as .toml or .json, in SI."""
+        if ending(path, LINEAR_MODEL) == ".json":
+            from json import dumps as dump_json
 
-        Raises
-        ------
-        FileError
-            For another ending or a place that cannot be written.
-        """
-        from swashplate.linear.export import write_model
+            write_text(dump_json(self.content(), indent=1) + "\n", path)
+        else:
+            from tomlkit import dumps as dump_toml
 
-        write_model(self, path)
+            write_text(dump_toml(self.content()), path)
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,18 +372,21 @@ class LinearDrive(LinearModel):
 
     __repr__ = LinearModel.__repr__
 
+    def content(self) -> dict[str, Any]:
+        """What is written of a model; see `LinearModel.content`."""
+        point = {k: v for k, v in asdict(self.operating_point).items() if v is not None}
+        sides = {"coulomb": self.coulomb, "one_sided": list(point.pop("one_sided"))}
+        # tables last, as TOML has them
+        return {**super().content(), **sides, "operating_point": point}
+
     @property
     def time_constant(self) -> float:
         """Time constant of the pump's lag, from current to swash angle. [s]
 
         At rest without plussing τ = (1 + Z6)/(Z1 Z3 Z5 Z8 √(Z9/2)); Kruse (2001), eqs. 6.72-6.74
-        with errata 4 and 23. Of a sampled model that of the lag with the same pole. Where friction
-        or damping give it more poles than one, that of the slowest.
-
-        Raises
-        ------
-        DomainError
-            If a sampled model's lag is shorter than its step.
+        with errata 4 and 23. Of a sampled model that of the lag with the same pole; one that is
+        shorter than its step is refused in a `DomainError`. Where friction or damping give it more
+        poles than one, that of the slowest.
         """
         slowest = self._poles(PLATE_STATES)[0]
         if self.sample_time is None:
@@ -305,20 +400,72 @@ class LinearDrive(LinearModel):
         return -self.sample_time / log(pole)
 
     def discrete(self, sample_time: float, interpolation: Interpolation = "linear") -> LinearDrive:
-        """The model at a sample time, with the recurrences of the march.
+        """The model at a sample time of 10 µs to 0.1 s, with the recurrences of the march. [s]
 
-        Parameters
-        ----------
-        sample_time : float
-            10 µs to 0.1 s; above 1/512 s the march's own sub-steps are taken. [s]
-        interpolation : {"linear", "previous"}
-            What the input is between samples: a straight line or held, as in `Drive.simulate`.
-
-        Returns
-        -------
-        LinearDrive
-            Agrees with a small motion of `Drive.simulate` or `Drive.stepper` sample for sample.
+        Between samples the input is a straight line or held, as in `Drive.simulate`; above 1/512 s
+        the march's own sub-steps are taken. Agrees with a small motion of `Drive.simulate` or
+        `Drive.stepper` sample for sample.
         """
         from swashplate.linear.drive import sampled
 
         return sampled(self, sample_time, interpolation)
+
+
+# --- delays ---------------------------------------------------------------------------------------
+
+
+def pade_polynomials(delay: float, order: int) -> tuple[Array, Array]:
+    """Numerator and denominator of the Padé approximant of e^(-s delay), highest power first.
+
+    The delay is in s; the order, 1 to 8, is the degree of both.
+    """
+    powers = np.arange(order, -1, -1)
+    denominator = _pade_coefficients(order)[::-1] * delay**powers
+    return denominator * (-1.0) ** powers, denominator
+
+
+def _pade_states(delay: float, order: int) -> Matrices:
+    """The same as a state space, its states scaled so that the coefficients are of one size."""
+    coefficients = _pade_coefficients(order)
+    sign = (-1.0) ** np.arange(order + 1)
+    through = sign[-1]
+    A = np.eye(order, k=1)
+    A[-1] = -coefficients[:-1]
+    B = np.zeros((order, 1))
+    B[-1, 0] = 1.0
+    C = ((sign - through) * coefficients)[np.newaxis, :-1]
+    return A / delay, B / delay, C, np.array([[through]])
+
+
+def _pade_coefficients(order: int) -> Array:
+    """Coefficients of the denominator in p = s delay, lowest first, the highest being 1."""
+    if not 1 <= order <= HIGHEST_PADE:
+        raise InputError(
+            f"The order of a Padé approximant is {order}, but must be 1 to {HIGHEST_PADE}, or 0 "
+            "to leave the delay out."
+        )
+    return np.array(
+        [comb(order, k) * factorial(2 * order - k) / factorial(order) for k in range(order + 1)]
+    )
+
+
+def with_line(
+    matrices: Matrices, states: tuple[str, ...], input: str, whole: int
+) -> tuple[Matrices, tuple[str, ...]]:
+    """Matrices and names of the states with whole samples of delay before the first input."""
+    if whole == 0:
+        return matrices, states
+    A = np.eye(whole, k=-1)
+    line = A, np.eye(whole, 1), np.eye(1, whole, whole - 1), np.zeros((1, 1))
+    names = tuple(f"{input}_{k}" for k in range(1, whole + 1))
+    return in_series(line, matrices), (*names, *states)
+
+
+def in_series(first: Matrices, second: Matrices) -> Matrices:
+    """A single-input system before the first input of another one."""
+    A1, B1, C1, D1 = first
+    A2, B2, C2, D2 = second
+    n, others = A1.shape[0], np.zeros((A1.shape[0], B2.shape[1] - 1))
+    A = np.block([[A1, np.zeros((n, A2.shape[0]))], [B2[:, :1] @ C1, A2]])
+    B = np.block([[B1, others], [B2[:, :1] @ D1, B2[:, 1:]]])
+    return A, B, np.hstack((D2[:, :1] @ C1, C2)), np.hstack((D2[:, :1] @ D1, D2[:, 1:]))

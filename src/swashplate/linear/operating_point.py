@@ -13,19 +13,18 @@ from swashplate.equations.equation import interpreted
 from swashplate.equations.marching.run import Instance, called
 from swashplate.errors import DomainError, InputError
 from swashplate.models.card import Card, channel_level
-from swashplate.models.drive import overpowered
 from swashplate.models.pump import (
     Pump,
     moment_sine,
+    overpowered,
     pump_sample,
     pump_settled,
-    settled_speed,
     solenoid_force,
 )
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.instance import card_of, instance_of
-from swashplate.simulation.steady import pump_arguments, steady_states
+from swashplate.simulation.instance import card_of, instance_of, without_ripple
+from swashplate.simulation.run import pump_arguments, steady_states
 
 Array = NDArray[np.float64]
 Input = Literal[
@@ -66,12 +65,7 @@ class OperatingPoint:
 class DeadZoneError(DomainError):
     """A point in a dead zone, where the gain is 0, and where there is a model instead.
 
-    Parameters
-    ----------
-    where : str
-        The point and its dead zone. Kept with what follows from it.
-    instead : str
-        What to linearise at: ``"linearise at +0.2064 V or more"``.
+    `where` names the point and its dead zone, `instead` what to linearise at.
     """
 
     def __init__(self, where: str, instead: str) -> None:
@@ -87,16 +81,9 @@ def operating_point(
     current: float | None = None,
     speed: float | None = None,
 ) -> OperatingPoint:
-    """Steady state at which small motions of an input have an answer.
+    """Steady state at which small motions of an input, one of `INPUTS`, have an answer.
 
-    Parameters
-    ----------
-    parameters : ParameterSet
-        The drive.
-    input : str
-        What moves, one of `INPUTS`.
-    voltage, current, speed : float
-        One of them. [V, A, rad/s]
+    Given by one of voltage [V], current [A] and speed [rad/s].
 
     Raises
     ------
@@ -122,7 +109,7 @@ def operating_point(
         )
     if speed is not None:
         voltage = _voltage_of(parameters, speed)
-    instance = instance_of(parameters, False)
+    instance = without_ripple(instance_of(parameters, False))
     pump: Pump = instance.parts[1].p
     sides: list[str] = []
     if voltage is not None:
@@ -160,7 +147,7 @@ def operating_point(
         known["state"].pressure,
         opening,
         signals.swash_angle,
-        called(settled_speed, known),
+        signals.shaft_speed,
         tuple(sides),
     )
 
@@ -170,13 +157,6 @@ def beyond_dead_zone(voltage: float, card: Card) -> float:
     if voltage >= 0.0:
         return max(voltage, nextafter(card.plus.V_dz, np.inf))
     return min(voltage, -nextafter(card.minus.V_dz, np.inf))
-
-
-def without_ripple(instance: Instance) -> Instance:
-    """The drive at the mean of a turn: the cam ring's ripple does not change it."""
-    card, pump = instance.parts
-    smooth = pump._replace(options=pump.options._replace(ripple=None))
-    return Instance(instance.model, (card, smooth), instance.name)
 
 
 def _level(voltage: float, card: Card) -> float:

@@ -11,7 +11,7 @@ from swashplate.logs.lookup import unit_of
 from swashplate.logs.opening import open_log
 from swashplate.logs.stamps import check_finite, check_stamps
 from swashplate.logs.text.options import TextOptions
-from swashplate.units import to_si
+from swashplate.units import speed_unit, to_si
 
 
 class Series(NamedTuple):
@@ -72,6 +72,7 @@ def read_series(
 def _si(log: Log, wanted: str, si: str, values: Array) -> Array:
     found = log.find(wanted)
     unit = unit_of(found, wanted, si)
+    unit = speed_unit(unit) if si == "rad/s" else unit
     what = f"{log.path}: column '{found.name}'"
     zero, one = (to_si(value, unit, si, what) for value in (0.0, 1.0))
     return values * one if zero == 0.0 else values * (one - zero) + zero

@@ -16,20 +16,20 @@ command ends with. Where the cubic would then leave the amplitude, as after a fa
 with the steepest slope of that sign with which it stays within, at the amplitude itself with none.
 """
 
-from swashplate.maneuvers.composition import SplineReturn as SplineReturn
-from swashplate.maneuvers.composition import spline_return as spline_return
-from swashplate.maneuvers.composition import superpose as superpose
-from swashplate.maneuvers.curves import Curve as Curve
-from swashplate.maneuvers.parsing import parse as parse
+from swashplate.maneuvers.pieces import Curve as Curve
 from swashplate.maneuvers.pieces import Maneuver as Maneuver
 from swashplate.maneuvers.pieces import Piece as Piece
+from swashplate.maneuvers.pieces import SplineReturn as SplineReturn
+from swashplate.maneuvers.pieces import spline_return as spline_return
+from swashplate.maneuvers.pieces import superpose as superpose
 from swashplate.maneuvers.records import recorded as recorded
 from swashplate.maneuvers.records import recorded_file as recorded_file
+from swashplate.maneuvers.shapes import chirp as chirp
+from swashplate.maneuvers.shapes import multisine as multisine
+from swashplate.maneuvers.shapes import parse as parse
 from swashplate.maneuvers.shapes import ramp as ramp
 from swashplate.maneuvers.shapes import rest as rest
+from swashplate.maneuvers.shapes import sine as sine
+from swashplate.maneuvers.shapes import source_tests as source_tests
 from swashplate.maneuvers.shapes import stairs as stairs
 from swashplate.maneuvers.shapes import step as step
-from swashplate.maneuvers.sines import chirp as chirp
-from swashplate.maneuvers.sines import multisine as multisine
-from swashplate.maneuvers.sines import sine as sine
-from swashplate.maneuvers.source import source_tests as source_tests

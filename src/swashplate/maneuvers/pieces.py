@@ -1,17 +1,234 @@
-"""Manoeuvres as objects: curves one after another, to be sampled, scaled and joined."""
+"""Manoeuvres as objects: curves one after another, to be sampled, scaled, joined and added."""
+# ruff: noqa: D102 - what the two methods of every curve return is said once, by Curve
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import finite, positive
-from swashplate.maneuvers.curves import NEAR, Array, Curve, Scaled, interval
+
+# --- curves ---------------------------------------------------------------------------------------
+
+
+Array = npt.NDArray[np.float64]
+
+NEAR = 1e-9
+"""An instant this little before a jump, or after the end, counts as being there. [s]
+
+Decimal durations do not add up exactly (0.1 + 0.2 > 0.3), and a step must not miss the sample meant
+for it.
+"""
+HALVINGS = 60
+"""Of the slope of a return until it is found, to the last bits."""
+
+
+def interval(starts: npt.ArrayLike, time: Array) -> npt.NDArray[np.intp]:
+    """Index of the last of the `starts` [s], in their order, that each `time` [s] has reached."""
+    return np.searchsorted(starts, time + NEAR, side="right") - 1
+
+
+class Curve(Protocol):
+    """What a piece of a manoeuvre follows; both methods take an array of times [s]."""
+
+    def __call__(self, time: Array, /) -> Array:
+        """Voltage [V], in an array of the same shape."""
+
+    def slope(self, time: Array, /) -> Array:
+        """Exact dV/dt [V/s], in an array of the same shape; at a kink, of what follows it."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """Straight line from `level` [V] on, which rises by `rise` [V/s]."""
+
+    level: float = 0.0
+    rise: float = 0.0
+
+    def __call__(self, time: Array) -> Array:
+        return self.level + self.rise * time
+
+    def slope(self, time: Array) -> Array:
+        return np.full_like(time, self.rise)
+
+
+@dataclass(frozen=True)
+class Hermite:
+    """Cubic from voltage `level` [V] and slope `rise` [V/s] to (0, 0) at `duration` [s]."""
+
+    level: float
+    rise: float
+    duration: float
+
+    def __call__(self, time: Array) -> Array:
+        # Written with the time left as a factor, it ends at exactly zero.
+        done = time / self.duration
+        return (1.0 - done) ** 2 * (self.level * (1.0 + 2.0 * done) + self.rise * time)
+
+    def slope(self, time: Array) -> Array:
+        done = time / self.duration
+        mean = self.level / self.duration
+        return (1.0 - done) * (self.rise * (1.0 - 3.0 * done) - 6.0 * mean * done)
+
+    @property
+    def peak(self) -> float:
+        """Largest magnitude. [V]"""
+        change = self.rise * self.duration
+        turn = 3.0 * (2.0 * self.level + change)
+        # where its one extremum beside the end lies, as a part of the duration
+        part = change / turn if turn else 0.0
+        if not 0.0 < part < 1.0:
+            return abs(self.level)
+        return max(abs(self.level), (1.0 - part) ** 2 * abs(self.level + change / 3.0))
+
+
+def return_within(amplitude: float, level: float, rise: float, duration: float) -> Hermite:
+    """Return from `level` [V] to rest that stays within ±`amplitude` [V], not below ±`level`.
+
+    It starts with the slope `rise` [V/s] where the cubic then stays within, else with the steepest
+    slope of that sign with which it does, which is 0 at the amplitude itself.
+    """
+    whole = Hermite(level, rise, duration)
+    bound = max(amplitude, abs(level))
+    if whole.peak <= bound:
+        return whole
+    low, high = 0.0, 1.0 if abs(level) < bound else 0.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if Hermite(level, middle * rise, duration).peak <= bound:
+            low = middle
+        else:
+            high = middle
+    return Hermite(level, low * rise, duration)
+
+
+@dataclass(frozen=True)
+class Tone:
+    """Sine of `amplitude` [V] and `phase` [rad]; its `frequency` [Hz] grows by `growth` [Hz/s]."""
+
+    amplitude: float
+    frequency: float
+    growth: float = 0.0
+    phase: float = 0.0
+
+    def __call__(self, time: Array) -> Array:
+        return self.amplitude * np.sin(self._angle(time))
+
+    def slope(self, time: Array) -> Array:
+        speed = 2.0 * np.pi * (self.frequency + self.growth * time)
+        return self.amplitude * speed * np.cos(self._angle(time))
+
+    def _angle(self, time: Array) -> Array:
+        return 2.0 * np.pi * (self.frequency + 0.5 * self.growth * time) * time + self.phase
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """Another curve times `factor` [1]."""
+
+    factor: float
+    curve: Curve
+
+    def __call__(self, time: Array) -> Array:
+        return self.factor * self.curve(time)
+
+    def slope(self, time: Array) -> Array:
+        return self.factor * self.curve.slope(time)
+
+
+@dataclass(frozen=True)
+class Sum:
+    """Sum of one or more curves."""
+
+    curves: tuple[Curve, ...]
+
+    def __call__(self, time: Array) -> Array:
+        return reduce(np.add, (curve(time) for curve in self.curves))
+
+    def slope(self, time: Array) -> Array:
+        return reduce(np.add, (curve.slope(time) for curve in self.curves))
+
+
+# --- checks ---------------------------------------------------------------------------------------
+
+
+def finite(name: str, value: float) -> float:
+    """Return `value` as a float, or raise InputError if it is no finite number."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be a number, not {value!r}.") from None
+    if not math.isfinite(number):
+        raise InputError(f"{name} must be finite, not {number}.")
+    return number
+
+
+def positive(name: str, value: float) -> float:
+    """Return `value` as a float, or raise InputError if it is not finite and positive."""
+    if (number := finite(name, value)) <= 0.0:
+        raise InputError(f"{name} must be positive, not {number:g}.")
+    return number
+
+
+def not_negative(name: str, value: float) -> float:
+    """Return `value` as a float, or raise InputError if it is not finite or negative."""
+    if (number := finite(name, value)) < 0.0:
+        raise InputError(f"{name} must not be negative, not {number:g}.")
+    return number
+
+
+def whole(name: str, value: object) -> int:
+    """Return `value` as an integer, or raise InputError if it is none or negative."""
+    if not isinstance(value, int | np.integer) or value < 0:
+        raise InputError(f"{name} must be a whole number from 0 up, not {value!r}.")
+    return int(value)
+
+
+def row(name: str, values: npt.ArrayLike) -> Array:
+    """Copy `values` to a row; raise InputError unless it has one or more numbers, all finite."""
+    try:
+        numbers = np.array(values, dtype=float, ndmin=1)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be numbers, not {values!r}.") from None
+    if numbers.ndim != 1 or numbers.size == 0:
+        raise InputError(f"{name} must be one row of numbers, not of shape {numbers.shape}.")
+    wrong = np.flatnonzero(~np.isfinite(numbers))
+    if wrong.size:
+        where = f"row {wrong[0]} (the first is 0) is {numbers[wrong[0]]}"
+        raise InputError(f"{name} must be finite, but {where}.")
+    return numbers
+
+
+def window(start: float, settle: float | None, length: float) -> tuple[float, float, float]:
+    """Start and end of the command between rest and return, and the whole length.
+
+    Parameters
+    ----------
+    start, settle, length : float
+        Rest before the command, return after it (None for none) and the whole. [s]
+
+    Raises
+    ------
+    InputError
+        If one is negative or not finite, or nothing is left for the command.
+    """
+    start, length = not_negative("start", start), not_negative("length", length)
+    settle = not_negative("settle", settle or 0.0)
+    if start + settle >= length:
+        raise InputError(
+            f"start {start:g} s and settle {settle:g} s leave nothing of a length of {length:g} s."
+        )
+    return start, length - settle, length
+
+
+# --- pieces ---------------------------------------------------------------------------------------
+
 
 LONGEST = 100_000_000
 """Samples that a manoeuvre may have; more is a mistake and would not fit into memory."""
@@ -121,3 +338,81 @@ class Maneuver:
             here = holding == index
             values[here] = function(np.maximum(stamps[here] - piece.start, 0.0))
         return values[()]  # a number for a number
+
+
+# --- composition ----------------------------------------------------------------------------------
+
+
+def superpose(*maneuvers: Maneuver) -> Maneuver:
+    """Sum of the voltages of manoeuvres, as long as the longest; its amplitude is theirs added.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if not maneuvers:
+        raise InputError("superpose needs at least one manoeuvre.")
+    length = max(each.length for each in maneuvers)
+    name = " with ".join(each.name for each in maneuvers)
+    together = Sum(tuple(_padded(each, length) for each in maneuvers))
+    amplitude = sum(each.amplitude for each in maneuvers)
+    return Maneuver(name, length, (Piece(0.0, together),), amplitude)
+
+
+def _padded(short: Maneuver, length: float) -> Maneuver:
+    """Let it rest from its end on, the end included, as after any jump."""
+    if short.length == length:
+        return short
+    return replace(short, length=length, pieces=(*short.pieces, Piece(short.length, Line())))
+
+
+@dataclass(frozen=True)
+class SplineReturn:
+    """What `spline_return` makes: an end, `duration` [s] long, for the manoeuvre it is added to."""
+
+    duration: float
+
+    def __radd__(self, before: Maneuver) -> Maneuver:
+        if not isinstance(before, Maneuver):
+            return NotImplemented
+        name = f"{before.name} + return {self.duration:g} s"
+        return returned(before, name, before.length + self.duration)
+
+
+def spline_return(duration: float) -> SplineReturn:
+    """Cubic Hermite from the voltage and slope at the end of what it is added to, to (0, 0).
+
+    It stays within the amplitude of what it is added to: where the slope there would carry it
+    beyond, it starts with the steepest slope of that sign that does not, at the amplitude itself
+    with none. What states no amplitude is not exceeded beyond the voltage that it ends with.
+
+    Parameters
+    ----------
+    duration : float
+        Positive. [s]
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    return SplineReturn(positive("duration", duration))
+
+
+def returned(before: Maneuver, name: str, length: float) -> Maneuver:
+    """Add to a manoeuvre the return that ends at `length` [s], to the last bit."""
+    level, slope = float(before(before.length)), float(before.slope(before.length))
+    within = before.amplitude if math.isfinite(before.amplitude) else 0.0
+    curve = return_within(within, level, slope, length - before.length)
+    return replace(
+        before, name=name, length=length, pieces=(*before.pieces, Piece(before.length, curve))
+    )
+
+
+def settled(
+    name: str, amplitude: float, pieces: Sequence[Piece], end: float, length: float
+) -> Maneuver:
+    """Rest, the pieces until `end` [s], and the return if there is time left until `length` [s]."""
+    command = Maneuver(name, end, (Piece(0.0, Line()), *pieces), abs(amplitude))
+    return returned(command, name, length) if end < length else command

@@ -9,9 +9,7 @@ import numpy.typing as npt
 
 from swashplate.errors import InputError
 from swashplate.logs import TextOptions, read_series
-from swashplate.maneuvers.checks import positive, row
-from swashplate.maneuvers.curves import Array, interval
-from swashplate.maneuvers.pieces import Maneuver, Piece
+from swashplate.maneuvers.pieces import Array, Maneuver, Piece, interval, positive, row
 
 
 @dataclass(frozen=True, eq=False)

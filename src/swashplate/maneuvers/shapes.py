@@ -1,16 +1,32 @@
-"""Manoeuvres of straight lines: rest, step, ramp, stairs.
+"""Manoeuvres by name: rest, step, ramp, stairs, sine, chirp, multisine, the source's tests."""
 
-What `start`, `settle` and `length` [s] are, the package says.
-"""
-
+import inspect
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
 
 from swashplate.errors import InputError
-from swashplate.maneuvers.checks import finite, not_negative, positive, row, window
-from swashplate.maneuvers.composition import settled
-from swashplate.maneuvers.curves import Line
-from swashplate.maneuvers.pieces import Maneuver, Piece
+from swashplate.maneuvers.pieces import (
+    Array,
+    Line,
+    Maneuver,
+    Piece,
+    Scaled,
+    Sum,
+    Tone,
+    finite,
+    not_negative,
+    positive,
+    row,
+    settled,
+    whole,
+    window,
+)
+
+# --- shapes ---------------------------------------------------------------------------------------
 
 
 def rest(duration: float) -> Maneuver:
@@ -93,3 +109,241 @@ def stairs(
     name = f"stairs {'/'.join(f'{level:g}' for level in volts)} V"
     amplitude = max(abs(level) for level in volts)
     return settled(name, amplitude, pieces, end, end + settle if volts[-1] != 0.0 else end)
+
+
+# --- sines ----------------------------------------------------------------------------------------
+
+
+# Points on the shortest period when the peak of a multisine is sought.
+_POINTS_PER_PERIOD = 256
+
+
+def sine(
+    amplitude: float,
+    frequency: float,
+    *,
+    start: float = 1.0,
+    settle: float | None = 2.5,
+    length: float = 30.0,
+) -> Maneuver:
+    """Sine that begins at `start` with phase zero; the return ends it wherever it is.
+
+    Parameters
+    ----------
+    amplitude : float
+        Peak. [V]
+    frequency : float
+        Positive. [Hz]
+
+    Raises
+    ------
+    InputError
+        If `frequency` is not positive, or `start` and `settle` leave nothing of `length`.
+    """
+    amplitude, frequency = finite("amplitude", amplitude), positive("frequency", frequency)
+    start, end, length = window(start, settle, length)
+    name = f"sine {amplitude:g} V {frequency:g} Hz"
+    return settled(name, amplitude, [Piece(start, Tone(amplitude, frequency))], end, length)
+
+
+def chirp(
+    amplitude: float,
+    first: float,
+    last: float,
+    *,
+    start: float = 1.0,
+    settle: float | None = 2.5,
+    length: float = 60.0,
+) -> Maneuver:
+    """Sine whose frequency goes from `first` to `last` at a constant rate, until the return.
+
+    Parameters
+    ----------
+    amplitude : float
+        Peak. [V]
+    first, last : float
+        Frequencies in either order, not negative. [Hz]
+
+    Raises
+    ------
+    InputError
+        If a frequency is negative, or `start` and `settle` leave nothing of `length`.
+    """
+    amplitude = finite("amplitude", amplitude)
+    first, last = not_negative("first", first), not_negative("last", last)
+    start, end, length = window(start, settle, length)
+    curve = Tone(amplitude, first, growth=(last - first) / (end - start))
+    name = f"chirp {amplitude:g} V {first:g} to {last:g} Hz"
+    return settled(name, amplitude, [Piece(start, curve)], end, length)
+
+
+def multisine(
+    amplitude: float,
+    frequencies: Sequence[float] | tuple[float, float, int],
+    *,
+    seed: int = 0,
+    start: float = 1.0,
+    settle: float | None = 2.5,
+    length: float = 60.0,
+) -> Maneuver:
+    """Sum of equally large sines of random phase; it begins with a jump to wherever they stand.
+
+    Parameters
+    ----------
+    amplitude : float
+        Largest magnitude, reached to 0.1 %. [V]
+    frequencies : list, array or tuple
+        A list or array holds the frequencies, used as they are. A tuple is a band, (low, high,
+        count), whose evenly spaced frequencies are rounded to whole periods between `start` and
+        the return: the signal is periodic there. Positive. [Hz]
+    seed : int
+        Not negative. The same seed gives the same phases.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of its range, `start` and `settle` leave nothing of `length`, or what
+        they leave is too short to tell the frequencies of a band apart.
+    """
+    amplitude, seed = finite("amplitude", amplitude), whole("seed", seed)
+    start, end, length = window(start, settle, length)
+    band = isinstance(frequencies, tuple)
+    lines = _band(frequencies, end - start) if band else row("frequencies", frequencies)
+    low, high = positive("the lowest frequency", lines.min()), lines.max()
+    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, lines.size)
+    pairs = zip(lines.tolist(), phases.tolist(), strict=True)
+    together = Sum(tuple(Tone(1.0, line, phase=phase) for line, phase in pairs))
+    points = math.ceil(_POINTS_PER_PERIOD * high * (end - start)) + 1
+    time, spacing = np.linspace(0.0, end - start, points, retstep=True)
+    # between two points it rises above the peak found by half its curvature at most
+    curvature = float(((2.0 * np.pi * lines) ** 2).sum())
+    peak = float(np.abs(together(time)).max()) + 0.5 * curvature * (0.5 * float(spacing)) ** 2
+    name = f"multisine {amplitude:g} V {low:g} to {high:g} Hz seed {seed}"
+    return settled(name, amplitude, [Piece(start, Scaled(amplitude / peak, together))], end, length)
+
+
+def _band(band: Sequence[float], period: float) -> Array:
+    """Evenly spaced frequencies, each with a whole number of its periods in `period`."""
+    if len(band) != 3 or not isinstance(band[2], int | np.integer) or band[2] < 1:
+        raise InputError(
+            f"a tuple of frequencies is (low, high, count), not {band}: "
+            "give a list for the frequencies themselves."
+        )
+    low, high = positive("low", band[0]), positive("high", band[1])
+    periods = np.unique(np.floor(np.linspace(low, high, band[2]) * period + 0.5))
+    if periods[0] < 1.0 or periods.size < band[2]:
+        raise InputError(
+            f"{band[2]} frequencies from {low:g} to {high:g} Hz cannot be told apart in "
+            f"{period:g} s: take fewer, a wider band or a longer time."
+        )
+    return np.asarray(periods / period)
+
+
+# --- source ---------------------------------------------------------------------------------------
+
+
+class _Axis(NamedTuple):
+    settle: float  # [s]
+    ramps: Sequence[float]  # [V/s]
+    steps: Sequence[float]  # [V]
+    sines: Sequence[tuple[float, float, float]]  # amplitude [V], frequency [Hz], length [s]
+
+
+_AXES = {
+    "hoist": _Axis(
+        settle=2.5,
+        ramps=(1, -1),
+        steps=(4, -4, 6.5, -6.5, 9, -9),
+        sines=((4, 0.1, 30), (6.5, 0.1, 30), (9, 0.1, 30), (6.5, 0.3, 20), (9, 0.3, 20)),
+    ),
+    "slew": _Axis(
+        settle=4.5,
+        ramps=(1,),
+        steps=(2,),
+        sines=((4, 0.05, 40), (4, 0.1, 30), (6, 0.05, 40)),
+    ),
+    "luff": _Axis(
+        settle=2.5,
+        ramps=(1,),
+        steps=(4, 6.5, 9),
+        sines=((4, 0.1, 30), (6.5, 0.1, 30), (9, 0.05, 40)),
+    ),
+}
+
+
+def source_tests(axis: str) -> dict[str, Maneuver]:
+    """Runs of the source's test campaign on the axis "hoist", "slew" or "luff".
+
+    Returns
+    -------
+    dict of str to Maneuver
+        By their names, such as "ramp +1 V/s", "step -4 V" and "sine 6.5 V 0.1 Hz".
+
+    Raises
+    ------
+    InputError
+        If there is no such axis.
+    """
+    if axis not in _AXES:
+        raise InputError(f"no tests of axis {axis!r}: the source has {', '.join(_AXES)}.")
+    settle, ramps, steps, sines = _AXES[axis]
+    runs = [replace(ramp(slope, settle=settle), name=f"ramp {slope:+g} V/s") for slope in ramps]
+    runs += [replace(step(volts), name=f"step {volts:+g} V") for volts in steps]
+    runs += [sine(volts, hertz, settle=settle, length=length) for volts, hertz, length in sines]
+    return {run.name: run for run in runs}
+
+
+# --- parsing --------------------------------------------------------------------------------------
+
+
+_COMMANDS: dict[str, Callable[..., Maneuver]] = {
+    make.__name__: make for make in (rest, step, ramp, sine, stairs, chirp, multisine)
+}
+
+
+def parse(text: str) -> Maneuver:
+    """Make a manoeuvre from a command line's "sine:6.5,0.1,length=40" or "stairs:2/4/0,dwell=3".
+
+    Parameters
+    ----------
+    text : str
+        Name of a function that makes a manoeuvre, colon, its arguments by position or keyword, in
+        V, s and Hz. A list is written 2/4/0, the band of a multisine low:high:count.
+
+    Raises
+    ------
+    InputError
+        If name, arguments or a number are wrong; it lists what is right.
+    """
+    name, _, arguments = text.partition(":")
+    if name not in _COMMANDS:
+        raise InputError(f"{name!r} is no manoeuvre: choose one of {', '.join(_COMMANDS)}.")
+    items = [item.rpartition("=") for item in arguments.split(",")] if arguments else []
+    positional = [_value(value) for _, equals, value in items if not equals]
+    keywords = {key.strip(): _value(value) for key, equals, value in items if equals}
+    if len(positional) + len(keywords) < len(items):
+        raise InputError(f"{text!r} gives a keyword twice: give it once.")
+    signature = inspect.signature(_COMMANDS[name])
+    try:
+        signature.bind(*positional, **keywords)
+    except TypeError as error:
+        known = ", ".join(signature.parameters)
+        raise InputError(f"{text!r}: {error}; {name} takes {known}.") from None
+    return _COMMANDS[name](*positional, **keywords)
+
+
+def _value(text: str) -> int | float | list[int | float] | tuple[int | float, ...]:
+    if "/" in text:
+        return [_number(part) for part in text.split("/")]
+    if ":" in text:
+        return tuple(_number(part) for part in text.split(":"))
+    return _number(text)
+
+
+def _number(text: str) -> int | float:
+    try:
+        return int(text) if text.strip().isdecimal() else float(text)
+    except ValueError:
+        raise InputError(
+            f"{text!r} is not a number: write one as 6.5, a list as 2/4/0, a band as 0.1:2:8."
+        ) from None

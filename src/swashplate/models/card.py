@@ -21,7 +21,7 @@ from swashplate.equations.derivatives import declared
 from swashplate.equations.equation import equation
 from swashplate.equations.fields import OFF, Definition, Flag
 from swashplate.equations.library import faded, interpolated, soft_threshold
-from swashplate.equations.model import Window
+from swashplate.equations.model import Model, Tap, Window
 
 COULOMB_WIDTH = 0.01
 """Rate of current below which the smooth Coulomb sign is proportional to it. [A/s]"""
@@ -73,33 +73,22 @@ class Card(NamedTuple):
 class CardInputs(NamedTuple):
     """The command as the card looks at it. [V]"""
 
-    at: Window
-    """Three samples around t - τ, two from there and one before."""
-    span: Window
-    """Three samples around the end of the interval of one sample about t - τ, t - τ + h/2."""
+    at: Window  # Three samples around t - τ, two from there and one before.
+    span: Window  # Three samples around the end of the sample interval about t - τ, t - τ + h/2.
 
 
 class ChannelConstants(NamedTuple):
     """What a channel needs of its parameters and the step; but for `decay` 0 without `exact`."""
 
-    decay: float
-    """exp(-a h)."""
-    stays: float
-    """I* one step after 1 A, at rest, without I_ss. [1]"""
-    swings: float
-    """I* one step after 1 A/s, without I_ss. [s]"""
-    pull: float
-    """Rate one step after I_ss came up to 1 A, at rest. [1/s]"""
-    slows: float
-    """Rate one step after 1 A/s, without I_ss. [1]"""
-    ramp: float
-    """I* at the end of a step in which I_ss rose from 0 to 1 A. [1]"""
-    ramp_rate: float
-    """Rate at the end of such a step. [1/s]"""
-    coulomb: float
-    """Rate that the Coulomb term takes in a step. [A/s]"""
-    lost: float
-    """I* lost for each rate that the Coulomb term takes. [s]"""
+    decay: float  # exp(-a h).
+    stays: float  # I* one step after 1 A, at rest, without I_ss. [1]
+    swings: float  # I* one step after 1 A/s, without I_ss. [s]
+    pull: float  # Rate one step after I_ss came up to 1 A, at rest. [1/s]
+    slows: float  # Rate one step after 1 A/s, without I_ss. [1]
+    ramp: float  # I* at the end of a step in which I_ss rose from 0 to 1 A. [1]
+    ramp_rate: float  # Rate at the end of such a step. [1/s]
+    coulomb: float  # Rate that the Coulomb term takes in a step. [A/s]
+    lost: float  # I* lost for each rate that the Coulomb term takes. [s]
 
 
 class CardConstants(NamedTuple):
@@ -112,12 +101,9 @@ class CardConstants(NamedTuple):
 class Filter(NamedTuple):
     """State of one channel."""
 
-    now: float
-    """I* at this sample; with `exact`, one sample earlier. [A]"""
-    before: float
-    """I* one sample before `now` [A]; with `exact`, its rate at `now` [A/s]."""
-    out: float
-    """I one sample earlier. [A]"""
+    now: float  # I* at this sample; with `exact`, one sample earlier. [A]
+    before: float  # I* one sample before `now` [A]; with `exact`, its rate at `now` [A/s].
+    out: float  # I one sample earlier. [A]
 
 
 class CardState(NamedTuple):
@@ -130,20 +116,15 @@ class CardState(NamedTuple):
 class CardSignals(NamedTuple):
     """What is known of the card at a sample."""
 
-    current: float
-    """Signed current, that of the positive channel less that of the negative one. [A]"""
+    current: float  # Signed, that of the positive channel less that of the negative one. [A]
     current_positive: float
-    current_negative: float
-    """I of each channel, never negative. [A]"""
+    current_negative: float  # I of each channel, never negative. [A]
     steady_positive: float
-    steady_negative: float
-    """I_ss of each channel. [A]"""
+    steady_negative: float  # I_ss of each channel. [A]
     filtered_positive: float
-    filtered_negative: float
-    """I* of each channel. [A]"""
+    filtered_negative: float  # I* of each channel. [A]
     rate_positive: float
-    rate_negative: float
-    """Rate of I* of each channel. [A/s]"""
+    rate_negative: float  # Rate of I* of each channel. [A/s]
 
 
 class ChannelSignals(NamedTuple):
@@ -158,19 +139,23 @@ class ChannelSignals(NamedTuple):
 class CardOptions(NamedTuple):
     """Forms of the card."""
 
-    literal: Flag = OFF
-    """Literal sign of the Coulomb term in the recursion, in place of the smooth one."""
-    split: Flag = OFF
-    """lim1 and the decay take over within a step, where the current passes I_t1 and I_t2."""
-    exact: Flag = OFF
-    """The filter's differential equation, in place of the recursion for 512 Hz."""
+    literal: Flag = OFF  # Literal sign of the Coulomb term in the recursion, not the smooth one.
+    split: Flag = OFF  # lim1 and the decay take over within a step, at I_t1 and I_t2.
+    exact: Flag = OFF  # The filter's differential equation, in place of the recursion for 512 Hz.
+
+
+class Currents(NamedTuple):
+    """A signed current as the channels of a card would have it. [A]"""
+
+    current: float
+    current_positive: float
+    current_negative: float
 
 
 class CardLimits(NamedTuple):
     """Limits of the card that can act at a sample."""
 
-    current_rate: bool
-    """A rate limit sets the current."""
+    current_rate: bool  # A rate limit sets the current.
 
 
 # --- command to settled current ------------------------------------------------------------------
@@ -201,22 +186,11 @@ def _share_above(first: float, last: float, threshold: float) -> tuple[float, fl
 def jump_share(
     newest: float, middle: float, oldest: float, fraction: float, threshold: float
 ) -> float:
-    """Share of one sample interval in which the command exceeds the dead zone.
+    """Share s of one sample interval in which the command exceeds the dead zone, 0 to 1.
 
-    Parameters
-    ----------
-    newest, middle, oldest : float
-        Three neighbouring samples of the channel's command. [V]
-    fraction : float
-        How far the interval's end lies behind `newest`, in samples, 0 to 1.
-    threshold : float
-        Dead zone V_dz. [V]
-
-    Returns
-    -------
-    float
-        s, 0 to 1. Switched by whole samples instead, the current would jump with V_dz and τ, and
-        no fit could move either.
+    Of three neighbouring samples of the channel's command [V]; the interval's end lies `fraction`
+    of a sample behind `newest`. Switched by whole samples instead, the current would jump with V_dz
+    and τ, and no fit could move either.
     """
     first = interpolated(middle, oldest, fraction)
     last = interpolated(newest, middle, fraction)
@@ -255,21 +229,10 @@ def _jump_share(
 
 @equation
 def steady_current(command: float, share: float, p: Channel) -> float:
-    """Current that a channel settles at.
+    """Current that a channel settles at, of the delayed command in its direction [V].
 
-    Parameters
-    ----------
-    command : float
-        Delayed command in the channel's direction. [V]
-    share : float
-        Share of the present interval in which the command exceeds V_dz, see `jump_share`.
-    p : Channel
-        Dead zone [V], jump [A] and polynomial gains [A/V, A/V², A/V³].
-
-    Returns
-    -------
-    float
-        I_ss = J s + G1 d + G2 d² + G3 d³ with d = max(V - V_dz, 0); Kruse eq. 3.3. [A]
+    I_ss = J s + G1 d + G2 d² + G3 d³ with d = max(V - V_dz, 0) and s of `jump_share`; Kruse eq.
+    3.3. [A]
     """
     d = max(command - p.V_dz, 0.0)
     return p.J * share + d * (p.G1 + d * (p.G2 + d * p.G3))
@@ -296,25 +259,10 @@ def coulomb_sign(change: float, h: float, literal: Flag) -> float:
 def filtered_current(
     now: float, before: float, steady: float, p: Channel, h: float, literal: Flag
 ) -> float:
-    """I* at the next sample by the source's recursion.
+    """I* at the next sample by the source's recursion, Kruse eq. 3.6. [A]
 
-    Parameters
-    ----------
-    now, before : float
-        I* at this sample and the one before. [A]
-    steady : float
-        I_ss at this sample. [A]
-    p : Channel
-        Damping [1], natural frequency [rad/s] and Coulomb term [A/s²].
-    h : float
-        Step. [s]
-    literal : None or True
-        True takes the literal sign of the rate, None the smooth one.
-
-    Returns
-    -------
-    float
-        Kruse eq. 3.6. Stable for ωh < 2ζ and ζωh < 1 + ω²h²/4 only (Jury). [A]
+    Of I* at this sample and the one before and of I_ss [A]; `literal` takes the literal sign of the
+    rate. Stable for ωh < 2ζ and ζωh < 1 + ω²h²/4 only (Jury).
     """
     w = p.omega * h
     friction = p.C * h * h * coulomb_sign(now - before, h, literal)
@@ -344,17 +292,8 @@ def current_acceleration(
 
 @equation
 def damped_waves(zeta: float, w: float) -> tuple[float, float]:
-    """The two functions that a damped oscillator is made of, e^(-ζw) cosh r and e^(-ζw) sinh r/r.
+    """The two functions of a damped oscillator at w = ω t, e^(-ζw) cosh r and e^(-ζw) sinh r/r.
 
-    Parameters
-    ----------
-    zeta : float
-        Damping ratio. [1]
-    w : float
-        Angle of the undamped oscillation, ω t. [rad]
-
-    Notes
-    -----
     r² = (ζ² - 1) w² is negative where the oscillator swings: cosh r and sinh r/r are then cos |r|
     and sin |r|/|r|. Both are entire functions of r², smooth at critical damping, where the power
     series computes them, to below rounding up to |r| = 1.
@@ -382,8 +321,6 @@ def damped_waves(zeta: float, w: float) -> tuple[float, float]:
 def channel_constants(p: Channel, h: float, options: CardOptions) -> ChannelConstants:
     """Constants of a channel's march.
 
-    Notes
-    -----
     With C = e^(-ζw) cosh r and S = e^(-ζw) sinh r/r of `damped_waves` at w = ωh, the solution of
     I'' + 2ζω I' + ω² I = ω² I_ss is I = (C + ζwS) I_0 + hS I_0', I' = -ω²hS I_0 + (C - ζwS) I_0'
     without I_ss; under an I_ss that rises by 1 A, straight over the step,
@@ -415,26 +352,11 @@ def channel_constants(p: Channel, h: float, options: CardOptions) -> ChannelCons
 def piece(
     first: float, last: float, length: float, centre: float, p: Channel
 ) -> tuple[float, float]:
-    """Integral of I_ss over a straight piece of the command, and its moment.
+    """Integral of I_ss over a straight piece of the command, and its moment, in steps. [A]
 
-    Parameters
-    ----------
-    first, last : float
-        Command at both ends, in the channel's direction. [V]
-    length, centre : float
-        Of the piece, in steps; the centre counts from the middle of the step.
-    p : Channel
-        Dead zone, jump and gains.
-
-    Returns
-    -------
-    integral, moment : float
-        ∫ I_ss and ∫ I_ss x, x in steps from the middle of the step. [A]
-
-    Notes
-    -----
-    The part beyond the dead zone lies at the end of a rise, at the beginning of a fall. Over it the
-    polynomial counts as straight.
+    The piece goes from `first` to `last` [V]; its length and its centre, counted from the middle of
+    the step, are in steps. The part beyond the dead zone lies at the end of a rise, at the
+    beginning of a fall. Over it the polynomial counts as straight.
     """
     on = length * share_above(first, last, p.V_dz)
     shift = 0.5 * (length - on)
@@ -447,27 +369,12 @@ def piece(
 
 @equation
 def steady_course(direction: float, at: Window, p: Channel) -> tuple[float, float]:
-    """I_ss at both ends of the step that ends at this sample, if it went straight between them.
+    """I_ss at both ends of the step that ends at this sample, if it went straight between them. [A]
 
-    Parameters
-    ----------
-    direction : float
-        Of the channel, +1.0 or -1.0.
-    at : Window
-        The command at t - τ and a sample before. [V]
-    p : Channel
-        Dead zone, jump and gains.
-
-    Returns
-    -------
-    begins, ends : float
-        Of the straight line with the integral and the moment of I_ss over the step. [A]
-
-    Notes
-    -----
-    The command goes straight between samples, one of which lies within the step; a jump happens
-    where it passes V_dz. A line through the two ends alone would come too early or too late by up
-    to half a step, and smear a jump over two. Nothing is seen of the command after t - τ.
+    The straight line has the integral and the moment of I_ss over the step: the command goes
+    straight between samples, one of which lies within the step; a jump happens where it passes
+    V_dz. A line through the two ends alone would come too early or too late by up to half a step,
+    and smear a jump over two. Nothing is seen of the command after t - τ.
     """
     middle = direction * at.s[1]
     first = direction * interpolated(at.s[1], at.s[2], at.f)
@@ -481,22 +388,10 @@ def steady_course(direction: float, at: Window, p: Channel) -> tuple[float, floa
 
 @equation
 def exact_filter(s: Filter, begins: float, ends: float, k: ChannelConstants) -> tuple[float, float]:
-    """I* [A] and its rate [A/s] at this sample, from those of the last one.
+    """I* [A] and its rate [A/s] at this sample, from the state and I_ss of the step between.
 
-    Parameters
-    ----------
-    s : Filter
-        I* and its rate at the last sample.
-    begins, ends : float
-        I_ss at both ends of the step between, see `steady_course`. [A]
-    k : ChannelConstants
-        Of the march.
-
-    Notes
-    -----
-    Within the step the Coulomb term is a constant between ±C, as large as it must be: it takes
-    C e^(-ζw) h sinh r/r of the rate, but stops at zero, where it holds the current. So it sticks
-    exactly, at any step.
+    The Coulomb term is a constant between ±C, as large as it must be: it takes C e^(-ζw) h sinh r/r
+    of the rate, but stops at zero, where it holds the current. So it sticks exactly, at any step.
     """
     off = s.now - begins
     rise = ends - begins
@@ -529,42 +424,15 @@ def taken_over(target: float, previous: float, I_t1: float, lim1: float, h: floa
 
 @equation
 def limited_current(
-    target: float,
-    previous: float,
-    steady: float,
-    p: Channel,
-    decay: float,
-    h: float,
-    split: Flag,
+    target: float, previous: float, steady: float, p: Channel, decay: float, h: float, split: Flag
 ) -> float:
-    """Channel output: the filter's state behind rate limits and the final decay.
+    """Channel output: the filter's state `target` behind rate limits and the final decay. [A]
 
-    Parameters
-    ----------
-    target : float
-        Filter state I*. [A]
-    previous : float
-        Output one sample earlier. [A]
-    steady : float
-        I_ss; zero means that the command has gone. [A]
-    p : Channel
-        lim1, lim2: rate limits away from and towards zero, magnitudes, `inf` for none [A/s];
-        I_t1, I_t2: output current above which lim1 acts, and below which lim2 gives way to the
-        decay [A].
-    decay : float
-        exp(-a h).
-    h : float
-        Step. [s]
-    split : None or True
-        Where within a step lim1 takes over from the filter, and the decay from lim2: None at the
-        step's end, True where the output passes I_t1 or I_t2. Then it follows both thresholds,
-        and anything before them, without flat stretches or jumps.
-
-    Returns
-    -------
-    float
-        I, never negative; Kruse eqs. 3.8 and 3.9 as a limiter of position, because the printed
-        rate form does not keep the steady level. [A]
+    Kruse eqs. 3.8 and 3.9 as a limiter of position, because the printed rate form does not keep the
+    steady level. `previous` is the output one sample earlier; I_ss = 0 means that the command has
+    gone; `decay` is exp(-a h). Without `split` lim1 takes over from the filter, and the decay from
+    lim2, at a step's end; with it where the output passes I_t1 or I_t2: then it follows both
+    thresholds, and anything before them, without flat stretches or jumps.
     """
     if target >= previous:
         if target <= p.I_t1:
@@ -630,12 +498,7 @@ def channel_sample(
 
 @equation
 def card_sample(
-    state: CardState,
-    inputs: CardInputs,
-    p: Card,
-    k: CardConstants,
-    h: float,
-    options: CardOptions,
+    state: CardState, inputs: CardInputs, p: Card, k: CardConstants, h: float, options: CardOptions
 ) -> CardSignals:
     """Currents of the card at a sample."""
     plus = channel_sample(state.plus, inputs, 1.0, p.plus, k.plus, h, options)
@@ -699,6 +562,21 @@ def card_step(
 
 
 @equation
+def channel_rates(state: Filter, command: float, p: Channel, options: CardOptions) -> Filter:
+    """Rates of I* and of its rate, which is `before` here, in continuous time."""
+    steady = steady_current(command, 1.0, p)
+    faster = current_acceleration(state.now, state.before, steady, p, options.literal)
+    return Filter(state.before, faster, 0.0)
+
+
+@equation
+def card_rates(state: CardState, voltage: float, p: Card, options: CardOptions) -> CardState:
+    """Rates of the card's state under the delayed command, while no rate limit acts. [1/s]"""
+    plus = channel_rates(state.plus, voltage, p.plus, options)
+    return CardState(plus, channel_rates(state.minus, -voltage, p.minus, options))
+
+
+@equation
 def channel_settled(level: float, options: CardOptions) -> Filter:
     """State of a channel that has settled at a current. [A]"""
     return Filter(level, level if options.exact is None else 0.0, level)
@@ -738,3 +616,48 @@ def card_limits(
             signals.current_negative, signals.filtered_negative, state.minus.out, p.minus.I_t2
         )
     )
+
+
+@equation
+def flowing_currents(state: CardState) -> Currents:
+    """Currents of a card while no rate limit acts."""
+    return Currents(state.plus.now - state.minus.now, state.plus.now, state.minus.now)
+
+
+@equation
+def flowing_rest(voltage: float, p: Card) -> CardState:
+    """State of a card in continuous time under a constant command. [V]"""
+    plus, minus = channel_level(voltage, p.plus), channel_level(-voltage, p.minus)
+    return CardState(Filter(plus, 0.0, plus), Filter(minus, 0.0, minus))
+
+
+# --- the models -----------------------------------------------------------------------------------
+
+card = Model(
+    "card",
+    parameters=Card,
+    state=CardState,
+    step=card_step,
+    sample=card_sample,
+    constants=card_constants,
+    rest=card_rest,
+    settled=card_settled,
+    inputs=CardInputs,
+    taps={
+        "at": Tap("voltage", delay="tau", width=3),
+        "span": Tap("voltage", delay="tau", ahead=0.5, width=3),
+    },
+    options=CardOptions,
+    limits=card_limits,
+)
+
+flowing_card = Model(
+    "card",
+    parameters=Card,
+    state=CardState,
+    step=card_rates,
+    sample=flowing_currents,
+    settled=flowing_rest,
+    options=CardOptions,
+)
+"""The card in continuous time: rates in place of the step, and no delay."""

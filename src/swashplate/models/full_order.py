@@ -19,7 +19,8 @@ from swashplate.equations.fields import OFF, Flag
 from swashplate.equations.library import clipped
 from swashplate.equations.loops import repeated, root
 from swashplate.equations.model import Model, join
-from swashplate.models.drive import card, current_sum, signed_current, source
+from swashplate.models.card import card
+from swashplate.models.drive import current_sum, signed_current, source
 from swashplate.models.machine import (
     Machine,
     balanced_spool,
@@ -60,104 +61,73 @@ class Plant(NamedTuple):
 class PlantOptions(NamedTuple):
     """Forms of the machine."""
 
-    symmetric: Flag = OFF
-    """Root √((ΔP - sgn(x)P)/2) in place of the published √((ΔP - P)/2) (erratum 13)."""
-    air: Flag = OFF
-    """The oil has free air in it, see `mixture_modulus`."""
-    held: Flag = OFF
-    """The current keeps its value between samples, in place of a straight line."""
+    symmetric: Flag = OFF  # √((ΔP - sgn(x)P)/2) in place of the published root (erratum 13).
+    air: Flag = OFF  # The oil has free air in it, see `mixture_modulus`.
+    held: Flag = OFF  # The current keeps its value between samples, in place of a straight line.
 
 
 class Substeps(NamedTuple):
     """How a run is integrated: the same for all runs that are compared."""
 
-    substeps: float
-    """Sub-steps between two samples."""
+    substeps: float  # Sub-steps between two samples.
 
 
 class Motion(NamedTuple):
     """The five states."""
 
-    spool_position: float
-    """x, positive towards more speed. [m]"""
-    spool_velocity: float
-    """[m/s]"""
-    piston_pressure: float
-    """Stroker pressure P. [Pa]"""
-    swash_angle: float
-    """α_sw. [rad]"""
-    swash_rate: float
-    """[rad/s]"""
+    spool_position: float  # x, positive towards more speed. [m]
+    spool_velocity: float  # [m/s]
+    piston_pressure: float  # Stroker pressure P. [Pa]
+    swash_angle: float  # α_sw. [rad]
+    swash_rate: float  # [rad/s]
 
 
 class PlantState(NamedTuple):
     """What the machine remembers from sample to sample."""
 
-    motion: Motion
-    """One sample earlier."""
-    current: float
-    """One sample earlier. [A]"""
-    begun: float
-    """0 at the first sample, 1 from the second on."""
+    motion: Motion  # One sample earlier.
+    current: float  # One sample earlier. [A]
+    begun: float  # 0 at the first sample, 1 from the second on.
 
 
 class PlantInputs(NamedTuple):
     """What drives the machine at a sample."""
 
-    current: float
-    """Signed current, that of the positive channel less that of the negative one. [A]"""
+    current: float  # Signed, that of the positive channel less that of the negative one. [A]
 
 
 class PlantConstants(NamedTuple):
     """What follows from the parameters alone."""
 
-    rest_pressure: float
-    """P0, which holds the load at rest with the plate upright. [Pa]"""
+    rest_pressure: float  # P0, which holds the load at rest with the plate upright. [Pa]
     lower: float
-    upper: float
-    """Pressures at which the relief valve opens. [Pa]"""
-    reserve: float
-    """2 less the fastest rate times a sub-step: above 0 where the scheme is stable. [1]"""
+    upper: float  # Pressures at which the relief valve opens. [Pa]
+    reserve: float  # 2 less the fastest rate times a sub-step: above 0 where stable. [1]
 
 
 class PlantSignals(NamedTuple):
     """What is known of the machine at a sample."""
 
-    solenoid_force: float
-    """Net force of both solenoids on the spool. [N]"""
-    spool_position: float
-    """Displacement of the spool. [m]"""
-    spool_velocity: float
-    """[m/s]"""
-    orifice_opening: float
-    """Effective opening, what the orifices leave of the spool's displacement. [m]"""
-    valve_flow: float
-    """Flow through the valve towards the stroking piston. [m³/s]"""
-    piston_pressure: float
-    """Stroker pressure P. [Pa]"""
-    stroker_pressure: float
-    """Stroking pressure δP = P - P0 about the one that holds the load at rest. [Pa]"""
-    swash_angle: float
-    """[rad]"""
-    swash_rate: float
-    """[rad/s]"""
-    shaft_speed: float
-    """Speed of the shaft, of the turret for slew. [rad/s]"""
-    motor_pressure_drop: float
-    """P_hi - P_lo across the motor, under load inertia and gravity. [Pa]"""
-    pump_flow: float
-    """Flow of the pump to the motor. [m³/s]"""
+    solenoid_force: float  # Net force of both solenoids on the spool. [N]
+    spool_position: float  # Displacement of the spool. [m]
+    spool_velocity: float  # [m/s]
+    orifice_opening: float  # What the orifices leave of the spool's displacement. [m]
+    valve_flow: float  # Flow through the valve towards the stroking piston. [m³/s]
+    piston_pressure: float  # Stroker pressure P. [Pa]
+    stroker_pressure: float  # δP = P - P0 about the one that holds the load at rest. [Pa]
+    swash_angle: float  # [rad]
+    swash_rate: float  # [rad/s]
+    shaft_speed: float  # Speed of the shaft, of the turret for slew. [rad/s]
+    motor_pressure_drop: float  # P_hi - P_lo across the motor, under load inertia and gravity. [Pa]
+    pump_flow: float  # Flow of the pump to the motor. [m³/s]
 
 
 class Rates(NamedTuple):
     """Rates of the three states whose rate is not itself a state, where no limit holds."""
 
-    velocity: float
-    """[m/s²]"""
-    pressure: float
-    """[Pa/s]"""
-    swash_rate: float
-    """[rad/s²]"""
+    velocity: float  # [m/s²]
+    pressure: float  # [Pa/s]
+    swash_rate: float  # [rad/s²]
 
 
 # --- in motion -----------------------------------------------------------------------------------
@@ -165,19 +135,7 @@ class Rates(NamedTuple):
 
 @equation
 def free_rates(state: Motion, force: float, p: Machine, options: PlantOptions) -> Rates:
-    """Rates where no limit holds; those of position and angle are velocity and swash rate.
-
-    Parameters
-    ----------
-    state : Motion
-        The five states.
-    force : float
-        Net force of both solenoids. [N]
-    p : Machine
-        The machine.
-    options : PlantOptions
-        Its form.
-    """
+    """Rates where no limit holds; those of position and angle are velocity and swash rate."""
     tangent = tan(state.swash_angle)
     sine = feedback_sine(tangent, p)
     pressure, rate = state.piston_pressure, state.swash_rate
@@ -207,36 +165,16 @@ def stopped(velocity: float, position: float, lower: float, upper: float) -> flo
 class Span(NamedTuple):
     """What the time between two samples is divided into."""
 
-    step: float
-    """A sub-step. [s]"""
-    current: float
-    """At its beginning. [A]"""
-    rise: float
-    """Of the current in a sub-step. [A]"""
+    step: float  # A sub-step. [s]
+    current: float  # At its beginning. [A]
+    rise: float  # Of the current in a sub-step. [A]
 
 
 @equation
 def substep(
-    state: Motion,
-    number: float,
-    span: Span,
-    p: Plant,
-    k: PlantConstants,
-    options: PlantOptions,
+    state: Motion, number: float, span: Span, p: Plant, k: PlantConstants, options: PlantOptions
 ) -> Motion:
-    """The five states a sub-step later, see the module's text.
-
-    Parameters
-    ----------
-    state : Motion
-        Before.
-    number : float
-        Of the sub-step, from 0.
-    span : Span
-        Length and current of the sub-steps.
-    p, k, options :
-        The machine.
-    """
+    """The five states a sub-step later, see the module's text; sub-steps are counted from 0."""
     m, h, before = p.machine, span.step, state.piston_pressure
     half, stroke = 0.5 * h, m.spool_stroke
     velocity = stopped(state.spool_velocity, state.spool_position, -stroke, stroke)

@@ -147,25 +147,11 @@ def spool_resistance(position: float, velocity: float, p: Machine) -> float:
 def spool_acceleration(
     position: float, velocity: float, force: float, arm_sine: float, p: Machine
 ) -> float:
-    """Acceleration of the spool.
+    """Acceleration x'' of the spool under the net force F of both solenoids. [m/s²]
 
-    Parameters
-    ----------
-    position, velocity : float
-        x [m] and its rate [m/s], positive towards more speed.
-    force : float
-        Net force F of both solenoids. [N]
-    arm_sine : float
-        sin α of the feedback arm, see `feedback_sine`.
-    p : Machine
-        d1, m_sp, J_fa, b_sp (viscous damping, which eq. 6.19 lacks), k_f d3², x0.
-
-    Returns
-    -------
-    float
-        x''. With u = x - x0 and D = d1² + u², Kruse eq. 6.19:
-        (m_sp D/d1 + J_fa d1/D) x'' = (F - b x') D/d1 - k_f d3² (d1 sin α + u cos α)/√D
-        + 2 J_fa d1 u x'²/D². [m/s²]
+    With u = x - x0 and D = d1² + u², Kruse eq. 6.19 with the viscous damping that it lacks:
+    (m_sp D/d1 + J_fa d1/D) x'' = (F - b x') D/d1 - k_f d3² (d1 sin α + u cos α)/√D
+    + 2 J_fa d1 u x'²/D².
     """
     moment = spool_moment(position, force, arm_sine, p)
     resisting = spool_resistance(position, velocity, p) * velocity
@@ -184,23 +170,10 @@ def valve_opening(position: float, p: Machine) -> float:
 
 @equation
 def valve_flow(position: float, pressure: float, p: Machine, symmetric: Flag) -> float:
-    """Flow through the valve towards the stroking piston.
+    """Flow through the valve towards the stroking piston. [m³/s]
 
-    Parameters
-    ----------
-    position : float
-        x of the spool. [m]
-    pressure : float
-        Stroker pressure P. [Pa]
-    p : Machine
-        C_o, ΔP, stroke and in-line orifices.
-    symmetric : None or True
-        True takes the root √((ΔP - sgn(x)P)/2), None the published √((ΔP - P)/2) (erratum 13).
-
-    Returns
-    -------
-    float
-        q = C_o √((ΔP - σP)/2) x_eff; Kruse eq. 6.31 with the constant gain of eq. 6.37. [m³/s]
+    q = C_o √((ΔP - σP)/2) x_eff; Kruse eq. 6.31 with the constant gain of eq. 6.37. σ is 1 in the
+    published root, with `symmetric` sgn(x) (erratum 13).
     """
     opening = valve_opening(position, p)
     head, _ = flow_head(pressure, opening, p.supply_pressure, symmetric)
@@ -209,21 +182,11 @@ def valve_flow(position: float, pressure: float, p: Machine, symmetric: Flag) ->
 
 @equation
 def mixture_modulus(pressure: float, p: Machine) -> float:
-    """Bulk modulus of oil with free air in it.
+    """Bulk modulus of oil with free air in it, at an absolute pressure. [Pa]
 
-    Parameters
-    ----------
-    pressure : float
-        Absolute. [Pa]
-    p : Machine
-        B of the oil alone, χ the air's volume over the oil's at atmospheric pressure p0.
-
-    Returns
-    -------
-    float
-        B (1 + χ p0/p)/(1 + χ p0 B/p²), air compressed at a constant temperature and none of it
-        dissolved; Gholizadeh, Burton and Schoenau (2011), Fluid bulk modulus: a literature survey,
-        International Journal of Fluid Power 12(3), 5-15. [Pa]
+    B (1 + χ p0/p)/(1 + χ p0 B/p²), air compressed at a constant temperature and none of it
+    dissolved; Gholizadeh, Burton and Schoenau (2011), Fluid bulk modulus: a literature survey,
+    International Journal of Fluid Power 12(3), 5-15.
     """
     air = p.air_fraction * ATMOSPHERE / pressure
     return p.bulk_modulus * (1.0 + air) / (1.0 + air * p.bulk_modulus / pressure)
@@ -231,10 +194,10 @@ def mixture_modulus(pressure: float, p: Machine) -> float:
 
 @equation
 def oil_modulus(pressure: float, p: Machine, air: Flag) -> float:
-    """Bulk modulus at a stroker pressure P: with air the mean of both ends of the cylinder.
+    """Bulk modulus at a stroker pressure P: with air the mean of both ends of the cylinder. [Pa]
 
     Both orifices of the valve drop the same, so that the ends are at p0 + (ΔP ± P)/2 (eqs. 6.26 to
-    6.28). [Pa]
+    6.28).
     """
     if air is None:
         return p.bulk_modulus
@@ -247,26 +210,7 @@ def oil_modulus(pressure: float, p: Machine, air: Flag) -> float:
 def oil_pressure_rate(
     pressure: float, flow: float, piston_speed: float, p: Machine, air: Flag
 ) -> float:
-    """Rate of the stroker pressure.
-
-    Parameters
-    ----------
-    pressure : float
-        P. [Pa]
-    flow : float
-        Flow through the valve. [m³/s]
-    piston_speed : float
-        x_st'. [m/s]
-    p : Machine
-        A_s, K_L around the piston, V, B, χ.
-    air : None or True
-        As in `oil_modulus`.
-
-    Returns
-    -------
-    float
-        (q - K_L P - A_s x_st') B/V; Kruse eqs. 6.32, 6.33, 6.35. [Pa/s]
-    """
+    """Rate of the stroker pressure, (q - K_L P - A_s x_st') B/V; Kruse eqs. 6.32 to 6.35. [Pa/s]"""
     stays = flow - p.piston_leakage * pressure - p.piston_area * piston_speed
     return stays * (oil_modulus(pressure, p, air) / p.oil_volume)
 
@@ -288,21 +232,9 @@ def piston_speed(tangent: float, swash_rate: float, p: Machine) -> float:
 
 @equation
 def holding_pressure(tangent: float, motor_pressure: float, p: Machine) -> float:
-    """Stroker pressure that holds the swash plate where it is.
+    """Stroker pressure that holds the swash plate where it is. [Pa]
 
-    Parameters
-    ----------
-    tangent : float
-        tan α_sw.
-    motor_pressure : float
-        Pressure drop across the motor, P_hi - P_lo. [Pa]
-    p : Machine
-        d4, k_r, A_s and A_p d5 of the pumping pistons.
-
-    Returns
-    -------
-    float
-        (k_r d4 tan α + (P_hi - P_lo) A_p d5 cos α/(d4 (1 + tan²α)))/A_s; Kruse eq. 6.53. [Pa]
+    (k_r d4 tan α + (P_hi - P_lo) A_p d5 cos α/(d4 (1 + tan²α)))/A_s; Kruse eq. 6.53.
     """
     w = 1.0 + tangent * tangent
     arm = p.swash_arm
@@ -337,25 +269,10 @@ def plate_resistance(tangent: float, swash_rate: float, p: Machine) -> float:
 def swash_acceleration(
     pressure: float, tangent: float, swash_rate: float, motor_pressure: float, p: Machine
 ) -> float:
-    """Angular acceleration of the swash plate.
+    """Angular acceleration α_sw'' of the swash plate. [rad/s²]
 
-    Parameters
-    ----------
-    pressure : float
-        Stroker pressure P. [Pa]
-    tangent, swash_rate : float
-        tan α_sw and α_sw' [rad/s].
-    motor_pressure : float
-        Pressure drop across the motor. [Pa]
-    p : Machine
-        d4, J_sw, m_st, b_st, and as in `holding_pressure`.
-
-    Returns
-    -------
-    float
-        α_sw''. With w = 1 + tan²α, Kruse eq. 6.51 with the lever d4 w (erratum 16):
-        (J_sw + m_st d4² w²) α'' = A_s d4 w (P - P_hold) - b_st d4² w² α'
-        - 2 m_st d4² tan α w² α'². [rad/s²]
+    With w = 1 + tan²α, Kruse eq. 6.51 with the lever d4 w (erratum 16):
+    (J_sw + m_st d4² w²) α'' = A_s d4 w (P - P_hold) - b_st d4² w² α' - 2 m_st d4² tan α w² α'².
     """
     moment = plate_moment(pressure, tangent, motor_pressure, p)
     resisting = plate_resistance(tangent, swash_rate, p) * swash_rate
@@ -369,8 +286,8 @@ def swash_acceleration(
 def pump_flow(swash_angle: float, p: Machine) -> float:
     """Flow of the pump, Q = C_q α_sw. [m³/s]
 
-    A swash plate pump's flow goes with tan α_sw; the angle itself is what the published Z10
-    belongs to (erratum 18).
+    A swash plate pump's flow goes with tan α_sw; the published Z10 belongs to the angle (erratum
+    18).
     """
     return p.pump_flow_gain * swash_angle
 

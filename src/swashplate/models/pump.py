@@ -24,6 +24,7 @@ from swashplate.equations.equation import equation
 from swashplate.equations.fields import MINUS, OFF, Definition, Flag
 from swashplate.equations.library import arctangent, small_arctangent
 from swashplate.equations.loops import root
+from swashplate.equations.model import Model
 from swashplate.models.refinements import (
     accelerating_leakage,
     damping_factor,
@@ -162,134 +163,83 @@ class Solenoids(NamedTuple):
 class PumpInputs(NamedTuple):
     """What drives the pump at a sample; where nothing was measured, the parameter's value."""
 
-    current: float
-    """Signed current, that of the positive channel less that of the negative one. [A]"""
-    pump_speed: float
-    """Speed of the prime mover, relative to that of Z10. [1]"""
-    load_torque: float
-    """C_g of gravity at the shaft, positive against positive speed. [N m]"""
-    supply_pressure: float
-    """Supply pressure less static pressure, in place of Z9. [Pa]"""
+    current: float  # Signed, that of the positive channel less that of the negative one. [A]
+    pump_speed: float  # Speed of the prime mover, relative to that of Z10. [1]
+    load_torque: float  # C_g of gravity at the shaft, positive against positive speed. [N m]
+    supply_pressure: float  # Supply pressure less static pressure, in place of Z9. [Pa]
 
 
 class PumpOptions(NamedTuple):
     """Forms of the pump."""
 
-    symmetric: Flag = OFF
-    """Root √((Z9 - sgn(x)δP)/2) in place of the published √((Z9 - δP)/2)."""
-    leaky: Flag = OFF
-    """Z7 counts: the pressure is integrated by Runge-Kutta."""
-    loaded: Flag = OFF
-    """Z12 counts: the speed depends on the swash plate's rate."""
-    steep: Flag = OFF
-    """A stop of the swash plate lies beyond 22.5°."""
-    friction: Flag = OFF
-    """Friction of spool and solenoid, see `held_back`."""
-    hysteresis: Flag = OFF
-    """Hysteresis of the solenoids, see `magnetising_current`."""
-    ripple: Flag = OFF
-    """Ripple of the cam ring, see `rippled_angle`."""
-    damping: Flag = OFF
-    """Damping of the swash plate, see `plate_follows`."""
-    leakage: Flag = OFF
-    """Leakage of the motor under load, see `static_leakage`."""
-    line: Flag = OFF
-    """Line and inertia, see `line_step`."""
+    symmetric: Flag = OFF  # Root √((Z9 - sgn(x)δP)/2) in place of the published √((Z9 - δP)/2).
+    leaky: Flag = OFF  # Z7 counts: the pressure is integrated by Runge-Kutta.
+    loaded: Flag = OFF  # Z12 counts: the speed depends on the swash plate's rate.
+    steep: Flag = OFF  # A stop of the swash plate lies beyond 22.5°.
+    friction: Flag = OFF  # Friction of spool and solenoid, see `held_back`.
+    hysteresis: Flag = OFF  # Hysteresis of the solenoids, see `magnetising_current`.
+    ripple: Flag = OFF  # Ripple of the cam ring, see `rippled_angle`.
+    damping: Flag = OFF  # Damping of the swash plate, see `plate_follows`.
+    leakage: Flag = OFF  # Leakage of the motor under load, see `static_leakage`.
+    line: Flag = OFF  # Line and inertia, see `line_step`.
 
 
 class PumpConstants(NamedTuple):
     """What the march needs of the parameters and the step; 0 for what is off."""
 
     lower_stop: float
-    upper_stop: float
-    """Pressures at which the swash plate reaches its stops. [Pa]"""
+    upper_stop: float  # Pressures at which the swash plate reaches its stops. [Pa]
     lower: float
-    upper: float
-    """The same within ±Z15: the pressure never leaves them. [Pa]"""
-    Z12: float
-    """With the motor's leakage, where the line is stiff. [1]"""
-    friction_width: float
-    """Distance by which friction can hold the spool back. [m]"""
-    dither_factor: float
-    """What dither leaves of it in a step. [1]"""
-    damping_factor: float
-    """What a step leaves of the plate's lag. [1]"""
+    upper: float  # The same within ±Z15: the pressure never leaves them. [Pa]
+    Z12: float  # With the motor's leakage, where the line is stiff. [1]
+    friction_width: float  # Distance by which friction can hold the spool back. [m]
+    dither_factor: float  # What dither leaves of it in a step. [1]
+    damping_factor: float  # What a step leaves of the plate's lag. [1]
 
 
 class PumpState(NamedTuple):
     """What the pump remembers from sample to sample; what belongs to an option is 0 without it."""
 
-    pressure: float
-    """δP at this sample. [Pa]"""
-    plate_pressure: float = 0.0
-    """Pressure at which the swash plate would stand still at this sample (damping). [Pa]"""
-    magnetising_current: float = 0.0
-    """One sample earlier (hysteresis). [A]"""
-    spool: float = 0.0
-    """Displacement of the spool one sample earlier (friction). [m]"""
-    deflection: float = 0.0
-    """Distance by which friction held it back then (friction). [m]"""
-    torque: float = 0.0
-    """Torque of the motor one sample earlier (line). [N m]"""
-    speed: float = 0.0
-    """Speed of the shaft one sample earlier (line, ripple). [rad/s]"""
-    flow_speed: float = 0.0
-    """Speed that the pump's flow would have given a stiff line then (line). [rad/s]"""
-    load_torque: float = 0.0
-    """Torque of the load one sample earlier (line). [N m]"""
-    shaft_angle: float = 0.0
-    """Angle of the shaft since the start, one sample earlier (ripple). [rad]"""
-    begun: float = 0.0
-    """0 at the first sample, 1 from the second on (friction, line, ripple)."""
+    pressure: float  # δP at this sample. [Pa]
+    plate_pressure: float = 0.0  # At which the plate would stand still now (damping). [Pa]
+    magnetising_current: float = 0.0  # One sample earlier (hysteresis). [A]
+    spool: float = 0.0  # Displacement of the spool one sample earlier (friction). [m]
+    deflection: float = 0.0  # Distance by which friction held it back then (friction). [m]
+    torque: float = 0.0  # Torque of the motor one sample earlier (line). [N m]
+    speed: float = 0.0  # Speed of the shaft one sample earlier (line, ripple). [rad/s]
+    flow_speed: float = 0.0  # Speed that the flow would have given a stiff line then. [rad/s]
+    load_torque: float = 0.0  # Torque of the load one sample earlier (line). [N m]
+    shaft_angle: float = 0.0  # Since the start, one sample earlier (ripple). [rad]
+    begun: float = 0.0  # 0 at the first sample, 1 from the second on (friction, line, ripple).
 
 
 class PumpSignals(NamedTuple):
     """What is known of the pump at a sample."""
 
-    magnetising_current: float
-    """Current that the force belongs to, behind the hysteresis. [A]"""
-    solenoid_force: float
-    """Net force of both solenoids on the spool, positive towards more speed. [N]"""
-    spool_free: float
-    """Displacement of the spool before its stop. [m]"""
-    spool_position: float
-    """Displacement of the spool, within its stroke. [m]"""
-    spool_deflection: float
-    """Distance by which friction holds it back. [m]"""
-    orifice_opening: float
-    """Effective opening, what the orifices leave of the spool's displacement. [m]"""
-    stroker_pressure: float
-    """Stroking pressure δP about its equilibrium. [Pa]"""
-    swash_angle: float
-    """Angle of the swash plate. [rad]"""
-    swash_rate: float
-    """Rate of the swash plate, zero at a stop. [rad/s]"""
-    flow_speed: float
-    """Speed that the pump's flow would give a stiff line. [rad/s]"""
-    shaft_speed: float
-    """Speed of the shaft, of the turret for slew. [rad/s]"""
-    shaft_angle: float
-    """Angle of the shaft since the start, as the ripple needs it; 0 without. [rad]"""
-    motor_torque: float
-    """Torque that the motor bears, positive where it drives towards positive speed. [N m]"""
-    motor_pressure_drop: float
-    """P_hi - P_lo over the motor, 0 where its constant is not known. [Pa]"""
+    magnetising_current: float  # Current that the force belongs to, behind the hysteresis. [A]
+    solenoid_force: float  # Net force on the spool, positive towards more speed. [N]
+    spool_free: float  # Displacement of the spool before its stop. [m]
+    spool_position: float  # Displacement of the spool, within its stroke. [m]
+    spool_deflection: float  # Distance by which friction holds it back. [m]
+    orifice_opening: float  # What the orifices leave of the spool's displacement. [m]
+    stroker_pressure: float  # Stroking pressure δP about its equilibrium. [Pa]
+    swash_angle: float  # Angle of the swash plate. [rad]
+    swash_rate: float  # Rate of the swash plate, zero at a stop. [rad/s]
+    flow_speed: float  # Speed that the pump's flow would give a stiff line. [rad/s]
+    shaft_speed: float  # Speed of the shaft, of the turret for slew. [rad/s]
+    shaft_angle: float  # Since the start, as the ripple needs it; 0 without. [rad]
+    motor_torque: float  # Positive where the motor drives towards positive speed. [N m]
+    motor_pressure_drop: float  # P_hi - P_lo, 0 where the motor's constant is not known. [Pa]
 
 
 class PumpLimits(NamedTuple):
     """Limits of the pump that can act at a sample."""
 
-    dead_zone: bool
-    """The current is within the solenoids' dead zone: no force."""
-    orifice: bool
-    """The in-line orifice, not the spool, limits the flow, and the plate moves: the acceleration
-    limit."""
-    spool: bool
-    """The spool is at its stop."""
-    swash_stop: bool
-    """The swash plate is at a stop: the speed limit."""
-    relief: bool
-    """The relief valve holds the stroking pressure at ±Z15."""
+    dead_zone: bool  # The current is within the solenoids' dead zone: no force.
+    orifice: bool  # The in-line orifice limits the flow, the plate moves: acceleration limit.
+    spool: bool  # The spool is at its stop.
+    swash_stop: bool  # The swash plate is at a stop: the speed limit.
+    relief: bool  # The relief valve holds the stroking pressure at ±Z15.
 
 
 # --- solenoids and spool -------------------------------------------------------------------------
@@ -306,10 +256,7 @@ def _effective_current(current: float, Z17: float) -> tuple[float, float]:
     # an edge of the dead zone belongs to it; without one, zero belongs to the positive side
     above = current > Z17 or (current == 0.0 and Z17 == 0.0)
     below = current < -Z17
-    return (
-        1.0 if above or below else 0.0,
-        -1.0 if above else (1.0 if below else 0.0),
-    )
+    return (1.0 if above or below else 0.0, -1.0 if above else (1.0 if below else 0.0))
 
 
 @equation
@@ -330,21 +277,10 @@ def solenoids_of(p: Pump) -> Solenoids:
 
 @equation
 def solenoid_force(current: float, p: Solenoids) -> float:
-    """Net force of both solenoids on the spool.
+    """Net force of both solenoids on the spool under a signed current. [N]
 
-    Parameters
-    ----------
-    current : float
-        Signed current, that of the positive channel less that of the negative one. [A]
-    p : Solenoids
-        Dead zone Z17, the same both ways [A]; polynomial coefficients Z19 to Z22 of each direction,
-        degrees 1 to 4 [N/A ... N/A⁴].
-
-    Returns
-    -------
-    float
-        F = Z19 i_e + Z20 i_e² + Z21 i_e³ + Z22 i_e⁴, positive towards more speed; Kruse eq. 6.61
-        on the *signed* i_e: even powers keep their own sign (erratum 1). [N]
+    F = Z19 i_e + Z20 i_e² + Z21 i_e³ + Z22 i_e⁴, positive towards more speed; Kruse eq. 6.61 on the
+    *signed* i_e: even powers keep their own sign (erratum 1).
     """
     e = effective_current(current, p.Z17)
     plus = e >= 0.0
@@ -363,40 +299,23 @@ def moment_sine(force: float, p: Pump) -> float:
 
 @equation
 def arm_sine(pressure: float, p: Pump) -> float:
-    """sin α of the feedback arm, which follows the swash plate.
+    """sin α of the feedback arm, which follows the swash plate; must lie within ±1.
 
     sin α = Z3 tan α_sw with tan α_sw = Z1 δP - Z2 (Kruse eqs. 6.55, 6.59), multiplied out so that
-    the products of parameters are constants of the march. Must lie within ±1.
+    the products of parameters are constants of the march.
     """
     return (p.Z3 * p.Z1) * pressure - p.Z3 * p.Z2
 
 
 @equation
 def spool_balance(force: float, arm_sine: float, p: Pump) -> float:
-    """Spool displacement at which solenoid and feedback spring balance.
+    """Spool displacement at which solenoid and feedback spring balance, before any stop. [m]
 
-    Parameters
-    ----------
-    force : float
-        Net force F of both solenoids, positive towards more speed. [N]
-    arm_sine : float
-        sin α of the feedback arm, see `arm_sine`.
-    p : Pump
-        Z4: squared spring moment k_f² d3⁴ [N² m²], Z5: arm d1 [m], Z18: plussing, displacement
-        without force, plate upright [m].
-
-    Returns
-    -------
-    float
-        x = Z5 tan(φ - α) + Z18 with sin φ = Z5 F/√Z4; Kruse eq. 6.57 in closed form (erratum 21),
-        before any stop. [m]
-
-    Notes
-    -----
-    Valid for |sin φ| < 1 and |sin α| < 1; the caller checks. The first of the two equal forms
-    keeps the square root out of the denominator, so that root and division overlap: it makes a
-    whole march 14 % faster. It is singular where φ + α = 90°, far from any real spool; there the
-    second form takes over.
+    x = Z5 tan(φ - α) + Z18 with sin φ = Z5 F/√Z4; Kruse eq. 6.57 in closed form (erratum 21). Valid
+    for |sin φ| < 1 and |sin α| < 1; the caller checks. The first of the two equal forms keeps the
+    square root out of the denominator, so that root and division overlap: it makes a whole march 14
+    % faster. It is singular where φ + α = 90°, far from any real spool; there the second takes
+    over.
     """
     a = moment_sine(force, p)
     s = arm_sine
@@ -417,20 +336,10 @@ def stopped_spool(position: float, p: Pump) -> float:
 
 @equation
 def orifice_opening(position: float, p: Pump) -> float:
-    """Effective opening towards the stroking piston.
+    """Effective opening towards the stroking piston, of the spool before its stop. [m]
 
-    Parameters
-    ----------
-    position : float
-        Spool displacement before its stop. [m]
-    p : Pump
-        Z14: stroke of the spool, both ways; Z16: opening beyond which the in-line orifice, not the
-        spool, limits the flow. [m]
-
-    Returns
-    -------
-    float
-        x_eff = clip(clip(x, ±Z14), -Z16₋, +Z16₊); Kruse eqs. 6.36 and 6.71. [m]
+    x_eff = clip(clip(x, ±Z14), -Z16₋, +Z16₊), beyond which the in-line orifice, not the spool,
+    limits the flow; Kruse eqs. 6.36 and 6.71.
     """
     return min(max(position, -min(p.Z14, p.Z16_minus)), min(p.Z14, p.Z16_plus))
 
@@ -440,14 +349,9 @@ def orifice_opening(position: float, p: Pump) -> float:
 
 @equation
 def pressure_limits(p: Pump) -> tuple[float, float, float, float]:
-    """Pressures at which the swash plate stops and the relief valve opens.
+    """Pressures at which the swash plate stops, and the same within ±Z15. [Pa]
 
-    Returns
-    -------
-    lower_stop, upper_stop : float
-        (∓tan Z13 + Z2)/Z1. [Pa]
-    lower, upper : float
-        The same within ±Z15: δP never leaves them, so nothing winds up at a stop. [Pa]
+    The stops are (∓tan Z13 + Z2)/Z1. δP never leaves the other two, so nothing winds up at a stop.
     """
     lower_stop = (p.Z2 - tan(p.Z13_minus)) / p.Z1
     upper_stop = (p.Z2 + tan(p.Z13_plus)) / p.Z1
@@ -479,31 +383,11 @@ def _head_root(head: float) -> float:
 
 @equation
 def pressure_rate(
-    pressure: float,
-    opening: float,
-    Z6: float,
-    Z7: float,
-    Z8: float,
-    Z9: float,
-    symmetric: Flag,
+    pressure: float, opening: float, Z6: float, Z7: float, Z8: float, Z9: float, symmetric: Flag
 ) -> float:
-    """Rate of the stroking pressure.
+    """Rate of the stroking pressure δP under the opening x_eff [m]. [Pa/s]
 
-    Parameters
-    ----------
-    pressure : float
-        δP. [Pa]
-    opening : float
-        x_eff. [m]
-    Z6, Z7, Z8, Z9 : float
-        Plate motion [1] (0 at a stop), leakage [1/s], valve gain [√Pa/(m s)], supply [Pa].
-    symmetric : None or True
-        True takes the root √((Z9 - sgn(x)δP)/2), None the published √((Z9 - δP)/2).
-
-    Returns
-    -------
-    float
-        δP'; Kruse eq. 6.67 with the leakage of eq. 6.64. [Pa/s]
+    Kruse eq. 6.67 with the leakage of eq. 6.64; Z6 is 0 at a stop.
     """
     head, _ = flow_head(pressure, opening, Z9, symmetric)
     return (Z8 * head_root(head) * opening - Z7 * pressure) / (1.0 + Z6)
@@ -511,21 +395,9 @@ def pressure_rate(
 
 @equation
 def pumped(pressure: float, opening: float, gain: float, root: float, sign: float) -> float:
-    """Pressure after a step in which the head lasts.
+    """Pressure after a step in which the head lasts, σ (Z9 - 2 (r - σ g x)²). [Pa]
 
-    Parameters
-    ----------
-    pressure, opening : float
-        δP [Pa], x_eff [m].
-    gain : float
-        g = Z8 h/(4 (1 + Z6)). [√Pa/m]
-    root, sign : float
-        √head [√Pa], σ.
-
-    Returns
-    -------
-    float
-        σ (Z9 - 2 (r - σ g x)²), multiplied out: no cancellation, and fewer operations in line. [Pa]
+    r = √head, g = Z8 h/(4 (1 + Z6)). Multiplied out: no cancellation, and fewer operations in line.
     """
     return (pressure + (4.0 * gain * root) * opening) - (2.0 * sign * gain * gain) * (
         opening * opening
@@ -543,11 +415,11 @@ def tight_step(
     h: float,
     symmetric: Flag,
 ) -> float:
-    """Pressure one step later without leakage, integrated exactly at constant opening.
+    """Pressure one step later without leakage, integrated exactly at constant opening. [Pa]
 
     With r = √((Z9 - σδP)/2) the equation reads r' = -σ Z8 x_eff / (4 (1 + Z6)), so that δP is a
     parabola in time until the head is used up. Z7 counts as zero; it is there for the derivative
-    by it. [Pa]
+    by it.
     """
     head, sign = flow_head(pressure, opening, Z9, symmetric)
     gain = 0.25 * Z8 * h / (1.0 + Z6)
@@ -624,21 +496,9 @@ def swash_tangent(pressure: float, p: Pump) -> float:
 
 @equation
 def swash_angle(tangent: float, p: Pump, steep: Flag) -> float:
-    """Swash plate angle between its stops.
+    """Swash plate angle clip(atan(tan α_sw), -Z13₋, +Z13₊); Kruse eqs. 6.55 and 8.9. [rad]
 
-    Parameters
-    ----------
-    tangent : float
-        tan α_sw = Z1 δP - Z2.
-    p : Pump
-        Stops Z13, both as magnitudes. [rad]
-    steep : None or True
-        None where both stops lie within 22.5°, which spares the arctangent its reduction.
-
-    Returns
-    -------
-    float
-        α_sw = clip(atan(tan α_sw), -Z13₋, +Z13₊); Kruse eqs. 6.55 and 8.9. [rad]
+    Where both stops lie within 22.5°, not `steep`, the arctangent is spared its reduction.
     """
     angle = small_arctangent(tangent) if steep is None else arctangent(tangent)
     return min(max(angle, -p.Z13_minus), p.Z13_plus)
@@ -652,21 +512,9 @@ def swash_rate(tangent: float, pressure_rate: float, Z1: float) -> float:
 
 @equation
 def plate_rate(plate: float, pressure_rate: float, p: Pump, k: PumpConstants) -> float:
-    """Rate of the swash plate, zero while a stop or the relief valve holds it.
+    """Rate of the swash plate, zero while a stop or the relief valve holds it. [rad/s]
 
-    Parameters
-    ----------
-    plate : float
-        Pressure at which the plate would stand still. [Pa]
-    pressure_rate : float
-        Its rate. [Pa/s]
-    p, k : Pump, PumpConstants
-        The pump.
-
-    Returns
-    -------
-    float
-        dα_sw/dt. [rad/s]
+    Of the pressure at which the plate would stand still [Pa] and its rate [Pa/s].
     """
     held = plate >= k.upper or plate <= k.lower
     return 0.0 if held else swash_rate(swash_tangent(plate, p), pressure_rate, p.Z1)
@@ -677,22 +525,9 @@ def plate_rate(plate: float, pressure_rate: float, p: Pump, k: PumpConstants) ->
 
 @equation
 def shaft_speed(swash_angle: float, leakage: float, Z10: float, Z11: float) -> float:
-    """Speed of the shaft that the drive turns.
+    """Speed of the shaft, Ω = Z10 α_sw - Z11 - leakage; Kruse eq. 6.69. [rad/s]
 
-    Parameters
-    ----------
-    swash_angle : float
-        α_sw. [rad]
-    leakage : float
-        Speed lost while the load accelerates, see `load_leakage`. [rad/s]
-    Z10, Z11 : float
-        Displacement ratio [1/s], static leakage [rad/s].
-
-    Returns
-    -------
-    float
-        Ω = Z10 α_sw - Z11 - leakage; Kruse eq. 6.69. Positive hoists, slews right, lifts the
-        boom. [rad/s]
+    Positive hoists, slews right, lifts the boom. For the leakage see `load_leakage`.
     """
     return Z10 * swash_angle - Z11 - leakage
 
@@ -745,12 +580,7 @@ def pump_constants(p: Pump, h: float, options: PumpOptions) -> PumpConstants:
 
 @equation
 def pump_sample(
-    state: PumpState,
-    inputs: PumpInputs,
-    p: Pump,
-    k: PumpConstants,
-    h: float,
-    options: PumpOptions,
+    state: PumpState, inputs: PumpInputs, p: Pump, k: PumpConstants, h: float, options: PumpOptions
 ) -> PumpSignals:
     """Everything that is known of the pump at a sample.
 
@@ -974,10 +804,10 @@ def closed_pressure(force: float, p: Pump, k: PumpConstants) -> float:
 def leaked_pressure(
     pressure: float, Z9: float, p: Pump, k: PumpConstants, symmetric: Flag
 ) -> float:
-    """What leakage around the stroking piston takes from the pressure at which the spool closes.
+    """What leakage takes from the pressure at which the spool closes. [Pa]
 
     The spool opens by x = Z7 δP/(Z8 √head), and x falls by Z1 Z3 (Z5² + Z18²)/(Z5 cos α) for each
-    pascal: the first order, which is all that the derivative at Z7 = 0 needs. [Pa]
+    pascal: the first order, which is all that the derivative at Z7 = 0 needs.
     """
     head, _ = flow_head(pressure, pressure, Z9, symmetric)
     if not k.lower < pressure < k.upper or head <= 0.0:
@@ -1009,30 +839,13 @@ def settled_pressure(inputs: PumpInputs, p: Pump, k: PumpConstants, options: Pum
 
 @equation
 def pump_settled(inputs: PumpInputs, p: Pump, k: PumpConstants, options: PumpOptions) -> PumpState:
-    """State that a pump settles at under constant inputs.
+    """State that a pump settles at: the middle of what friction and hysteresis leave open.
 
-    Friction and hysteresis leave a range open, of which this is the middle.
+    The sample there has the speed that the drive settles at; the cam ring's ripple, which does not
+    change the mean of a turn, must be off.
     """
     pressure = settled_pressure(inputs, p, k, options)
     return standing(pressure, inputs.current, inputs.load_torque, options)
-
-
-@equation
-def settled_speed(inputs: PumpInputs, p: Pump, k: PumpConstants, options: PumpOptions) -> float:
-    """Speed that the drive settles at under constant inputs, the mean of a turn. [rad/s]
-
-    The cam ring's ripple does not change the mean, and a line at rest bears the load.
-    """
-    pressure = settled_pressure(inputs, p, k, options)
-    tangent = swash_tangent(pressure, p)
-    angle = swash_angle(tangent, p, options.steep)
-    force = solenoid_force(inputs.current, solenoids_of(p))
-    rising = pressure_gain(pressure, force, inputs.supply_pressure, p, options)
-    rate = plate_rate(pressure, rising, p, k)
-    flow = flow_speed(angle, tangent, rate, inputs, p, k, options)
-    if options.line is None:
-        return flow
-    return flow - static_leakage(p.motor_leakage, inputs.load_torque)
 
 
 @equation
@@ -1065,3 +878,32 @@ def pump_domain(signals: PumpSignals, inputs: PumpInputs, p: Pump, k: PumpConsta
     """1 - sin²φ, above 0 within the model: at 0 the solenoid overpowers the feedback spring."""
     a = moment_sine(signals.solenoid_force, p)
     return 1.0 - a * a
+
+
+def overpowered(margin: float, cause: str) -> str:
+    """What has happened where sin²φ is not below 1, for a sentence."""
+    return (
+        f"Z5·F/√Z4 reaches {sqrt(1.0 - margin):.4g} under this {cause}, but must stay below 1, "
+        "where the solenoid overpowers the feedback spring; check Z19 to Z22, Z4, Z5 and the "
+        f"{cause}'s size."
+    )
+
+
+pump = Model(
+    "pump",
+    parameters=Pump,
+    state=PumpState,
+    step=pump_step,
+    sample=pump_sample,
+    constants=pump_constants,
+    rest=pump_rest,
+    settled=pump_settled,
+    inputs=PumpInputs,
+    defaults={"pump_speed": "pump_speed", "load_torque": "load_torque", "supply_pressure": "Z9"},
+    options=PumpOptions,
+    limits=pump_limits,
+    domain=pump_domain,
+    integrals={"shaft_position": "shaft_speed"},
+    free_start={"pressure": ("pressure", "plate_pressure")},
+    outside=overpowered,
+)

@@ -18,7 +18,7 @@ from swashplate.errors import ParameterError
 from swashplate.models.card import Card
 from swashplate.models.pump import Pump
 
-Block = Literal["control_card", "pump_motor", "refinements"]
+Block = Literal["control_card", "pump_motor", "refinements", "physical"]
 
 INPUTS = ("pump_speed",)
 """Fields of the models that no set has: what drives the machine, not what it is."""
@@ -40,7 +40,8 @@ class Definition(Meaning):
         return (self.symbol,)
 
 
-def _definition(each: Declared, block: Block) -> Definition:
+def definition_of(each: Declared, block: Block) -> Definition:
+    """What a model declares, with where a set has it."""
     meaning = {field.name: getattr(each.definition, field.name) for field in fields(Meaning)}
     return Definition(**meaning, symbol=each.symbol, block=block, directional=len(each.fields) == 2)
 
@@ -48,11 +49,11 @@ def _definition(each: Declared, block: Block) -> Definition:
 def _collected() -> Iterator[Definition]:
     """All parameters in the order of the source's tables, the refinements last."""
     for each in declared_by(Card):
-        yield _definition(each, "control_card")
+        yield definition_of(each, "control_card")
     for each in declared_by(Pump):
         if each.symbol not in INPUTS:
             optional = each.definition.default is not None
-            yield _definition(each, "refinements" if optional else "pump_motor")
+            yield definition_of(each, "refinements" if optional else "pump_motor")
 
 
 _ALL = tuple(_collected())

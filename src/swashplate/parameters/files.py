@@ -82,7 +82,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
 
 def dump_set(parameters: ParameterSet) -> str:
     """A parameter set as TOML text that `read_set` turns back into an equal set."""
-    from tomlkit import comment, document, dumps, inline_table, table
+    from tomlkit import comment, document, dumps, table
 
     text = document()
     text.add(comment("swashplate parameter set; SI units; [plus, minus] as magnitudes"))
@@ -106,18 +106,25 @@ def dump_set(parameters: ParameterSet) -> str:
         for parameter in parameters.values():
             if parameter.definition.block != block:
                 continue
-            entry = inline_table()
-            pair = isinstance(parameter.value, Pair)
-            entry.append("value", list(parameter.values) if pair else parameter.value)
-            entry.append("unit", parameter.unit)
-            if parameter.source:
-                entry.append("source", parameter.source)
-            entry.append("status", parameter.status)
-            if parameter.own_bounds is not None:
-                entry.append("bounds", list(parameter.own_bounds))
-            entries.add(parameter.symbol, entry)
+            entries.add(parameter.symbol, written(parameter))
         text.add(block, entries)
     return dumps(text)
+
+
+def written(parameter: Parameter) -> Mapping[str, object]:
+    """A parameter as an entry of a file."""
+    from tomlkit import inline_table
+
+    entry = inline_table()
+    pair = isinstance(parameter.value, Pair)
+    entry.append("value", list(parameter.values) if pair else parameter.value)
+    entry.append("unit", parameter.unit)
+    if parameter.source:
+        entry.append("source", parameter.source)
+    entry.append("status", parameter.status)
+    if parameter.own_bounds is not None:
+        entry.append("bounds", list(parameter.own_bounds))
+    return entry
 
 
 def _folder(name: str):  # type: ignore[no-untyped-def]

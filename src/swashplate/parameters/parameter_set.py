@@ -21,7 +21,7 @@ from swashplate.parameters.rules import check_bounds, check_options, check_rules
 PressureRoot = Literal["published", "symmetric"]
 CoulombSign = Literal["smooth", "literal"]
 CardSwitch = Literal["sampled", "split"]
-Status = Literal["fitted", "assumed", "approximate", "inactive", "user"]
+Status = Literal["fitted", "fixed", "assumed", "approximate", "inactive", "user"]
 
 
 class Pair(NamedTuple):
@@ -219,7 +219,7 @@ class ParameterSet(Mapping[str, Parameter]):
             definition = find(name)
             old = parameters.get(definition.symbol, self[definition.symbol])
             parameters[definition.symbol] = replace(
-                old, value=_changed(name, definition, old, change), source="", status="user"
+                old, value=value_of(name, definition, change, old), source="", status="user"
             )
         if options is None:
             numbers = {symbol: parameters[symbol].values[0] for symbol in parameters}
@@ -243,7 +243,10 @@ class ParameterSet(Mapping[str, Parameter]):
         return self.replace(changes)
 
 
-def _changed(name: str, definition: Definition, old: Parameter, change: Change) -> Value:
+def value_of(
+    name: str, definition: Definition, change: Change, old: Parameter | None = None
+) -> Value:
+    """A change in the form that a parameter's value has; of one side beside the old other one."""
     if isinstance(change, tuple) and (not definition.directional or name != definition.symbol):
         raise ParameterError(f"{name} has one value, not a plus and a minus one.")
     if isinstance(change, tuple) and len(change) != 2:
@@ -259,8 +262,9 @@ def _changed(name: str, definition: Definition, old: Parameter, change: Change) 
     (number,) = numbers
     if not definition.directional:
         return number
-    assert isinstance(old.value, Pair)
     if name == definition.symbol:
         return Pair(number, number)
+    assert old is not None
+    assert isinstance(old.value, Pair)
     side = name.removeprefix(definition.symbol + "_")
     return old.value._replace(**{side: number})

@@ -114,8 +114,8 @@ def broken_rules(numbers: Mapping[str, Array]) -> Iterator[Broken]:
     for column, values in numbers.items():
         definition = find(column)
         yield (
-            _out_of_range(definition, values),
-            partial(_range_sentence, column, definition, values),
+            out_of_range(definition, values),
+            partial(range_sentence, column, definition, values),
         )
     if not REFINEMENTS.keys().isdisjoint(numbers):
         yield _dither(numbers)
@@ -130,22 +130,23 @@ def broken_rules(numbers: Mapping[str, Array]) -> Iterator[Broken]:
         yield _solenoid_moment(moment[:, k], side)
 
 
-def _out_of_range(definition: Definition, values: Array) -> Mask:
-    low = values < definition.lower if definition.above is None else values <= definition.lower
-    high = np.isposinf(values) & (not definition.can_be_off)
-    if isfinite(definition.upper):
-        high = values >= definition.upper
-    return low | high | np.isnan(values) | np.isneginf(values)
+def out_of_range(definition: Definition, values: Array) -> Mask:
+    """Which values lie outside a definition's range."""
+    # what is no number passes no comparison
+    strict = definition.above is not None or not isfinite(definition.lower)
+    allowed = values > definition.lower if strict else values >= definition.lower
+    if isfinite(definition.upper) or not definition.can_be_off:
+        allowed &= values < definition.upper
+    return np.logical_not(allowed)
 
 
-def _range_sentence(column: str, definition: Definition, values: Array, i: int) -> str:
+def range_sentence(column: str, definition: Definition, values: Array, i: int) -> str:
+    """What is wrong with one of the values."""
     value, hint = float(values[i]), ""
     if value < 0.0 and definition.directional and not (isnan(value) or isinf(value)):
         hint = "; minus values are stored as magnitudes"
-    return (
-        f"{column} ({definition.name}) is {value:g} {definition.unit}, but must be "
-        f"{definition.range}{hint}."
-    )
+    unit = "" if definition.unit == "1" else f" {definition.unit}"
+    return f"{column} ({definition.name}) is {value:g}{unit}, but must be {definition.range}{hint}."
 
 
 def _dither(numbers: Mapping[str, Array]) -> Broken:

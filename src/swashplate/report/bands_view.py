@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.typing import ColorType
 
-from swashplate.analysis.bands import Bands
+from swashplate.analysis.monte_carlo import Bands
 from swashplate.report.style import (
     BLUE,
     INK,

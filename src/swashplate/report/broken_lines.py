@@ -159,18 +159,3 @@ def draw_broken(
             markeredgewidth=0.0,
             zorder=zorder,
         )
-
-
-def draw_band(ax: Axes, time: Array, low: Array, high: Array, color: str, zorder: float) -> None:
-    """Fill what lies between two signals, (n,) arrays, but nothing across a gap."""
-    breaks = gap_rows(time)
-    rows = np.union1d(thinned(time, low, breaks), thinned(time, high, breaks))
-    places = np.searchsorted(rows, breaks, side="right")
-    ax.fill_between(
-        np.insert(time[rows], places, time[breaks]),
-        np.insert(low[rows], places, np.nan),
-        np.insert(high[rows], places, np.nan),
-        color=color,
-        linewidth=0.0,
-        zorder=zorder,
-    )

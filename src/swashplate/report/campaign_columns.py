@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swashplate.report.display_units import DisplayUnit, display_unit
 
 if TYPE_CHECKING:
-    from swashplate.campaign.experiment import Channel, Experiment, InputSignal
+    from swashplate.campaign import Channel, Experiment, InputSignal
 
 Array = NDArray[np.float64]
 
@@ -58,21 +58,28 @@ def columns_of(experiments: Sequence[Experiment]) -> list[Column]:
     return [_column(key, met[key]) for key in inputs_first]
 
 
+def counted(signal: InputSignal | Channel) -> Array:
+    """Samples that are not ignored; all of them of an input, or where none is left."""
+    used = getattr(signal, "used", None)
+    return signal.values if used is None or not used.any() else signal.values[used]
+
+
 def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> Column:
     name, si = key
-    low = min(float(signal.values.min()) for signal in signals)
-    high = max(float(signal.values.max()) for signal in signals)
+    # what is ignored may leave the panel: one spike would flatten all runs
+    shown = [counted(signal) for signal in signals]
+    low, high = min(float(each.min()) for each in shown), max(float(each.max()) for each in shown)
     kind = signals[0].kind
     unit = display_unit(si, max(abs(low), abs(high)))
     free = kind in ("position", "encoder_counts")
     if free:
-        high = 0.5 * max(float(np.ptp(signal.values)) for signal in signals)
+        high = 0.5 * max(float(np.ptp(each)) for each in shown)
         low = -high
-    shown = {"encoder_counts": "encoder's angle", "other": signals[0].source.column}
+    words = {"encoder_counts": "encoder's angle", "other": signals[0].source.column}
     return Column(
         key,
         name or "input",
-        unit.label(shown.get(kind, kind.replace("_", " "))),
+        unit.label(words.get(kind, kind.replace("_", " "))),
         unit,
         unit.factor * low,
         unit.factor * high,

@@ -25,7 +25,7 @@ from swashplate.report.style import (
 )
 
 if TYPE_CHECKING:
-    from swashplate.campaign.experiment import Experiment
+    from swashplate.campaign import Experiment
 
 RUNS = 8
 """Runs on a page: with more, panels are too low to read or the page too high to print."""
@@ -42,7 +42,7 @@ def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None
     side. A column has one unit and one scale; positions, whose zero is free, have it about the
     middle of each run. What is ignored is shaded and hatched, weights that differ stand along the
     foot with their factors, samples at the end of their instrument's range are barred, gaps in the
-    stamps leave the line open and are pointed at. Runs with the role ``"ignore"`` are grey.
+    stamps leave the line open and are pointed at.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from swashplate.report.broken_lines import draw_broken, gap_rows
-from swashplate.report.campaign_columns import Column, signals_of
+from swashplate.report.campaign_columns import Column, counted, signals_of
 from swashplate.report.campaign_marks import (
     IGNORED,
     mark_clipped,
@@ -25,7 +25,7 @@ from swashplate.report.campaign_weights import FOOT, has_weights, mark_weights
 from swashplate.report.style import BLUE, GREY, INK, SMALL, THIN, dress, zero_line
 
 if TYPE_CHECKING:
-    from swashplate.campaign.experiment import Channel, Experiment, InputSignal
+    from swashplate.campaign import Channel, Experiment, InputSignal
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ _ROOM = 0.08
 """Empty share of a panel above and below its signal."""
 _NEAR_ZERO = 0.02
 """A record that begins at less than this share of its length is shown from zero on."""
-_ROLES = {"fit": "for the fit", "validate": "for validation", "ignore": "ignored"}
+_ROLES = {"fit": "for the fit", "validate": "for validation"}
 
 
 def fill_row(row: Sequence[Axes], columns: Sequence[Column], experiment: Experiment) -> None:
@@ -73,7 +73,7 @@ def _say_missing(ax: Axes) -> None:
 
 
 def _fill(ax: Axes, column: Column, signal: InputSignal | Channel, experiment: Experiment) -> None:
-    from swashplate.campaign.experiment import Channel
+    from swashplate.campaign import Channel
 
     factor = column.unit.factor
     values = factor * signal.values
@@ -84,7 +84,7 @@ def _fill(ax: Axes, column: Column, signal: InputSignal | Channel, experiment: E
     else:
         held = signal.interpolation == "previous"
     zero_line(ax)
-    low, high = column.limits(values)
+    low, high = column.limits(factor * counted(signal))
     margin = _ROOM * (high - low) or 1.0
     below = 0.0
     if weight is not None and has_weights(weight):
@@ -101,7 +101,7 @@ def _fill(ax: Axes, column: Column, signal: InputSignal | Channel, experiment: E
             ax, signal.time, values, (factor * signal.limits[0], factor * signal.limits[1])
         )
     mark_gaps(ax, signal.time)
-    color = GREY if experiment.role == "ignore" else INK if weight is None else BLUE
+    color = INK if weight is None else BLUE
     draw_broken(ax, signal.time, values, color, held=held, width=THIN)
 
 

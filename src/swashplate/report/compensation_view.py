@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from swashplate.analysis.inverse import InverseMap
+from swashplate.analysis.compensation import InverseMap
 from swashplate.analysis.tracking import Improvement, proportional_command
 from swashplate.report.style import (
     FAINT,

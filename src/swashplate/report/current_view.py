@@ -45,7 +45,7 @@ from swashplate.report.style import (
 from swashplate.report.windows import rows_within
 
 if TYPE_CHECKING:
-    from swashplate.campaign.experiment import Channel
+    from swashplate.campaign import Channel
     from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
@@ -169,7 +169,7 @@ class Compared(NamedTuple):
 def _compared(
     channel: Channel, simulation: Simulation, rows: slice, mask_width: float, level: float
 ) -> Compared:
-    from swashplate.campaign.ammeter import rectified_current, zero_crossings
+    from swashplate.campaign import zero_crossings
 
     time = channel.time[rows]
     # of the whole record, so that a crossing just outside the window masks what lies within
@@ -179,9 +179,8 @@ def _compared(
     return Compared(
         time,
         channel.values[rows],
-        rectified_current(
-            simulation.at(time, "current_positive"), simulation.at(time, "current_negative")
-        ),
+        np.abs(simulation.at(time, "current_positive"))
+        + np.abs(simulation.at(time, "current_negative")),
         crossings.masked[rows],
         channel.weight[rows] == 0.0,
     )

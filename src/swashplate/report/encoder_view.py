@@ -46,8 +46,7 @@ from swashplate.report.style import (
 from swashplate.report.windows import rows_within
 
 if TYPE_CHECKING:
-    from swashplate.campaign.experiment import Channel, Encoder
-    from swashplate.campaign.speed import Method
+    from swashplate.campaign import Channel, Encoder, Method
 
 
 WIDTH = 8.6
@@ -72,10 +71,10 @@ def plot_encoder(
     channel : Channel
         An encoder, or another position.
     methods : sequence of Method, optional
-        How the speed is made (`campaign.speed.speed_of`). By default all that the stamps and the
+        How the speed is made (`campaign.speed_of`). By default all that the stamps and the
         channel allow: the plain difference; the source's filters, in their exact form where the
-        stamps are uneven or not at 512 Hz; Savitzky and Golay's where they are even; the Kalman
-        smoother for an encoder, or where the channel's noise is known. The legend names them.
+        stamps are uneven or not at 512 Hz; Savitzky and Golay's where they are even. The legend
+        names them.
     window : (float, float), optional
         First and last instant to show [s]. Everything is computed from the whole record.
     title : str, optional
@@ -101,7 +100,7 @@ def plot_encoder(
             f"{channel.source} is a {channel.kind}; this figure shows an encoder or a position."
         )
     rows = rows_within(channel.time, window, str(channel.source))
-    from swashplate.campaign.speed import speed_of
+    from swashplate.campaign import speed_of
 
     chosen = usable_methods(channel) if methods is None else tuple(methods)
     speeds = {method: speed_of(channel, method) for method in chosen}
@@ -153,7 +152,7 @@ def _draw_position(ax: Axes, channel: Channel, rows: slice) -> None:
     )
     if channel.counts is None or channel.encoder is None:
         return
-    from swashplate.campaign.encoder import interpolate_counts
+    from swashplate.campaign import interpolate_counts
 
     between = interpolate_counts(channel.time, channel.counts)[rows]
     angle = channel.encoder.angle_per_count * between

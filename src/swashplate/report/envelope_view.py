@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from swashplate.analysis.acceleration import AcceleratedBy, AccelerationCurve
-from swashplate.analysis.envelope import Envelope, Way
+from swashplate.analysis.envelope import AcceleratedBy, AccelerationCurve, Envelope, Way
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.style import (
     BLUE,

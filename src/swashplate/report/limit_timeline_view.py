@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
-from swashplate.analysis.limit_timeline import LimitTimeline, limit_timeline
+from swashplate.analysis.limits import LimitTimeline, limit_timeline
 from swashplate.errors import InputError
 from swashplate.report.shading import MOST_RUNS, SHADES, merged
 from swashplate.report.style import (

@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from swashplate.analysis.sensitivity import OneAtATime
-from swashplate.analysis.sobol import SobolIndices
+from swashplate.analysis.sensitivity import OneAtATime, SobolIndices
 from swashplate.errors import InputError
 from swashplate.report.outcome_units import outcome_text, outcome_unit, outcome_words
 from swashplate.report.style import (

@@ -11,20 +11,17 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from swashplate.report.broken_lines import draw_band, draw_broken
+from swashplate.report.broken_lines import draw_broken
 from swashplate.report.display_units import DisplayUnit
-from swashplate.report.style import BLUE, GREEN, LINE, THIN, VERMILION, Dashes
+from swashplate.report.style import BLUE, GREEN, LINE, THIN, Dashes
 
 if TYPE_CHECKING:
-    from swashplate.campaign.experiment import Channel
-    from swashplate.campaign.speed import Method, Speed
+    from swashplate.campaign import Channel, Method, Speed
 
 Array = NDArray[np.float64]
 
 SOURCE_RATE = 512.0
 """Rate that the source's explicit filters are made for. [Hz]"""
-BAND = "#f6cdb0"
-"""Colour of the band of two standard deviations."""
 ROUGH = "#d2d2d2"
 """Colour of the plain difference, which fills its panel where the count changes often."""
 ROOM = 0.12
@@ -46,13 +43,12 @@ LOOKS: dict[Method, Look] = {
     "source": Look(BLUE, "solid", LINE, 2.0, "10 and 30 Hz filters"),
     "exact": Look(BLUE, "solid", LINE, 2.0, "10 and 30 Hz filters, exact form"),
     "savitzky_golay": Look(GREEN, "dashed", LINE, 2.2, "Savitzky-Golay"),
-    "kalman": Look(VERMILION, "solid", THIN, 2.1, "Kalman smoother"),
 }
 
 
 def usable_methods(channel: Channel) -> tuple[Method, ...]:
-    """The methods that a channel's stamps, and what is known of its noise, allow."""
-    from swashplate.campaign.stamps import stamps_of
+    """The methods that a channel's stamps allow."""
+    from swashplate.campaign import stamps_of
 
     period = stamps_of(channel.time).period
     methods: list[Method] = ["difference"]
@@ -62,8 +58,6 @@ def usable_methods(channel: Channel) -> tuple[Method, ...]:
         methods.append("exact")
     if period is not None:
         methods.append("savitzky_golay")
-    if channel.encoder is not None or channel.noise is not None:
-        methods.append("kalman")
     return tuple(methods)
 
 
@@ -73,8 +67,7 @@ def cut(speed: Speed, time: Array) -> Speed:
         int(np.searchsorted(speed.time, time[0], side="left")),
         int(np.searchsorted(speed.time, time[-1], side="right")),
     )
-    deviation = None if speed.deviation is None else speed.deviation[rows]
-    return speed._replace(time=speed.time[rows], speed=speed.speed[rows], deviation=deviation)
+    return speed._replace(time=speed.time[rows], speed=speed.speed[rows])
 
 
 def reach_of(speeds: Mapping[Method, Speed]) -> tuple[float, float]:
@@ -85,12 +78,9 @@ def reach_of(speeds: Mapping[Method, Speed]) -> tuple[float, float]:
 
 
 def draw_speed(ax: Axes, method: Method, speed: Speed, unit: DisplayUnit) -> None:
-    """Draw a speed, with a band of two standard deviations on either side where it has them."""
+    """Draw a speed."""
     look = LOOKS[method]
     values = unit.factor * speed.speed
-    if speed.deviation is not None:
-        double = 2.0 * unit.factor * speed.deviation
-        draw_band(ax, speed.time, values - double, values + double, BAND, 1.4)
     draw_broken(
         ax,
         speed.time,
@@ -133,6 +123,4 @@ def speed_handles(
                 [], [], color=look.color, linestyle=look.dashes, linewidth=look.width, label=words
             )
         )
-        if speed.deviation is not None:
-            handles.append(Patch(facecolor=BAND, label="± 2 standard deviations"))
     return handles

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 INK = "#222222"
 GREY = "#767676"
@@ -65,6 +65,8 @@ class Margins(NamedTuple):
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty white figure of a size. [inch]"""
+    from matplotlib.figure import Figure
+
     return Figure(figsize=(width, height), dpi=DPI, facecolor="white")
 
 
@@ -95,6 +97,8 @@ def write_title(figure: Figure, title: str, left: float) -> None:
 
 def dress(ax: Axes, label: str = "") -> None:
     """Give a panel its light grid, quiet axes and the label of its ordinate."""
+    from matplotlib.ticker import MaxNLocator
+
     ax.set_axisbelow(True)
     ax.grid(True, color=GRID, linewidth=0.6)
     ax.xaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))

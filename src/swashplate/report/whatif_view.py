@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from swashplate.analysis.bands import Bands
+from swashplate.analysis.monte_carlo import Bands
 from swashplate.analysis.whatif import AS_IS, CHANGED, WhatIf
 from swashplate.report.bands_view import shade_band
 from swashplate.report.style import (

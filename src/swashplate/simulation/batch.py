@@ -6,7 +6,7 @@ Of each set its output, in memory or streamed to files, or only its cost.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,28 +14,22 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations import Model, instance_of, parameter_paths
+from swashplate.equations import Model, instance_of, parameter_paths, state_paths
 from swashplate.equations.fields import floats_of
 from swashplate.equations.library import TAN_22_5
 from swashplate.equations.marching.lanes import LANES, march_lanes
 from swashplate.equations.marching.march import output_of
+from swashplate.equations.marching.observation import Observation
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import outside
 from swashplate.equations.marching.use import records_of
 from swashplate.errors import FileError, InputError
 from swashplate.executors import Executor, Threads
-from swashplate.models.pump import PumpOptions
+from swashplate.models.drive import drive, pump_drive
 from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import broken_rules
-from swashplate.simulation.instance import (
-    PATHS,
-    SIDES,
-    card_options,
-    model_of,
-    pump_options,
-    step_limit,
-)
+from swashplate.simulation.instance import PATHS, SIDES, card_options, pump_options, step_limit
 from swashplate.tables import write_whole
 
 Array = NDArray[np.float64]
@@ -100,15 +94,11 @@ class _Block(NamedTuple):
 
 
 class _Marched(NamedTuple):
-    """What is told of a block's sets."""
+    """What is told of a block's sets: those that failed with their worst margin."""
 
     sets: Indices
-    values: Array | None
-    """Costs or outputs, None where the outputs are in their place already."""
-    end: Array
-    """Finite where all numbers are."""
-    worst: Array
-    """Worst margin of the domain."""
+    values: Array | None  # costs or outputs, None where the outputs are in their place already
+    failed: list[tuple[int, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,19 +106,15 @@ class _Sets:
     """Sets over one record, and what of them is wanted."""
 
     model: Model
-    numbers: Mapping[str, Array]
-    """(m,) each, by path; see `march_lanes`."""
+    numbers: Mapping[str, Array]  # (m,) each, by path; see `march_lanes`
     record: Record
-    driver: str
-    others: Mapping[str, Array]
+    records: Mapping[str, Array]  # external signals on the record's grid
     output: str
     measured: Array
     weight: Array
-    keep: bool
-    """Whether outputs are wanted, not costs."""
-    to: Path | None = None
-    place: Array | None = field(default=None, repr=False)
-    """(m, n) where outputs go, within this process."""
+    keep: bool  # whether outputs are wanted, not costs
+    to: Path | None
+    place: Array | None = field(default=None, repr=False)  # (m, n), within this process
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what other processes have no use for."""
@@ -145,15 +131,15 @@ def _march(shared: _Sets, blocks: Sequence[_Block]) -> list[_Marched]:
             shared.model,
             options,
             {path: values[padded] for path, values in shared.numbers.items()},
-            {shared.driver: record.values, **shared.others},
+            shared.records,
             record.step,
             shared.output,
-            shared.measured,
-            shared.weight,
-            shared.keep,
+            measured=shared.measured,
+            weight=shared.weight,
+            keep=shared.keep,
         )
-        end, worst = found.end[:size], found.worst[:size]
-        bad = ~(np.isfinite(end) & (worst > 0.0))
+        worst = found.worst[:size]
+        bad = ~(np.isfinite(found.end[:size]) & (worst > 0.0))
         values: Array | None = np.where(bad, np.inf, found.cost[:size])
         if shared.keep:
             values = found.outputs[:size, :: record.substeps]
@@ -164,10 +150,15 @@ def _march(shared: _Sets, blocks: Sequence[_Block]) -> list[_Marched]:
             elif shared.place is not None:
                 shared.place[sets] = values
                 values = None
-        made.append(_Marched(sets, values, end, worst))
+        failed = list(zip(sets[bad].tolist(), worst[bad].tolist(), strict=True))
+        made.append(_Marched(sets, values, failed))
     if shared.to is not None:
-        _write(shared.to / f"{blocks[0].sets[0]:08d}.parquet", {"time": record.time, **table})
+        _write(shared.to / _file(blocks), {"time": record.time, **table})
     return made
+
+
+def _file(blocks: Sequence[_Block]) -> str:
+    return f"{blocks[0].sets[0]:08d}.parquet"
 
 
 def _write(path: Path, columns: Mapping[str, Array]) -> None:
@@ -191,28 +182,25 @@ def _run(
     executor: Executor | None,
 ) -> Batch:
     """March all blocks wherever the executor runs them."""
-    samples = shared.record.time.size
-    costs = None if shared.keep else np.full(count, np.inf)
-    outputs = _outputs(count, samples) if shared.keep and shared.to is None else None
+    samples, several = shared.record.time.size, 1
+    values = np.full(count, np.inf) if not shared.keep else None
     if shared.to is not None:
         _make_folder(shared.to)
-    several = max(SAMPLES_A_FILE // (samples * LANES), 1) if shared.to is not None else 1
+        several = max(SAMPLES_A_FILE // (samples * LANES), 1)
+    elif shared.keep:
+        values = _outputs(count, samples)
+        shared = replace(shared, place=values)
     items = [blocks[k : k + several] for k in range(0, len(blocks), several)]
-    shared = replace(shared, place=outputs)
     # each block writes its own sets' places, so the result does not depend on who is first
     for _, made in (executor or Threads()).run(_march, shared, items):
-        for sets, values, end, worst in made:
-            for number, last, margin in zip(sets, end, worst, strict=True):
-                if not (np.isfinite(last) and margin > 0.0):
-                    failures[int(number)] = why(float(margin))
-            if values is not None:
-                target = outputs if costs is None else costs
-                assert target is not None
-                target[sets] = values
-    files = (
-        tuple(shared.to / f"{each[0].sets[0]:08d}.parquet" for each in items) if shared.to else ()
-    )
-    return Batch(costs, outputs, dict(sorted(failures.items())), files)
+        for sets, found, failed in made:
+            failures |= {number: why(margin) for number, margin in failed}
+            if found is not None:
+                assert values is not None
+                values[sets] = found
+    files = tuple(shared.to / _file(each) for each in items) if shared.to else ()
+    kept, costs = (values, None) if shared.keep else (None, values)
+    return Batch(costs, kept, dict(sorted(failures.items())), files)
 
 
 def _outputs(count: int, samples: int) -> Array:
@@ -269,14 +257,16 @@ def simulate_many(
     given: Any = None,
     executor: Executor | None = None,
 ) -> Batch:
-    """Simulate many parameter sets of a model over one record, from rest.
+    """Simulate many parameter sets of a model over one record, from rest or states of one's own.
 
     Parameters
     ----------
     model, p, inputs, rate, options, given :
         As in `swashplate.equations.simulate`.
     changes : mapping of str to (m,) array_like
-        Values of parameters by path, one for each set; the others are those of `p`.
+        Values of parameters by path, one for each set; the others are those of `p`. With
+        ``start.`` before its path, a number of the state at the first sample, as `begin` of
+        `swashplate.equations.simulate`.
     output : str
         The signal to return; with `cost` it is not needed.
     cost : SquaredError, optional
@@ -300,47 +290,34 @@ def simulate_many(
     records = records_of(instance, inputs, rate)
     paths, several = parameter_paths(model), len(model.parts) > 1
     values, count = _given_sets(changes)
+    starts = [f"start.{path}" for path in state_paths(model)]
     for path in values:
-        if path not in paths:
-            raise InputError(f"{model.name} has no parameter '{path}'; it has {', '.join(paths)}.")
+        if path not in (*paths, *starts):
+            raise InputError(
+                f"{model.name} has no parameter '{path}'; it has {', '.join((*paths, *starts))}."
+            )
     observed = cost.output if cost is not None else output
     if not observed:
         raise InputError(f"{model.name}: say which output of the sets is wanted, or give a cost.")
     output_of(model, observed)
-    held = dict(zip(paths, instance.params, strict=True))
-    givens = [
-        f"given {part.name}.{path}" if several else f"given {path}"
-        for part in model.parts
-        if part.given is not None
-        for path in floats_of(part.given)
-    ]
+    held, delays = dict(zip(paths, instance.params, strict=True)), set()
+    givens = []
+    for part in model.parts:
+        prefix = f"{part.name}." if several else ""
+        delays |= {f"{prefix}{tap.delay}" for tap in part.taps.values() if tap.delay}
+        if part.given is not None:
+            givens += [f"given {prefix}{path}" for path in floats_of(part.given)]
     held |= dict(zip(givens, instance.given, strict=True))
-    numbers = {path: values.get(path, np.full(count, number)) for path, number in held.items()}
+    numbers = {**{path: np.full(count, number) for path, number in held.items()}, **values}
     failures: dict[int, str] = {}
     for path, column in values.items():
-        delays = any(
-            path == (f"{part.name}.{tap.delay}" if several else tap.delay)
-            for part in model.parts
-            for tap in part.taps.values()
-        )
-        for i in np.flatnonzero(~np.isfinite(column) | (delays & (column < 0.0))):
-            rule = "a finite number, at least 0" if delays else "a finite number"
+        late = path in delays
+        rule = "a finite number, at least 0" if late else "a finite number"
+        for i in np.flatnonzero(~np.isfinite(column) | (late & (column < 0.0))):
             failures[int(i)] = f"{model.name}: {path} is {column[i]:g}, but must be {rule}."
     good = np.setdiff1d(np.arange(count), list(failures))
-    driver, *others = records
-    size = records[driver].size
-    record = Record(records[driver], 0.0, float(rate), 1)
-    shared = _Sets(
-        model,
-        numbers,
-        record,
-        driver,
-        {name: records[name] for name in others},
-        observed,
-        *_comparison(cost, size, record),
-        cost is None,
-        _folder(to, cost),
-    )
+    record = Record(next(iter(records.values())), 0.0, float(rate), 1)
+    shared = _shared(model, numbers, record, records, observed, cost, to)
 
     def why(worst: float) -> str:
         if worst > 0.0:
@@ -349,6 +326,88 @@ def simulate_many(
 
     blocks = [_Block(good[k : k + LANES], instance.options) for k in range(0, good.size, LANES)]
     return _run(shared, blocks, count, failures, why, executor)
+
+
+# --- drives ---------------------------------------------------------------------------------------
+
+
+def simulate_drives(
+    parameters: ParameterSet,
+    changes: Mapping[str, ArrayLike],
+    record: Record,
+    by_voltage: bool,
+    cost: SquaredError | None,
+    output: str,
+    to: str | Path | None,
+    executor: Executor | None,
+) -> Batch:
+    """March many sets over one record; see `Drive.simulate_many`."""
+    given, count = _given_sets(changes)
+    columns = [(column, each) for name, each in given.items() for column in columns_of([name])]
+    twice = [column for k, (column, _) in enumerate(columns) if column in dict(columns[:k])]
+    if twice:
+        raise InputError(f"{twice[0]} is given twice.")
+    held = {name: np.full(count, value) for name, value in parameters.numbers.items()}
+    numbers = {**held, **dict(columns)}
+    failures = _failures(parameters, numbers, record.step, by_voltage)
+    observed = cost.output if cost is not None else output
+    if observed not in OUTPUTS:
+        raise InputError(f"A batch has no output '{observed}'; it has {', '.join(OUTPUTS)}.")
+    by_path = {PATHS[column]: values for column, values in numbers.items()}
+    records = {"voltage" if by_voltage else "current": record.values}
+    model = drive if by_voltage else pump_drive
+    shared = _shared(model, by_path, record, records, observed, cost, to)
+
+    def why(worst: float) -> str:
+        return f"{parameters.name}: {OVERFLOW if worst > 0.0 else OVERPOWERED}"
+
+    blocks = _blocks(parameters, numbers, failures, given, by_voltage)
+    return _run(shared, blocks, count, failures, why, executor)
+
+
+def _failures(
+    parameters: ParameterSet, numbers: Mapping[str, Array], step: float, by_voltage: bool
+) -> dict[int, str]:
+    """Sets that cannot be marched at all."""
+    name, failures, exact = parameters.name, dict[int, str](), parameters.rate is None
+    for mask, sentence in broken_rules(numbers):
+        for i in np.flatnonzero(mask):
+            failures.setdefault(int(i), f"{name}: {sentence(int(i))}")
+    why = "swings too fast for" if exact else "is unstable at"
+    for side in SIDES if by_voltage else ():
+        limit = step_limit(numbers[f"zeta_{side}"], exact)
+        said = f"{name}: the current filter of the {side} channel {why} this step."
+        for i in np.flatnonzero(~(numbers[f"omega_{side}"] * step < limit)):
+            failures.setdefault(int(i), said)
+    return failures
+
+
+def _blocks(
+    parameters: ParameterSet,
+    numbers: Mapping[str, Array],
+    failures: Mapping[int, str],
+    changed: Iterable[str],
+    by_voltage: bool,
+) -> list[_Block]:
+    """Blocks of sets that share the options which the kernels are compiled for."""
+    stops = np.tan(np.maximum(numbers["Z13_plus"], numbers["Z13_minus"]))
+    masks: dict[str, NDArray[np.bool_]] = {"steep": stops >= TAN_22_5}
+    for option in {SWITCHES[column] for column in changed if column in SWITCHES}:
+        own = [numbers[each] for each in SWITCHES if SWITCHES[each] == option and each in numbers]
+        masks[option] = np.any(own, axis=0)
+    kinds = np.stack(list(masks.values()), axis=1)
+    good = np.setdiff1d(np.arange(stops.size), list(failures))
+    base, card = pump_options(parameters), card_options(parameters) if by_voltage else None
+    found = []
+    for kind in np.unique(kinds[good], axis=0):
+        members = good[(kinds[good] == kind).all(axis=1)]
+        on = {name: True if each else None for name, each in zip(masks, kind, strict=True)}
+        options = card, base._replace(**on)
+        found += [_Block(members[k : k + LANES], options) for k in range(0, members.size, LANES)]
+    return found
+
+
+# --- what both have in common ---------------------------------------------------------------------
 
 
 def _given_sets(changes: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], int]:
@@ -366,154 +425,32 @@ def _given_sets(changes: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], int
     return values, sizes.pop()
 
 
-# --- drives ---------------------------------------------------------------------------------------
-
-
-def simulate_drives(
-    parameters: ParameterSet,
-    changes: Mapping[str, ArrayLike],
+def _shared(
+    model: Model,
+    numbers: Mapping[str, Array],
     record: Record,
-    *,
-    by_voltage: bool,
-    cost: SquaredError | None,
+    records: Mapping[str, Array],
     output: str,
+    cost: SquaredError | None,
     to: str | Path | None,
-    executor: Executor | None,
-) -> Batch:
-    """March many sets over one record; see `Drive.simulate_many`."""
-    numbers, count = _columns(parameters, changes)
-    failures = _failures(parameters, numbers, record.step, by_voltage)
-    observed = cost.output if cost is not None else output
-    if observed not in OUTPUTS:
-        raise InputError(f"A batch has no output '{observed}'; it has {', '.join(OUTPUTS)}.")
-    card = card_options(parameters) if by_voltage else None
-    shared = _Sets(
-        model_of(by_voltage),
-        {PATHS[column]: values for column, values in numbers.items()},
-        record,
-        "voltage" if by_voltage else "current",
-        {},
-        observed,
-        *_comparison(cost, record.time.size, record),
-        cost is None,
-        _folder(to, cost),
-    )
-    blocks = [
-        _Block(sets, (card, chosen))
-        for sets, chosen in _jobs(parameters, numbers, failures, count, tuple(changes))
-    ]
-
-    def why(worst: float) -> str:
-        return f"{parameters.name}: {OVERFLOW if worst > 0.0 else OVERPOWERED}"
-
-    return _run(shared, blocks, count, failures, why, executor)
-
-
-def _columns(
-    parameters: ParameterSet, changes: Mapping[str, ArrayLike]
-) -> tuple[dict[str, Array], int]:
-    """Every value of every set, and how many sets there are."""
-    values, count = _given_sets(changes)
-    given: dict[str, Array] = {}
-    for name, each in values.items():
-        for column in columns_of([name]):
-            if column in given:
-                raise InputError(f"{column} is given twice.")
-            given[column] = each
-    return {
-        **{
-            column: given.get(column, np.full(count, value))
-            for column, value in parameters.numbers.items()
-        },
-        **given,
-    }, count
-
-
-def _failures(
-    parameters: ParameterSet, numbers: Mapping[str, Array], step: float, by_voltage: bool
-) -> dict[int, str]:
-    """Sets that cannot be marched at all."""
-    name, failures = parameters.name, dict[int, str]()
-    for mask, sentence in broken_rules(numbers):
-        for i in np.flatnonzero(mask):
-            failures.setdefault(int(i), f"{name}: {sentence(int(i))}")
-    for side in SIDES if by_voltage else ():
-        limit = step_limit(numbers[f"zeta_{side}"], parameters.rate is None)
-        for i in np.flatnonzero(~(numbers[f"omega_{side}"] * step < limit)):
-            failures.setdefault(
-                int(i),
-                f"{name}: the current filter of the {side} channel "
-                f"{'swings too fast for' if parameters.rate is None else 'is unstable at'} this "
-                "step.",
-            )
-    return failures
-
-
-def _folder(to: str | Path | None, cost: SquaredError | None) -> Path | None:
-    """Where outputs go."""
+) -> _Sets:
+    """Sets with what of them is wanted."""
     if to is not None and cost is not None:
         raise InputError(
             "Outputs are written to files, costs are not: leave out one of to and cost."
         )
-    return None if to is None else Path(to)
+    compared = _comparison(cost, record)
+    folder = None if to is None else Path(to)
+    return _Sets(model, numbers, record, records, output, *compared, cost is None, folder)
 
 
-def _comparison(cost: SquaredError | None, samples: int, record: Record) -> tuple[Array, Array]:
+def _comparison(cost: SquaredError | None, record: Record) -> tuple[Array, Array]:
     """Measured values and weights on the march's grid, zero weight between the samples."""
     # zeros that nobody writes to take no memory
     measured, weight = np.zeros(record.values.size), np.zeros(record.values.size)
-    if cost is None:
-        return measured, weight
-    given = np.asarray(cost.measured, dtype=np.float64)
-    if given.shape != (samples,):
-        raise InputError(f"The record has {samples} samples, but {given.size} were measured.")
-    try:
-        weights = np.broadcast_to(np.asarray(cost.weight, dtype=np.float64), (samples,))
-    except ValueError:
-        raise InputError(f"The weight must be one number or {samples}.") from None
-    bad = ~np.isfinite(weights) | (weights < 0.0) | ((weights > 0.0) & ~np.isfinite(given))
-    if bad.any():
-        raise InputError(
-            f"Measured value or weight is not finite, or the weight negative, at sample "
-            f"{int(np.argmax(bad))}; give weight 0 to samples that are not to count."
-        )
-    counted = np.where(weights > 0.0, given, 0.0) if (weights == 0.0).any() else given
-    if record.substeps == 1:
-        # the kernels are compiled for arrays that can be written to
-        return np.require(counted, requirements=["C", "W"]), np.require(
-            weights, requirements=["C", "W"]
-        )
-    measured[:: record.substeps] = counted
-    weight[:: record.substeps] = weights
+    if cost is not None:
+        seen = Observation(cost.output, record.time, cost.measured, cost.weight)
+        weights = np.asarray(seen.weight)
+        measured[:: record.substeps] = np.where(weights > 0.0, seen.values, 0.0)
+        weight[:: record.substeps] = weights
     return measured, weight
-
-
-def _jobs(
-    parameters: ParameterSet,
-    numbers: Mapping[str, Array],
-    failures: Mapping[int, str],
-    count: int,
-    changed: Sequence[str],
-) -> Iterator[tuple[Indices, PumpOptions]]:
-    """Blocks of sets that share the options which the kernels are compiled for."""
-    good = np.ones(count, dtype=bool)
-    good[list(failures)] = False
-    base = pump_options(parameters)
-    masks: dict[str, NDArray[np.bool_]] = {
-        "steep": np.tan(np.maximum(numbers["Z13_plus"], numbers["Z13_minus"])) >= TAN_22_5
-    }
-    for option in {SWITCHES[column] for column in changed if column in SWITCHES}:
-        own = [numbers[each] for each in SWITCHES if SWITCHES[each] == option and each in numbers]
-        masks[option] = np.any(own, axis=0)
-    names = list(masks)
-    kind = sum(
-        (masks[name].astype(np.int64) << k for k, name in enumerate(names)),
-        np.zeros(count, np.int64),
-    )
-    for each in np.unique(kind[good]):
-        members = np.flatnonzero(good & (kind == each))
-        options = base._replace(
-            **{name: True if each >> k & 1 else None for k, name in enumerate(names)}
-        )
-        for first in range(0, members.size, LANES):
-            yield members[first : first + LANES], options

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.fields import floats_of
 from swashplate.equations.library import TAN_22_5
 from swashplate.equations.marching.run import Instance, Part
-from swashplate.equations.model import Model
 from swashplate.errors import InputError
 from swashplate.models.card import Card, CardOptions, Channel
 from swashplate.models.drive import Source as CurrentSource
@@ -27,18 +26,14 @@ MOST_SUBSTEPS = 1000
 """Steps a sample that anyone would wait for."""
 
 
-def _paths() -> dict[str, str]:
-    found = {path: f"pump.{path}" for path in floats_of(Pump)}
-    for side in SIDES:
-        found |= {f"{name}_{side}": f"card.{side}.{name}" for name in Channel._fields}
-    return {**found, "tau": "card.tau"}
-
-
-PATHS = _paths()
+PATHS = {
+    **{path: f"pump.{path}" for path in floats_of(Pump)},
+    **{f"{name}_{side}": f"card.{side}.{name}" for side in SIDES for name in Channel._fields},
+    "tau": "card.tau",
+}
 """Path in the model of every column such as ``Z16_plus``."""
 START_PRESSURE = "start_pressure"
 """Column of δP at the first sample, where it is an unknown of the experiment."""
-START_PATHS = {START_PRESSURE: ("pump.pressure", "pump.plate_pressure")}
 
 
 def path_of(column: str) -> str:
@@ -91,31 +86,21 @@ def instance_of(parameters: ParameterSet, by_voltage: bool) -> Instance:
     return Instance(pump_drive, (Part(CurrentSource()), pump), parameters.name)
 
 
-def model_of(by_voltage: bool) -> Model:
-    """The model behind `instance_of`."""
-    return drive if by_voltage else pump_drive
-
-
-# --- the card's filter ----------------------------------------------------------------------------
+def without_ripple(instance: Instance) -> Instance:
+    """The drive at the mean of a turn: the cam ring's ripple does not change it."""
+    card, pump = instance.parts
+    smooth = pump._replace(options=pump.options._replace(ripple=None))
+    return Instance(instance.model, (card, smooth), instance.name)
 
 
 def step_limit(zeta: ArrayLike, exact: bool) -> NDArray[np.float64]:
     """Largest ωh, itself excluded, that the card's filter bears, for each ζ.
 
-    Parameters
-    ----------
-    zeta : array_like
-        Damping ratios. [1]
-    exact : bool
-        Whether the filter is its differential equation, and not the recursion.
-
-    Notes
-    -----
     Recursion: Jury's criterion for z² - 2(1 - ζωh) z + 1 - 2ζωh + ω²h² is ωh < 2ζ and
     ζωh < 1 + ω²h²/4. The first condition is the stricter one where damping is small: an explicit
     step adds to a swing what the damping has to take away. From ζ = 1 on the second gives
-    ωh < 2(ζ - √(ζ² - 1)), here written without cancellation. Differential equation: half a swing,
-    ωh √(1 - ζ²) < π, within which its Coulomb term may count as constant.
+    ωh < 2(ζ - √(ζ² - 1)), here written without cancellation. Differential equation (`exact`): half
+    a swing, ωh √(1 - ζ²) < π, within which its Coulomb term may count as constant.
     """
     damping = np.asarray(zeta, dtype=np.float64)
     if exact:
@@ -135,12 +120,13 @@ def check_filter_stability(parameters: ParameterSet, step: float) -> None:
     InputError
         Unless ωh is below `step_limit`; the sentence says how many steps a sample would do.
     """
-    owner, numbers, exact = parameters.name, parameters.numbers, parameters.rate is None
+    numbers, exact = parameters.numbers, parameters.rate is None
     for side in SIDES:
         zeta, omega = numbers[f"zeta_{side}"], numbers[f"omega_{side}"]
         steps = omega * step / float(step_limit(zeta, exact))
         if steps < 1.0:
             continue
+        channel = f"{parameters.name}: the current filter of the {side} channel (zeta = {zeta:g}"
         if not steps < MOST_SUBSTEPS:
             has, change = "has so little damping", "raise zeta"
             if zeta >= 1.0:
@@ -148,30 +134,27 @@ def check_filter_stability(parameters: ParameterSet, step: float) -> None:
             if exact:
                 has, change = f"swings so fast with omega = {omega:g} rad/s", "lower omega"
             raise InputError(
-                f"{owner}: the current filter of the {side} channel (zeta = {zeta:g}) {has} that "
-                f"{MOST_SUBSTEPS} steps a sample would not do; {change}."
+                f"{channel}) {has} that {MOST_SUBSTEPS} steps a sample would not do; {change}."
             )
         raise InputError(
-            f"{owner}: the current filter of the {side} channel (zeta = {zeta:g}, omega = "
-            f"{omega:g} rad/s) {'swings too fast for' if exact else 'is unstable at'} a step of "
-            f"1/{1.0 / step:g} s; simulate with "
-            f"substeps={floor(steps) + 1} or more or at a higher rate, or lower omega."
+            f"{channel}, omega = {omega:g} rad/s) "
+            f"{'swings too fast for' if exact else 'is unstable at'} a step of 1/{1.0 / step:g} s; "
+            f"simulate with substeps={floor(steps) + 1} or more or at a higher rate, or lower "
+            "omega."
         )
 
 
 def at_every_rate(parameters: ParameterSet) -> ParameterSet:
     """The set with the filter's differential equation in place of the recursion for one rate.
 
+    Both have the same poles, z = e^(sh) at the recursion's rate, and the same band C/ω² in which
+    the Coulomb term holds the current. By that their delays are alike as well: 2ζ/ω of the
+    equation, a sample less by the old ζ and ω of the recursion.
+
     Raises
     ------
     InputError
         If the recursion changes its sign from sample to sample, as no differential equation does.
-
-    Notes
-    -----
-    Both have the same poles, z = e^(sh) at the recursion's rate, and the same band C/ω² in which
-    the Coulomb term holds the current. By that their delays are alike as well: 2ζ/ω of the
-    equation, a sample less by the old ζ and ω of the recursion.
     """
     if parameters.rate is None:
         return parameters

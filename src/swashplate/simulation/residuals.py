@@ -1,33 +1,35 @@
-"""Residuals of an experiment, their Jacobian and its triangular factor, for one parameter set."""
+"""Derivatives of a drive: residuals of an experiment, their Jacobian, sensitivities of a run."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.marching import jacobian as engine
 from swashplate.equations.marching.jacobian import Jacobian as Jacobian
 from swashplate.equations.marching.jacobian import Triangle as Triangle
-from swashplate.equations.marching.observation import ObservedRecord
+from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.observation import Own as EngineOwn
+from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.rows import BLOCK
-from swashplate.equations.marching.run import Instance
+from swashplate.equations.marching.run import Instance, Start
 from swashplate.errors import InputError
 from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.instance import (
-    SIDES,
+    PATHS,
     START_PRESSURE,
     check_filter_stability,
     instance_of,
     path_of,
 )
-from swashplate.simulation.run import check_start_pressure, started_at
+from swashplate.simulation.result import Named, Simulation
+from swashplate.simulation.run import Driver, simulate_drive, start_states, started_at
 
 Array = NDArray[np.float64]
 
@@ -62,10 +64,8 @@ class Ready(NamedTuple):
 
     instance: Instance
     own: EngineOwn
-    paths: Sequence[str] = ()
-    """Columns of derivatives."""
-    moved: Sequence[bool] | None = None
-    """Whether the record may depend on a column at all."""
+    paths: Sequence[str] = ()  # Columns of derivatives.
+    moved: Sequence[bool] | None = None  # Whether the record may depend on a column at all.
 
 
 def residuals(
@@ -89,23 +89,10 @@ def jacobian(
     out: Array | None = None,
     block: int = BLOCK,
 ) -> Jacobian:
-    """The same residuals with their exact derivatives.
+    """The same residuals with their exact derivatives; see the engine's `jacobian`.
 
-    Parameters
-    ----------
-    parameters : ParameterSet
-        The drive.
-    observed : ObservedRecord
-        The record, and what was measured under it.
-    columns : sequence of str
-        Symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and
-        ``"start_pressure"``. What the record does not depend on gives zeros.
-    own : Own
-        Values of the experiment's own unknowns.
-    out : (k + 1, m) array, optional
-        Where to write; the `rows` of an earlier call, for example.
-    block : int
-        Samples marched at a time, 2 to 512.
+    Columns are symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and
+    ``"start_pressure"``. What the record does not depend on gives zeros.
     """
     names = wanted_columns(columns)
     instance, inner, paths, moved = made_ready(parameters, observed, names, own)
@@ -129,28 +116,19 @@ def triangle(
 
 
 def wanted_columns(columns: Sequence[str]) -> tuple[str, ...]:
-    """Columns that are asked for, symbols taken apart.
+    """Columns that are asked for, symbols taken apart; refused where one is asked for twice."""
+    return _wanted(tuple(columns))
 
-    Raises
-    ------
-    InputError
-        If a column is asked for twice.
-    ParameterError
-        If there is no such parameter.
-    """
-    if list(columns).count(START_PRESSURE) > 1:
-        raise InputError(
-            f"{START_PRESSURE} is asked for {list(columns).count(START_PRESSURE)} times."
-        )
-    names = tuple(
-        each
-        for name in columns
-        for each in ((name,) if name == START_PRESSURE else columns_of([name]))
-    )
-    if len(set(names)) != len(names):
-        twice = next(name for k, name in enumerate(names) if name in names[:k])
-        raise InputError(f"{twice} is asked for twice.")
-    return names
+
+@lru_cache(maxsize=256)
+def _wanted(columns: tuple[str, ...]) -> tuple[str, ...]:
+    names: list[str] = []
+    for name in columns:
+        names += [name] if name == START_PRESSURE else columns_of([name])
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise InputError(f"{name} is asked for twice.")
+    return tuple(names)
 
 
 def moved_by(
@@ -163,30 +141,16 @@ def moved_by(
         "plus": by_voltage and high > parameters.numbers["V_dz_plus"],
         "minus": by_voltage and -low > parameters.numbers["V_dz_minus"],
     }
+    moved = {"card.plus": driven["plus"], "card.minus": driven["minus"]}
+    moved["card"] = any(driven.values())
     pump = any(each.signal not in CURRENTS for each in observed.observations)
-    found = []
-    for name in names:
-        path = path_of(name)
-        side = next((side for side in SIDES if path.startswith(f"card.{side}.")), None)
-        if side is not None:
-            found.append(driven[side])
-        elif path == "card.tau":
-            found.append(any(driven.values()))
-        else:
-            found.append(pump)
-    return found
+    return [moved.get(path_of(name).rpartition(".")[0], pump) for name in names]
 
 
 def made_ready(
     parameters: ParameterSet, observed: ObservedRecord, names: Sequence[str], own: Own
 ) -> Ready:
-    """The drive's model with its numbers, for some columns.
-
-    Raises
-    ------
-    InputError
-        If a signal cannot be observed, the filter is unstable, or a start has no value.
-    """
+    """The drive's model with its numbers, for some columns."""
     by_voltage = observed.driven_by == "voltage"
     for each in observed.observations:
         if each.signal not in OBSERVABLE:
@@ -201,10 +165,8 @@ def made_ready(
     start: dict[str, float] = {}
     if own.start_pressure is not None:
         started = started_at(instance, observed.records, observed.record.step, observed.start)
-        pressure = check_start_pressure(instance, own.start_pressure, started)
-        start["pump.pressure"] = pressure
-        if instance.parts[1].options.damping is not None:
-            start["pump.plate_pressure"] = pressure
+        states = start_states(instance, own.start_pressure, started)
+        start = {f"pump.{path}": pressure for path, pressure in states.items()}
     elif START_PRESSURE in names:
         raise InputError(f"{START_PRESSURE} is a column, so Own needs a value of it.")
     return Ready(
@@ -221,3 +183,97 @@ def _switched_on(parameters: ParameterSet, asked: frozenset[str]) -> ParameterSe
     if asked <= parameters.options:
         return parameters
     return replace(parameters, options=parameters.options | asked)
+
+
+# --- over a whole run -----------------------------------------------------------------------------
+
+OUTPUTS = ("current", "current_positive", "current_negative", "shaft_speed", "shaft_position")
+"""Signals that have sensitivities."""
+PUMP_COLUMNS = tuple(name for name, path in PATHS.items() if path.startswith("pump.Z"))
+"""Columns of the pump and motor of the source."""
+ALL_COLUMNS = (
+    *PUMP_COLUMNS,
+    *(name for name in PATHS if name.endswith("_plus") and name not in PUMP_COLUMNS),
+    *(name for name in PATHS if name.endswith("_minus") and name not in PUMP_COLUMNS),
+    "tau",
+)
+"""Columns of card, pump and motor, refinements apart, in their order."""
+
+
+def _columns(found: Sensitivities, signal: str) -> Array:
+    """The Jacobian of unit weights: every sample observed as zero."""
+    run = found.simulation
+    seen = Observation(signal, run.time, np.zeros(run.time.size))
+    observed = ObservedRecord(run.record, [seen], run.driven_by, found.start, run.measured)
+    return jacobian(found.parameters, observed, found.names).columns
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """Derivatives of the outputs by parameters, one column for each of `names`.
+
+    The unit of a column is the output's over the parameter's, both SI. At a switch (the edge of a
+    dead zone, a limit just reached) they are the one-sided derivatives that the equations declare.
+    """
+
+    simulation: Simulation
+    """The plain simulation, the same to the last bit as without sensitivities."""
+    names: tuple[str, ...]
+    """Columns such as ``Z16_plus``, in the order asked for."""
+    parameters: ParameterSet = field(repr=False)
+    start: Start = "rest"
+
+    def __repr__(self) -> str:
+        return f"Sensitivities({self.simulation!r}, by {', '.join(self.names)})"
+
+    current_positive = Named(_columns)
+    """(n, k) derivatives of the positive channel's current. [A/...]"""
+    current_negative = Named(_columns)
+    """(n, k) derivatives of the negative channel's current, a magnitude. [A/...]"""
+    shaft_speed = Named(_columns)
+    """(n, k) derivatives of the speed. [(rad/s)/...]"""
+    shaft_position = Named(_columns)
+    """(n, k) derivatives of the position. [rad/...]"""
+
+    @property
+    def current(self) -> Array:
+        """(n, k) derivatives of the signed current. [A/...]"""
+        return self.current_positive - self.current_negative
+
+    def at(self, time: ArrayLike, output: str) -> Array:
+        """(m, k) derivatives of an output at other time stamps, by linear interpolation.
+
+        Parameters
+        ----------
+        time : (m,) array_like
+            Time stamps. [s]
+        output : str
+            One of `OUTPUTS`.
+        """
+        rows = getattr(self, output)
+        stamps = np.asarray(time, dtype=np.float64)
+        return np.column_stack(
+            [np.interp(stamps, self.simulation.time, column) for column in rows.T]
+        )
+
+
+def sensitivities(
+    parameters: ParameterSet,
+    record: Record,
+    driver: Driver,
+    start: Start,
+    names: Sequence[str] | None,
+) -> Sensitivities:
+    """Derivatives by some columns; see `Drive.sensitivities` and `Drive.sensitivities_current`."""
+    chosen = ALL_COLUMNS if driver == "voltage" else PUMP_COLUMNS
+    if names is not None:
+        if isinstance(names, str) or not names:
+            raise InputError("Name at least one parameter to differentiate by, in a list.")
+        chosen = tuple(columns_of(list(names)))
+    foreign = [name for name in chosen if PATHS[name].startswith("card.")]
+    if foreign and driver == "current":
+        raise InputError(
+            f"{foreign[0]} belongs to the card, which a given current does not go through."
+        )
+    run = simulate_drive(parameters, record, start, driver=driver)
+    return Sensitivities(run, chosen, parameters, start)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import IntFlag
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,7 @@ from swashplate.equations.marching.march import Stored
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Instance, observe_kernel
 from swashplate.models.pump import Pump
+from swashplate.tables import Tabular
 
 if TYPE_CHECKING:
     import polars
@@ -69,18 +70,66 @@ def read_only(array: NDArray[T]) -> NDArray[T]:
     return view
 
 
-@dataclass(frozen=True, eq=False)
-class Simulation:
-    """Signals of one simulated record, read-only arrays of the record's length, all SI.
+class Named:
+    """An attribute of a result by its name: an array, computed when it is first asked for."""
 
-    Signs: positive voltage, current, force, opening, angle and speed go together; positive speed
-    hoists, slews right, lifts the boom.
-    """
+    def __init__(self, made: Callable[[Any, str], Array]) -> None:
+        self._made = made
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, result: object | None, owner: type | None = None) -> Array:
+        if result is None:
+            return self  # type: ignore[return-value]  # the class's own attribute
+        # an attribute of that name is found before this
+        found = result.__dict__[self._name] = self._made(result, self._name)
+        return found
+
+
+def signal(run: Signals, name: str) -> Array:
+    """A signal at the record's samples."""
+    return run.sampled(run.fine(name))
+
+
+@dataclass(frozen=True, eq=False)
+class Signals(Tabular):
+    """Signals over one record, read-only arrays of the record's length, all SI."""
 
     name: str
     """Name of the parameter set."""
     record: Record
-    """The input on the march's grid: a voltage, or without a card a signed current."""
+    """The input on the march's grid."""
+
+    @abstractmethod
+    def fine(self, signal: str) -> Array:
+        """A signal on the march's grid, `substeps` points a sample."""
+
+    def sampled(self, fine: NDArray[T]) -> NDArray[T]:
+        """Samples of the record out of the march's grid."""
+        return read_only(np.ascontiguousarray(fine[:: self.record.substeps]))
+
+    @cached_property
+    def time(self) -> Array:
+        """Time stamps. [s]"""
+        return self.record.time
+
+    def turned(self) -> Array:
+        """Trapezoidal integral of the shaft's speed on the march's grid, zero at the start."""
+        speed = self.fine("shaft_speed")
+        angle = np.zeros_like(speed)
+        np.cumsum(0.5 * self.record.step * (speed[:-1] + speed[1:]), out=angle[1:])
+        return angle
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation(Signals):
+    """Signals of one simulated record, read-only arrays of the record's length, all SI.
+
+    Signs: positive voltage, current, force, opening, angle and speed go together; positive speed
+    hoists, slews right, lifts the boom. The record is a voltage, or without a card a current.
+    """
+
     instance: Instance = field(repr=False)
     """The model with its numbers."""
     driven_by: str
@@ -91,10 +140,6 @@ class Simulation:
     flags: Flags = field(repr=False)
     measured: Mapping[str, Array] = field(default_factory=dict, repr=False)
     """Further inputs that were given as signals, on the march's grid."""
-
-    def _sampled(self, fine: NDArray[T]) -> NDArray[T]:
-        """Samples of the record out of the march's grid."""
-        return np.ascontiguousarray(fine[:: self.record.substeps])
 
     def __repr__(self) -> str:
         samples = (self.record.values.size - 1) // self.record.substeps + 1
@@ -113,25 +158,16 @@ class Simulation:
 
     @property
     def refined(self) -> bool:
-        """Whether an option beyond the source's equations is on."""
+        """Whether an option beyond the source's equations is on, or the motor's constant known."""
         options = self.instance.parts[1].options
         names = ("friction", "hysteresis", "ripple", "damping", "leakage", "line")
-        return any(getattr(options, name) is not None for name in names) or self.knows_pressure
-
-    @property
-    def knows_pressure(self) -> bool:
-        """Whether a motor_constant is given, which makes a pressure drop of the torque."""
-        return self.pump.motor_constant > 0.0
-
-    @cached_property
-    def time(self) -> Array:
-        """Time stamps. [s]"""
-        return self.record.time
+        known = self.pump.motor_constant > 0.0
+        return known or any(getattr(options, name) is not None for name in names)
 
     @cached_property
     def voltage(self) -> Array | None:
         """Command, None where a current was given instead. [V]"""
-        return read_only(self._sampled(self.record.values)) if self.driven_by_voltage else None
+        return self.sampled(self.record.values) if self.driven_by_voltage else None
 
     @cached_property
     def _fine(self) -> dict[str, Array]:
@@ -139,6 +175,7 @@ class Simulation:
         return {
             "current_positive": self.out[0],
             "current_negative": self.out[1],
+            "stroker_pressure": self.out[self.kept.index(Stored(1, "state", "pressure"))],
         }
 
     def fine(self, signal: str) -> Array:
@@ -152,118 +189,69 @@ class Simulation:
         """
         found = self._fine
         if signal not in found:
+            plus, minus = found["current_positive"], found["current_negative"]
             if signal == "current":
-                found[signal] = (
-                    found["current_positive"] - found["current_negative"]
-                    if self.driven_by_voltage
-                    else self.record.values
-                )
+                found[signal] = plus - minus if self.driven_by_voltage else self.record.values
             elif signal == "current_sum":
-                found[signal] = found["current_positive"] + found["current_negative"]
-            elif signal == "stroker_pressure":
-                found[signal] = self.out[self.kept.index(Stored(1, "state", "pressure"))]
+                found[signal] = plus + minus
             elif signal == "shaft_position":
-                speed = self.fine("shaft_speed")
-                position = np.zeros_like(speed)
-                np.cumsum(0.5 * self.record.step * (speed[:-1] + speed[1:]), out=position[1:])
-                found[signal] = position
+                found[signal] = self.turned()
             else:
                 group = next((each for each in (INSIDE, MOTOR) if signal in each), (signal,))
-                out, _ = self._observed(tuple(Stored(1, "signals", each) for each in group))
+                out = self._observed(tuple(Stored(1, "signals", each) for each in group))
                 found |= dict(zip(group, out, strict=True))
         return found[signal]
 
-    def _observed(self, wanted: tuple[Stored, ...]) -> tuple[Array, Flags]:
+    def _observed(self, wanted: tuple[Stored, ...]) -> Array:
         """Signals of the pump at the states that the march left."""
-        packed = sum(each.kind == "limits" for each in wanted)
-        size = self.out.shape[1]
-        out = np.empty((len(wanted) - packed, size))
-        flags = np.empty((packed, size), dtype=np.uint8)
-        kept, rows = self.kept, self.out
-        if self.measured:
-            kept = (*kept, *(Stored(1, "input", name) for name in self.measured))
-            rows = np.vstack([rows, *self.measured.values()])
-        kept = tuple(each for each in kept if each.kind != "limits")
-        signals = (self.driven_by, *self.measured)
-        instance = self.instance
+        out = np.empty((len(wanted), self.out.shape[1]))
+        kept = tuple(each for each in self.kept if each.kind != "limits")
+        kept += tuple(Stored(1, "input", name) for name in self.measured)
+        rows = np.vstack([self.out, *self.measured.values()]) if self.measured else self.out
+        instance, signals = self.instance, (self.driven_by, *self.measured)
         observe_kernel(instance.model, 1, signals, instance.options, kept, wanted)(
-            instance.params, instance.given, self.record.step, rows, out, flags
+            instance.params, instance.given, self.record.step, rows, out
         )
-        return out, flags
+        return out
 
-    def _signal(self, name: str) -> Array:
-        return read_only(self._sampled(self.fine(name)))
-
-    @cached_property
-    def current_positive(self) -> Array:
-        """Current of the solenoid towards positive speed, never negative. [A]"""
-        return self._signal("current_positive")
-
-    @cached_property
-    def current_negative(self) -> Array:
-        """Current of the other solenoid, never negative. [A]"""
-        return self._signal("current_negative")
-
-    @cached_property
-    def current(self) -> Array:
-        """Signed current, positive less negative; an ammeter reads the sum of both. [A]"""
-        return self._signal("current")
-
-    @cached_property
-    def solenoid_force(self) -> Array:
-        """Net force of both solenoids on the spool. [N]"""
-        return self._signal("solenoid_force")
-
-    @cached_property
-    def spool_position(self) -> Array:
-        """Displacement of the spool, within its stroke. [m]"""
-        return self._signal("spool_position")
-
-    @cached_property
-    def orifice_opening(self) -> Array:
-        """Effective opening, what the orifices leave of the spool's displacement. [m]"""
-        return self._signal("orifice_opening")
-
-    @cached_property
-    def stroker_pressure(self) -> Array:
-        """Stroking pressure δP about its equilibrium. [Pa]"""
-        return self._signal("stroker_pressure")
-
-    @cached_property
-    def swash_angle(self) -> Array:
-        """Angle of the swash plate. [rad]"""
-        return self._signal("swash_angle")
-
-    @cached_property
-    def shaft_speed(self) -> Array:
-        """Speed of the shaft, of the turret for slew. [rad/s]"""
-        return self._signal("shaft_speed")
-
-    @cached_property
-    def shaft_position(self) -> Array:
-        """Trapezoidal integral of the speed on the march's grid, zero at the start. [rad]"""
-        return self._signal("shaft_position")
-
-    @cached_property
-    def motor_torque(self) -> Array:
-        """Torque that the motor bears, positive where it drives towards positive speed. [N m]"""
-        return self._signal("motor_torque")
+    current_positive = Named(signal)
+    """Current of the solenoid towards positive speed, never negative. [A]"""
+    current_negative = Named(signal)
+    """Current of the other solenoid, never negative. [A]"""
+    current = Named(signal)
+    """Signed current, positive less negative; an ammeter reads the sum of both. [A]"""
+    solenoid_force = Named(signal)
+    """Net force of both solenoids on the spool. [N]"""
+    spool_position = Named(signal)
+    """Displacement of the spool, within its stroke. [m]"""
+    orifice_opening = Named(signal)
+    """Effective opening, what the orifices leave of the spool's displacement. [m]"""
+    stroker_pressure = Named(signal)
+    """Stroking pressure δP about its equilibrium. [Pa]"""
+    swash_angle = Named(signal)
+    """Angle of the swash plate. [rad]"""
+    shaft_speed = Named(signal)
+    """Speed of the shaft, of the turret for slew. [rad/s]"""
+    shaft_position = Named(signal)
+    """Trapezoidal integral of the speed on the march's grid, zero at the start. [rad]"""
+    motor_torque = Named(signal)
+    """Torque that the motor bears, positive where it drives towards positive speed. [N m]"""
 
     @cached_property
     def motor_pressure_drop(self) -> Array | None:
         """P_hi - P_lo over the motor, None where no motor_constant is given. [Pa]"""
-        return self._signal("motor_pressure_drop") if self.knows_pressure else None
+        known = self.pump.motor_constant > 0.0
+        return self.sampled(self.fine("motor_pressure_drop")) if known else None
 
     @cached_property
     def limits(self) -> Flags:
         """Limits that act at each sample, bits of `Limit`."""
-        _, flags = self._observed((Stored(1, "limits"),))
         # the pump's limits in their order, with the card's between the first and the second
-        pump = flags[0]
+        pump = self._observed((Stored(1, "limits"),))[0].astype(np.uint8)
         bits = (pump & 1) | ((pump & 0b11110) << 1)
         if self.driven_by_voltage:
             bits = bits | (self.flags[0] << 1)
-        return read_only(self._sampled(bits.astype(np.uint8)))
+        return self.sampled(bits.astype(np.uint8))
 
     def active(self, limit: Limit) -> NDArray[np.bool_]:
         """Samples at which a limit, or any of several, acts."""
@@ -305,20 +293,6 @@ class Simulation:
             if self.motor_pressure_drop is not None:
                 columns["motor_pressure_drop"] = self.motor_pressure_drop
         return pl.DataFrame(columns)
-
-    def write(self, path: str | Path) -> None:
-        """Write the table of `to_polars` as CSV or Parquet, by the path's ending.
-
-        The file appears whole or not at all: it is written beside and renamed.
-
-        Raises
-        ------
-        FileError
-            For another ending, or a folder that cannot be written.
-        """
-        from swashplate.tables import write_table
-
-        write_table(self.to_polars(), path)
 
     def plot(self) -> Figure:
         """Figure of the chain's signals with the active limits shaded."""

@@ -1,19 +1,33 @@
-"""Simulation of a drive: from a parameter set and a record to a result."""
+"""Simulation of a drive: from a parameter set and a record to a result, and its steady states."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.code import generating
-from swashplate.equations.marching.march import Sampler, Stored
+from swashplate.equations import expressions as ex
+from swashplate.equations.code import Code, Tuple, generating, leaves
+from swashplate.equations.expressions import text
+from swashplate.equations.marching.march import Sampler, Stored, function_source, indented, value_of
 from swashplate.equations.marching.record import Record
-from swashplate.equations.marching.run import Instance, Start, Started, check_start, marched
+from swashplate.equations.marching.run import Instance, Start, Started, called, marched, module
 from swashplate.equations.model import Model
+from swashplate.equations.writing import lines_of
 from swashplate.errors import DomainError, InputError
+from swashplate.models.card import channel_level
+from swashplate.models.drive import drive
+from swashplate.models.pump import (
+    PumpConstants,
+    PumpInputs,
+    PumpState,
+    pump_constants,
+    pump_sample,
+    pump_settled,
+)
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import check_filter_stability, instance_of
@@ -21,18 +35,10 @@ from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
 Driver = Literal["voltage", "current"]
-MEASURED = ("pump_speed", "load_torque", "supply_pressure")
-"""Inputs beside the command that may be given as signals; otherwise a parameter stands for them."""
 
 
 def check_voltage(record: Record, clip: bool) -> Record:
-    """Refuse, or on request clip, a command beyond ±10 V.
-
-    Raises
-    ------
-    InputError
-        Naming the first sample out of range.
-    """
+    """Refuse, or on request clip, a command beyond ±10 V; the first such sample is named."""
     low, high = float(record.values.min()), float(record.values.max())
     if low >= -FULL_VOLTAGE and high <= FULL_VOLTAGE:
         return record
@@ -49,22 +55,16 @@ def check_voltage(record: Record, clip: bool) -> Record:
 @generating
 def kept_of(model: Model, signals: tuple[str, ...], options: tuple[Any, ...]) -> tuple[Stored, ...]:
     """What a march leaves: currents, and the states from which all else follows."""
-    pump = model.parts[1]
-    inside = [Stored(1, "signals", path) for path in pump.signal_names if path in _inside(model)]
+    card, pump = model.parts
+    assert pump.signals is not None
+    inside = [Stored(1, "signals", path) for path in pump.signals._fields]
     sampler = Sampler(model, signals, options, [*inside, Stored(1, "limits")])
-    kept = [Stored(0, "signals", "current_positive"), Stored(0, "signals", "current_negative")]
-    kept += [Stored(1, "state", path) for path in sampler.carried[1]]
-    if model.parts[0].limits is None:
-        kept.append(Stored(0, "signals", "current"))
-    if model.parts[0].limits is not None:
-        kept.append(Stored(0, "limits"))
-    return tuple(kept)
-
-
-def _inside(model: Model) -> tuple[str, ...]:
-    made = model.parts[1].signals
-    assert made is not None
-    return tuple(made._fields)
+    return (
+        Stored(0, "signals", "current_positive"),
+        Stored(0, "signals", "current_negative"),
+        *(Stored(1, "state", path) for path in sampler.carried[1]),
+        Stored(0, "signals", "current") if card.limits is None else Stored(0, "limits"),
+    )
 
 
 def simulate_drive(
@@ -73,40 +73,26 @@ def simulate_drive(
     start: Start,
     start_pressure: float | None = None,
     measured: Mapping[str, Array] | None = None,
+    *,
+    driver: Driver = "voltage",
 ) -> Simulation:
     """March card and pump over a voltage record; see `Drive.simulate`.
 
     With `start_pressure` the pump begins there [Pa] and only the card's state is that of `start`.
     """
-    check_filter_stability(parameters, record.step)
-    return _simulate(parameters, record, "voltage", start, start_pressure, measured or {})
-
-
-def simulate_pump(
-    parameters: ParameterSet,
-    record: Record,
-    start: Start,
-    start_pressure: float | None = None,
-    measured: Mapping[str, Array] | None = None,
-) -> Simulation:
-    """March the pump alone over a signed current; see `Drive.simulate_current`."""
-    return _simulate(parameters, record, "current", start, start_pressure, measured or {})
-
-
-def _simulate(
-    parameters: ParameterSet,
-    record: Record,
-    driver: Driver,
-    start: Start,
-    start_pressure: float | None,
-    measured: Mapping[str, Array],
-) -> Simulation:
+    if driver == "voltage":
+        check_filter_stability(parameters, record.step)
     instance = instance_of(parameters, driver == "voltage")
-    records = {driver: record.values, **measured}
+    others = measured or {}
+    records = {driver: record.values, **others}
     started = started_at(instance, records, record.step, start, start_pressure)
     kept = kept_of(instance.model, tuple(records), instance.options)
     out, flags = marched(instance, records, record.step, started, kept, driver)
-    return Simulation(parameters.name, record, instance, driver, kept, out, flags, measured)
+    return Simulation(parameters.name, record, instance, driver, kept, out, flags, others)
+
+
+simulate_pump = partial(simulate_drive, driver="current")
+"""March the pump alone over a signed current; see `Drive.simulate_current`."""
 
 
 def started_at(
@@ -116,27 +102,17 @@ def started_at(
     start: Start,
     start_pressure: float | None = None,
 ) -> Started:
-    """Where a record begins.
-
-    Raises
-    ------
-    DomainError
-        If the pressure at the start lies beyond a stop of the swash plate or Z15.
-    """
-    check_start(start)
+    """Where a record begins, with the pump at a pressure of its own if one is given. [Pa]"""
     started = instance.start({name: float(v[0]) for name, v in records.items()}, step, start)
     if start_pressure is None:
         return started
-    pressure = check_start_pressure(instance, start_pressure, started)
     card, pump = started.states
-    pump = pump._replace(pressure=pressure)
-    if instance.parts[1].options.damping is not None:
-        pump = pump._replace(plate_pressure=pressure)
+    pump = pump._replace(**start_states(instance, start_pressure, started))
     return started._replace(states=(card, pump))
 
 
-def check_start_pressure(instance: Instance, pressure: float, started: Started) -> float:
-    """A pressure to start with, refused where the drive cannot have it. [Pa]
+def start_states(instance: Instance, pressure: float, started: Started) -> dict[str, float]:
+    """Numbers of the pump's state that a pressure at the start sets. [Pa]
 
     Raises
     ------
@@ -153,33 +129,31 @@ def check_start_pressure(instance: Instance, pressure: float, started: Started) 
             f"{instance.name}: the pressure at the start is {pressure:.6g} Pa, but the stops of "
             f"the swash plate and Z15 keep it between {k.lower:.6g} and {k.upper:.6g} Pa."
         )
-    return float(pressure)
+    return dict.fromkeys(instance.model.parts[1].free_start["pressure"], float(pressure))
 
 
-def measured_records(record: Record, given: Mapping[str, object]) -> dict[str, Array]:
+def measured_records(
+    record: Record,
+    load_torque: ArrayLike | None,
+    pump_speed: ArrayLike | None,
+    supply_pressure: ArrayLike | None,
+) -> dict[str, Array]:
     """Inputs beside the command, on the march's grid.
 
-    Parameters
-    ----------
-    record : Record
-        The command.
-    given : mapping
-        Of `MEASURED` to a number or to as many samples as the command has; None is left out.
-
-    Raises
-    ------
-    InputError
-        For another name, length, or a sample that is not finite.
+    Each is None, a number, or as many finite samples as the command has.
     """
+    given = {
+        "load_torque": load_torque,
+        "pump_speed": pump_speed,
+        "supply_pressure": supply_pressure,
+    }
     found: dict[str, Array] = {}
+    grid = np.arange(record.values.size)
+    size = (record.values.size - 1) // record.substeps + 1
     for name, values in given.items():
         if values is None:
             continue
-        if name not in MEASURED:
-            raise InputError(f"There is no input '{name}'; there are {', '.join(MEASURED)}.")
         samples = np.asarray(values, dtype=np.float64)
-        grid = np.arange(record.values.size)
-        size = (record.values.size - 1) // record.substeps + 1
         if samples.ndim == 0:
             samples = np.full(size, float(samples))
         if samples.shape != (size,):
@@ -189,3 +163,77 @@ def measured_records(record: Record, given: Mapping[str, object]) -> dict[str, A
             raise InputError(f"{name} is {samples[bad]} at sample {bad}; it must be finite.")
         found[name] = np.interp(grid, grid[:: record.substeps], samples)
     return found
+
+
+# --- steady states --------------------------------------------------------------------------------
+
+
+@generating
+def _kernel(options: tuple[Any, ...]) -> Callable[..., None]:
+    """The compiled map from constant voltages to currents and speeds."""
+    sampler = Sampler(drive, ("voltage",), options, [])
+    card, pump = sampler.parts
+    code = Code(pump.code.taken)
+    volts = ex.name("volts")
+    plus = card.call(code, channel_level, {"voltage": volts, "p": card.p.items[0]})  # type: ignore[union-attr]
+    minus = card.call(
+        code,
+        channel_level,
+        {"voltage": ex.make("neg", volts), "p": card.p.items[1]},  # type: ignore[union-attr]
+    )
+    current = ex.make("-", plus, minus)  # type: ignore[arg-type]
+    given = (current, *(value_of(pump.p, name) for name in ("pump_speed", "load_torque", "Z9")))
+    known = {**pump.known, "inputs": Tuple(PumpInputs, given)}
+    known["state"] = pump.call(code, pump_settled, known)
+    speed = value_of(pump.call(code, pump_sample, known), "shaft_speed")
+    results = [current, speed]
+    sampler.ends = [[ex.name(node.value) for _, node in leaves(part.p)] for part in sampler.parts]
+    read = code.reads(results)
+    for part in sampler.parts:
+        sampler.ends[part.part] = [ex.name(name) for name in sorted(read)]
+    lines = [
+        *sampler.ahead(),
+        "for n in range(voltage.size):",
+        "    volts = voltage[n]",
+        *indented(lines_of(code, results)),
+        f"    current[n] = {text(current)}",
+        f"    speed[n] = {text(speed)}",
+    ]
+    source = function_source(
+        "settled(voltage, params, given, h, current, speed)",
+        "Signed current and speed that each of many constant voltages settles at.",
+        lines,
+    )
+    return module("drive_settled", source, sampler.names | code.names)["settled"]  # type: ignore[no-any-return]
+
+
+def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Array]:
+    """Signed current [A] and speed [rad/s] that each of many constant voltages settles at."""
+    instance = instance_of(parameters, True)
+    card, pump = instance.options
+    current, speed = np.empty(voltage.size), np.empty(voltage.size)
+    _kernel((card, pump._replace(ripple=None)))(
+        voltage, instance.params, instance.given, 1.0, current, speed
+    )
+    return current, speed
+
+
+def pump_arguments(instance: Instance, current: float, step: float = 1.0) -> dict[str, Any]:
+    """What the pump's equations take under a constant current, by the arguments' names."""
+    p, options, _ = instance.parts[1]
+    known: dict[str, Any] = {"p": p, "options": options, "h": step}
+    known["k"] = called(pump_constants, known)
+    known["inputs"] = PumpInputs(current, p.pump_speed, p.load_torque, p.Z9)
+    return known
+
+
+def settled_state(instance: Instance, current: float) -> PumpState:
+    """State of the pump that a constant signed current settles at."""
+    made: PumpState = called(pump_settled, pump_arguments(instance, current))
+    return made
+
+
+def pressure_limits(instance: Instance) -> PumpConstants:
+    """Pressures at which stops and relief valve act, with the other constants. [Pa]"""
+    made: PumpConstants = pump_arguments(instance, 0.0)["k"]
+    return made

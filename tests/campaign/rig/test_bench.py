@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError, maneuvers
-from swashplate.campaign import rig
-from swashplate.campaign.recognition import recognise
+from swashplate.campaign import recognise, rig
 from swashplate.campaign.rig.bench import perturbed
 
 STEP = maneuvers.step(4.0)

@@ -5,7 +5,7 @@ import pytest
 
 from swashplate import InputError
 from swashplate.campaign.rig import SEVERITIES, Instruments
-from swashplate.campaign.rig.readings import (
+from swashplate.campaign.rig.instruments import (
     dither_ripple,
     lost,
     play,

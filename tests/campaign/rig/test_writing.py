@@ -5,11 +5,9 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from scipy.io import loadmat
 
-from swashplate import Drive, FileError, InputError, maneuvers
-from swashplate.campaign import rig
-from swashplate.campaign.campaign import Campaign
+from swashplate import Drive, FileError, maneuvers
+from swashplate.campaign import Campaign, rig
 
 STEP = maneuvers.step(4.0)
 SINE = maneuvers.sine(4.0, 0.2, length=12.0)
@@ -49,44 +47,19 @@ def test_clean_logs_keep_every_digit(tmp_path: Path) -> None:
         np.testing.assert_array_equal(table[name].to_numpy(), values)
 
 
-def test_parquet_logs(harsh: rig.VirtualTests, tmp_path: Path) -> None:
-    rig.write(harsh, tmp_path, "parquet")
-    path = tmp_path / "hoist_step_4_V.parquet"
-    assert "no measurement" in pl.read_parquet_metadata(path)["virtual"]
-    read = pl.read_parquet(path)["current"].fill_null(np.nan).to_numpy()
-    np.testing.assert_array_equal(read, harsh.runs[STEP.name].columns["current"])
-
-
-def test_mat_logs_are_one_matrix_of_rows(harsh: rig.VirtualTests, tmp_path: Path) -> None:
-    rig.write(harsh, tmp_path, "mat")
-    path = tmp_path / "hoist_step_4_V.mat"
-    held = loadmat(path)
-    assert held["virtual"].item().startswith("virtual: simulated by swashplate ")
-    assert held["rows"].item() == "time, voltage, current, counts"
-    columns = harsh.runs[STEP.name].columns
-    np.testing.assert_array_equal(held["data"], np.vstack(list(columns.values())))
-    assert b"virtual test" in path.read_bytes()[:116]
-
-
-@pytest.mark.parametrize("format", ["csv", "mat", "parquet"])
-def test_the_same_seed_gives_the_same_files(
-    format: str, harsh: rig.VirtualTests, tmp_path: Path
-) -> None:
+def test_the_same_seed_gives_the_same_files(harsh: rig.VirtualTests, tmp_path: Path) -> None:
     again = rig.run("hoist", [SINE, STEP], severity="harsh", seed=4)
-    rig.write(harsh, tmp_path / "one", format)
-    rig.write(again, tmp_path / "two", format)
+    rig.write(harsh, tmp_path / "one")
+    rig.write(again, tmp_path / "two")
     one, two = content(tmp_path / "one"), content(tmp_path / "two")
     assert one.keys() == two.keys()
     assert [name for name in one if one[name] != two[name]] == ["campaign.toml", "truth/truth.toml"]
 
 
 @pytest.mark.parametrize("severity", ["clean", "realistic", "harsh"])
-@pytest.mark.parametrize("format", ["csv", "mat", "parquet"])
-def test_a_campaign_reads_what_is_written(
-    severity: rig.Severity, format: str, tmp_path: Path
-) -> None:
+def test_a_campaign_reads_what_is_written(severity: rig.Severity, tmp_path: Path) -> None:
     tests = rig.run("hoist", [STEP, SINE], severity=severity, validate=[SINE.name])
-    read = Campaign.from_toml(rig.write(tests, tmp_path / "new" / "folder", format))
+    read = Campaign.from_toml(rig.write(tests, tmp_path / "new" / "folder"))
     assert read.virtual
     assert "Virtual" in read.title
     assert [each.maneuver for each in read] == ["step +4 V", "sine 4 V 0.2 Hz"]
@@ -153,5 +126,3 @@ def test_a_folder_that_holds_something_is_kept(harsh: rig.VirtualTests, tmp_path
     assert (tmp_path / "notes.txt").read_text() == "mine"
     with pytest.raises(FileError, match="is a file; name a folder"):
         rig.write(harsh, tmp_path / "notes.txt")
-    with pytest.raises(InputError, match="format is 'xls'; it is one of csv, mat, parquet"):
-        rig.write(harsh, tmp_path / "new", "xls")

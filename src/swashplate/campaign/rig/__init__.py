@@ -10,10 +10,11 @@ Everything that is written says that it is virtual.
 >>> rig.write(tests, "virtual-hoist")
 """
 
+from swashplate.campaign.rig.bench import COUNTS_PER_TURN as COUNTS_PER_TURN
 from swashplate.campaign.rig.bench import VirtualRun as VirtualRun
 from swashplate.campaign.rig.bench import VirtualTests as VirtualTests
 from swashplate.campaign.rig.bench import run as run
+from swashplate.campaign.rig.bench import write as write
 from swashplate.campaign.rig.instruments import SEVERITIES as SEVERITIES
 from swashplate.campaign.rig.instruments import Instruments as Instruments
 from swashplate.campaign.rig.instruments import Severity as Severity
-from swashplate.campaign.rig.writing import write as write

@@ -1,24 +1,38 @@
-"""The test bench: manoeuvres in, logs out."""
+"""Test bench: manoeuvres in; logs, a campaign file and, apart, the truth out."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from importlib.metadata import version
+from json import dumps
+from pathlib import Path
+from platform import python_version
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.kinds import CHANNEL_KINDS, ChannelKind
-from swashplate.campaign.rig.instruments import SEVERITIES, Instruments, Severity
-from swashplate.campaign.rig.readings import logged, put_out, stream
+from swashplate.__about__ import __version__
+from swashplate.campaign.rig.instruments import (
+    COLUMNS,
+    SEVERITIES,
+    Instruments,
+    Severity,
+    logged,
+    put_out,
+    stream,
+)
+from swashplate.campaign.schema import CHANNEL_KINDS, KINDS, ChannelKind
 from swashplate.drive import Drive
 from swashplate.equations.marching.record import SOURCE_RATE
-from swashplate.errors import InputError, ParameterError
+from swashplate.errors import FileError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver, source_tests
-from swashplate.maneuvers.checks import positive, whole
+from swashplate.maneuvers.pieces import positive, whole
 from swashplate.simulation.result import Simulation
+from swashplate.tables import write_text, write_whole
 
 Array = NDArray[np.float64]
 
@@ -273,3 +287,162 @@ def perturbed(drive: Drive, spread: float, seed: int) -> Drive:
         f"No draw of {TRIES} within ±{100 * spread:g} % keeps the rules of {drive.name}'s "
         "parameters; take a smaller spread."
     )
+
+
+# --- files ----------------------------------------------------------------------------------
+
+DRIVE_FILE = "drive.toml"
+"""Parameters of the drive that was simulated, beside truth.toml; or, beside campaign.toml, those of
+the one that a fit starts from."""
+
+
+def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -> Path:
+    """Files that a campaign leaves, and the truth beside them.
+
+    Parameters
+    ----------
+    tests : VirtualTests
+        What `run` simulated.
+    folder : path
+        New or empty: logs as CSV, named after axis and manoeuvre, and campaign.toml. In its folder
+        ``truth`` lie truth.toml and the parameters that were simulated.
+    overwrite : bool
+        Allow a folder that holds something, and replace files of the same names.
+
+    Returns
+    -------
+    path
+        Of campaign.toml, written last: where it is, everything is.
+
+    Raises
+    ------
+    FileError
+        If the folder is not empty or something cannot be written.
+    """
+    place = _prepared(Path(folder), overwrite)
+    for each in tests.runs.values():
+        write_whole(place / f"{each.stem}.csv", partial(_write_log, tests, each))
+    if tests.preset is None:
+        tests.nominal.to_toml(place / DRIVE_FILE)
+    tests.drive.to_toml(place / "truth" / DRIVE_FILE)
+    write_text(truth_text(tests), place / "truth" / "truth.toml")
+    campaign = place / "campaign.toml"
+    write_text(campaign_text(tests), campaign)
+    return campaign
+
+
+def _prepared(place: Path, overwrite: bool) -> Path:
+    """The folder, made if need be."""
+    try:
+        if place.exists() and not place.is_dir():
+            raise FileError(f"{place} is a file; name a folder.")
+        if place.is_dir() and not overwrite and any(place.iterdir()):
+            raise FileError(f"{place} is not empty; name a new folder, or allow overwriting.")
+        (place / "truth").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{place} cannot be written: {error.strerror or error}.") from None
+    return place
+
+
+def _write_log(tests: VirtualTests, run: VirtualRun, path: Path) -> None:
+    """A CSV: an empty cell for NaN, whole numbers for an encoder that counts them."""
+    import polars as pl
+
+    refinements = ", ".join(tests.drive.parameters.refinements) or "none"
+    table = pl.DataFrame(dict(run.columns), nan_to_null=True)
+    counts = run.columns.get("counts")
+    if counts is not None and np.array_equal(counts, np.rint(counts), equal_nan=True):
+        table = table.with_columns(pl.col("counts").cast(pl.Int64))
+    with path.open("wb") as file:
+        note = (
+            f"# virtual: simulated by swashplate {__version__}, no measurement; axis {tests.axis}, "
+            f"{run.name}, instruments {tests.severity}, refinements {refinements}, "
+            f"seed {tests.seed}\n"
+        )
+        file.write(note.encode())
+        table.write_csv(file)
+
+
+def campaign_text(tests: VirtualTests) -> str:
+    """Text of the campaign file.
+
+    The input is joined by straight lines, because that is what was simulated between two samples.
+    """
+    refinements = ", ".join(tests.drive.parameters.refinements) or "none"
+    drive = tests.preset or DRIVE_FILE
+    lines = [
+        f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.",
+        f"# Instruments: {tests.severity}; refinements: {refinements}; seed {tests.seed}.",
+        "# What was simulated stands in truth/truth.toml: look only after the fit.",
+        f"title = {dumps(f'Virtual tests, {tests.axis}', ensure_ascii=False)}",
+        "virtual = true",
+        "",
+        f"[axes.{_key(tests.axis)}]",
+        f'drive = "{drive}"    # the model that a fit starts from',
+        'time = { column = "time", unit = "s" }',
+        'start = "rest"',
+        "",
+        f"[axes.{_key(tests.axis)}.input]",
+        'kind = "voltage"',
+        'column = "voltage"',
+        'unit = "V"',
+        'interpolation = "linear"',
+        *_missing(tests),
+    ]
+    for kind in tests.channels:
+        column = COLUMNS.get(kind, kind)
+        lines += ["", f"[axes.{_key(tests.axis)}.channels.{column}]", f'kind = "{kind}"']
+        lines.append(f'column = "{column}"')
+        if kind == "encoder_counts":
+            lines.append(f"counts_per_turn = {tests.counts_per_turn!r}    # of the shaft")
+            if tests.instruments.counter_bits:
+                lines.append(f"rolls_over_at = {2**tests.instruments.counter_bits}")
+        else:
+            lines.append(f'unit = "{KINDS[kind].units[0]}"')
+        lines += _missing(tests)
+    for run in tests.runs.values():
+        lines += ["", "[[runs]]", f'file = "{run.stem}.csv"', f'role = "{run.role}"']
+    return "\n".join(lines) + "\n"
+
+
+def _key(axis: str) -> str:
+    """A name as a key of TOML, whose strings are escaped as those of JSON."""
+    return axis if re.fullmatch(r"[A-Za-z0-9_-]+", axis) else dumps(axis, ensure_ascii=False)
+
+
+def _missing(tests: VirtualTests) -> list[str]:
+    if not tests.instruments.empty_cells:
+        return []
+    return ['missing = "drop"    # cells without a number']
+
+
+def truth_text(tests: VirtualTests) -> str:
+    """What was simulated: instruments, seed and versions; the drive has its own file."""
+    from tomlkit import comment, document, table
+
+    text = document()
+    text.add(comment("The truth behind the virtual tests beside this folder."))
+    text.add("virtual", True)
+    text.add("axis", tests.axis)
+    text.add("drive", DRIVE_FILE)
+    text.add("severity", tests.severity)
+    text.add("seed", tests.seed)
+    text.add("counts_per_turn", tests.counts_per_turn)
+    text.add("runs", list(tests.runs))
+    for name, values in (
+        ("instruments", asdict(tests.instruments)),
+        (
+            "versions",
+            {
+                "swashplate": __version__,
+                "numpy": version("numpy"),
+                "numba": version("numba"),
+                "python": python_version(),
+            },
+        ),
+    ):
+        entries = table()
+        for key, value in values.items():
+            entries.add(key, value)
+        text.add(name, entries)
+    return text.as_string()

@@ -1,4 +1,6 @@
-"""The instruments of a campaign: every error one number, 0 for none, so that each can be chosen.
+"""Instruments of a campaign, every error one number, 0 for none, and what they make of a run.
+
+Every reading is a pure function of the true signal, the instruments and chance.
 
 What a test campaign of this kind had is known in words: a 12-bit command, one true-RMS ammeter
 around both leads, a 100 Hz dither that beats in 512 Hz samples, an encoder. The sizes of the errors
@@ -9,11 +11,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from hashlib import blake2b
 from math import isfinite
 from types import MappingProxyType
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.campaign.schema import ChannelKind
 from swashplate.errors import InputError
+from swashplate.simulation.result import Simulation
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Generator = np.random.Generator
 
 Severity = Literal["clean", "realistic", "harsh"]
 
@@ -154,3 +166,331 @@ card's dead zone), so that a fit of the right model is unbiased and its confiden
 held against the truth. harsh: zero and gain errors, a lagging ammeter with a floor, jitter that
 moves steps by a part of a sample, gaps and a counter that rolls over.
 """
+
+
+# --- readings ----------------------------------------------------------------------------------
+
+COLUMNS: Mapping[str, str] = {"rectified_current": "current", "encoder_counts": "counts"}
+"""Columns that are not called as the kind of their channel."""
+SIGNALS: Mapping[str, str] = {
+    "signed_current": "current",
+    "current_plus": "current_positive",
+    "current_minus": "current_negative",
+    "position": "shaft_position",
+    "encoder_counts": "shaft_position",
+}
+"""Simulated signals that are not called as the kind of their channel."""
+FULL_SCALE = 10.0
+"""Range of the command's converters, either way. [V]"""
+OVERSAMPLING = 32
+"""Points from one sample to the next at which a lagging ammeter is followed: 160 a period of a
+100 Hz dither at 512 Hz."""
+FARTHEST = 0.4
+"""Of the way to the next grid point a sample strays at most, so that the stamps increase. [1]"""
+
+
+def stream(seed: int, *names: str) -> Generator:
+    """Random numbers that depend on the seed and on names, on nothing else.
+
+    So a run is the same whatever runs before it, and an instrument that is switched off takes no
+    numbers from the others.
+    """
+    words = [
+        int.from_bytes(blake2b(name.encode(), digest_size=8).digest(), "little") for name in names
+    ]
+    return np.random.default_rng(np.random.SeedSequence([seed, *words]))
+
+
+def logged(
+    truth: Simulation,
+    kinds: tuple[ChannelKind, ...],
+    instruments: Instruments,
+    counts_per_turn: float,
+    seed: int,
+    name: str,
+) -> dict[str, Array]:
+    """What the instruments make of a run; each has its own stream of chance."""
+    grid = truth.time
+    instants, stamps = sampled_instants(grid, instruments, stream(seed, name, "time"))
+    assert truth.voltage is not None
+    at_voltage = interpolated(instants, grid, truth.voltage)
+    columns = {
+        "time": stamps,
+        "voltage": read_voltage(at_voltage, instruments, stream(seed, name, "voltage")),
+    }
+    for kind in kinds:
+        chance = stream(seed, name, kind)
+        if kind == "rectified_current":
+            currents = truth.current_positive, truth.current_negative
+            reading = read_current(grid, *currents, instants, instruments, chance)
+        else:
+            signal: Array = getattr(truth, SIGNALS.get(kind, kind))
+            if kind in ("position", "encoder_counts") and instruments.backlash:
+                signal = play(signal, instruments.backlash)
+            signal = interpolated(instants, grid, signal)
+            if kind == "encoder_counts":
+                reading = read_counts(signal, counts_per_turn, instruments, chance)
+            else:
+                reading = read_transducer(signal, instruments, chance)
+        columns[COLUMNS.get(kind, kind)] = reading
+    for column, values in columns.items():
+        if column != "time" and instruments.empty_cells:
+            chance = stream(seed, name, "empty", column)
+            gaps = lost(values.size, instruments.empty_cells, instruments.longest_gap, chance)
+            columns[column] = np.where(gaps, np.nan, values)
+    gone = lost(
+        grid.size, instruments.lost_rows, instruments.longest_loss, stream(seed, name, "rows")
+    )
+    if gone.all():
+        raise InputError(f"{name}: lost_rows leaves no row; take a smaller share.")
+    return {column: values[~gone] for column, values in columns.items()}
+
+
+def sampled_instants(
+    grid: Array, instruments: Instruments, generator: Generator
+) -> tuple[Array, Array]:
+    """Instants at which samples are taken, and the stamps that are written for them.
+
+    Parameters
+    ----------
+    grid : (n,) array
+        Even instants from the run's beginning to its end. [s]
+
+    Returns
+    -------
+    instants, stamps : (n,) arrays
+        Instants lie within the run. The stamps leave the hidden part of the jitter out and are
+        rounded; without jitter both are the grid. [s]
+    """
+    told = instruments.jitter * generator.standard_normal(grid.size)
+    hidden = instruments.hidden_jitter * generator.standard_normal(grid.size)
+    spacing = grid[1] - grid[0] if grid.size > 1 else 0.0
+    bound = 0.5 * FARTHEST * spacing
+    stamps = np.clip(grid + np.clip(told, -bound, bound), grid[0], grid[-1])
+    instants = np.clip(stamps + np.clip(hidden, -bound, bound), grid[0], grid[-1])
+    if instruments.stamp_resolution:
+        stamps = rounded(stamps, instruments.stamp_resolution)
+    return instants, stamps
+
+
+def rounded(values: Array, step: float) -> Array:
+    """Values rounded to whole steps, as the nearest decimals where the step is one."""
+    per_unit = 1.0 / step
+    if abs(per_unit - round(per_unit)) < 1e-6 * per_unit:
+        # division by a whole number gives the float that the decimal number is read as
+        return np.asarray(np.rint(values * round(per_unit)) / round(per_unit) + 0.0)
+    return np.asarray(np.rint(values / step) * step + 0.0)
+
+
+def lost(size: int, share: float, longest: int, generator: Generator) -> Mask:
+    """Which of `size` rows are lost: in runs of 1 to `longest`, together about a share of all.
+
+    Parameters
+    ----------
+    share : float
+        Expected share of rows that are lost, as long as it is small. [1]
+    """
+    mask = np.zeros(size, dtype=np.bool_)
+    begins = np.flatnonzero(generator.random(size) < share / (0.5 * (1 + longest)))
+    lengths = generator.integers(1, longest, size=begins.size, endpoint=True)
+    for begin, length in zip(begins.tolist(), lengths.tolist(), strict=True):
+        mask[begin : begin + length] = True
+    return mask
+
+
+def interpolated(instants: Array, time: Array, signal: Array) -> Array:
+    """A signal of the grid at other instants, on straight lines; on the grid itself, its samples.
+
+    The drive is marched on the grid, so what lies between is not known better. At an instant that
+    strays by a hundredth of a sample the line is off by 4 % of what it is half way between two.
+    """
+    if instants is time or np.array_equal(instants, time):
+        return signal
+    return np.interp(instants, time, signal)
+
+
+def put_out(voltage: Array, instruments: Instruments) -> Array:
+    """The command as the converter that puts it out makes it. [V]
+
+    Raises
+    ------
+    InputError
+        If it goes beyond ±10 V, which a converter would clip. At 10 V it stays one step below.
+    """
+    largest = float(np.abs(voltage).max())
+    if largest > FULL_SCALE:
+        raise InputError(f"The command reaches {largest:g} V, but the card takes ±10 V; scale it.")
+    return _converted(voltage, instruments.command_bits)
+
+
+def read_voltage(voltage: Array, instruments: Instruments, generator: Generator) -> Array:
+    """The command as it is read back. [V]
+
+    Parameters
+    ----------
+    voltage : (n,) array
+        Command at the instants sampled. [V]
+    """
+    reading = voltage + instruments.voltage_offset
+    reading = reading + instruments.voltage_noise * generator.standard_normal(voltage.size)
+    return _converted(reading, instruments.voltage_bits)
+
+
+def _converted(voltage: Array, bits: int) -> Array:
+    """Codes of b bits over ±10 V: whole multiples of 20/2ᵇ V, up to one below 10 V. [V]"""
+    if not bits:
+        return voltage
+    half = 2.0 ** (bits - 1)
+    codes = np.clip(np.rint(voltage / FULL_SCALE * half), -half, half - 1.0)
+    # 0.0 turns -0.0 into 0.0, which reads better in a log
+    return np.asarray(codes * (FULL_SCALE / half) + 0.0)
+
+
+def dither_ripple(time: Array, current: Array, phase: float, instruments: Instruments) -> Array:
+    """What pulse width modulation adds to the mean of a channel's current. [A]
+
+    Parameters
+    ----------
+    time : (n,) array
+        Instants. [s]
+    current : (n,) array
+        Mean current of the channel, not negative. [A]
+    phase : float
+        Share of a period that has passed at 0 s. [1]
+
+    Notes
+    -----
+    Pulses of the length D T, D = I / I_full, raise the current of an inductive coil along a
+    straight line and let it fall along another: a triangle of mean zero whose height goes with
+    D (1 − D). It has all multiples of the frequency; at 512 Hz the fifth of 100 Hz shows at 12 Hz.
+    """
+    duty = np.clip(current / instruments.full_current, 0.0, 1.0)
+    height = 4.0 * instruments.dither * duty * (1.0 - duty)
+    passed = np.mod(instruments.dither_frequency * time + phase, 1.0)
+    rising = 2.0 * passed / np.maximum(duty, 1e-9) - 1.0
+    falling = 1.0 - 2.0 * (passed - duty) / np.maximum(1.0 - duty, 1e-9)
+    return np.asarray(height * np.where(passed < duty, rising, falling))
+
+
+def read_current(
+    time: Array,
+    plus: Array,
+    minus: Array,
+    instants: Array,
+    instruments: Instruments,
+    generator: Generator,
+) -> Array:
+    """The ammeter around both leads. [A]
+
+    Parameters
+    ----------
+    time, plus, minus : (n,) arrays
+        Even grid [s] and currents of both channels on it, magnitudes. [A]
+    instants : (m,) array
+        When it is read. [s]
+
+    Notes
+    -----
+    With i = |I₊ + ripple| + |I₋ + ripple| the meter shows y = √(p + floor²), T p' + p = i², and
+    p = i² where the averaging time T is 0. The reading is (1 + gain error) y + zero error + noise.
+    """
+    phase = float(generator.random())
+    noise = instruments.current_noise * generator.standard_normal(instants.size)
+    if instruments.averaging_time and time.size > 1:
+        fine = np.linspace(time[0], time[-1], (time.size - 1) * OVERSAMPLING + 1)
+        square = _followed(_sum(time, plus, minus, fine, phase, instruments), fine, instruments)
+        mean = np.sqrt(np.interp(instants, fine, square))
+    else:
+        mean = _sum(time, plus, minus, instants, phase, instruments)
+    reading = np.hypot(mean, instruments.current_floor)
+    reading = (1.0 + instruments.current_gain_error) * reading + instruments.current_zero + noise
+    if instruments.current_resolution:
+        return rounded(reading, instruments.current_resolution)
+    return np.asarray(reading)
+
+
+def _sum(
+    time: Array, plus: Array, minus: Array, at: Array, phase: float, instruments: Instruments
+) -> Array:
+    """|I₊| + |I₋| with the ripple of both. [A]"""
+    total = np.zeros(at.size)
+    for channel in (plus, minus):
+        mean = interpolated(at, time, channel)
+        ripple = dither_ripple(at, mean, phase, instruments) if instruments.dither else 0.0
+        total += np.abs(mean + ripple)
+    return total
+
+
+def _followed(current: Array, fine: Array, instruments: Instruments) -> Array:
+    """Mean of the square with an exponential memory, exact for a square that is held."""
+    from scipy.signal import lfilter
+
+    keep = float(np.exp(-(fine[1] - fine[0]) / instruments.averaging_time))
+    square = current**2
+    followed, _ = lfilter([1.0 - keep], [1.0, -keep], square, zi=[keep * square[0]])
+    return np.asarray(followed)
+
+
+def read_counts(
+    position: Array, counts_per_turn: float, instruments: Instruments, generator: Generator
+) -> Array:
+    """The encoder's counter, 0 at the first sample. [count]
+
+    Parameters
+    ----------
+    position : (n,) array
+        Angle of the shaft at the instants sampled. [rad]
+    counts_per_turn : float
+        Counts in a turn of the shaft.
+
+    Notes
+    -----
+    The counter shows how many edges were passed. Where between two edges the shaft stands at first
+    is chance, so that on average the steps are no error. A counter of b bits counts from −2ᵇ⁻¹ to
+    2ᵇ⁻¹ − 1 and begins anew.
+    """
+    counts = position * (counts_per_turn / (2.0 * np.pi))
+    first = float(generator.random())
+    if instruments.encoder_step:
+        step = float(instruments.encoder_step)
+        counts = step * (np.floor(counts / step + first) - np.floor(counts[:1] / step + first))
+    if instruments.counter_bits:
+        half = 2.0 ** (instruments.counter_bits - 1)
+        counts = np.mod(counts + half, 2.0 * half) - half
+    return np.asarray(counts)
+
+
+def read_transducer(signal: Array, instruments: Instruments, generator: Generator) -> Array:
+    """Any other signal: itself and white noise in proportion to its largest magnitude."""
+    noise = generator.standard_normal(signal.size)
+    return np.asarray(signal + instruments.transducer_noise * np.abs(signal).max() * noise)
+
+
+def play(position: Array, width: float) -> Array:
+    """Position behind a gear with backlash: the play operator. [rad]
+
+    Parameters
+    ----------
+    position : (n,) array
+        Position of what drives. [rad]
+    width : float
+        Way that it can go without taking the other along. [rad]
+
+    Notes
+    -----
+    yₙ = max(xₙ − b/2, min(xₙ + b/2, yₙ₋₁)), in the middle of the gap at first. Between two
+    reversals of x it is one maximum or minimum, which is how it is computed.
+    """
+    half, behind = 0.5 * width, float(position[0])
+    driven = np.empty_like(position)
+    driven[0] = behind
+    rising = np.diff(position) >= 0.0
+    turns = np.flatnonzero(rising[1:] != rising[:-1]) + 1
+    for begin, end in zip([0, *turns.tolist()], [*turns.tolist(), rising.size], strict=True):
+        way = position[begin + 1 : end + 1]
+        if end > begin and rising[begin]:
+            driven[begin + 1 : end + 1] = np.maximum(way - half, behind)
+        else:
+            driven[begin + 1 : end + 1] = np.minimum(way + half, behind)
+        behind = float(driven[end])
+    return driven

@@ -26,7 +26,7 @@ from swashplate.equations.marching.march import (
     Stored,
     function_source,
     indented,
-    march_piece_source,
+    march_source,
     output_of,
     rest_of,
     settled_of,
@@ -208,7 +208,7 @@ class _Builder:
             if place.kind == "link":
                 self._row_for(place)
         rows = {each: _place(row, "n - first") for each, row in self.stored.items()}
-        text, names = march_piece_source(self.model, self.signals, self.options, rows)
+        text, names = march_source(self.model, self.signals, self.options, rows)
         march = self._planned("march", text, names)
         return Graph(
             self.graphs,

@@ -13,7 +13,7 @@ from swashplate.equations.code import generating, leaves
 from swashplate.equations.fields import floats_of, value_at
 from swashplate.equations.marching.graph import By, Entry, Graph, Group, PartGraph, graph_of
 from swashplate.equations.marching.observation import ObservedRecord, Own
-from swashplate.equations.marching.pieces import addresses, pointers
+from swashplate.equations.marching.pieces import addresses
 from swashplate.equations.marching.rows import (
     ABREAST,
     BLOCK,
@@ -29,7 +29,7 @@ from swashplate.equations.marching.rows import (
     march_observed,
     room_for,
 )
-from swashplate.equations.marching.run import Instance, Places, Start, check_domain
+from swashplate.equations.marching.run import Instance, Places, Start, arrays_of, check_domain
 from swashplate.equations.marching.triangle import ROWS, aligned, upright
 from swashplate.equations.model import Model, Source
 from swashplate.errors import InputError
@@ -639,20 +639,9 @@ def _march(
     marched = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
     met = np.array([np.inf])
     room = room_for(layout.rows, layout.constant, layout.states, len(columns), plan)
-    arrays = (
-        pointers(marched),
-        np.array([started.before[name] for name in signals]),
-        places.whole,
-        places.fraction,
-        instance.params,
-        instance.given,
-        states,
-        met,
-        room.flat,
-    )
-    size = marched[0].size
-    pieces = addresses(graph.pieces, layout.pieces)
-    march_observed(pieces, arrays, size, block, h, tangent, program, plan, sink, room)
+    arrays = arrays_of(instance, marched, started, places, states, met, room.flat)
+    pieces, grid = addresses(graph.pieces, layout.pieces), (marched[0].size, block, h)
+    march_observed(pieces, arrays, grid, tangent, program, plan, sink, room)
     check_domain(instance, states, float(met[0]), observed.driven_by)
 
 

@@ -7,6 +7,7 @@ to the last bit, whatever its neighbours are.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -22,11 +23,12 @@ from swashplate.equations.marching.march import (
     Sampler,
     function_source,
     indented,
+    lower,
     output_of,
     rest_of,
 )
 from swashplate.equations.marching.run import module
-from swashplate.equations.marching.straight import CALLED, Statement, Straight
+from swashplate.equations.marching.straight import CALLED, VECTOR, Statement, Straight
 from swashplate.equations.marching.triangle import aligned
 from swashplate.equations.model import Model
 from swashplate.equations.writing import lines_of
@@ -35,6 +37,11 @@ Array = NDArray[np.float64]
 
 LANES = 16
 """Sets marched side by side: two vectors of eight where the processor has them, else four of 4."""
+
+
+CALLS = re.compile(r"([A-Za-z_]\w*)\(")
+CALLED_ONCE = re.compile(r"_[0-9a-f]{8}$")
+"""What a generated function's name ends in."""
 
 
 class Rows:
@@ -91,10 +98,7 @@ def lanes_source(
     place, is_rate = output_of(model, output)
     sampler, rows = Sampler(model, signals, options, [place]), Rows()
     parts = sampler.used()
-    known = {node.value for part in parts for _, node in (*leaves(part.p), *leaves(part.given))}
-    known |= {part.fraction(tap) for part in parts for tap in part.taps}
-    constants = {name for part in parts for name in sampler.constants(part)}
-    straight = Straight(known | constants, parts[0].code.fresh)
+    straight, known = straight_of(sampler)
 
     # what rows become at the end of a sample
     following: dict[str, Node] = {}
@@ -107,7 +111,7 @@ def lanes_source(
                 straight.let(part.source(source), node)
         if part.margin is not None:
             worst = following.get("worst", ex.name("worst"))
-            following["worst"] = ex.make("min", worst, part.margin)
+            following["worst"] = lower(worst, part.margin)
         if place.part == part.part:
             code, node = sampler.observed(part, place)
             straight.add(code, code.kept([node]))
@@ -170,6 +174,64 @@ def lanes_source(
     return "\n\n".join(texts), called, rows.number, sampler
 
 
+def straight_of(sampler: Sampler) -> tuple[Straight, set[str]]:
+    """Room for a sample without branches, and the names of numbers that are known ahead of it."""
+    parts = sampler.used()
+    known = {node.value for part in parts for _, node in (*leaves(part.p), *leaves(part.given))}
+    known |= {part.fraction(tap) for part in parts for tap in part.taps}
+    constants = {name for part in parts for name in sampler.constants(part)}
+    return Straight(known | constants, parts[0].code.fresh), known
+
+
+def report(model: Model, output: str | None = None, *, options: Any = None) -> str:
+    """What keeps many sets of a model from being marched side by side in vector instructions.
+
+    Parameters
+    ----------
+    model : Model
+        A single model, or a joined one.
+    output : str, optional
+        Signal that is wanted; by default the last that the model names.
+    options : named tuple, optional
+        Its options; all off if omitted.
+
+    Returns
+    -------
+    str
+        A line for each operation that is done set by set, with the equation that it stands in; or
+        that there is none. `simulate_many` works either way, and slower in the first.
+    """
+    signals = [
+        part.tap(name).signal
+        for i, part in enumerate(model.parts)
+        for name in part.input_types
+        if model.link_of(i, name) is None and name not in part.defaults
+    ]
+    several = len(model.parts) > 1
+    chosen = [getattr(options, part.name, None) if several else options for part in model.parts]
+    chosen = [
+        part.options() if made is None and part.options is not None else made
+        for made, part in zip(chosen, model.parts, strict=True)
+    ]
+    names = (*model.outputs, *model.parts[-1].outputs) or model.parts[-1].signal_names
+    place, _ = output_of(model, output or names[-1])
+    sampler = Sampler(model, signals, chosen, [place])
+    found: dict[str, None] = {}
+    straight, _ = straight_of(sampler)
+    for part in sampler.used():
+        before = len(straight.loops)
+        straight.add(part.code, part.code.kept(sampler.ends[part.part]))
+        for statement in [each for loop in straight.loops[before - 1 :] for each in loop]:
+            if not statement.vector:
+                where = part.code.origins.get(statement.names[0], part.own.name)
+                called = {word for line in statement.lines for word in CALLS.findall(line)}
+                slow = sorted(CALLED_ONCE.sub("", word) for word in called - {*VECTOR, *CALLED})
+                found[f"{where} calls {', '.join(slow)}"] = None
+    if not found:
+        return f"Nothing keeps {model.name} from vector instructions."
+    return "\n".join([f"{model.name} is not all vector instructions:", *found])
+
+
 def prepared(
     sampler: Sampler, straight: Straight, rows: Rows, known: set[str], read: set[str]
 ) -> list[str]:
@@ -214,8 +276,8 @@ class Lanes:
     columns: Mapping[str, tuple[int, float | None]]
     """Row and default of each parameter and given that is read, as `march_lanes` takes them."""
     taps: Sequence[Delayed]
-    ends: Sequence[int]
-    """Rows of states and cost."""
+    starts: Mapping[str, int]
+    """Row of each state, as `march_lanes` takes them."""
 
 
 @generating
@@ -226,7 +288,7 @@ def lanes_of(
     source, names, rows, sampler = lanes_source(model, signals, options, output)
     made = module(f"{model.name}_lanes", source, names)
     columns: dict[str, tuple[int, float | None]] = {}
-    taps, ends = [], [rows["cost"]]
+    taps, starts = [], {}
     for part in sampler.used():
         prefix = f"{part.own.name}." if len(model.parts) > 1 else ""
         defaults, states = part.own.parameters._field_defaults, dict(leaves(part.state))
@@ -240,8 +302,9 @@ def lanes_of(
             delay = f"{prefix}{each.tap.delay}" if each.tap.delay else None
             fraction = rows.get(part.fraction(each))
             taps.append(Delayed(each.number, delay, each.tap.ahead, fraction))
-        ends += [rows[states[path].value] for path in sampler.carried[part.part]]
-    return Lanes(made["prepare"], made["march"], rows, columns, taps, ends)
+        for path in sampler.carried[part.part]:
+            starts[f"start.{prefix}{path}"] = rows[states[path].value]
+    return Lanes(made["prepare"], made["march"], rows, columns, taps, starts)
 
 
 class Marched(NamedTuple):
@@ -264,17 +327,19 @@ def march_lanes(
     records: Mapping[str, Array],
     h: float,
     output: str,
+    *,
     measured: Array,
     weight: Array,
     keep: bool,
 ) -> Marched:
-    """March LANES sets over one record, from rest.
+    """March LANES sets over one record, from rest but for what the numbers say.
 
     Parameters
     ----------
     numbers : mapping of str to (LANES,) array
         Every parameter by its path, and every given, ``"given "`` before it; parameters that a type
-        has a default for may be left out.
+        has a default for may be left out. States at the first sample, ``"start."`` before their
+        paths, where they are not those at rest.
     records : mapping of str to (n,) array
         External signals, zero before.
     h : float
@@ -306,6 +371,8 @@ def march_lanes(
     values = tuple(np.require(each, np.float64, ["C", "W"]) for each in records.values())
     with np.errstate(all="ignore"):  # of ways that are not taken there is nothing to say
         lanes.prepare(h, block.reshape(-1))
+        for path in lanes.starts.keys() & numbers.keys():
+            block[lanes.starts[path]] = numbers[path]
         lanes.march(values, whole, h, block.reshape(-1), measured, weight, outputs)
-    end = block[lanes.ends].sum(axis=0)
+    end = block[[lanes.rows["cost"], *lanes.starts.values()]].sum(axis=0)
     return Marched(block[lanes.rows["cost"]], worst, end, outputs[:, :size])

@@ -3,8 +3,7 @@
 Every march is generated as readable source in which the model's equations stand as straight code
 over scalars (`scalars`). `PartCode` has one sample of a part, and the functions below wrap it as
 
-- `march_source`: the plain march over whole records,
-- `march_piece_source`: the march over a block of them, for the Jacobian,
+- `march_source`: the march, over whole records or a block of them for the Jacobian,
 - `observe_source`: signals at states that are known already,
 - `advance_source`: one sample, for steppers and for kernels that close loops.
 
@@ -17,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
 from swashplate.equations import expressions as ex
@@ -85,8 +84,13 @@ class TapOf(NamedTuple):
     tap: Tap
 
 
-def taps_of(model: Model, signals: Sequence[str]) -> list[TapOf]:
+def taps_of(model: Model, signals: Sequence[str]) -> tuple[TapOf, ...]:
     """All taps on signals that are given as records, numbered."""
+    return _taps_of(model, tuple(signals))
+
+
+@lru_cache(maxsize=256)
+def _taps_of(model: Model, signals: tuple[str, ...]) -> tuple[TapOf, ...]:
     found: list[TapOf] = []
     for i, part in enumerate(model.parts):
         for name in part.input_types:
@@ -94,7 +98,7 @@ def taps_of(model: Model, signals: Sequence[str]) -> list[TapOf]:
             outside = model.link_of(i, name) is None and tap.signal in signals
             if outside and part.looked_at(name):
                 found.append(TapOf(i, name, len(found), tap))
-    return found
+    return tuple(found)
 
 
 class PartCode:
@@ -190,8 +194,11 @@ class PartCode:
         given = {name: known[name] for name in arguments_of(equation) if name in known}
         if "options" in arguments_of(equation):
             given["options"] = fixed(self.options) or Flag("unknown", "options")
-        made = read(code, equation, given)
-        return code.named(made, plain(equation).__name__ if isinstance(made, Node) else "")
+        made, name = read(code, equation, given), plain(equation).__name__
+        before = {*code.taken}
+        made = code.named(made, name if isinstance(made, Node) else "")
+        code.origins |= dict.fromkeys(code.taken - before, name)
+        return made
 
     def _input(self, name: str) -> Value:
         """An input as a name, a window of names, or what a hold makes of one."""
@@ -468,31 +475,22 @@ class Sampler:
         return lines
 
     def stored(
-        self,
-        part: PartCode,
-        stored: Sequence[Stored],
-        at: str,
-        into: Callable[[int], str] | None = None,
+        self, part: PartCode, stored: Sequence[Stored], into: Callable[[int], str]
     ) -> list[str]:
-        """Lines that write what is kept of a part into ``out`` and ``flags``, or elsewhere.
+        """Lines that write what is kept of a part; `into` says where, by the place in `stored`.
 
-        `into` says where a number goes, by its place in `stored`, instead of ``out[place, at]``.
+        Limits are one number, a bit for each.
         """
-        lines, row, flag = [], 0, 0
-        for each in stored:
-            if each.kind == "limits":
-                if each.part == part.part:
-                    packed = " | ".join(
-                        f"({1 << k} if {text(node)} else 0)" for k, node in enumerate(part.limits)
-                    )
-                    lines.append(f"flags[{flag}, {at}] = {packed}")
-                flag += 1
+        lines = []
+        for row, each in enumerate(stored):
+            if each.part != part.part:
                 continue
-            if each.part == part.part:
+            if each.kind == "limits":
+                bits = (f"({1 << k} if {text(n)} else 0)" for k, n in enumerate(part.limits))
+                lines.append(f"{into(row)} = {' | '.join(bits)}")
+            else:
                 code, made = self.observed(part, each)
-                target = into(row) if into else f"out[{row}, {at}]"
-                lines += [*lines_of(code, [made]), f"{target} = {text(made)}"]
-            row += 1
+                lines += [*lines_of(code, [made]), f"{into(row)} = {text(made)}"]
         return lines
 
     def observed(self, part: PartCode, stored: Stored) -> tuple[Code, Node]:
@@ -511,7 +509,7 @@ class Sampler:
         """Lines that keep the worst margin."""
         if part.margin is None:
             return []
-        return [f"worst = min(worst, {text(part.margin)})"]
+        return [f"worst = {text(lower(ex.name('worst'), part.margin))}"]
 
     def load(self, part: PartCode, array: str = "states") -> list[str]:
         """Lines that take a part's state out of a flat array."""
@@ -539,6 +537,12 @@ class Sampler:
         return [f"{left} = {right}"]
 
 
+def lower(one: Node, two: Node) -> Node:
+    """The lower of two margins; not a number once one of them was none."""
+    test = ex.make("or", ex.make("<=", one, two), ex.make("!=", one, one))
+    return ex.choose(test, one, two)
+
+
 def indented(lines: Iterable[str], depth: int = 1) -> list[str]:
     """Lines moved in."""
     return [f"{'    ' * depth}{line}" for line in lines]
@@ -550,47 +554,19 @@ def function_source(head: str, says: str, lines: Iterable[str], mark: str = "@ke
 
 
 def march_source(
-    model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[Stored]
-) -> tuple[str, dict[str, Any]]:
-    """Text of the plain march, and what its names mean.
-
-    The kernel ``march(records, before, whole, fraction, params, given, h, states, span, out,
-    flags)`` marches samples ``span[0]`` to ``span[1]`` - 1, fills rows of ``out`` and ``flags`` in
-    the order of `stored`, advances ``states`` in place, and returns the worst margin met.
-    """
-    sampler = Sampler(model, signals, options, stored)
-    lines = ["first, last = span", *_marching(sampler, stored), "return worst"]
-    head = "march(records, before, whole, fraction, params, given, h, states, span, out, flags)"
-    return function_source(head, f"March {model.name} over its inputs.", lines), sampler.names
-
-
-def march_piece_source(
     model: Model, signals: Sequence[str], options: Sequence[Any], rows: Mapping[Stored, str]
 ) -> tuple[str, dict[str, Any]]:
-    """Text of the march over a block of samples as a `piece`, and what its names mean.
+    """Text of the march over samples as a `piece`, and what its names mean.
 
     Parameters
     ----------
     rows : mapping of Stored to str
-        What is kept, and where it goes at sample ``n - first`` of the block.
+        What is kept, and where it goes at sample ``n - first``.
     """
-    stored = tuple(rows)
+    stored, places = tuple(rows), tuple(rows.values())
     sampler = Sampler(model, signals, options, stored)
-    lines = [
-        "last = first + count",
-        *_marching(sampler, stored, lambda row: rows[stored[row]]),
-        "met[0] = min(met[0], worst)",
-    ]
-    says = f"March {model.name} over a block of its inputs."
-    return function_source(f"march({PIECE})", says, lines, "@piece"), sampler.names
-
-
-def _marching(
-    sampler: Sampler, stored: Sequence[Stored], into: Callable[[int], str] | None = None
-) -> list[str]:
-    """Lines that march samples ``first`` to ``last`` - 1 and find the worst margin."""
     parts = sampler.used()
-    lines = [*sampler.places(), *sampler.ahead()]
+    lines = ["last = first + count", *sampler.places(), *sampler.ahead()]
     for part in parts:
         lines += sampler.load(part)
     lines += ["worst = inf", "for n in range(first, last):"]
@@ -598,14 +574,16 @@ def _marching(
     for part in parts:
         inner += sampler.fetched(part)
         inner += sampler.body(part)
-        inner += sampler.stored(part, stored, "n - first", into)
+        inner += sampler.stored(part, stored, lambda row: places[row])
         inner += sampler.margin(part)
     for part in parts:
         inner += sampler.step(part)
     lines += indented(inner)
     for part in parts:
         lines += sampler.save(part)
-    return lines
+    lines.append("met[0] = worst if worst < met[0] or worst != worst else met[0]")
+    says = f"March {model.name} over its inputs."
+    return function_source(f"march({PIECE})", says, lines, "@piece"), sampler.names
 
 
 def advance_source(
@@ -656,7 +634,7 @@ def advance_source(
             if f"x_{signal}" in read:
                 lines.append(f"x_{signal} = values[{k}]")
         lines += sampler.body(part)
-        lines += sampler.stored(part, stored, "0", lambda row: f"out[{row}]")
+        lines += sampler.stored(part, stored, lambda row: f"out[{row}]")
     lines.append("worst = inf")
     for part in parts:
         lines += [*sampler.margin(part), *sampler.step(part), *sampler.save(part)]
@@ -729,8 +707,8 @@ def observe_source(
 ) -> tuple[str, dict[str, Any]]:
     """Text of a kernel that computes signals of one part where its states are known.
 
-    The kernel ``observe(params, given, h, kept, out, flags)`` takes rows of states, inputs and
-    taps' samples in the order of `kept`.
+    The kernel ``observe(params, given, h, kept, out)`` takes rows of states, inputs and taps'
+    samples in the order of `kept`, and fills rows in the order of `wanted`.
     """
     sampler = Sampler(model, signals, options, wanted)
     own = sampler.parts[part]
@@ -741,7 +719,7 @@ def observe_source(
         for node in (own.limits if each.kind == "limits" else [own.node(each)])
     ]
     read = sampler.read(own)
-    lines = [*sampler.ahead([own]), "for m in range(max(out.shape[1], flags.shape[1])):"]
+    lines = [*sampler.ahead([own]), "for m in range(out.shape[1]):"]
     inner = []
     for row, each in enumerate(kept):
         if each.part == part:
@@ -751,9 +729,9 @@ def observe_source(
         if name in read:
             inner.append(f"{name} = kept[{row}, m]")
     inner += lines_of(own.code, sampler.ends[part])
-    inner += sampler.stored(own, wanted, "m")
+    inner += sampler.stored(own, wanted, lambda row: f"out[{row}, m]")
     lines += indented(inner)
-    head = "observe(params, given, h, kept, out, flags)"
+    head = "observe(params, given, h, kept, out)"
     says = f"Signals of {own.own.name} at known states."
     return function_source(head, says, lines), sampler.names
 

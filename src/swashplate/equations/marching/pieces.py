@@ -19,7 +19,7 @@ from numba.core.typing.templates import signature
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from swashplate.equations.cache import on_disk
+from swashplate.equations.cache import kernel, on_disk
 from swashplate.equations.code import GENERATING
 from swashplate.equations.equation import known
 from swashplate.equations.syntax import plain
@@ -119,3 +119,9 @@ else:
 
         taken: Any = signature
         return taken(types.void, address, count, first, h, arrays), codegen
+
+
+@kernel
+def run_once(pieces: Any, arrays: tuple[Any, ...], count: int, h: float) -> None:
+    """Call one piece over all samples."""
+    call(pieces[0], count, 0, h, arrays)

@@ -4,6 +4,7 @@ What is here knows no model: it works on rows of a block of samples that a plan 
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -150,19 +151,13 @@ def room_for(
     for row, value in constant.items():
         table[row] = value
     observations, low_passes = plan.kept.shape
-    idle = (derived + 1,) * (-(derived + 1) % ABREAST)
     seen = aligned(observations, derived + 2, STRIDE)
-    own = np.array([*range(derived + 1), *idle], dtype=np.int64)
-    columns = np.zeros((observations, 4, own.size), dtype=np.int64)
-    for r in range(observations):
-        columns[r, :2] = (r * (derived + 2) + own) * STRIDE + CARRIED
-        columns[r, 2] = own
     return Room(
         flat,
         table,
         seen,
         seen.reshape(-1),
-        columns,
+        _columns(observations, derived),
         np.zeros((observations, low_passes, derived + 2)),
         np.zeros((observations, derived + 1, 3)),
         np.empty(STRIDE),
@@ -170,6 +165,18 @@ def room_for(
         np.empty((2, states, ABREAST)),
         plan.first[:-1].copy(),
     )
+
+
+@lru_cache(maxsize=256)
+def _columns(observations: int, derived: int) -> Indices:
+    """Rows of each observation, for `follow`."""
+    idle = (derived + 1,) * (-(derived + 1) % ABREAST)
+    own = np.array([*range(derived + 1), *idle], dtype=np.int64)
+    columns = np.zeros((observations, 4, own.size), dtype=np.int64)
+    for r in range(observations):
+        columns[r, :2] = (r * (derived + 2) + own) * STRIDE + CARRIED
+        columns[r, 2] = own
+    return columns
 
 
 @subroutine
@@ -421,8 +428,7 @@ def rotate(
     base: int,
     plan: Plan,
     r: int,
-    at: int,
-    end: int,
+    stamps: tuple[int, int],
     sink: Sink,
     used: int,
     products: Array,
@@ -431,10 +437,10 @@ def rotate(
 
     Parameters
     ----------
-    seen, base, plan, r, at, sink :
+    seen, base, plan, r, sink :
         As in `place`.
-    end : int
-        The stamp behind the last.
+    stamps : (int, int)
+        The first stamp of the observation, and the one behind the last.
     used : int
         Rows that wait in the sink to be rotated.
     products : array
@@ -445,6 +451,7 @@ def rotate(
     int
         Rows that wait now.
     """
+    at, end = stamps
     while at < end:
         if plan.weight[at] == 0.0:
             at += 1
@@ -528,7 +535,7 @@ def deliver(
             end += 1
         room.progress[r] = end
         if sink.factor.size > 0:
-            used = rotate(rows, base, plan, r, at, end, sink, used, room.products)
+            used = rotate(rows, base, plan, r, (at, end), sink, used, room.products)
         elif end > at:
             place(rows, base, plan, r, at, end - at, sink, at)
     return used
@@ -548,9 +555,7 @@ def finish(sink: Sink, room: Room, used: int) -> None:
 def march_observed(
     pieces: Any,
     arrays: tuple[Any, ...],
-    size: int,
-    block: int,
-    h: float,
+    grid: tuple[int, int, float],
     tangent: Array,
     program: Program,
     plan: Plan,
@@ -565,15 +570,14 @@ def march_observed(
         Addresses of the generated pieces; the first one marches.
     arrays : tuple of array
         What they take, from ``records`` on (see `pieces.PIECE`).
-    size, block : int
-        Samples of the record, and most of them in a block.
-    h : float
-        Step. [s]
+    grid : (int, int, float)
+        Samples of the record, most of them in a block, and the step. [1, 1, s]
     tangent : array
         Derivatives of the states at the first sample, replaced by those behind the last.
     program, plan, sink, room :
         What to do, where to look, what to fill, where to work.
     """
+    size, block, h = grid
     used, count, flat = int(plan.first[0]), 0, room.flat
     for first in range(0, size, block):
         carry(room, count)

@@ -16,6 +16,7 @@ from swashplate.equations.code import compiled_names, generating
 from swashplate.equations.equation import inlined, interpreted
 from swashplate.equations.fields import floats_of, made, numbers_of, value_at
 from swashplate.equations.marching.march import Stored, march_source, observe_source, taps_of
+from swashplate.equations.marching.pieces import Planned, addresses, piece, pointers, run_once
 from swashplate.equations.model import Link, Model, Place, Window, arguments_of, place
 from swashplate.equations.syntax import plain
 from swashplate.errors import DomainError, InputError
@@ -269,12 +270,14 @@ def module(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @generating
-def march_kernel(
+def march_of(
     model: Model, signals: tuple[str, ...], options: tuple[Any, ...], stored: tuple[Stored, ...]
-) -> Callable[..., float]:
-    """The compiled plain march."""
-    text, names = march_source(model, signals, options, stored)
-    return module(f"{model.name}_march", text, names)["march"]  # type: ignore[no-any-return]
+) -> Planned:
+    """The march over whole records, a row for each number that is kept."""
+    rows = {each: f"flat[{row} * count + n]" for row, each in enumerate(stored)}
+    text, names = march_source(model, signals, options, rows)
+    names["piece"] = piece
+    return Planned(lambda: module(f"{model.name}_march", text, names)["march"])
 
 
 @generating
@@ -324,27 +327,40 @@ def marched(
     DomainError
         If the model leaves its domain, or a number overflows.
     """
-    signals = tuple(records)
-    size = next(iter(records.values())).size
-    packed = sum(each.kind == "limits" for each in stored)
-    out = np.empty((len(stored) - packed, size))
-    flags = np.empty((packed, size), dtype=np.uint8)
-    places, states = instance.places(signals, h), started.flat
-    worst = march_kernel(instance.model, signals, instance.options, stored)(
-        tuple(np.require(v, np.float64, ["C", "W"]) for v in records.values()),
-        tuple(started.before[name] for name in signals),
+    signals, size = tuple(records), next(iter(records.values())).size
+    numbers = tuple(each for each in stored if each.kind != "limits")
+    ordered = (*numbers, *(each for each in stored if each.kind == "limits"))
+    planned = march_of(instance.model, signals, instance.options, ordered)
+    table, states, met = np.empty((len(stored), size)), started.flat, np.array([np.inf])
+    values = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
+    places = instance.places(signals, h)
+    arrays = arrays_of(instance, values, started, places, states, met, table.reshape(-1))
+    run_once(addresses((planned,), (0,)), arrays, size, h)
+    check_domain(instance, states, float(met[0]), cause)
+    return table[: len(numbers)], table[len(numbers) :].astype(np.uint8)
+
+
+def arrays_of(
+    instance: Instance,
+    values: tuple[Array, ...],
+    started: Started,
+    places: Places,
+    states: Array,
+    met: Array,
+    flat: Array,
+) -> tuple[Any, ...]:
+    """What pieces take from ``records`` on (see `pieces.PIECE`); `values` must be kept as well."""
+    return (
+        pointers(values),
+        np.array([*started.before.values()]),
         places.whole,
         places.fraction,
         instance.params,
         instance.given,
-        h,
         states,
-        (0, size),
-        out,
-        flags,
+        met,
+        flat,
     )
-    check_domain(instance, states, worst, cause)
-    return out, flags
 
 
 def check_domain(instance: Instance, states: Array, worst: float, cause: str) -> None:

@@ -173,9 +173,12 @@ def _names_and_units(
         return trimmed, None, 1
     if len(names) == 1 or above[-1].text.rstrip().endswith((":", ".")):
         return [], None, 0  # a title
+    hint = ""
+    if layout.delimiter == "," and layout.width >= 2 * len(names) - 1:
+        hint = " Do decimal commas stand between commas? Export it with semicolons."
     raise FileError(
         f"{path} has {len(names)} names in line {above[-1].number}, but {layout.width} fields in "
-        "the rows below."
+        f"the rows below.{hint}"
     )
 
 

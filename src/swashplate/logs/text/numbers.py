@@ -39,7 +39,7 @@ def is_number(cell: str, decimal: str) -> bool:
     if (_POINT if decimal == "." else _COMMA).fullmatch(cell):
         return True
     bare = cell.lstrip(_SIGNS).lower()
-    return bare in NOT_A_NUMBER or bare in INFINITE
+    return bare in NOT_A_NUMBER or bare in INFINITE or (not bare and len(cell) > 1)
 
 
 def numbers_of(cells: polars.Series, decimal: str) -> Array | NoNumber:
@@ -69,7 +69,8 @@ def numbers_of(cells: polars.Series, decimal: str) -> Array | NoNumber:
         bare = text.str.strip_chars_start(_SIGNS).str.to_lowercase()
         negative = text.str.starts_with("-")
         infinite = bare.is_in(INFINITE)
-        missing = bare.is_in(NOT_A_NUMBER)
+        # loggers write -- or --- for nothing; a single dash may be anything
+        missing = bare.is_in(NOT_A_NUMBER) | ((bare == "") & (text.str.len_chars() > 1))
         wrong = unread & ~(missing | infinite)
         if wrong.any():
             row = int(wrong.arg_max() or 0)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from swashplate.errors import FileError
 from swashplate.logs.damage import printable
-from swashplate.logs.text.dates import microseconds_of
+from swashplate.logs.text.dates import DAY, microseconds_of
 from swashplate.logs.text.encoding import TextSource
 from swashplate.logs.text.header import Heading
 from swashplate.logs.text.layout import Layout
@@ -80,9 +80,14 @@ class RowReader:
                 pieces.append(numbers)
             count += len(rows.lines)
         arrays = []
-        for pieces in found:
-            arrays.append(np.concatenate(pieces) if pieces else np.empty(0))
+        for position, pieces in zip(positions, found, strict=True):
+            values = np.concatenate(pieces) if pieces else np.empty(0)
             pieces.clear()
+            if first.get(position, DAY) < DAY and values.size:
+                # a clock without a date begins anew at midnight
+                passed = np.diff(values, prepend=values[0]) < -0.5e-6 * DAY
+                values = values + 1e-6 * DAY * np.cumsum(passed)
+            arrays.append(values)
         return arrays
 
     def _pieces(self) -> Iterator[_Rows]:

@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from swashplate.campaign.campaign import Campaign
+from swashplate.campaign import Campaign
 from swashplate.errors import FileError
 from swashplate.identification.assessment import Assessment, RunQuality, assess
-from swashplate.identification.fit import Fit
+from swashplate.identification.fitting import Fit
 from swashplate.identification.starts import StartResult
 from swashplate.identification.validation import ignored_windows
 from swashplate.identification.verdict import starts_of
@@ -24,6 +24,7 @@ from swashplate.report.files import save_figure
 from swashplate.report.fit_page.run_tables import quality_row
 from swashplate.report.fit_page.runs import (
     ShownRun,
+    off_scale,
     predicted_runs,
     shown_runs,
 )
@@ -168,6 +169,12 @@ def plot_overlay(run: ShownRun, *, virtual: bool = False) -> Figure:
         draw_broken(upper, time, factor * shown.channel.values, GREY)
         draw_broken(upper, time, factor * shown.quality.simulated, VERMILION)
         draw_broken(lower, time, shown.small.factor * shown.quality.residual, BLUE)
+        residual = shown.small.factor * shown.quality.residual
+        for ax, values in ((upper, factor * shown.channel.values), (lower, residual)):
+            if off_scale(shown.channel, values).any():
+                counted = values[shown.channel.used]
+                room = 0.1 * float(np.ptp(counted))
+                ax.set_ylim(float(counted.min()) - room, float(counted.max()) + room)
         for first, last in ignored_windows(shown.channel):
             for ax in (upper, lower):
                 ax.axvspan(first, last, color=FAINT, alpha=0.35, linewidth=0.0)

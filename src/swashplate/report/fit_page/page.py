@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from swashplate.campaign.campaign import Campaign
+from swashplate.campaign import Campaign
 from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment, RunQuality, assess
 from swashplate.identification.cross_validation import CrossValidation
-from swashplate.identification.fit import Fit, StageFit
-from swashplate.identification.fit_file import StageProfile as StageProfile
+from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.starts import StartResult
+from swashplate.identification.storing import StageProfile as StageProfile
 from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_page.excitation_tables import excitation_table

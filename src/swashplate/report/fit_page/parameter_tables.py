@@ -8,8 +8,9 @@ from typing import NamedTuple
 from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.fit import Fit, StageFit
+from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.identifiability import GAUGES
+from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.uncertainty import Estimate, estimates
 from swashplate.identification.unknowns import Unknown
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
@@ -93,7 +94,10 @@ def parameter_table(assessment: Assessment, truth: ParameterSet | None = None) -
         # the verdict says why there are no intervals
         quoted = white = [None] * len(stage.problem.unknowns)
     values = stage.values
-    at_bounds = stage.problem.unknowns.at_bounds(stage.solution.vector)
+    point = stage.problem.unknowns.at(stage.solution.vector)
+    sides = {-1: "lower", 1: "upper"}
+    ends = zip(point.names, point.at_bound, strict=True)
+    at_bounds = {name: sides.get(int(k)) for name, k in ends}
     rows, own = list[ParameterRow](), list[ParameterRow]()
     for name, unknown, estimate, narrow in zip(
         stage.problem.unknowns.names, stage.problem.unknowns, quoted, white, strict=True
@@ -112,7 +116,7 @@ def parameter_table(assessment: Assessment, truth: ParameterSet | None = None) -
 
 
 def held_rows(fit: Fit, truth: ParameterSet | None = None) -> tuple[HeldRow, ...]:
-    """The drive's parameters that no stage moved.
+    """The parameters that no stage moved.
 
     Parameters
     ----------
@@ -121,19 +125,25 @@ def held_rows(fit: Fit, truth: ParameterSet | None = None) -> tuple[HeldRow, ...
     truth : ParameterSet, optional
         As it is, in no other scales.
     """
-    moved = moved_columns(fit)
+    moved, parameters = moved_columns(fit), fit.parameters
+    if isinstance(parameters, ModelParameters):
+        return tuple(
+            HeldRow(name, "", "", plain(value), "given with the model", "")
+            for name, value in parameters.numbers.items()
+            if name not in moved
+        )
     rows = []
     for column, symbol in COLUMNS.items():
         if column in moved:
             continue
-        parameter = fit.parameters[symbol]
+        parameter = parameters[symbol]
         rows.append(
             HeldRow(
                 column,
                 meaning_of(column),
                 unit_text(parameter.unit),
-                plain(fit.parameters.numbers[column]),
-                _why_held(fit, column, symbol, moved),
+                plain(parameters.numbers[column]),
+                _why_held(parameters, column, symbol, moved),
                 parameter.source,
                 "" if truth is None else plain(truth.numbers[column]),
             )
@@ -141,16 +151,16 @@ def held_rows(fit: Fit, truth: ParameterSet | None = None) -> tuple[HeldRow, ...
     return tuple(rows)
 
 
-def _why_held(fit: Fit, column: str, symbol: str, moved: set[str]) -> str:
+def _why_held(parameters: ParameterSet, column: str, symbol: str, moved: set[str]) -> str:
     """Why nothing was to be found out about a parameter, as far as that can be told."""
     for gauge in GAUGES:
         held = next((each for each in gauge.hold if not _is_moved(each, moved)), None)
         others = [each for each in gauge.moves if each != symbol and _is_moved(each, moved)]
         if gauge.name in SCALES and held == symbol and others:
             return f"fixes the {gauge.name}: {gauge.determined}"
-    if fit.parameters[symbol].status == "inactive":
+    if parameters[symbol].status == "inactive":
         return "inactive: no test reaches it"
-    if fit.parameters.numbers[column] == 0.0:
+    if parameters.numbers[column] == 0.0:
         return "0: this effect is left out"
     return ""
 
@@ -167,6 +177,12 @@ def _holds(estimate: Estimate | None, truth: float) -> str:
 
 def meaning_of(name: str, stage: StageFit | None = None) -> str:
     """What an unknown is, in words; empty if nothing is known of the name."""
+    if (
+        stage is not None
+        and stage.stage.part == "model"
+        and not name.startswith(("offset ", "clock "))
+    ):
+        return "number of the state at the first sample" if name.startswith("start.") else ""
     side = name.rpartition("_")[2]
     for known, suffix in ((COLUMNS.get(name), side), (name, "")):
         if known in CATALOGUE:

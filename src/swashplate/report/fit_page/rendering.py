@@ -11,10 +11,11 @@ from bokeh.resources import Resources
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from swashplate.campaign.campaign import Campaign
+from swashplate.campaign import Campaign
 from swashplate.identification.assessment import ResidualTest
+from swashplate.identification.own_model import ModelParameters
+from swashplate.identification.staging import Parameters
 from swashplate.identification.validation import source_rules
-from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_page.error_sections import error_sections
 from swashplate.report.fit_page.numbers import count, fixed, plain
 from swashplate.report.fit_page.run_data import run_data
@@ -48,7 +49,7 @@ class ResidualRow(NamedTuple):
 
 
 def shared_content(
-    campaign: Campaign, runs: Sequence[ShownRun], drive: ParameterSet
+    campaign: Campaign, runs: Sequence[ShownRun], drive: Parameters
 ) -> dict[str, Any]:
     """What the template needs of drive and runs, whatever the page is about.
 
@@ -62,6 +63,7 @@ def shared_content(
         "virtual": campaign.virtual,
         "campaign": campaign,
         "drive": drive,
+        "own_model": isinstance(drive, ModelParameters),
         "runs": [
             (run, stacks[stack_of(run)], [quality_row(run, each) for each in run.channels])
             for run in runs

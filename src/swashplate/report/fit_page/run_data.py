@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign import Channel
 from swashplate.identification.validation import ignored_windows
 from swashplate.report.broken_lines import gap_rows
 from swashplate.report.display_units import display_unit
-from swashplate.report.fit_page.runs import Shown, ShownRun
+from swashplate.report.fit_page.runs import Shown, ShownRun, off_scale
 
 Array = NDArray[np.float64]
 FINE = 0.01
@@ -21,8 +22,8 @@ FINE = 0.01
 def run_data(run: ShownRun) -> dict[str, Any]:
     """Stamps and samples of a run for `page.js`: input, and each channel with its residual.
 
-    Lines are broken by a NaN where the stamps have a gap. A clock that several signals share is
-    given once.
+    Ignored samples that would press the others flat are left out. Lines are broken by a NaN where
+    the stamps have a gap. A clock that several signals share is given once.
     """
     clocks: list[Array] = []
     drive = run.experiment.input
@@ -56,16 +57,21 @@ def packed(values: Array, *, stamps: bool = False) -> dict[str, str]:
 
 def _channel(clocks: list[Array], shown: Shown) -> dict[str, Any]:
     channel, factor = shown.channel, shown.unit.factor
+    residual = shown.quality.residual
     made = _signals(
         clocks,
         channel.time,
         {
-            "measured": factor * channel.values,
+            "measured": _on_scale(channel, factor * channel.values),
             "simulated": factor * shown.quality.simulated,
-            "residual": shown.small.factor * shown.quality.residual,
+            "residual": _on_scale(channel, shown.small.factor * residual),
         },
     )
     return {**made, "ignored": ignored_windows(channel)}
+
+
+def _on_scale(channel: Channel, values: Array) -> Array:
+    return np.where(off_scale(channel, values), np.nan, values)
 
 
 def _signals(clocks: list[Array], time: Array, signals: dict[str, Array]) -> dict[str, Any]:

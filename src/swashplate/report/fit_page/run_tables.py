@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.quality import Quality, examine
+from swashplate.campaign import Experiment, Quality, examine
 from swashplate.report.display_units import display_unit
 from swashplate.report.fit_page.numbers import NONE, fixed, plain, seconds
 from swashplate.report.fit_page.runs import (
@@ -98,7 +97,7 @@ def _data_row(quality: Quality) -> DataRow:
         high,
         # not a number where no range is known
         f"{100.0 * quality.clipped:.2g} %" if quality.clipped == quality.clipped else NONE,
-        f"{seconds(quality.gap_time)} s",
+        f"{seconds(quality.stamps.longest)} s",
         f"{100.0 * quality.ignored:.3g} %",
         quality.findings,
     )

@@ -6,12 +6,15 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign import Channel, Experiment
 from swashplate.identification.assessment import Assessment, RunQuality
 from swashplate.identification.validation import ignored_windows, with_speeds
 from swashplate.report.display_units import DisplayUnit, display_unit
 from swashplate.report.fit_page.numbers import listed, seconds
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +97,17 @@ def start_words(experiment: Experiment) -> str:
         "given": "given",
         "estimated": "pressure estimated",
     }[experiment.start]
+
+
+def off_scale(channel: Channel, values: Array) -> NDArray[np.bool_]:
+    """(m,) ignored samples so far from those that count that they would press these flat."""
+    used = channel.used
+    if not used.any():
+        return np.zeros(values.size, dtype=np.bool_)
+    low, high = float(values[used].min()), float(values[used].max())
+    room = 0.5 * (high - low)
+    far: NDArray[np.bool_] = ~used & ((values < low - room) | (values > high + room))
+    return far
 
 
 def ignored_words(experiment: Experiment, channel: Channel) -> str:

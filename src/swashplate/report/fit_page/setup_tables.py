@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from swashplate.identification.fit import StageFit
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.unknowns import Unknown
 from swashplate.report.display_units import display_unit
 from swashplate.report.fit_page.numbers import listed, plain, unit_text
@@ -35,6 +35,7 @@ _PARTS = {
     "card": "the control card alone, from the command to the currents",
     "pump": "pump and motor, driven by the current",
     "chain": "the whole chain, from the command to the speed",
+    "model": "a model of one's own, from its inputs to its channels",
 }
 
 

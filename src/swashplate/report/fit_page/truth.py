@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from math import isclose
 
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.fit import Fit, StageFit
+from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.identifiability import GAUGES, Gauge
-from swashplate.identification.known_truth import true_value
+from swashplate.identification.staging import true_value
 from swashplate.parameters.definitions import COLUMNS
 from swashplate.parameters.parameter_set import ParameterSet
 

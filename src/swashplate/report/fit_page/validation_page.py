@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from swashplate.campaign.campaign import Campaign
+from swashplate.campaign import Campaign
 from swashplate.identification.assessment import RunQuality
+from swashplate.identification.staging import Parameters
 from swashplate.identification.verdict import Verdict, verdict
-from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_page.numbers import count
 from swashplate.report.fit_page.rendering import Section, rendered, shared_content
 from swashplate.report.fit_page.runs import predicted_runs
@@ -27,7 +27,7 @@ SECTIONS = (
 
 
 def write_validation_report(
-    drive: ParameterSet,
+    drive: Parameters,
     campaign: Campaign,
     path: str | Path,
     predicted: Sequence[RunQuality],
@@ -39,8 +39,8 @@ def write_validation_report(
 
     Parameters
     ----------
-    drive : ParameterSet
-        The drive that was held against the runs.
+    drive : ParameterSet or ModelParameters
+        The drive, or the model of one's own, that was held against the runs.
     campaign : Campaign
         The tests.
     path : path

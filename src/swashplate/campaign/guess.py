@@ -1,0 +1,426 @@
+"""First guesses of an unknown machine's numbers, read off its logs.
+
+What a drive does between command and speed is, at first sight, a dead zone, a gain, a top speed and
+a greatest acceleration each way, one delay and one lag. `guess_drive` finds these by least squares
+on mean speeds and puts them into the drive "neutral"; `fit_configuration` frees them, with bounds
+about them. Both are where a fit begins, not its result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf, isfinite, log, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign.schema import ChannelKind
+from swashplate.drive import Drive
+from swashplate.equations.cache import kernel
+from swashplate.errors import InputError
+from swashplate.parameters.parameter_set import ParameterSet
+
+Array = NDArray[np.float64]
+
+STEP = 0.005
+"""Step of the march. [s]"""
+WINDOW = 0.05
+"""Time over which mean speeds are compared, or two samples where these are farther apart. [s]"""
+LAGS = (0.02, 0.06, 0.2, 0.6)
+DELAYS = (0.0, 0.04, 0.12, 0.3)
+DEAD_ZONES = (0.02, 0.1, 0.25)
+"""Where the search begins; dead zones as shares of the largest command each way. [s], [s], [1]"""
+LONGEST_DELAY = 1.0
+"""[s]"""
+FEWEST = 40
+"""Mean speeds that tell anything."""
+SEEN = 1.02
+"""A limit without which the squared error grows by less than this is not seen in the logs. [1]"""
+NEXT_TO_NOTHING = 1e-4
+"""Nor is one by less than this share of all that moves. [1]"""
+ONE_WAY = 0.05
+"""A way that gets less than this share of the command of the other is not exercised. [1]"""
+ANGLE = 0.2
+"""Angle of the swash plate at the greatest speed that was seen, at most. [rad]"""
+STEEPEST = 30.0
+"""Volts that a radian takes at least, so that at 10 V and at the upper bounds of all gains the
+solenoids do not overpower the feedback spring. [V/rad]"""
+FAR_STOP = 0.39
+"""Stop of the swash plate where none was seen. [rad]"""
+
+
+class Guess(NamedTuple):
+    """What logs show at first sight; both ways of a pair as magnitudes, plus first."""
+
+    axis: str
+    unit: str
+    """Of a speed, ``"rad/s"`` or ``"m/s"``."""
+    dead_zone: tuple[float, float]
+    """[V]"""
+    gain: tuple[float, float]
+    """Speed for a volt beyond the dead zone. [unit/V]"""
+    top_speed: tuple[float, float]
+    """Infinite where none was reached. [unit]"""
+    acceleration: tuple[float, float]
+    """Infinite where it limits nothing. [unit/s]"""
+    lag: float
+    """[s]"""
+    delay: float
+    """[s]"""
+    command: tuple[float, float]
+    """Largest command; 0 for a way that was not tried, whose numbers are the other's. [V]"""
+    speed: float
+    """Greatest mean speed. [unit]"""
+    fit_percent: float
+    """100 (1 - error's RMS over the mean speeds' standard deviation). [%]"""
+
+
+@kernel
+def march_guess(
+    command: Array,
+    h: float,
+    dead: Array,
+    gain: Array,
+    top: Array,
+    pull: Array,
+    share: float,
+    start: float,
+    position: Array,
+) -> None:
+    """March speed and position behind dead zone, gain, limits and lag.
+
+    Parameters
+    ----------
+    command : (n,) array
+        Delayed command. [V]
+    h, share, start : float
+        Step [s], share of the way to its target that the speed takes in a step [1], speed at first.
+    dead, gain, top, pull : (2,) arrays
+        Dead zones, gains, top speeds and accelerations, plus and minus.
+    position : (n,) array
+        Output, 0 at the first sample.
+    """
+    speed, position[0] = start, 0.0
+    for n in range(1, command.size):
+        u = command[n - 1]
+        target = min(gain[0] * max(u - dead[0], 0.0), top[0])
+        target -= min(gain[1] * max(-u - dead[1], 0.0), top[1])
+        move = share * (target - speed)
+        last = speed
+        speed += min(max(move, -pull[1] * h), pull[0] * h)
+        position[n] = position[n - 1] + 0.5 * h * (last + speed)
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A run on the march's grid, and the mean speeds in its windows."""
+
+    time: Array
+    command: Array
+    start: float
+    begins: Array
+    ends: Array
+    """(m,) edges of the windows. [s]"""
+    speeds: Array
+    """(m,)"""
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    """What is searched for, both ways in an array."""
+
+    dead: Array
+    gain: Array
+    top: Array
+    pull: Array
+    lag: float
+    delay: float
+
+
+def guess_drive(experiments: Sequence[Experiment]) -> Guess:
+    """First guess from the runs of one axis, by their commands and their speeds or positions.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+        Runs with a voltage as input and a channel of the kind shaft_speed, position or
+        encoder_counts; what is ignored does not count.
+
+    Raises
+    ------
+    InputError
+        If no run has such a channel, the input is no voltage, the speed goes against the command,
+        or too little moves.
+    """
+    runs, unit = [], ""
+    for each in experiments:
+        channel = _moving(each)
+        if channel is None:
+            continue
+        if each.input.kind != "voltage":
+            raise InputError(
+                f"{each.input.source}: the input is of the kind '{each.input.kind}', but a guess "
+                'needs a command in V: write kind = "voltage", unit = "V", and a scale that makes '
+                "its full range ±10 V."
+            )
+        unit = f"{channel.unit}/s" if channel.is_position else channel.unit
+        runs.append(_run(each, channel))
+    if sum(run.speeds.size for run in runs) < FEWEST:
+        raise InputError(
+            "No run measures a motion that a guess could be read off: it needs a channel of the "
+            "kind shaft_speed, position or encoder_counts that is not ignored."
+        )
+    commands = np.concatenate([run.command for run in runs])
+    size = np.array([max(float(commands.max()), 0.0), max(-float(commands.min()), 0.0)])
+    size[size < ONE_WAY * size.max()] = 0.0
+    speeds = np.concatenate([run.speeds for run in runs])
+    scale = float(np.quantile(np.abs(speeds), 0.99))
+    if not size.max() > 0.0 or scale == 0.0:
+        raise InputError("The command or the speed never leaves rest: there is nothing to guess.")
+    found = _searched(runs, size, scale)
+    errors = np.concatenate([_errors(run, found) for run in runs])
+    spread = float(np.std(speeds))
+    return Guess(
+        experiments[0].axis,
+        unit,
+        _both(found.dead, size),
+        _both(found.gain, size),
+        _both(found.top, size),
+        _both(found.pull, size),
+        found.lag,
+        found.delay,
+        (float(size[0]), float(size[1])),
+        scale,
+        100.0 * (1.0 - float(np.sqrt(np.mean(errors**2))) / spread),
+    )
+
+
+def _moving(experiment: Experiment) -> Channel | None:
+    """The channel that tells how it moves: a speed before a position."""
+    kinds: tuple[ChannelKind, ...] = ("shaft_speed", "encoder_counts", "position")
+    for kind in kinds:
+        for channel in experiment.of_kind(kind):
+            if np.count_nonzero(channel.used) > 8:
+                return channel
+    return None
+
+
+def _run(experiment: Experiment, channel: Channel) -> _Run:
+    drive, used = experiment.input, channel.used
+    time, values = channel.time[used], channel.values[used]
+    travelled = values - values[0]
+    if not channel.is_position:
+        steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
+        travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    interval = float(np.median(np.diff(time)))
+    width = max(WINDOW, 2.0 * interval)
+    begin, end = max(time[0], drive.time[0]), min(time[-1], drive.time[-1])
+    edges = np.arange(begin, end, width)
+    at = np.interp(edges, time, travelled)
+    # a window across ignored samples or a gap tells of no speed
+    gaps = np.flatnonzero(np.diff(time) > 3.0 * interval)
+    broken = np.zeros(max(edges.size - 1, 0), dtype=np.bool_)
+    for gap in gaps:
+        broken |= (edges[:-1] < time[gap + 1]) & (edges[1:] > time[gap])
+    speeds = np.diff(at)[~broken] / width
+    grid = np.arange(drive.time[0], drive.time[-1] + STEP, STEP)
+    start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
+    return _Run(grid, drive.at(grid), start, edges[:-1][~broken], edges[1:][~broken], speeds)
+
+
+def _errors(run: _Run, numbers: _Numbers) -> Array:
+    """Simulated less measured mean speeds of a run."""
+    position = np.empty(run.time.size)
+    share = 1.0 - np.exp(-STEP / max(numbers.lag, 1e-4))
+    command = np.interp(run.time - numbers.delay, run.time, run.command)
+    march_guess(
+        command, STEP, numbers.dead, numbers.gain, numbers.top, numbers.pull, share, run.start,
+        position,
+    )  # fmt: skip
+    there, back = (np.interp(each, run.time, position) for each in (run.ends, run.begins))
+    return (there - back) / (run.ends - run.begins) - run.speeds
+
+
+def _searched(runs: Sequence[_Run], size: Array, scale: float) -> _Numbers:
+    """The least squares: a grid first, on which gains are linear, then all numbers at once."""
+    from scipy.optimize import least_squares
+
+    free, tried = np.full(2, inf), size > 0.0
+    candidates: list[tuple[float, _Numbers]] = []
+    speeds = np.concatenate([run.speeds for run in runs])
+    for lag in LAGS:
+        for delay in DELAYS:
+            for share in DEAD_ZONES:
+                numbers = _Numbers(share * size, np.ones(2), free, free, lag, delay)
+                ways = []
+                for way in np.flatnonzero(tried):
+                    only = np.zeros(2)
+                    only[way] = 1.0
+                    alone = replace(numbers, gain=only)
+                    still = replace(numbers, gain=np.zeros(2))
+                    ways.append(
+                        np.concatenate([_errors(r, alone) - _errors(r, still) for r in runs])
+                    )
+                design = np.transpose(ways)
+                gains, *_ = np.linalg.lstsq(design, speeds, rcond=None)
+                full = np.zeros(2)
+                full[tried] = gains
+                cost = float(np.sum((design @ gains - speeds) ** 2))
+                candidates.append((cost, replace(numbers, gain=full)))
+    candidates.sort(key=lambda each: each[0])
+    best = candidates[0][1]
+    if (best.gain[tried] <= 0.0).any():
+        raise InputError(
+            "The speed goes against the command: turn it round with sign = -1 in its channel."
+        )
+
+    def numbers_of(vector: Array, *, limited: bool) -> _Numbers:
+        gain = np.exp(vector[2:4]) * scale / size.max()
+        top, pull = free, free
+        if limited:
+            top, pull = np.exp(vector[6:8]) * scale, np.exp(vector[8:10]) * scale
+        return _Numbers(vector[:2] * size, gain, top, pull, float(np.exp(vector[4])), vector[5])
+
+    def residuals(vector: Array, *, limited: bool) -> Array:
+        numbers = numbers_of(vector, limited=limited)
+        return np.concatenate([_errors(run, numbers) for run in runs]) / scale
+
+    def solved(vector: Array, *, limited: bool) -> tuple[float, Array]:
+        low = np.array([0.0, 0.0, -5.0, -5.0, log(0.002), 0.0, -1.5, -1.5, -2.0, -2.0])
+        high = np.array([0.95, 0.95, 7.0, 7.0, log(5.0), LONGEST_DELAY, 1.5, 1.5, 6.0, 6.0])
+        n = vector.size
+        found = least_squares(
+            residuals,
+            np.clip(vector, low[:n] + 1e-6, high[:n] - 1e-6),
+            bounds=(low[:n], high[:n]),
+            kwargs={"limited": limited},
+            loss="soft_l1",
+            f_scale=0.05,
+            x_scale=np.array([0.05, 0.05, 0.2, 0.2, 0.3, 0.02, 0.1, 0.1, 0.5, 0.5])[:n],
+            diff_step=1e-3,
+            max_nfev=60,
+        )
+        return float(found.cost), found.x
+
+    begins = []
+    for _, each in candidates[:3]:
+        share = np.divide(each.dead, size, out=np.full(2, 0.1), where=tried)
+        gain = np.log(np.maximum(each.gain, 1e-3 * scale / size.max()) * size.max() / scale)
+        begins.append(np.array([*share, *gain, log(each.lag), each.delay]))
+    _, plain = min((solved(each, limited=False) for each in begins), key=lambda each: each[0])
+    steep = np.log([0.7 / np.exp(plain[4])] * 2)
+    limits = [*np.log([1.0, 1.0]), *steep]
+    tries = [plain, np.array([*plain[:2], *(plain[2:4] + 0.7), plain[4] - 0.7, plain[5]])]
+    cost, whole = min(
+        (solved(np.array([*each, *limits]), limited=True) for each in tries),
+        key=lambda each: each[0],
+    )
+    # a limit that makes no difference was not reached
+    for index in range(6, 10):
+        without = whole.copy()
+        without[index] = 30.0
+        rough = residuals(without, limited=True) / 0.05
+        loss = 0.05**2 * float(np.sum(np.sqrt(1.0 + rough**2) - 1.0))
+        if loss < SEEN * cost + NEXT_TO_NOTHING * float(np.sum((speeds / scale) ** 2)):
+            whole = without
+    made = numbers_of(whole, limited=True)
+    return replace(
+        made,
+        top=np.where(whole[6:8] > 20.0, inf, made.top),
+        pull=np.where(whole[8:10] > 20.0, inf, made.pull),
+    )
+
+
+def _both(values: Array, size: Array) -> tuple[float, float]:
+    """Numbers of both ways; those of a way that was not tried are the other's."""
+    plus, minus = (float(each) for each in values)
+    return (plus if size[0] else minus), (minus if size[1] else plus)
+
+
+def guessed_set(guess: Guess, source: str) -> ParameterSet:
+    """The drive "neutral" with the numbers of a guess.
+
+    Parameters
+    ----------
+    guess : Guess
+        What `guess_drive` found.
+    source : str
+        Where they are from, for the parameter file.
+
+    Notes
+    -----
+    The greatest speed that was seen is given a swash angle of 0.2 rad at most, which sets Z10; no
+    measurement of a speed could tell it. With sin φ = Z5 Z19 I/√Z4 and tan α = sin φ/Z3 the gain is
+    Z10 Z5 Z19 G1/(√Z4 Z3); the lag is 1/(Z1 Z3 Z5 Z8 √(Z9/2)); the acceleration beyond which the
+    orifice opens no further is Z10 Z1 Z8 √(Z9/2) Z16.
+    """
+    base = Drive.preset("neutral").parameters
+    n = base.numbers
+    per_angle = max(guess.speed / ANGLE, STEEPEST * max(guess.gain))
+    per_ampere = per_angle * n["Z5"] * n["Z19_plus"] / (sqrt(n["Z4"]) * n["Z3"])
+    lag = max(guess.lag, 0.005)
+    flow = n["Z1"] * sqrt(0.5 * n["Z9"])
+    speed_of_flow = 1.0 / (lag * flow * n["Z3"] * n["Z5"])
+    stops = [min(top / per_angle, FAR_STOP) for top in guess.top_speed]
+    orifices = [pull / (per_angle * flow * speed_of_flow) for pull in guess.acceleration]
+    made = base.replace(
+        {
+            "V_dz": guess.dead_zone,
+            "G1": (guess.gain[0] / per_ampere, guess.gain[1] / per_ampere),
+            "tau": guess.delay,
+            "Z8": speed_of_flow,
+            "Z10": per_angle,
+            "Z13": (stops[0], stops[1]),
+            "Z16": (orifices[0], orifices[1]),
+        }
+    )
+    changed = {"V_dz", "G1", "tau", "Z8", "Z10", "Z13", "Z16"}
+    said = {
+        symbol: replace(each, source=source, status="approximate")
+        if symbol in changed
+        else replace(each, source="made up: no speed tells it")
+        for symbol, each in made.parameters.items()
+    }
+    return replace(
+        made, name=guess.axis, title=f"{guess.axis}: guessed from {source}", parameters=said
+    )
+
+
+def fit_configuration(guess: Guess, start: ParameterSet) -> str:
+    """Text of a fit configuration that frees what was guessed, with bounds about it."""
+    lines = [
+        f"# Read off the logs of the axis '{guess.axis}' by `swashplate guess`: what they show is",
+        "# free, within bounds about the first guess; what they do not show stays fixed.",
+        f'title = "{guess.axis}, guessed"',
+        "",
+        "[[stages]]",
+        'name = "drive"',
+        'part = "chain"',
+        'channels = ["shaft_speed", "position", "encoder_counts"]',
+        "",
+        "[stages.free]",
+    ]
+    for side, way in (("plus", 0), ("minus", 1)):
+        if not guess.command[way]:
+            lines.append(f"# no run goes {side}: its numbers are those of the other way, fixed")
+            continue
+        gain = start.numbers[f"G1_{side}"]
+        # so that more command never means less current, whatever the gain within its bounds
+        curved = 0.2 * gain / guess.command[way]
+        lines += [
+            f"V_dz_{side} = {{ bounds = [0.0, {0.95 * guess.command[way]:.4g}] }}",
+            f"G1_{side} = {{ relative = [0.5, 2.0], log = true }}",
+            f"G2_{side} = {{ bounds = [{-curved:.4g}, {curved:.4g}] }}    # how the gain bends",
+        ]
+        if isfinite(guess.top_speed[way]):
+            lines.append(f"Z13_{side} = {{ relative = [0.7, 1.4], log = true }}    # top speed")
+        if isfinite(guess.acceleration[way]):
+            lines.append(f"Z16_{side} = {{ relative = [0.3, 3.0], log = true }}    # acceleration")
+    lines += [
+        "Z8 = { relative = [0.2, 5.0], log = true }    # lag",
+        f"tau = {{ bounds = [0.0, {max(2.0 * guess.delay, guess.delay + 0.1):.4g}] }}    # delay",
+    ]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,615 @@
+"""Manoeuvres recognised from nothing but the command that was logged.
+
+`recognise` says which of the package's manoeuvres a record is (rest, step, stairs, ramp or sine),
+with its numbers, or that it is none of them: ``"free"``. It never guesses. The name decides which
+windows of a campaign file hold in a run, which runs are dealt into which fold, and what a table of
+errors puts together; the numbers beside it are what the name is made of.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import floor, log10
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.errors import InputError
+
+Array = NDArray[np.float64]
+Kind = Literal["rest", "step", "stairs", "ramp", "sine", "free"]
+
+SURE = 6.0
+"""Standard deviations that noise exceeds by chance less than once in a hundred million samples."""
+SMALLEST_VOLTS = 0.1
+"""Smallest voltage that counts as a command: 1 % of full scale. [V]"""
+LARGEST_ZERO = 0.5
+"""Reading at rest beyond which it is no zero error of an instrument. [V]"""
+SHORTEST = 16
+"""Samples below which nothing is told apart."""
+ENOUGH = 20_000
+"""Samples that a curve is fitted to; more do not make it better where noise is small."""
+JUMP_SAMPLES, JUMP_SECONDS = 3, 0.03
+"""A jump takes so many samples or seconds at most, whichever is more."""
+SMALLEST_JUMP = 0.05
+"""Smallest jump, as a share of the largest level. [1]"""
+MOST_JUMPS = 200
+"""A record with more jumps is not looked at as stairs."""
+HELD = 5
+"""Samples for which a level is held at least, or that a rise has between 10 % and 80 % of it."""
+SHORTEST_HOLD = 0.25
+"""For so long a ramp stays at its limit; a shorter stay is the crest of its return. [s]"""
+BAND = 0.3
+"""A sine's crossing is a change between +BAND and -BAND of the peak. [1]"""
+EVEN = 0.15
+"""How much half a period may differ from the median half period. [1]"""
+COARSEST = 6.0
+"""Samples in a period of a sine, at least."""
+
+
+@dataclass(frozen=True)
+class Recognised:
+    """The manoeuvre of a record. Numbers are rounded to what the data support.
+
+    Levels and amplitudes are relative to `rest`, in `unit`; positive and negative as in the record.
+    A number that does not belong to the kind is None.
+    """
+
+    kind: Kind
+    name: str
+    """As `swashplate.maneuvers` names it: ``"step +4 V"``, ``"sine 6.5 V 0.1 Hz"``, ``"free"``."""
+    unit: str
+    rest: float
+    """The input at rest, not rounded. [unit]"""
+    levels: tuple[float, ...] = ()
+    """Levels of a step or of stairs in their order, without the rest at the end. [unit]"""
+    slope: float | None = None
+    """Slope of a ramp. [unit/s]"""
+    limit: float | None = None
+    """Level at which a ramp ends and is held, None for one that is cut short. [unit]"""
+    amplitude: float | None = None
+    """Amplitude of a sine, negative for one that begins downwards. [unit]"""
+    frequency: float | None = None
+    """Frequency of a sine. [Hz]"""
+
+
+def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recognised:
+    """Name of the manoeuvre of a record, from the command alone.
+
+    Parameters
+    ----------
+    time : (n,) array_like
+        Increasing stamps, even or not. [s]
+    voltage : (n,) array_like
+        The command, with the noise and steps of its instrument. [unit]
+    unit : str
+        Its unit, for the name. All levels are relative to what the record begins with, which in V
+        must be within 0.5 V of zero. Changes of less than 0.1 V are no command, in other units any.
+
+    Returns
+    -------
+    Recognised
+        Of kind ``"free"`` wherever none of the manoeuvres fits: its RMS over the record must be
+        below 1 % of the peak, noise apart, and below three times that in every fiftieth part.
+
+    Raises
+    ------
+    InputError
+        If the columns differ in length, hold what is no number, or the time does not increase.
+
+    Notes
+    -----
+    Step, stairs, ramp and sine are those of `swashplate.maneuvers`. How they return to rest is free
+    as long as they do, within three quarters of the time that the command took. A sine may begin at
+    any phase, but has a whole period at least, about rest. Chirps, multisines, joysticks and
+    different manoeuvres after one another are free.
+    """
+    trace = _trace(time, voltage, unit)
+    if unit == "V" and abs(trace.rest) > LARGEST_ZERO:
+        return Recognised("free", "free", unit, trace.rest)
+    if trace.peak <= trace.least:
+        return Recognised("rest", "rest", unit, trace.rest)
+    if trace.time.size >= SHORTEST:
+        for find in (_stairs, _ramp, _sine):
+            found = find(trace, unit)
+            if found is not None:
+                return found
+    return Recognised("free", "free", unit, trace.rest)
+
+
+def roundest(value: float, uncertainty: float) -> float:
+    """The number of fewest significant digits within `uncertainty` of `value`.
+
+    Of several with as few digits it is the nearest: 0.09997 within 0.0001 is 0.1, 6.4935 within
+    0.013 is 6.5. Both are in the same unit, the uncertainty is not negative.
+    """
+    if abs(value) <= uncertainty:
+        return 0.0
+    exponent = floor(log10(abs(value)))
+    for digits in range(-exponent, 17 - exponent):
+        candidate = round(value, digits)
+        if abs(candidate - value) <= uncertainty:
+            return candidate
+    return value
+
+
+# --- the record about its rest --------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _Trace:
+    """A record about its rest."""
+
+    time: Array
+    """Increasing stamps. [s]"""
+    values: Array
+    """Input less its value at rest. [unit]"""
+    rest: float
+    rest_error: float
+    """Standard error of `rest`. [unit]"""
+    noise: float
+    """Standard deviation from sample to sample. [unit]"""
+    least: float
+    """Changes up to this are no command. [unit]"""
+    peak: float
+    """Largest magnitude of `values`. [unit]"""
+    spacing: float
+    """Median distance of the stamps. [s]"""
+
+    @property
+    def tolerance(self) -> float:
+        """Deviation of a single sample that noise does not explain. [unit]"""
+        return max(SURE * self.noise, 0.01 * self.peak)
+
+    @property
+    def jump(self) -> int:
+        """Samples that a jump may take."""
+        return max(JUMP_SAMPLES, round(JUMP_SECONDS / self.spacing))
+
+    def first(self, mask: NDArray[np.bool_], start: int) -> int:
+        """Index of the first true element of a mask that begins at `start`, or the length."""
+        return start + int(mask.argmax()) if mask.any() else self.time.size
+
+    def picked(self, start: int, stop: int) -> NDArray[np.intp]:
+        """Indices from `start` to before `stop`: all, or `ENOUGH` spread unevenly over them.
+
+        Evenly picked ones would hide what happens between two, at their own rhythm.
+        """
+        if stop - start <= ENOUGH:
+            return np.arange(start, stop)
+        steps = np.arange(ENOUGH)
+        share = (steps + np.mod(steps * 0.6180339887498949, 1.0)) / ENOUGH
+        chosen: NDArray[np.intp] = start + (share * (stop - start)).astype(np.intp)
+        return chosen
+
+
+def _trace(time: ArrayLike, voltage: ArrayLike, unit: str) -> _Trace:
+    stamps, values = _row(time, "time"), _row(voltage, "input")
+    if stamps.size != values.size:
+        raise InputError(f"There are {stamps.size} time stamps for {values.size} input samples.")
+    steps = np.diff(stamps)
+    if steps.size and steps.min() <= 0.0:
+        late = int(np.argmax(steps <= 0.0)) + 1
+        raise InputError(
+            f"The time must increase, but row {late} (the first is 0) has {stamps[late]:g} s "
+            f"after {stamps[late - 1]:g} s."
+        )
+    noise = _noise(stamps, values)
+    zero, error = _rest(values, noise)
+    values = values - zero
+    peak = float(np.abs(values).max())
+    smallest = SMALLEST_VOLTS if unit == "V" else 0.0
+    # more noise than that may well be what is commanded
+    least = max(smallest, min(SURE * noise, SURE * smallest), 1e-12 * abs(zero))
+    spacing = float(np.median(steps)) if steps.size else 0.0
+    return _Trace(stamps, values, zero, error, min(noise, 0.05 * peak), least, peak, spacing)
+
+
+def _row(values: ArrayLike, what: str) -> Array:
+    data = np.asarray(values, dtype=np.float64)
+    if data.ndim != 1 or data.size == 0:
+        raise InputError(f"The {what} must be one row of numbers, not of shape {data.shape}.")
+    wrong = np.flatnonzero(~np.isfinite(data))
+    if wrong.size:
+        raise InputError(
+            f"The {what} is {data[wrong[0]]} in row {wrong[0]} (the first is 0); leave out the "
+            "rows without a number."
+        )
+    return data
+
+
+def _noise(time: Array, values: Array) -> float:
+    """Standard deviation of what a straight line between both neighbours does not explain.
+
+    The median leaves jumps out; the curvature of a coarsely sampled sine counts as noise. The steps
+    of a converter count as well: where they hide the noise, the median is zero.
+    """
+    if values.size < 3:
+        return 0.0
+    middle = np.unique(np.linspace(1, values.size - 2, 50_000).astype(np.intp))
+    before, after = time[middle] - time[middle - 1], time[middle + 1] - time[middle]
+    share = before / (before + after)
+    line = values[middle - 1] + share * (values[middle + 1] - values[middle - 1])
+    deviation = (values[middle] - line) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
+    changes = np.abs(values[middle] - values[middle - 1])
+    smallest = float(np.min(changes, where=changes > 0.0, initial=np.inf))
+    # of a command without noise the smallest change is no converter's step, but a part of it
+    quantum = min(0.3 * smallest, 0.002 * float(np.ptp(values)))
+    return max(float(np.median(np.abs(deviation))) / 0.6745, quantum)
+
+
+def _rest(values: Array, noise: float) -> tuple[float, float]:
+    """Mean of what the record begins with, as long as it stays there, and its standard error."""
+    zero, count = float(np.median(values[:3])), 3
+    for _ in range(2):
+        away = np.abs(values - zero) > SURE * noise + 1e-12 * abs(zero)
+        stays = int(away.argmax()) if away.any() else values.size
+        # the second half may hold the beginning of a slow ramp
+        count = max(stays // 2, 3)
+        zero = float(values[:count].mean())
+    return zero, noise / float(np.sqrt(count))
+
+
+# --- how a command ends, and whether a model of it will do ----------------------------------------
+
+
+class _Ending(NamedTuple):
+    """What comes after the command: samples `first` to before `last`, then rest."""
+
+    kind: Literal["none", "fall", "return"]
+    first: int
+    last: int
+
+
+def _ending(trace: _Trace, first: int, earliest: float) -> _Ending | None:
+    """How it goes on from the first sample off the curve; `earliest` is where that began. [s]"""
+    size = trace.time.size
+    if first >= size:
+        return _Ending("none", size, size)
+    moving = np.flatnonzero(np.abs(trace.values[first:]) > trace.tolerance)
+    last = first + (int(moving[-1]) + 1 if moving.size else 0)
+    if last - first < trace.jump and last < size:
+        return _Ending("fall", first, last)
+    start, stop = float(trace.time[first]), float(trace.time[min(last, size - 1)])
+    if abs(trace.values[-1]) > max(trace.tolerance, 0.05 * trace.peak):
+        return None
+    tail = trace.values[first:last]
+    turns = np.count_nonzero(np.abs(np.diff(np.sign(tail[np.abs(tail) > trace.tolerance]))) > 1)
+    if stop - start > 0.75 * (start - earliest) or turns > 1:
+        return None
+    return _Ending("return", first, last)
+
+
+def _judged(
+    trace: _Trace, model: Array, ending: _Ending, jumps: list[tuple[int, int]] | None = None
+) -> float | None:
+    """RMS of record less model, None where the whole or any part of it is too large."""
+    kept = np.ones(model.size, dtype=np.bool_)
+    if ending.kind != "none":
+        model[ending.last :] = 0.0
+        kept[max(ending.first - 1, 0) : ending.last] = False
+    for before, after in jumps or ():
+        kept[before:after] = False
+    squares = (trace.values - model)[kept] ** 2
+    # one percent of the peak, and noise with a margin for its estimate
+    quality = float(np.hypot(0.01 * trace.peak, 1.5 * trace.noise))
+    rms = float(np.sqrt(squares.mean()))
+    if not rms <= quality:
+        return None
+    parts = max(min(50, squares.size // 8), 1)
+    edges = np.linspace(0, squares.size, parts, endpoint=False).astype(np.intp)
+    means = np.add.reduceat(squares, edges) / np.diff(edges, append=squares.size)
+    worst = float(np.sqrt(means.max()))
+    return rms if worst <= 3.0 * quality else None
+
+
+# --- steps and stairs -----------------------------------------------------------------------------
+
+
+class _Level(NamedTuple):
+    height: float
+    start: float
+    """When it is reached. [s]"""
+    first: int
+    last: int
+    """Samples from `first` to before `last` are held."""
+
+
+def _stairs(trace: _Trace, unit: str) -> Recognised | None:
+    """Levels that are held, with jumps between them, None of other records."""
+    held = _held_levels(trace)
+    if held is None:
+        return held
+    levels, ending = held
+    model = np.zeros_like(trace.values)
+    # of the jump to the first level it is known when it is complete
+    jumps = [(max(levels[0].first - trace.jump, 0), levels[0].first)]
+    for before, level in zip([None, *levels], levels, strict=False):
+        model[level.first : level.last] = level.height
+        if before is not None:
+            jumps.append((before.last, level.first))
+    if ending.kind == "fall":
+        jumps.append((levels[-1].last, ending.first))
+    rms = _judged(trace, model, ending, jumps)
+    if rms is None:
+        return rms
+    errors = [
+        np.hypot(trace.noise / (each.last - each.first) ** 0.5, trace.rest_error) for each in levels
+    ]
+    heights = tuple(
+        roundest(each.height, max(3.0 * float(error), 0.002 * trace.peak))
+        for each, error in zip(levels, errors, strict=True)
+    )
+    if len(levels) == 1:
+        name = f"step {heights[0]:+g} {unit}"
+    else:
+        shown = [*heights, 0.0] if ending.kind == "fall" else heights
+        name = f"stairs {'/'.join(f'{height:g}' for height in shown)} {unit}"
+    return Recognised(
+        "step" if len(levels) == 1 else "stairs",
+        name,
+        unit,
+        trace.rest,
+        levels=heights,
+    )
+
+
+def _held_levels(trace: _Trace) -> tuple[list[_Level], _Ending] | None:
+    """Levels other than the rest before and after, and the ending."""
+    values, least = trace.values, max(2.0 * trace.tolerance, SMALLEST_JUMP * trace.peak)
+    jumps = np.flatnonzero(np.abs(np.diff(values)) > least)
+    if jumps.size == 0:
+        return None
+    groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > HELD) + 1)
+    if len(groups) > MOST_JUMPS:
+        return None
+    if any(group[-1] - group[0] >= trace.jump for group in groups):
+        return None
+    firsts = [0, *(int(group[-1]) + 1 for group in groups)]
+    lasts = [*(int(group[0]) + 1 for group in groups), values.size]
+    levels: list[_Level] = []
+    for bounds in zip(firsts, lasts, strict=True):
+        first, last = _trimmed(trace, *bounds)
+        final = last == values.size
+        sure = np.median(values[first : first + max(HELD, (last - first) // 10)])
+        leaves = min(trace.first(np.abs(values[first:last] - sure) > trace.tolerance, first), last)
+        if leaves - first < (1 if final else HELD):
+            return None
+        level = _Level(float(values[first:leaves].mean()), float(trace.time[first]), first, leaves)
+        resting = abs(level.height) <= trace.tolerance
+        if leaves < last:
+            if resting or not final:
+                return None
+            start = levels[0].start if levels else level.start
+            ending = _ending(trace, leaves, start)
+            if ending is None:
+                return ending
+            if ending.kind == "none" or ending.first - first < HELD:
+                return None
+            return [*levels, level], ending
+        if final and resting:
+            ending = _Ending("fall", first, first)
+            return (levels, ending) if levels else None
+        if levels or not resting:
+            levels.append(level)
+    return levels, _Ending("none", values.size, values.size)
+
+
+def _trimmed(trace: _Trace, first: int, last: int) -> tuple[int, int]:
+    """A level without the samples beside its jumps that were taken while they lasted."""
+    values = trace.values
+    width = min(max(HELD, (last - first) // 10), last - first)
+
+    def off(level: Array) -> int:
+        away = np.flatnonzero(np.abs(level[:2] - np.median(level)) > trace.tolerance)
+        return int(away[-1]) + 1 if away.size else 0
+
+    late, early = off(values[first : first + width]), off(values[last - width : last][::-1])
+    return first + (late if first else 0), last - (early if last < values.size else 0)
+
+
+# --- ramps ----------------------------------------------------------------------------------------
+
+
+def _ramp(trace: _Trace, unit: str) -> Recognised | None:
+    """A straight rise from rest, perhaps to a level that is held, None of other records."""
+    time = trace.time
+    values = trace.values * np.sign(trace.values[np.abs(trace.values).argmax()])
+    low, high = (int((values >= share * trace.peak).argmax()) for share in (0.1, 0.8))
+    if high - low < HELD or time[high] - time[low] < 0.1:
+        return None
+    leaves = high
+    for _ in range(2):  # once more with all that lies on the first line
+        slope, start, error = _line(trace, low, leaves)
+        if slope == 0.0 or not time[0] - trace.spacing <= start < time[low]:
+            return None
+        line = slope * np.maximum(time - start, 0.0)
+        leaves = trace.first(np.abs(trace.values[low:] - line[low:]) > trace.tolerance, low)
+        if leaves < high:
+            return None
+    ending, limit = _ending(trace, leaves, start), None
+    near = trace.values[leaves + 2 : leaves + 2 + HELD]
+    if (ending is None or ending.kind == "return") and near.size == HELD:
+        away = np.abs(trace.values[leaves + 2 :] - np.median(near)) > trace.tolerance
+        stops = trace.first(away, leaves + 2)
+        if time[stops - 1] - time[leaves] >= SHORTEST_HOLD:
+            limit = float(trace.values[leaves + 2 : stops].mean())
+            ending = _ending(trace, stops, start)
+            line = np.minimum(line, limit) if limit > 0.0 else np.maximum(line, limit)
+    if ending is None:
+        return ending
+    rms = _judged(trace, line, ending)
+    if rms is None:
+        return rms
+    shown = roundest(slope, max(3.0 * error, 0.002 * abs(slope)))
+    return Recognised(
+        "ramp",
+        f"ramp {shown:+g} {unit}/s",
+        unit,
+        trace.rest,
+        slope=shown,
+        limit=None if limit is None else roundest(limit, 0.002 * trace.peak),
+    )
+
+
+def _line(trace: _Trace, first: int, last: int) -> tuple[float, float, float]:
+    """Slope [unit/s], instant of zero [s] and the slope's standard error, by least squares."""
+    chosen = trace.picked(first, last)
+    time, values = trace.time[chosen], trace.values[chosen]
+    middle = time.mean()
+    spread = float(((time - middle) ** 2).sum())
+    slope = float(((time - middle) @ values) / spread)
+    start = float(middle - values.mean() / slope) if slope else float(middle)
+    return slope, start, trace.noise / spread**0.5
+
+
+# --- sines ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Tone:
+    sine: float
+    cosine: float
+    mean: float
+    omega: float
+    origin: float
+    """Instant from which its phase counts. [s]"""
+    error: float
+    """Standard error of omega. [rad/s]"""
+
+    @property
+    def amplitude(self) -> float:
+        return float(np.hypot(self.sine, self.cosine))
+
+    @property
+    def crossing(self) -> float:
+        """An upward crossing of its mean. [s]"""
+        return self.origin - float(np.arctan2(self.cosine, self.sine)) / self.omega
+
+    def __call__(self, time: Array) -> Array:
+        # one sine, not two: it is computed over the whole record
+        return self.mean + self.amplitude * np.sin(self.omega * (time - self.crossing))
+
+
+def _sine(trace: _Trace, unit: str) -> Recognised | None:
+    """One frequency, at least a whole period of it, None of other records."""
+    guess = _guessed(trace)
+    if guess is None:
+        return guess
+    departs = trace.first(np.abs(trace.values) > trace.tolerance, 0)
+    certain = int(np.searchsorted(trace.time, guess[1]))
+    if certain - departs < COARSEST:
+        return None
+    tone = _fitted(trace, guess[0], departs, certain)
+    start = _start(trace, tone, departs)
+    first = int(np.searchsorted(trace.time, start - 1e-9))
+    leaves = _leaves(trace, tone, first)
+    if leaves < certain:
+        return None
+    tone = _fitted(trace, tone, first, leaves)
+    ending = _ending(trace, leaves, start)
+    if ending is None:
+        return ending
+    end = float(trace.time[min(leaves, trace.time.size - 1)])
+    if (end - start) * tone.omega < 2.0 * np.pi * 0.99:
+        return None
+    if abs(tone.mean) > max(0.02 * tone.amplitude, trace.noise) and first:
+        return None
+    model = tone(trace.time)
+    model[:first] = 0.0
+    rms = _judged(trace, model, ending)
+    if rms is None:
+        return rms
+    hertz = tone.omega / (2.0 * np.pi)
+    frequency = roundest(hertz, max(3.0 * tone.error / (2.0 * np.pi), 0.001 * hertz))
+    down = float(np.cos(tone.omega * (start - tone.crossing))) < -1e-9
+    amplitude = roundest(-tone.amplitude if down else tone.amplitude, 0.002 * tone.amplitude)
+    return Recognised(
+        "sine",
+        f"sine {amplitude:g} {unit} {frequency:g} Hz",
+        unit,
+        # where it begins within the sine there is no rest to see
+        trace.rest if first else trace.rest + tone.mean,
+        amplitude=amplitude,
+        frequency=frequency,
+    )
+
+
+def _guessed(trace: _Trace) -> tuple[_Tone, float] | None:
+    """A tone through the changes of sign, and the last instant up to which they are a sine's."""
+    beyond = np.flatnonzero(np.abs(trace.values) > BAND * trace.peak)
+    changes = np.flatnonzero(np.diff(np.signbit(trace.values[beyond])))
+    if changes.size < 2:
+        return None
+    before, after = beyond[changes], beyond[changes + 1]
+    crossings = 0.5 * (trace.time[before] + trace.time[after])
+    halves = np.diff(crossings)
+    half = float(np.median(halves))
+    uneven = np.abs(halves - half) > EVEN * half
+    regular = int(uneven.argmax()) if uneven.any() else halves.size
+    if regular < max(halves.size - 1, 1):
+        return None
+    if 2.0 * half < COARSEST * trace.spacing:
+        return None
+    # the last may be a part of the return
+    even = crossings[: min(regular + 1, max(crossings.size - 1, 2))]
+    half, first = np.polynomial.Polynomial.fit(np.arange(even.size), even, 1).convert().coef[::-1]
+    sign = 1.0 if trace.values[after[0]] > 0.0 else -1.0
+    tone = _Tone(sign * trace.peak, 0.0, 0.0, float(np.pi / half), float(first), 0.0)
+    return tone, float(even[-1])
+
+
+def _fitted(trace: _Trace, guess: _Tone, first: int, last: int) -> _Tone:
+    """Least-squares sine of four parameters through samples `first` to before `last`.
+
+    Gauss-Newton from a guess whose phase is right to a small part of a turn over the whole record,
+    as IEEE Std 1057 does it.
+    """
+    chosen = trace.picked(first, last)
+    time, values = trace.time[chosen], trace.values[chosen]
+    origin = float(0.5 * (time[0] + time[-1]))
+    omega = guess.omega
+    # carried along to where it hardly correlates with the frequency
+    phase = omega * (origin - guess.crossing)
+    sine, cosine = guess.amplitude * np.cos(phase), guess.amplitude * np.sin(phase)
+    mean, since = guess.mean, time - origin
+    design = np.ones((time.size, 4))
+    for _ in range(6):
+        s, c = np.sin(omega * since), np.cos(omega * since)
+        design[:, 0], design[:, 1] = s, c
+        design[:, 3] = since * (sine * c - cosine * s)
+        normal = design.T @ design
+        # a minimum-norm solution where few samples leave a direction open
+        sine, cosine, mean, step = np.linalg.lstsq(normal, design.T @ values)[0]
+        omega += float(np.clip(step, -0.1 * omega, 0.1 * omega))
+        if abs(step) < 1e-12 * omega:
+            break
+    error = trace.noise * float(np.sqrt(np.linalg.pinv(normal)[3, 3]))
+    return _Tone(float(sine), float(cosine), float(mean), float(omega), origin, error)
+
+
+def _start(trace: _Trace, tone: _Tone, departs: int) -> float:
+    """Where it begins: at the crossing before it is seen, or elsewhere where it is seen. [s]"""
+    seen = float(trace.time[departs])
+    if departs == 0:
+        return seen
+    half = np.pi / tone.omega
+    # so long it takes from the crossing to the tolerance
+    hidden = np.arcsin(min(trace.tolerance / tone.amplitude, 1.0)) / tone.omega
+    crossing = tone.crossing + half * round((seen - hidden - tone.crossing) / half)
+    if abs(crossing - (seen - hidden)) > 0.1 * half + trace.spacing or crossing > seen:
+        return seen
+    return max(float(crossing), float(trace.time[0]))
+
+
+def _leaves(trace: _Trace, tone: _Tone, first: int) -> int:
+    """First sample that is not on the tone, or the record's length; long records are leapt over."""
+    chosen = trace.picked(first, trace.time.size)
+    away = np.abs(trace.values[chosen] - tone(trace.time[chosen])) > trace.tolerance
+    if not away.any():
+        return trace.time.size
+    late = int(away.argmax())
+    begin, end = int(chosen[max(late - 1, 0)]), int(chosen[late]) + 1
+    near = slice(begin, end)
+    return trace.first(np.abs(trace.values[near] - tone(trace.time[near])) > trace.tolerance, begin)

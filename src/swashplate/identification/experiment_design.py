@@ -1,0 +1,651 @@
+"""Design of experiments: which further test or sensor tells most, by Fisher information."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from math import inf
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.campaign import KINDS, ChannelKind
+from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Source
+from swashplate.campaign.rig import COUNTS_PER_TURN
+from swashplate.drive import Drive
+from swashplate.errors import InputError
+from swashplate.identification.drive_model import CURRENTS, SIGNALS
+from swashplate.identification.linearised import (
+    TOLERANCE,
+    LinearisedFit,
+    linearised_fit,
+    triangular_factor,
+    whitening,
+)
+from swashplate.identification.problem import Problem
+from swashplate.identification.setup import Free, Setup, Stage
+from swashplate.identification.staging import stage_problem
+from swashplate.identification.uncertainty import uncertainty
+from swashplate.identification.unknowns import Unknowns
+from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
+from swashplate.parameters.definitions import CATALOGUE, find
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.rules import FULL_VOLTAGE
+
+Array = NDArray[np.float64]
+
+RATE = 512.0
+"""At which tests to come are simulated. [Hz]"""
+TRANSDUCER = 0.005
+"""Noise that is assumed of a sensor, over the largest value that the drive makes it read. [1]"""
+MEMORY = 0.1
+"""Time over which errors of a measurement are assumed to stay correlated. [s]"""
+ADDED: tuple[ChannelKind, ...] = (
+    "current_plus",
+    "current_minus",
+    "spool_position",
+    "stroker_pressure",
+    "swash_angle",
+    "shaft_speed",
+)
+"""Sensors that could be added."""
+
+
+class Sensor(NamedTuple):
+    """What is measured in a test, and how well."""
+
+    kind: ChannelKind
+    noise: float
+    """Standard deviation. [SI unit of the kind]"""
+    memory: float = MEMORY
+    """Time for which one sample stands. [s]"""
+    origin: str = "stated"
+    """Where the noise is known from, for people."""
+
+    @property
+    def deviation(self) -> float:
+        """Of a sample of the candidates, so that each counts as an independent one."""
+        return self.noise * float(np.sqrt(max(self.memory * RATE, 1.0)))
+
+
+def default_sensors(drive: Drive) -> tuple[Sensor, ...]:
+    """Those of the source's tests: an ammeter around both leads and, where known, its encoder."""
+    if drive.name not in COUNTS_PER_TURN:
+        return assumed_sensors(drive, ("rectified_current", "shaft_speed"))
+    rounding = 2.0 * np.pi / COUNTS_PER_TURN[drive.name] / np.sqrt(12.0)
+    encoder = Sensor("encoder_counts", float(rounding), origin="rounding of the source's encoder")
+    return (*assumed_sensors(drive, ("rectified_current",)), encoder)
+
+
+def assumed_sensors(drive: Drive, kinds: Sequence[ChannelKind]) -> tuple[Sensor, ...]:
+    """Sensors of which nothing is known: noise of 0.5 % of what full command makes them read.
+
+    Raises
+    ------
+    InputError
+        If a kind is none that the drive has.
+    """
+    full = [drive.simulate(step(sign * FULL_VOLTAGE).sample(RATE), RATE) for sign in (1.0, -1.0)]
+    made = []
+    for kind in kinds:
+        if kind not in SIGNALS:
+            raise InputError(f"There is no sensor '{kind}'; there are {', '.join(SIGNALS)}.")
+        signal = "current" if kind in ("rectified_current", "signed_current") else SIGNALS[kind]
+        largest = max(float(np.abs(getattr(run, signal)).max()) for run in full)
+        made.append(
+            Sensor(kind, TRANSDUCER * largest, origin=f"assumed, {100.0 * TRANSDUCER:g} % of range")
+        )
+    return tuple(made)
+
+
+def measurable(part: str, kinds: Sequence[ChannelKind]) -> tuple[ChannelKind, ...]:
+    """Kinds of sensor that tell of a part of the drive."""
+    return tuple(
+        kind for kind in kinds if part == "chain" or (kind in CURRENTS) == (part == "card")
+    )
+
+
+NOISELESS = 1e-9
+"""Residuals, over their channel's noise, that are rounding."""
+FARTHEST = 0.05
+"""Residuals, over the range of what is measured, of a drive that nobody would call fitted."""
+
+
+def measured_sensors(
+    problem: Problem, machine: Sequence[int], *, fitted: bool
+) -> dict[str, Sensor]:
+    """The campaign's own sensors, by channel.
+
+    Parameters
+    ----------
+    problem : Problem
+        The tests, begun at the drive's values.
+    machine : sequence of int
+        Places of the unknowns that belong to no single run.
+    fitted : bool
+        Whether the residuals of that drive are noise; else it is as the campaign states.
+
+    Raises
+    ------
+    InputError
+        If the residuals are zero, or so large that the drive was not fitted to these tests.
+    """
+    kinds = {
+        name: each[name].kind
+        for each in problem.experiments
+        for name in problem.channels
+        if name in each.channels
+    }
+    if not fitted:
+        return {
+            name: Sensor(kind, problem.scales[name], origin="as in the campaign")
+            for name, kind in kinds.items()
+        }
+    fit = _zeroed(problem, machine)
+    made = {}
+    for name, kind in kinds.items():
+        ours = [run for run in fit.runs if run.channel == name]
+        residual = np.concatenate([run.residual for run in ours])
+        deviation = float(np.sqrt(np.mean(residual**2)))
+        if not deviation > NOISELESS:
+            raise InputError(
+                f"The residuals of '{name}' are as good as zero: without noise any test is perfect."
+            )
+        reached = [each[name].values for each in problem.experiments if name in each.channels]
+        whole = max(float(np.ptp(each)) for each in reached)
+        noise = problem.scales[name] * deviation
+        if noise > FARTHEST * whole:
+            share = 100.0 * noise / whole
+            raise InputError(
+                f"The drive misses '{name}' by {share:.2g} % of its range, so that its residuals "
+                "are no noise; give a drive that was fitted to these tests, or none."
+            )
+        alone = replace(fit, runs=tuple(ours))
+        told = uncertainty(alone)
+        # not of all that the residuals hold, but of what meets the unknowns' derivatives
+        worth = float(np.median(told.inflation[told.own.determined]))
+        memory = worth * interval(problem, name)
+        made[name] = Sensor(kind, noise, memory, "residuals of the drive")
+    return made
+
+
+def _zeroed(problem: Problem, machine: Sequence[int]) -> LinearisedFit:
+    """The tests at the drive's values, the free zeros and other unknowns of single runs fitted."""
+    fit = linearised_fit(problem, problem.start)
+    runs = []
+    for run in fit.runs:
+        own = np.delete(run.jacobian, list(machine), axis=1)
+        shift = np.linalg.lstsq(own, -run.residual, rcond=None)[0]
+        runs.append(run._replace(residual=run.residual + own @ shift))
+    return replace(fit, runs=tuple(runs))
+
+
+def interval(problem: Problem, channel: str) -> float:
+    """Median interval between samples of a channel. [s]"""
+    return float(
+        np.median(
+            np.concatenate(
+                [
+                    np.diff(each[channel].time)
+                    for each in problem.experiments
+                    if channel in each.channels and each[channel].time.size > 1
+                ]
+            )
+        )
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A drive, what is to be found of it, and what is known so far: where candidates are tried."""
+
+    parameters: ParameterSet
+    stage: Stage
+    """All unknowns at once."""
+    variables: Unknowns
+    """The machine's unknowns."""
+    present: Array
+    """(m, K) what the runs made so far tell, in noise's deviations; no rows for none."""
+    sensors: tuple[Sensor, ...]
+    """Those of the campaign, or of a fresh plan."""
+
+    _tried: dict[tuple[str, Sensor], Array] = field(default_factory=dict, repr=False)
+
+    def rows(self, maneuver: Maneuver, sensor: Sensor) -> Array:
+        """(<= K, K) factor of what one sensor would tell in a test, its free zero spent."""
+        key = (maneuver.name, sensor)
+        if key not in self._tried:
+            experiment = _imagined(maneuver, sensor)
+            problem = stage_problem(_without_priors(self.stage), self.parameters, [experiment])
+            self._tried[key] = _machine_rows(problem, problem.start)
+        return self._tried[key]
+
+    def candidate(
+        self, maneuver: Maneuver, sensors: Sequence[Sensor], name: str | None = None
+    ) -> Candidate:
+        """A test with some sensors."""
+        rows = np.vstack([self.rows(maneuver, each) for each in sensors])
+        return Candidate(name or maneuver.name, rows, duration=maneuver.length)
+
+
+def bench(
+    parameters: ParameterSet,
+    setup: Setup,
+    experiments: Sequence[Experiment] = (),
+    *,
+    fitted: bool = False,
+    free: Sequence[str] = (),
+    sensors: Sequence[Sensor] = (),
+) -> Bench:
+    """What is known of a drive before the next test.
+
+    Parameters
+    ----------
+    parameters : ParameterSet
+        The drive, best a fitted one.
+    setup : Setup
+        What is free; its stages are taken together.
+    experiments : sequence of Experiment
+        Tests made so far; none for a fresh plan.
+    fitted : bool
+        Whether the drive is fitted to them: noise and its colour are then those of the residuals.
+        Else noise is as the campaign states it, correlated over `MEMORY`.
+    free : sequence of str
+        Symbols or columns that are held in the set-up and count as unknown here.
+    sensors : sequence of Sensor
+        Of a fresh plan; beside experiments they replace those of the same kind.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If set-up, runs and parameters do not fit each other.
+    """
+    stage = _together(setup, free, parameters)
+    if not experiments:
+        asked = {each.kind: each for each in sensors or default_sensors(Drive(parameters))}
+        chosen = tuple(asked[kind] for kind in measurable(stage.part, list(asked)))
+        if not chosen:
+            raise InputError(
+                f"A {stage.part} shows nothing to {', '.join(asked)}: name another sensor."
+            )
+        problem = stage_problem(stage, parameters, [_imagined(step(1.0), chosen[0])])
+        variables, machine = _machine(problem)
+        _, prior = problem.unknowns.prior_rows(problem.start)
+        return Bench(parameters, stage, variables, prior[:, machine], chosen)
+    problem = stage_problem(stage, parameters, experiments)
+    variables, machine = _machine(problem)
+    known = measured_sensors(problem, machine, fitted=fitted)
+    own = {each.kind: each for each in sensors}
+    named = {}
+    for name, sensor in known.items():
+        named[name] = own.pop(sensor.kind, sensor)
+    # an independent sample every so often: the others are worth nothing
+    scales = {
+        name: sensor.noise * float(np.sqrt(max(sensor.memory / interval(problem, name), 1.0)))
+        for name, sensor in named.items()
+    }
+    present = _machine_rows(replace(problem, scales=scales), problem.start)
+    kept = {sensor.kind: sensor for sensor in named.values()}
+    return Bench(parameters, stage, variables, present, (*kept.values(), *own.values()))
+
+
+def _together(setup: Setup, free: Sequence[str], parameters: ParameterSet) -> Stage:
+    """One stage of all unknowns, through the whole chain unless they belong to one part of it."""
+    (stage,) = setup.joint().stages
+    parts = {each.part for each in setup.stages}
+    if len(parts) == 1:
+        stage = stage.model_copy(update={"part": parts.pop()})
+    more: dict[str, Free] = {}
+    for name in free:
+        symbol = find(name).symbol
+        if {name, symbol} & set(stage.free) or (
+            stage.forces is not None and symbol in ("Z19", "Z20", "Z21", "Z22")
+        ):
+            raise InputError(f"{name} is free in the set-up already.")
+        columns = CATALOGUE[symbol].columns if name == symbol else (name,)
+        if any(not np.isfinite(parameters.numbers[column]) for column in columns):
+            raise InputError(f"{name} is off in the drive, so that no test can tell it.")
+        positive = all(parameters.numbers[column] > 0.0 for column in columns)
+        zero = any(parameters.numbers[column] == 0.0 for column in columns)
+        more[name] = Free(bounds=(-1.0, 1.0)) if zero else Free(relative=(0.5, 2.0), log=positive)
+    return stage.model_copy(update={"free": {**stage.free, **more}})
+
+
+def _without_priors(stage: Stage) -> Stage:
+    """What is known beforehand counts once, not once a test."""
+    free = {name: each.model_copy(update={"prior": None}) for name, each in stage.free.items()}
+    return stage.model_copy(update={"free": free})
+
+
+def _imagined(maneuver: Maneuver, sensor: Sensor) -> Experiment:
+    """A test that has not been made: only its stamps count, not its values."""
+    time = maneuver.time(RATE)
+    source = Source(Path("none"), sensor.kind)
+    channel = Channel(
+        sensor.kind,
+        sensor.kind,
+        KINDS[sensor.kind].units[0],
+        time,
+        np.zeros_like(time),
+        np.ones_like(time),
+        source,
+        noise=sensor.deviation,
+    )
+    command = InputSignal("voltage", "V", time, maneuver.sample(RATE), "linear", source)
+    name = maneuver.name
+    return Experiment(name, "", name, "fit", "rest", None, command, {sensor.kind: channel})
+
+
+def _machine(problem: Problem) -> tuple[Unknowns, list[int]]:
+    """The unknowns that are no run's own, and their places."""
+    places = [k for k, each in enumerate(problem.unknowns) if each.run is None]
+    return Unknowns(tuple(problem.unknowns[k] for k in places)), places
+
+
+def _machine_rows(problem: Problem, vector: Array) -> Array:
+    """(<= K, K) factor of the derivatives by the machine's unknowns, those of single runs spent."""
+    derivatives = problem.evaluate(vector).jacobian
+    _, machine = _machine(problem)
+    own = [k for k in range(derivatives.shape[1]) if k not in machine]
+    factor = triangular_factor(np.column_stack([derivatives[:, own], derivatives[:, machine]]))
+    return np.asarray(factor[len(own) :, len(own) :])
+
+
+KNOWN = 1.0
+"""Standard error of a solver's number, 100 %, up to which an unknown counts as determined."""
+
+WORTH = 1e-3
+"""Relative gain below which nothing is said of it."""
+
+NAMED = 6
+"""Unknowns that a sentence names."""
+
+
+class Candidate(NamedTuple):
+    """A test that could be made."""
+
+    name: str
+    derivatives: Array
+    """(m, K) of what it would measure by the solver's vector, over the noise's deviation; or their
+    triangular factor."""
+    duration: float | None = None
+    """How long it takes, if that is to count. [s]"""
+
+    @property
+    def rows(self) -> Array:
+        """(<= K, K) triangular factor."""
+        return triangular_factor(self.derivatives)
+
+
+class Gain(NamedTuple):
+    """What a candidate would do for one unknown."""
+
+    name: str
+    before: float
+    """Standard error of the solver's number now; inf if undetermined."""
+    after: float
+    """And with the candidate."""
+
+    @property
+    def ratio(self) -> float:
+        """After over before: 1 is no gain, 0 determines what was not."""
+        if self.before == self.after:
+            return 1.0
+        return 0.0 if self.before == inf else self.after / self.before
+
+
+@dataclass(frozen=True)
+class Advice:
+    """One candidate, judged."""
+
+    candidate: str
+    gains: tuple[Gain, ...]
+    """For each free unknown."""
+    newly_determined: tuple[str, ...]
+    """Unknowns whose standard error it would be the first to bring below 100 %."""
+    ranks: int
+    """How many more combinations would be determined."""
+    d_gain: float
+    """Mean factor by which standard errors shrink along the directions determined already
+    (D-criterion), 1 is none."""
+    duration: float | None
+
+    @property
+    def rank(self) -> tuple[int, int, float]:
+        """Least for the best: unknowns newly determined, combinations, D-gain."""
+        return -len(self.newly_determined), -self.ranks, -self.d_gain
+
+    @property
+    def best(self) -> Gain | None:
+        """The unknown that gains most, of those that are then known to better than 100 %."""
+        known = [gain for gain in self.gains if gain.after <= KNOWN]
+        return min(known, key=lambda gain: gain.ratio) if known else None
+
+    @property
+    def sentence(self) -> str:
+        """What an engineer would say."""
+        if self.newly_determined:
+            named = ", ".join(self.newly_determined[:NAMED])
+            more = len(self.newly_determined) - NAMED
+            first = f"{self.candidate} would be the first to determine {named}"
+            first += f" and {more} more" if more > 0 else ""
+        elif self.best is not None and self.best.ratio < 1.0 - WORTH:
+            first = (
+                f"{self.candidate} would tell most of {self.best.name}: its standard error would "
+                f"shrink to {100.0 * self.best.ratio:.0f} %"
+            )
+        else:
+            return f"{self.candidate} would tell next to nothing new."
+        if self.d_gain < 1.0 + WORTH:
+            return f"{first}."
+        return f"{first}; what is known already would be known {self.d_gain:.3g} times better."
+
+
+def advise(
+    present: Array,
+    candidates: Sequence[Candidate],
+    variables: Unknowns,
+    *,
+    tolerance: float = TOLERANCE,
+) -> tuple[Advice, ...]:
+    """Rank candidate tests by what they would add.
+
+    Parameters
+    ----------
+    present : (m, K) array
+        What the tests made so far tell: derivatives of the weighted residuals over the deviation of
+        an independent one; no rows if there are none.
+    candidates : sequence of Candidate
+        Tests to choose from.
+    variables : Unknowns
+        The unknowns; those at a bound count as known.
+    tolerance : float
+        As of `whitening`.
+
+    Returns
+    -------
+    tuple of Advice
+        Best first: most unknowns newly determined, most combinations, largest D-gain.
+
+    Raises
+    ------
+    InputError
+        If there is no candidate, a shape is wrong, or a number is not finite.
+    """
+    if not candidates:
+        raise InputError("There is no candidate to choose from.")
+    _check("what is known at present", present, variables.count)
+    for each in candidates:
+        _check(each.name, each.derivatives, variables.count)
+    judged = [_judge(present, each, variables, tolerance) for each in candidates]
+    return tuple(sorted(judged, key=lambda each: each.rank))
+
+
+def _judge(present: Array, candidate: Candidate, variables: Unknowns, tolerance: float) -> Advice:
+    free = variables.free
+    now, known_now = whitening(present, free, tolerance)
+    both = np.vstack([present, candidate.rows])
+    then, known_then = whitening(both, free, tolerance)
+    before = np.where(known_now, np.sqrt(np.sum(now**2, axis=1)), inf)
+    after = np.where(known_then, np.sqrt(np.sum(then**2, axis=1)), inf)
+    names = variables.names
+    # along the directions known now the candidate adds (candidate W)ᵀ(candidate W) to the identity;
+    # what it says of them through directions unknown now has to be spent on those first
+    hidden = _unknown_directions(present, free, tolerance)
+    seen = candidate.rows @ now
+    if hidden.shape[1]:
+        basis = np.linalg.svd(candidate.rows @ hidden, full_matrices=False)
+        spent = basis[0][:, basis[1] > tolerance * max(float(basis[1].max(initial=0.0)), 1e-300)]
+        seen = seen - spent @ (spent.T @ seen)
+    shrinking = np.log1p(np.linalg.svd(seen, compute_uv=False) ** 2).sum() if seen.size else 0.0
+    return Advice(
+        candidate.name,
+        tuple(
+            Gain(names[k], float(before[k]), float(min(after[k], before[k])))
+            for k in np.flatnonzero(free)
+        ),
+        tuple(names[k] for k in np.flatnonzero(free & (after <= KNOWN) & (before > KNOWN))),
+        then.shape[1] - now.shape[1],
+        float(np.exp(0.5 * shrinking / max(now.shape[1], 1))),
+        candidate.duration,
+    )
+
+
+def _unknown_directions(rows: Array, free: NDArray[np.bool_], tolerance: float) -> Array:
+    """(K, k) basis of the directions of the free unknowns that rows do not determine."""
+    moving = np.flatnonzero(free)
+    rows = triangular_factor(rows)
+    lengths = np.linalg.norm(rows[:, moving], axis=0)
+    lengths = np.where(lengths > 0.0, lengths, 1.0)
+    _, sizes, basis = np.linalg.svd(rows[:, moving] / lengths, full_matrices=True)
+    rank = int(np.count_nonzero(sizes > tolerance * sizes.max(initial=0.0)))
+    hidden = np.zeros((rows.shape[1], moving.size - rank))
+    hidden[moving] = basis[rank:].T / lengths[:, None]
+    return hidden
+
+
+def _check(name: str, rows: Array, count: int) -> None:
+    if rows.ndim != 2 or rows.shape[1] != count:
+        raise InputError(f"{name}: {count} unknowns need as many columns, not {rows.shape}.")
+    if not np.isfinite(rows).all():
+        raise InputError(f"{name}: the derivatives must be finite.")
+
+
+def default_maneuvers() -> tuple[Maneuver, ...]:
+    """Small and large, slow and fast, both ways: what to choose from where nothing is named."""
+    both = (1.0, -1.0)
+    up_and_down = (2.0, 4.0, 6.0, 8.0, 10.0, 8.0, 6.0, 4.0, 2.0, 0.0)
+    return (
+        *(step(sign * volts) for volts in (2.0, 5.0, 9.0) for sign in both),
+        *(ramp(sign) for sign in both),
+        *(
+            replace(
+                stairs([sign * volts + 0.0 for volts in up_and_down], 2.0),
+                name=f"stairs to {10.0 * sign:g} V and back",
+            )
+            for sign in both
+        ),
+        stairs([5.0, -5.0, 5.0, -5.0, 0.0], 2.0),
+        stairs([9.0, -9.0, 0.0], 3.0),
+        *(sine(volts, 0.1, length=30.0) for volts in (2.0, 5.0, 9.0)),
+        sine(9.0, 0.3, length=20.0),
+        *(
+            replace(
+                multisine(volts, (0.05, 2.0, 8), length=60.0),
+                name=f"multisine {volts:g} V 0.05 to 2 Hz",
+            )
+            for volts in (4.0, 9.0)
+        ),
+    )
+
+
+class SensorAdvice(NamedTuple):
+    """A sensor that could be added to a test."""
+
+    sensor: Sensor
+    maneuver: str
+    """The test in which it would tell most."""
+    advice: Advice
+    """What it would add to that test with the sensors at hand."""
+
+
+def judge_sensors(
+    bench: Bench,
+    maneuvers: Sequence[Maneuver],
+    added: Sequence[Sensor],
+    *,
+    beside: Sequence[str] = (),
+) -> tuple[SensorAdvice, ...]:
+    """For each sensor the test in which it tells most, and what it adds there.
+
+    Parameters
+    ----------
+    bench : Bench
+        What is known so far.
+    maneuvers : sequence of Maneuver
+        Tests in which it could be read.
+    added : sequence of Sensor
+        To be judged, one by one.
+    beside : sequence of str
+        Names of manoeuvres that count as made where the bench has no tests yet.
+    """
+    known = [bench.present]
+    if not len(bench.present):
+        made = [each for each in maneuvers if each.name in beside]
+        known += [bench.candidate(each, bench.sensors).rows for each in made]
+    found = []
+    for sensor in added:
+        judged = []
+        for maneuver in maneuvers:
+            without = bench.candidate(maneuver, bench.sensors).rows
+            more = Candidate(sensor.kind, bench.rows(maneuver, sensor), duration=maneuver.length)
+            (advice,) = advise(np.vstack([*known, without]), [more], bench.variables)
+            judged.append(SensorAdvice(sensor, maneuver.name, advice))
+        found.append(min(judged, key=lambda each: each.advice.rank))
+    return tuple(found)
+
+
+def in_turn(
+    present: Array,
+    candidates: Sequence[Candidate],
+    variables: Unknowns,
+    count: int,
+    *,
+    tolerance: float = TOLERANCE,
+) -> tuple[Advice, ...]:
+    """A plan of tests: the best one, then the best beside it, and so on, each at most once.
+
+    Parameters
+    ----------
+    present, candidates, variables, tolerance :
+        As of `advise`.
+    count : int
+        Tests to choose; fewer if none of the others tells anything new.
+    """
+    left, chosen = list(candidates), list[Advice]()
+    while left and len(chosen) < count:
+        best = advise(present, left, variables, tolerance=tolerance)[0]
+        if not best.newly_determined and not best.ranks and best.d_gain < 1.0 + WORTH:
+            break
+        taken = next(each for each in left if each.name == best.candidate)
+        left.remove(taken)
+        chosen.append(best)
+        present = triangular_factor(np.vstack([present, taken.rows]))
+    return tuple(chosen)
+
+
+def best_for_each(judged: Sequence[Advice]) -> dict[str, tuple[str, Gain]]:
+    """For each unknown the candidate after which its standard error is least, and the gain.
+
+    Unknowns that none would tell more of are left out.
+    """
+    best: dict[str, tuple[str, Gain]] = {}
+    for advice in judged:
+        for gain in advice.gains:
+            if gain.ratio < 1.0 - WORTH and (
+                gain.name not in best or gain.after < best[gain.name][1].after
+            ):
+                best[gain.name] = (advice.candidate, gain)
+    return best

@@ -1,0 +1,313 @@
+"""The fit of a drive, stage after stage, or of a model of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.__about__ import __version__
+from swashplate.campaign.campaign import Campaign
+from swashplate.campaign.experiment import Experiment
+from swashplate.drive import Drive
+from swashplate.equations import Model as Equations
+from swashplate.errors import InputError
+from swashplate.executors import Executor, Serial
+from swashplate.identification.data_checks import check_sound, refuse_unsound
+from swashplate.identification.drive_model import DriveModel, at_rate_of
+from swashplate.identification.model import Model
+from swashplate.identification.own_model import ModelParameters, ModelSetup, Range
+from swashplate.identification.problem import Problem
+from swashplate.identification.setup import Setup, Stage
+from swashplate.identification.solving import Loss, Progress, Solution, solve
+from swashplate.identification.staging import Parameters, stage_problem, with_estimates
+from swashplate.identification.starts import StartResult, sobol_starts, solve_from
+from swashplate.identification.uncertainty import weighed
+from swashplate.identification.unknowns import Unknown
+from swashplate.parameters.parameter_set import ParameterSet
+
+P = TypeVar("P", bound=Parameters)
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Search:
+    """Starts besides the nominal one, in each stage."""
+
+    starts: int
+    """Sobol points over the bounds, besides the nominal values."""
+    seed: int = 0
+    executor: Executor = field(default_factory=Serial)
+    store: Path | None = None
+    """Folder that keeps each result as it is ready, a folder in it for each stage."""
+    resume: bool = False
+    """Take what is in the store instead of computing it again."""
+    watch: Callable[[str, StartResult, int], None] | None = None
+    """Told the stage, each result and how many there are by now."""
+
+
+@dataclass(frozen=True, eq=False)
+class StageFit:
+    """What one stage found."""
+
+    stage: Stage
+    problem: Problem
+    solution: Solution
+    parameters: Parameters
+    """The drive, or the model of one's own, with what was found."""
+    starts: tuple[StartResult, ...] = ()
+    """How each start ended, where there was more than one."""
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The unknowns by name, in their units."""
+        return self.problem.unknowns.values(self.solution.vector)
+
+    @property
+    def drive(self) -> Drive:
+        """The drive with what was found.
+
+        Raises
+        ------
+        InputError
+            If it is a model of one's own.
+        """
+        if isinstance(self.parameters, ModelParameters):
+            raise InputError(f"{self.parameters.name} is a model of your own, no drive.")
+        return Drive(self.parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fitted drive, or model of one's own, and how it came about."""
+
+    setup: Setup
+    nominal: Parameters
+    stages: tuple[StageFit, ...]
+    doubts: tuple[str, ...] = ()
+    """What the runs lack, in sentences, where they could be fitted all the same."""
+
+    @property
+    def parameters(self) -> Parameters:
+        """The fitted parameters."""
+        return self.stages[-1].parameters
+
+    @property
+    def drive(self) -> Drive:
+        """The fitted drive; refused where a model of one's own was fitted."""
+        return self.stages[-1].drive
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was stopped before the last stage's optimum."""
+        return self.stages[-1].solution.interrupted
+
+
+def fit(
+    model: Drive | Parameters | ModelSetup | Model | Equations,
+    tests: Campaign | Sequence[Experiment],
+    free: Setup | Mapping[str, Range | Unknown] | None = None,
+    *,
+    channels: Sequence[str] = (),
+    noise: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    loss: Loss = "linear",
+    tolerance: float = 1e-10,
+    max_evaluations: int = 300,
+    threads: int | None = None,
+    search: Search | None = None,
+    watch: Callable[[str, Progress], None] | None = None,
+) -> Fit:
+    """Fit of a drive, or of a model of one's own, to tests.
+
+    Parameters
+    ----------
+    model : Drive, ParameterSet, Model or ModelSetup
+        A drive: where to begin, and what stays fixed. The decay's switch is split, see `smooth`,
+        and the card's filter one that holds at the rate of the runs. Or a model of one's own: of
+        equations, an `OwnModel` of them, any object with `simulate`, or a `ModelSetup`.
+    tests : Campaign or sequence of Experiment
+        The runs to fit; of a campaign those with the role ``"fit"``.
+    free : Setup or mapping of str to (low, nominal, high) or Unknown
+        Of a drive its stages and free parameters; of a model of one's own what is to be found,
+        see `ModelSetup`.
+    channels, noise, fixed : optional
+        Of a model of one's own, as of `ModelSetup`.
+    loss, tolerance, max_evaluations :
+        As of `solving.solve`, in each stage.
+    threads : int, optional
+        Threads over experiments; all cores by default. The result does not depend on it.
+    search : Search, optional
+        More starts than the nominal one; the best is refined. Ctrl-C during them ends the whole
+        fit, with the best start of that stage as its last result.
+    watch : callable, optional
+        Told the stage's name and each of its iterations.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If tests, model and what is free do not fit each other, or no fit of these runs can mean
+        anything.
+    DomainError
+        If the model does not hold at the nominal values.
+
+    Examples
+    --------
+    >>> fit(Drive.preset("hoist"), campaign, load_setup("hoist"))
+    >>> fit(valve, campaign, {"lag": (0.005, 0.06, 0.5), "gain": (0.1, 1.0, 10.0)})
+    """
+    experiments = tests.select(role="fit") if isinstance(tests, Campaign) else tuple(tests)
+    if not experiments:
+        raise InputError("There is no run to fit.")
+    nominal = model.parameters if isinstance(model, Drive) else model
+    doubts: tuple[str, ...] = ()
+    if isinstance(nominal, ParameterSet):
+        if not isinstance(free, Setup):
+            raise InputError(
+                "A drive needs a Setup, such as load_setup('hoist'), for what is free."
+            )
+        setup = free
+        doubts = refuse_unsound(check_sound(experiments, smooth(nominal), setup))
+        nominal, changed = at_rate_of(experiments, nominal)
+        doubts = (*doubts, *changed)
+    elif not isinstance(nominal, ModelParameters):
+        own = nominal
+        if not isinstance(own, ModelSetup):
+            entries = free if isinstance(free, Mapping) else {}
+            named = tuple(channels), dict(noise or {}), dict(fixed or {})
+            own = ModelSetup(own, entries, "", *named)
+        nominal = own.nominal(experiments)
+        setup = own.setup
+    else:
+        setup = nominal.setup.setup
+    parameters, stages = smooth(nominal), []
+    for stage in setup.stages:
+        problem = stage_problem(stage, parameters, experiments, threads=threads)
+        begin: Array | None = None
+        results: tuple[StartResult, ...] = ()
+        if search is not None and search.starts > 0:
+            results = _searched(stage, problem, search, tolerance, max_evaluations)
+            best = min(results, key=lambda each: each.cost)
+            begin = np.array(best.vector)
+            if len(results) <= search.starts:
+                solution = _stopped(best, len(results), 1 + search.starts)
+                stages.append(StageFit(stage, problem, solution, parameters, results))
+                break
+        solved = partial(
+            solve,
+            loss=loss,
+            tolerance=tolerance,
+            max_evaluations=max_evaluations,
+            watch=None if watch is None else partial(watch, stage.name),
+        )
+        solution = solved(problem, begin)
+        if any(each.prior is not None for each in problem.unknowns) and not solution.interrupted:
+            # what the residuals are worth is known only now
+            problem = weighed(problem, solution.vector)
+            solution = solved(problem, solution.vector)
+        parameters = with_estimates(parameters, problem, solution.vector)
+        stages.append(StageFit(stage, problem, solution, parameters, results))
+        if solution.interrupted:
+            break
+    return Fit(setup, nominal, tuple(stages), doubts)
+
+
+def refined(staged: Fit, experiments: Sequence[Experiment], **settings: Any) -> Fit:
+    """All unknowns of a staged fit at once through the whole chain, from where the stages ended.
+
+    A staged fit takes each stage's result for granted in the next one, so that its intervals leave
+    out what the earlier stages do not know. Those of a joint fit do not; from afar, though, a joint
+    fit is often caught on its way.
+
+    Parameters
+    ----------
+    staged : Fit
+        Of more than one stage.
+    experiments :
+        The runs.
+    **settings :
+        As of `fit`: tolerance, max_evaluations, threads, watch.
+    """
+    return fit(staged.parameters, experiments, staged.setup.joint(), **settings)
+
+
+def smooth(parameters: P) -> P:
+    """The set with the decay's switch split within the step.
+
+    Sampled, as published, it makes the current jump by up to 0.7 mA as any of the card's parameters
+    varies, and a fit ends where it was caught (docs/decisions/0008).
+    """
+    if isinstance(parameters, ParameterSet):
+        return replace(parameters, card_switch="split")
+    return parameters  # a model of one's own has no card
+
+
+def _searched(
+    stage: Stage,
+    problem: Problem,
+    search: Search,
+    tolerance: float,
+    max_evaluations: int,
+) -> tuple[StartResult, ...]:
+    # starts run side by side, so each of them runs on one thread
+    alone = replace(problem, threads=1)
+    watch = search.watch
+    return solve_from(
+        alone,
+        [problem.start, *sobol_starts(alone, search.starts, search.seed)],
+        executor=search.executor,
+        store=None if search.store is None else search.store / stage.name,
+        origin=_origin(stage, problem, tolerance, max_evaluations),
+        resume=search.resume,
+        tolerance=tolerance,
+        max_evaluations=max_evaluations,
+        watch=None if watch is None else (lambda result, done: watch(stage.name, result, done)),
+    )
+
+
+def _origin(stage: Stage, problem: Problem, *settings: object) -> dict[str, str]:
+    """Fingerprints of all that the result of a start depends on."""
+    known: object = (problem.start.tolist(), sorted(problem.fixed.items()))
+    if isinstance(problem.model, DriveModel):
+        drive = problem.model.parameters
+        forms = drive.pressure_root, drive.coulomb_sign, drive.rate, sorted(drive.options)
+        known = sorted(drive.numbers.items()), forms
+    digest = blake2b(digest_size=16)
+    for experiment, weights in zip(problem.experiments, problem.weights, strict=True):
+        arrays = [experiment.input.time, experiment.input.values]
+        for name, weight in weights.items():
+            channel = experiment[name]
+            arrays += [channel.time, channel.values, weight]
+        for array in arrays:
+            digest.update(np.ascontiguousarray(array).tobytes())
+    return {
+        "version of swashplate": __version__,
+        "stage of the set-up": _mark(stage.model_dump_json()),
+        "tolerances": _mark(settings),
+        "nominal values": _mark(known),
+        "runs and their weights": digest.hexdigest(),
+    }
+
+
+def _mark(content: object) -> str:
+    return blake2b(repr(content).encode(), digest_size=8).hexdigest()
+
+
+def _stopped(best: StartResult, done: int, starts: int) -> Solution:
+    """The best of some starts as what an interrupted search found."""
+    return Solution(
+        np.array(best.vector),
+        best.cost,
+        best.start_cost,
+        best.evaluations,
+        False,
+        True,
+        f"interrupted after {done} of {starts} starts: the best of them",
+        best.seconds,
+    )

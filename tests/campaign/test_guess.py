@@ -1,0 +1,157 @@
+"""First guesses: numbers that made the logs are found again, and a fit begins from them."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate import Campaign, Channel, Drive, Experiment, InputError
+from swashplate.campaign import (
+    InputSignal,
+    Source,
+    fit_configuration,
+    guess_drive,
+    guessed_set,
+)
+from swashplate.identification.setup import Setup
+
+RATE = 500.0
+TIME = np.arange(int(12.0 * RATE)) / RATE
+SOURCE = Source(Path("log.csv"), "x")
+DEAD, GAIN, LAG, DELAY = (0.8, 0.5), (0.4, 0.6), 0.15, 0.06
+
+
+def machine(
+    command: np.ndarray, top: float = np.inf, pull: float = np.inf, lag: float = LAG
+) -> np.ndarray:
+    """Speed behind dead zone, gain, top speed, acceleration, lag and delay, in steps of 2 ms."""
+    late = np.interp(TIME - DELAY, TIME, command)
+    target = GAIN[0] * np.maximum(late - DEAD[0], 0.0) - GAIN[1] * np.maximum(-late - DEAD[1], 0.0)
+    target = np.clip(target, -top, top)
+    speed = np.zeros(TIME.size)
+    for n in range(1, TIME.size):
+        move = (target[n - 1] - speed[n - 1]) * (1.0 - np.exp(-1.0 / RATE / lag))
+        speed[n] = speed[n - 1] + np.clip(move, -pull / RATE, pull / RATE)
+    return speed
+
+
+COMMANDS = {
+    "sine": 6.0 * np.sin(2.0 * np.pi * 0.2 * TIME),
+    "up": 8.0 * ((TIME > 1.0) & (TIME < 6.0)),
+    "down": -8.0 * ((TIME > 1.0) & (TIME < 6.0)),
+    "small": 3.0 * np.sin(2.0 * np.pi * 0.5 * TIME),
+}
+
+
+def runs(kind: str = "shaft_speed", noise: float = 0.02, **numbers: float) -> list[Experiment]:
+    """A run of each command, measured by a tacho or by a position."""
+    random, made = np.random.default_rng(1), []
+    for name, command in COMMANDS.items():
+        speed = machine(command, **numbers)
+        position = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) / RATE])
+        values = speed + random.normal(0.0, noise, TIME.size)
+        if kind == "position":
+            values = np.round(position, 3)
+        unit = "rad/s" if kind == "shaft_speed" else "rad"
+        channel = Channel("measured", kind, unit, TIME, values, np.ones(TIME.size), SOURCE)
+        signal = InputSignal("voltage", "V", TIME, command, "previous", SOURCE)
+        made.append(
+            Experiment(name, "winch", name, "fit", "rest", None, signal, {"measured": channel})
+        )
+    return made
+
+
+@pytest.mark.parametrize("kind", ["shaft_speed", "position"])
+def test_dead_zones_gains_lag_and_delay_are_found_again(kind: str) -> None:
+    found = guess_drive(runs(kind))
+    assert found.dead_zone == pytest.approx(DEAD, abs=0.05)
+    assert found.gain == pytest.approx(GAIN, rel=0.02)
+    assert found.lag == pytest.approx(LAG, rel=0.05)
+    # of a command that is held, half a sample comes to the delay
+    assert found.delay == pytest.approx(DELAY + 0.5 / RATE, abs=0.004)
+    assert found.top_speed == found.acceleration == (np.inf, np.inf)
+    assert found.unit == "rad/s"
+    assert found.fit_percent > 97.0
+
+
+def test_limits_are_found_where_they_act() -> None:
+    found = guess_drive(runs(top=2.0, pull=4.0))
+    assert found.top_speed == pytest.approx((2.0, 2.0), rel=0.02)
+    assert found.acceleration == pytest.approx((4.0, 4.0), rel=0.1)
+    assert found.gain == pytest.approx(GAIN, rel=0.05)
+
+
+def test_a_guess_becomes_a_drive_and_a_fit_configuration() -> None:
+    """The drive's speeds are those that were guessed: steady ones, and the lag of a small step."""
+    found = guess_drive(runs(top=2.0, pull=4.0))
+    parameters = guessed_set(found, "campaign.toml")
+    drive = Drive(parameters)
+    steady = drive.steady_speed([-9.0, -2.5, 2.0, 9.0])
+    expected = [-2.0, -GAIN[1] * (2.5 - DEAD[1]), GAIN[0] * (2.0 - DEAD[0]), 2.0]
+    assert steady == pytest.approx(expected, rel=0.06)
+    run = drive.simulate(np.full(1024, 2.5))
+    end = run.shaft_speed[-1]
+    reached = np.interp(1.0 - np.exp(-1.0), run.shaft_speed / end, run.time)
+    # the card's two milliseconds twice
+    assert reached == pytest.approx(DELAY + LAG + 2.0 / 512.0, rel=0.1)
+    assert {parameters[name].status for name in ("V_dz", "G1", "Z8", "tau")} == {"approximate"}
+    setup = Setup(**tomllib.loads(fit_configuration(found, parameters)))
+    (stage,) = setup.stages
+    assert {"V_dz_plus", "G1_minus", "Z8", "tau", "Z13_plus", "Z16_minus"} <= stage.free.keys()
+
+
+def test_a_way_that_was_not_tried_is_the_other_s_and_fixed() -> None:
+    found = guess_drive([each for each in runs() if each.name == "up"])
+    assert found.command == (8.0, 0.0)
+    assert found.gain[0] == found.gain[1]
+    text = fit_configuration(found, guessed_set(found, "x"))
+    assert "G1_plus" in text
+    assert "G1_minus" not in text
+
+
+def test_what_tells_nothing_is_refused() -> None:
+    (sine, *_) = runs()
+    turned = Channel(
+        "measured", "shaft_speed", "rad/s", TIME, -sine["measured"].values, np.ones(TIME.size),
+        SOURCE,
+    )  # fmt: skip
+    with pytest.raises(InputError, match="against the command: turn it round with sign = -1"):
+        guess_drive([_with(sine, turned)])
+    other = InputSignal("other", "%", TIME, sine.input.values, "previous", SOURCE)
+    with pytest.raises(InputError, match="needs a command in V"):
+        guess_drive([_with(sine, sine["measured"], other)])
+    ignored = Channel("measured", "shaft_speed", "rad/s", TIME, TIME, np.zeros(TIME.size), SOURCE)
+    with pytest.raises(InputError, match="No run measures a motion"):
+        guess_drive([_with(sine, ignored)])
+
+
+def _with(run: Experiment, channel: Channel, signal: InputSignal | None = None) -> Experiment:
+    return Experiment(
+        run.name, run.axis, run.run, run.role, run.start, None, signal or run.input,
+        {"measured": channel},
+    )  # fmt: skip
+
+
+DATA = Path(__file__).parents[3] / "shared" / "data" / "eha"
+
+
+@pytest.mark.skipif(not DATA.exists(), reason="the actuator's logs are not beside this checkout")
+def test_an_electro_hydrostatic_actuator_blind(tmp_path: Path) -> None:
+    """Speed of its pump to position of its rod: the guess alone follows its mean speeds to 85 %."""
+    (tmp_path / "campaign.toml").write_text(
+        f"""
+[axes.rod]
+time = {{ column = "EXP_Time", unit = "s" }}
+input = {{ kind = "voltage", column = "EXP_Velocity", unit = "V", scale = 0.005 }}
+channels.position = {{ kind = "position", column = "EXP_PosFb", unit = "mm" }}
+
+[[runs]]
+file = "{(DATA / "exp_data_1_3.csv").as_posix()}"
+""",
+        "utf-8",
+    )
+    found = guess_drive(Campaign.from_toml(tmp_path / "campaign.toml").experiments)
+    assert found.unit == "m/s"
+    assert found.fit_percent > 85.0
+    assert 0.05 < found.lag < 0.2

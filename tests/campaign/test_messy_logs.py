@@ -1,0 +1,377 @@
+"""Logs as people have them: each case was met by someone who tried the package as a new user."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate import Campaign, FileError, InputError
+from swashplate.campaign import campaign_findings, draft_campaign, examine, unsigned_currents
+
+RATE = 200.0
+TIME = np.arange(int(8.0 * RATE)) / RATE
+BOTH = 4.0 * (TIME > 1.0) - 8.0 * (TIME > 3.0) + 4.0 * (TIME > 5.0)
+"""A command of both signs: 4 V from 1 s to 3 s, -4 V to 5 s. [V]"""
+SINE = 5.0 * np.sin(2.0 * np.pi * 0.4 * TIME)
+
+
+def lagged(command: np.ndarray, lag: float = 0.1) -> np.ndarray:
+    """A first-order lag of a command, exact for one that is held."""
+    share, state, out = 1.0 - np.exp(-1.0 / RATE / lag), 0.0, np.empty_like(command)
+    for k, each in enumerate(command):
+        out[k] = state
+        state += share * (each - state)
+    return out
+
+
+def write(folder: Path, name: str, **columns: np.ndarray | list[str]) -> Path:
+    """A CSV whose columns are called as the keyword arguments."""
+    rows = zip(*columns.values(), strict=True)
+    lines = [",".join(columns)] + [
+        ",".join(cell if isinstance(cell, str) else f"{cell:.9g}" for cell in row) for row in rows
+    ]
+    (folder / name).write_text("\n".join(lines) + "\n", "utf-8")
+    return folder / name
+
+
+def drafted(folder: Path, *logs: Path, **options: object) -> Campaign:
+    """What the draft of some logs is read as."""
+    text = draft_campaign(logs, folder, **options)  # type: ignore[arg-type]
+    (folder / "campaign.toml").write_text(text, "utf-8")
+    return Campaign.from_toml(folder / "campaign.toml")
+
+
+def findings(tests: Campaign) -> list[str]:
+    found = [said for each in tests for quality in examine(each) for said in quality.findings]
+    return [*campaign_findings(tests), *found]
+
+
+def edit(tests: Campaign, old: str, new: str) -> Campaign:
+    text = tests.path.read_text("utf-8")
+    assert old in text
+    tests.path.write_text(text.replace(old, new), "utf-8")
+    return Campaign.from_toml(tests.path)
+
+
+# --- M1: a clamp that lost its sign ---------------------------------------------------------------
+
+
+def clamp(command: np.ndarray, seed: int, *, rectified: bool) -> np.ndarray:
+    """0.78 A at 4 V and noise of 20 mA, which crosses zero. [A]"""
+    current = 0.195 * lagged(command)
+    noise = np.random.default_rng(seed).normal(0.0, 0.007, current.size)
+    return (np.abs(current) if rectified else current) + noise
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("rectified", [True, False])
+def test_a_noisy_clamp_keeps_the_kind_it_has(tmp_path: Path, seed: int, rectified: bool) -> None:
+    logs = [
+        write(tmp_path, f"{n}.csv", time=TIME, voltage=u, Strom=clamp(u, seed, rectified=rectified))
+        for n, u in {"step": BOTH, "down": -np.abs(BOTH), "sine": SINE}.items()
+    ]
+    tests = drafted(tmp_path, *logs)
+    kind = "rectified_current" if rectified else "signed_current"
+    assert [channel.kind for each in tests for channel in each.channels.values()] == [kind] * 3
+    assert not any("current" in said or "sign" in said for said in findings(tests))
+
+
+def test_a_rectified_clamp_called_signed_is_told_in_one_sentence(tmp_path: Path) -> None:
+    logs = [
+        write(tmp_path, f"{n}.csv", time=TIME, voltage=u, Strom=clamp(u, 3, rectified=True))
+        for n, u in {"step": BOTH, "down": -np.abs(BOTH), "sine": SINE}.items()
+    ]
+    tests = edit(drafted(tmp_path, *logs), '"rectified_current"', '"signed_current"')
+    (said,) = unsigned_currents(tests).values()
+    assert 'write kind = "rectified_current" in [axes.drive.channels.rectified_current]' in said
+    assert said in campaign_findings(tests)
+    unsigned = {name for _, name in unsigned_currents(tests)}
+    assert not [f for e in tests for q in examine(e, unsigned) for f in q.findings]
+
+
+# --- M3: units of a speed -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "unit",
+    ["1/min", "min^-1", "min⁻¹", "min-1", "U/min", "Upm", "r/min", "rev/min", "RPM", "tr/min"],
+)
+def test_a_nameplates_turns_a_minute(tmp_path: Path, unit: str) -> None:
+    """35 turns a minute are 210 deg/s."""
+    speed = np.full(TIME.size, 35.0)
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, **{f"n_Trommel [{unit}]": speed})
+    channel = drafted(tmp_path, log)["log"]["shaft_speed"]
+    assert channel.unit == "rad/s"
+    assert np.degrees(channel.values) == pytest.approx(210.0)
+
+
+@pytest.mark.parametrize("unit", ["Hz", "1/s", "s^-1", "U/s"])
+def test_turns_a_second(tmp_path: Path, unit: str) -> None:
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, **{f"speed [{unit}]": BOTH})
+    channel = drafted(tmp_path, log)["log"]["shaft_speed"]
+    assert channel.values == pytest.approx(2.0 * np.pi * BOTH)
+
+
+def test_a_column_called_rpm(tmp_path: Path) -> None:
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, rpm=BOTH)
+    tests = drafted(tmp_path, log)
+    assert 'unit = "rpm"' in tests.path.read_text("utf-8")
+    assert tests["log"]["shaft_speed"].values == pytest.approx(2.0 * np.pi / 60.0 * BOTH)
+
+
+# --- M4, M5: spikes, and what is ignored ----------------------------------------------------------
+
+
+def test_a_spike_is_found_with_the_line_that_leaves_it_out(tmp_path: Path) -> None:
+    current = clamp(BOTH, 1, rectified=True)
+    current[700:702] = 9.9
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, Strom=current)
+    tests = drafted(tmp_path, log)
+    (said,) = [each for each in findings(tests) if "no channel measures its motion" not in each]
+    assert said.startswith("1 spike, up to 9.9 A: leave out with ")
+    line = said.removeprefix("1 spike, up to 9.9 A: leave out with ").removesuffix(" in this run")
+    text = tests.path.read_text("utf-8")
+    tests.path.write_text(text + line + "\n", "utf-8")
+    mended = Campaign.from_toml(tests.path)
+    assert not [each for each in findings(mended) if "spike" in each]
+    channel = mended["log"]["rectified_current"]
+    assert np.flatnonzero(~channel.used).tolist() == [700, 701]
+    (_, quality) = examine(mended["log"])
+    assert quality.high < 1.0
+
+
+def test_a_drop_out_while_the_command_stands_still_is_a_spike(tmp_path: Path) -> None:
+    speed = lagged(BOTH) + np.random.default_rng(1).normal(0.0, 0.01, TIME.size)
+    speed[500] = 0.0
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, speed=speed)
+    (said,) = findings(drafted(tmp_path, log))
+    assert said.startswith("1 spike, up to 0 rad/s")
+
+
+@pytest.mark.parametrize("command", [BOTH, SINE, np.abs(BOTH)])
+@pytest.mark.parametrize("lag", [0.02, 0.1])
+def test_motions_and_zero_crossings_are_no_spikes(
+    tmp_path: Path, command: np.ndarray, lag: float
+) -> None:
+    rng = np.random.default_rng(2)
+    for size in (0.0, 0.01):
+        speed = lagged(command, lag) + rng.normal(0.0, size, TIME.size)
+        current = np.abs(lagged(command, lag)) + rng.normal(0.0, size, TIME.size)
+        log = write(tmp_path, "log.csv", time=TIME, voltage=command, speed=speed, current=current)
+        assert not [said for said in findings(drafted(tmp_path, log)) if "spike" in said]
+
+
+def test_ignored_glitches_of_a_counter_are_no_findings(tmp_path: Path) -> None:
+    counts = np.floor(200.0 * np.cumsum(lagged(BOTH)) / RATE)
+    counts[[700, 701]] += 5000.0
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, counts=counts)
+    tests = drafted(tmp_path, log, counts_per_turn=1000.0)
+    (said,) = findings(tests)
+    assert "jumps 2 times" in said
+    tests = edit(
+        tests, "gear_ratio = 1.0", "ignore = [{ from = 3.4975, to = 3.5075 }]\ngear_ratio = 1.0"
+    )
+    assert findings(tests) == []
+
+
+def test_a_channel_that_is_ignored_has_no_findings(tmp_path: Path) -> None:
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, speed=-lagged(BOTH), pos=TIME)
+    tests = drafted(tmp_path, log)
+    assert any("moves against" in said for said in findings(tests))
+    tests = edit(tests, '"shaft_speed"    #', '"shaft_speed"\nignore = [{ from = 0.0 }]    #')
+    assert findings(tests) == []
+
+
+# --- M2: a gap in which a counter may have gone round ---------------------------------------------
+
+
+def test_a_run_is_split_where_its_counter_may_have_gone_round(tmp_path: Path) -> None:
+    """17,000 counts a second and 16 bits: half a round takes 1.9 s, the gap 2.3 s."""
+    speed = 17_000.0 * lagged(4.0 * (TIME > 0.1)) / 4.0
+    counts = np.floor(np.cumsum(speed) / RATE) % 65536
+    kept = (TIME < 5.0) | (TIME > 7.3)
+    columns = {"time": TIME, "voltage": 4.0 * (TIME > 0.1), "counts": counts}
+    log = write(tmp_path, "log.csv", **{name: each[kept] for name, each in columns.items()})
+    tests = drafted(tmp_path, log, counts_per_turn=4096.0)
+    assert [each.name for each in tests] == ["log", "log from 7.305 s"]
+    first, second = tests
+    assert (first.start, second.start) == ("rest", "estimated")
+    assert first.input.time[-1] < 5.0
+    assert "split at 7.305 s" in first.notes[0]
+    assert "the counter 'encoder_counts', which begins anew after 65536" in first.notes[0]
+    # each part turns as fast as the shaft did
+    for part, true in ((first, speed[TIME < 5.0]), (second, speed[TIME > 7.3])):
+        turns = np.diff(part["encoder_counts"].values) / (2.0 * np.pi) * 4096.0 * RATE
+        assert turns[-50:].mean() == pytest.approx(true[-50:].mean(), rel=2e-3)
+
+
+def test_a_gap_that_leaves_no_doubt_splits_nothing(tmp_path: Path) -> None:
+    counts = np.floor(np.cumsum(17_000.0 * (TIME > 0.1)) / RATE) % 65536
+    kept = (TIME < 5.0) | (TIME > 5.5)
+    columns = {"time": TIME, "voltage": 4.0 * (TIME > 0.1), "counts": counts}
+    log = write(tmp_path, "log.csv", **{name: each[kept] for name, each in columns.items()})
+    (run,) = drafted(tmp_path, log, counts_per_turn=4096.0)
+    assert run.notes == ()
+    moved = run["encoder_counts"].counts
+    assert moved is not None
+    assert moved[-1] - moved[0] == pytest.approx(17_000.0 * 7.9, rel=1e-3)
+
+
+# --- B3: runs that lack a channel -----------------------------------------------------------------
+
+
+def test_a_run_without_a_channel(tmp_path: Path) -> None:
+    speed, current = lagged(BOTH), np.abs(lagged(BOTH))
+    logs = [
+        write(tmp_path, "all.csv", time=TIME, voltage=BOTH, speed=speed, Strom=current),
+        write(tmp_path, "no_clamp.csv", time=TIME, voltage=BOTH, speed=speed),
+        write(tmp_path, "empty.csv", time=TIME, voltage=BOTH, speed=speed, Strom=[""] * TIME.size),
+        write(tmp_path, "no_input.csv", time=TIME, speed=speed, Strom=current),
+    ]
+    tests = drafted(tmp_path, *logs, drive="hoist")
+    text = tests.path.read_text("utf-8")
+    assert "axes.hoist.channels.rectified_current = false" in text
+    assert list(tests["all"].channels) == ["shaft_speed", "rectified_current"]
+    assert list(tests["no_clamp"].channels) == ["shaft_speed"]
+    assert list(tests["empty"].channels) == ["shaft_speed"]
+    assert "'rectified_current' has no sample here" in tests["empty"].notes[0]
+    assert tests.ignored == ("no_input",)
+
+
+def test_an_ignored_run_is_not_opened(tmp_path: Path) -> None:
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, speed=BOTH)
+    tests = drafted(tmp_path, log)
+    with tests.path.open("a", encoding="utf-8") as file:
+        file.write('\n[[runs]]\nfile = "nowhere.csv"\nrole = "ignore"\n')
+    tests = Campaign.from_toml(tests.path)
+    assert (len(tests), tests.ignored) == (1, ("nowhere",))
+    with pytest.raises(InputError, match="the run 'nowhere' has the role 'ignore'"):
+        tests["nowhere"]
+
+
+def test_what_cannot_be_read_is_drafted_as_ignored(tmp_path: Path) -> None:
+    back = TIME.copy()
+    back[100:] -= 0.3
+    logs = [
+        write(tmp_path, "good.csv", time=TIME, voltage=BOTH, speed=BOTH),
+        write(tmp_path, "back.csv", time=back, voltage=BOTH, speed=BOTH),
+    ]
+    tests = drafted(tmp_path, *logs)
+    assert tests.ignored == ("back",)
+    assert 'role = "ignore"    # FIXME: ' in tests.path.read_text("utf-8")
+
+
+# --- M6: headers ----------------------------------------------------------------------------------
+
+
+def test_units_at_the_end_of_names(tmp_path: Path) -> None:
+    log = write(tmp_path, "t1.csv", time_ms=1e3 * TIME, voltage_V=BOTH, speed_rpm=BOTH)
+    run = drafted(tmp_path, log)["t1"]
+    assert run.input.time == pytest.approx(TIME)
+    assert run.input.values == pytest.approx(BOTH)
+    assert run["shaft_speed"].values == pytest.approx(2.0 * np.pi / 60.0 * BOTH)
+
+
+def test_milliseconds_since_1970(tmp_path: Path) -> None:
+    stamps = [f"{1_710_284_397_000 + round(1e3 * each)}" for each in TIME]
+    log = write(tmp_path, "t1.csv", time_ms=stamps, **{"Voltage [V]": BOTH, "Speed [rpm]": BOTH})
+    run = drafted(tmp_path, log)["t1"]
+    assert run.input.time == pytest.approx(TIME, abs=1e-9)
+    assert list(run.channels) == ["shaft_speed"]
+
+
+def test_percent_of_a_joystick(tmp_path: Path) -> None:
+    log = write(tmp_path, "log.csv", t=TIME, **{"Stellgröße [%]": 10.0 * BOTH}, n=BOTH)
+    run = drafted(tmp_path, log)["log"]
+    assert run.input.kind == "voltage"
+    assert run.input.values == pytest.approx(BOTH)
+    assert list(run.channels) == ["shaft_speed"]
+
+
+def test_two_clamps_are_plus_and_minus(tmp_path: Path) -> None:
+    plus, minus = np.maximum(BOTH, 0.0), np.maximum(-BOTH, 0.0)
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, I_A=plus, I_B=minus)
+    run = drafted(tmp_path, log)["log"]
+    assert list(run.channels) == ["current_plus", "current_minus"]
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, I_A=plus)
+    assert list(drafted(tmp_path, log)["log"].channels) == ["rectified_current"]
+
+
+def test_manoeuvres_in_a_comment_are_in_volts(tmp_path: Path) -> None:
+    command = np.where((TIME > 1.0) & (TIME < 5.0), -3000.0, 0.0)
+    log = write(tmp_path, "log.csv", time=TIME, **{"stick [mV]": command}, speed=BOTH)
+    assert "step -3 V" in draft_campaign([log], tmp_path)
+
+
+def test_the_run_held_back_leaves_its_kind_in_the_fit(tmp_path: Path) -> None:
+    """The last by name is the only step upwards."""
+    steps = {"a": -8.0, "b": -6.0, "c": -4.0, "d": 8.0}
+    logs = [
+        write(tmp_path, f"{n}.csv", time=TIME, voltage=u * (TIME > 1.0), speed=u * (TIME > 1.0))
+        for n, u in steps.items()
+    ]
+    text = draft_campaign(logs, tmp_path)
+    roles = {run["file"]: run["role"] for run in tomllib.loads(text)["runs"]}
+    assert roles == {"a.csv": "fit", "b.csv": "fit", "c.csv": "validate", "d.csv": "fit"}
+
+
+def test_an_axis_has_the_packaged_drive_of_its_name(tmp_path: Path) -> None:
+    columns = {
+        f"{axis} {what}": BOTH for axis in ("hoist", "slew", "aux") for what in ("voltage", "speed")
+    }
+    log = write(tmp_path, "log.csv", time=TIME, **columns)
+    axes = tomllib.loads(draft_campaign([log], tmp_path, "hoist"))["axes"]
+    assert {name: axis["drive"] for name, axis in axes.items()} == {
+        "hoist": "hoist",
+        "slew": "slew",
+        "aux": "hoist",
+    }
+
+
+# --- M7: time stamps ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("stamps", "seconds"),
+    [
+        (["2024-03-12T23:59:57.000+01:00", "2024-03-13T00:00:02.500+01:00"], 5.5),
+        (["2024-03-12T23:59:57.000Z", "2024-03-13T01:00:02.500+01:00"], 5.5),
+        (["2024-03-12 22:29:57-0130", "2024-03-13 00:00:02.5+0000"], 5.5),
+        (["11:59:57 AM", "12:00:02.5 PM"], 5.5),
+        (["12:59:57.0 pm", "1:00:02.5 pm"], 5.5),
+        (["3/12/2024 11:59:57 PM", "3/13/2024 12:00:02.5 AM"], 5.5),
+        (["23:59:57,000", "00:00:02,500"], 5.5),
+        (["11:59:57 PM", "12:00:02.5 AM"], 5.5),
+    ],
+)
+def test_stamps_of_a_calendar_and_of_a_clock(
+    tmp_path: Path, stamps: list[str], seconds: float
+) -> None:
+    rows = [f"{stamp};{k};{k}" for k, stamp in enumerate(stamps)]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join(["Zeit;voltage;speed", *rows]) + "\n", "utf-8")
+    time = drafted(tmp_path, log)["log"].input.time
+    assert time == pytest.approx([0.0, seconds])
+
+
+def test_a_clock_that_goes_back_is_refused_all_the_same(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time;voltage;speed\n10:00:05;1;1\n10:00:04;2;2\n", "utf-8")
+    assert drafted(tmp_path, log).ignored == ("log",)
+
+
+def test_dashes_are_missing_numbers(tmp_path: Path) -> None:
+    cells = [f"{each:g}" for each in BOTH]
+    cells[5:8] = ["---", "--", "---"]
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, speed=cells)
+    tests = drafted(tmp_path, log)
+    assert 'missing = "drop"    # guessed: 3 cells are empty' in tests.path.read_text("utf-8")
+    assert tests["log"]["shaft_speed"].dropped == 3
+
+
+def test_decimal_commas_between_commas_are_named(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time,voltage,speed\n0,0,1,0,2,0\n0,1,1,5,2,5\n", "utf-8")
+    with pytest.raises(FileError, match="Do decimal commas stand between commas"):
+        draft_campaign([log], tmp_path)
