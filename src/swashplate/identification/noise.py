@@ -439,8 +439,8 @@ def band_score_covariance(fit: LinearisedFit) -> Covariance:
     The sandwich (JᵀJ)⁻¹ Σ_runs Σ_bands ½ Re(C Cᴴ) (JᵀJ)⁻¹ with C = Σ_{f in band} J(f)* r(f): scores
     clustered by bands of frequency (Liang and Zeger 1986). Within a band the score is summed before
     it is squared, so that noise which comes with every step, or a ripple that meets ten reversals
-    at the same phase, counts in full. Degrees of freedom are those of a sum of squares, two for each
-    band and run.
+    at the same phase, counts in full. Degrees of freedom are those of a sum of squares, two for
+    each band and run.
     """
     fit.spare_samples  # noqa: B018  refuses what tells nothing of the noise
     middle = fit.whitening.T @ fit.prior_middle @ fit.whitening
