@@ -5,8 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swashplate import InputError
+from swashplate import DomainError, Drive, InputError
+from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.triangle import ROWS, combine
+from swashplate.simulation.residuals import triangle
 
 pytestmark = pytest.mark.traced
 
@@ -75,3 +78,26 @@ def test_nothing_to_combine() -> None:
         combine([])
     with pytest.raises(InputError, match="but they have 2 and 3"):
         combine([np.eye(2), np.eye(3)])
+
+
+@pytest.mark.parametrize("size", [1e-150, 1e-158, 1e-162, 1e-200, 1e150])
+def test_columns_of_any_size_leave_numbers(size: float) -> None:
+    """A column that is next to nothing leaves the others' products as they are."""
+    matrix = np.random.default_rng(3).normal(size=(900, 4))
+    matrix[:, 1] *= size
+    factor = combine([matrix])
+    assert np.isfinite(factor).all()
+    others = [0, 2, 3]
+    products = (factor.T @ factor)[np.ix_(others, others)]
+    expected = (matrix.T @ matrix)[np.ix_(others, others)]
+    np.testing.assert_allclose(products, expected, rtol=0.0, atol=1e-10)
+
+
+def test_derivatives_that_overflow_end_in_a_sentence(hoist: Drive) -> None:
+    current = np.full(64, 0.4)
+    stamps = np.arange(64) / 512.0
+    record = record_of(current, 512.0, what="current")
+    huge = Observation("shaft_speed", stamps, np.zeros(64), weight=1e170)
+    observed = ObservedRecord(record, [huge], driven_by="current")
+    with pytest.raises(DomainError, match="Z8: the derivatives are too large"):
+        triangle(hoist.parameters, observed, ["Z8", "Z10"])

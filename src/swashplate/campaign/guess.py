@@ -86,8 +86,7 @@ def march_guess(
     gain: Array,
     top: Array,
     pull: Array,
-    share: float,
-    start: float,
+    began: tuple[float, float],
     position: Array,
 ) -> None:
     """March speed and position behind dead zone, gain, limits and lag.
@@ -96,14 +95,17 @@ def march_guess(
     ----------
     command : (n,) array
         Delayed command. [V]
-    h, share, start : float
-        Step [s], share of the way to its target that the speed takes in a step [1], speed at first.
+    h : float
+        Step. [s]
     dead, gain, top, pull : (2,) arrays
         Dead zones, gains, top speeds and accelerations, plus and minus.
+    began : (float, float)
+        Share of the way to its target that the speed takes in a step [1], and speed at first.
     position : (n,) array
         Output, 0 at the first sample.
     """
-    speed, position[0] = start, 0.0
+    share, speed = began
+    position[0] = 0.0
     for n in range(1, command.size):
         u = command[n - 1]
         target = min(gain[0] * max(u - dead[0], 0.0), top[0])
@@ -237,9 +239,15 @@ def _errors(run: _Run, numbers: _Numbers) -> Array:
     share = 1.0 - np.exp(-STEP / max(numbers.lag, 1e-4))
     command = np.interp(run.time - numbers.delay, run.time, run.command)
     march_guess(
-        command, STEP, numbers.dead, numbers.gain, numbers.top, numbers.pull, share, run.start,
+        command,
+        STEP,
+        numbers.dead,
+        numbers.gain,
+        numbers.top,
+        numbers.pull,
+        (float(share), float(run.start)),
         position,
-    )  # fmt: skip
+    )
     there, back = (np.interp(each, run.time, position) for each in (run.ends, run.begins))
     return (there - back) / (run.ends - run.begins) - run.speeds
 

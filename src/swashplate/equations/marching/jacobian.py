@@ -32,7 +32,7 @@ from swashplate.equations.marching.rows import (
 from swashplate.equations.marching.run import Instance, Places, Start, arrays_of, check_domain
 from swashplate.equations.marching.triangle import ROWS, aligned, upright
 from swashplate.equations.model import Model, Source
-from swashplate.errors import InputError
+from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
 
@@ -565,6 +565,11 @@ def triangle(
     """Triangular factor of [J r]; arguments as in `jacobian`, which is never held.
 
     Memory does not grow with the record, apart from the record and the observations themselves.
+
+    Raises
+    ------
+    DomainError
+        Also if a derivative is so large that its square overflows.
     """
     count = len(columns)
     to = np.flatnonzero(np.ones(count, dtype=bool) if moved is None else np.asarray(moved))
@@ -582,6 +587,13 @@ def triangle(
     places = np.concatenate([to, np.arange(count, len(names) + 1)])
     factor = np.zeros((len(names) + 1, len(names) + 1))
     factor[np.ix_(places, places)] = sink.factor
+    if not np.isfinite(factor).all():
+        overflown = np.asarray(~np.isfinite(factor)).any(axis=0)
+        bad = [*names, "the residuals"][int(np.argmax(overflown))]
+        raise DomainError(
+            f"{instance.name}: {bad}: the derivatives are too large for a least-squares problem; check "
+            "the size of the parameters and weights."
+        )
     return Triangle(names, upright(factor), sink.squares)
 
 

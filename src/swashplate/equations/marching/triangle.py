@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 ROWS = 512
 """Rows of a block: known to the compiler, and few enough for a fast cache."""
 EIGHTH = ROWS // 8
+NOTHING = 1e-290
+"""Square of a column's norm that counts as none: the reflection divides by numbers of its size."""
 CACHE_LINE = 64
 """Bytes. Vectors that lie across two lines take twice as long to load."""
 
@@ -79,7 +81,7 @@ def absorb(rows: Array, factor: Array, room: Array) -> None:
     for j in range(rows.shape[0]):
         pivot = rows[j]
         square = dot(pivot, pivot, room)
-        if square == 0.0:
+        if square < NOTHING:
             continue  # nothing to rotate, as with a parameter that the block does not depend on
         corner = factor[j, j]
         norm = sqrt(corner * corner + square)
