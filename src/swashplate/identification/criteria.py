@@ -46,7 +46,7 @@ MOVES = 0.05
 the measurement error is known, by less than five times that."""
 MISFIT = 1.2
 """Residuals over their known measurement error from which there is lack of fit: 37 of 39 sound
-campaigns of slew lay between 0.97 and 1.02; in the other two the search ended in another optimum."""
+campaigns of slew lay between 0.97 and 1.02; in two the search ended in another optimum."""
 MODEL_ERROR = 0.01
 """Error of held-out runs over their range from which lack of fit rules out prediction: what is
 wrong is not small on known manoeuvres, and larger on others."""
