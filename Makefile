@@ -71,7 +71,7 @@ cluster: $(STAMP) ## many starts on a local Dask cluster that loses a worker
 	@$(BIN)/pip install -qq -c constraints.txt -e '.[dask]'
 	@$(BIN)/python benchmarks/cluster.py
 
-calibration: $(STAMP) ## how often intervals hold the truth, over 400 virtual campaigns (half an hour)
+calibration: $(STAMP) ## how often intervals hold the truth, over 400 virtual campaigns an axis (hours)
 	@$(BIN)/python benchmarks/calibration.py
 
 coverage: $(STAMP) ## which lines of src no test reaches; the kernels interpreted (ten minutes)

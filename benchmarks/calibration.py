@@ -280,7 +280,7 @@ def smoothed_spectrum(fit):
 
 
 def larger_of_both(fit):
-    """The larger error of the smoothed spectrum and of band scores, HC3."""
+    """The larger error of the smoothed spectrum and of band scores."""
     from swashplate.identification.noise import coloured_noise_covariance
 
     return coloured_noise_covariance(fit), np.zeros(fit.variables.count)

@@ -94,7 +94,7 @@ def test_a_longer_delay_than_the_fixed_one_is_named(tmp_path: Path) -> None:
     tau = nominal.parameters.numbers["tau"]
     assessments, found = fitted(tmp_path, nominal.replace(tau=tau + 0.02))
     assert found.grade == "Usable for prediction", found.headline
-    assert failed(found) == {MISFIT}
+    assert {MISFIT, "time stamps of counts"} <= failed(found)
     causes = {each.name: each for each in lack_of_fit(assessments).causes}
     # after one step: the other estimates have moved to make up for a part of it
     assert causes["time stamps of counts"].size == pytest.approx(20.0, rel=0.2)

@@ -257,19 +257,6 @@ def test_a_position_is_judged_by_its_speed_too(read: Page) -> None:
     assert "start transient" in read.words
 
 
-def test_spectral_lines_are_listed_in_a_table(read: Page, assessments) -> None:
-    lines = [each.uncertainty.lines for each in assessments]
-    listed = [line for each in lines if len(each) > 1 for line in each]
-    assert listed
-    rows = [row for row in read.tables["lines"] if row[0] != "channel"]
-    assert [row[0] for row in rows] == [line.channel for line in listed]
-    found = [number(row[1]) for row in rows]
-    assert found == pytest.approx([line.frequency for line in listed], rel=5e-3)
-    # in the verdict and beside the intervals
-    heads = sum(len(each) > 1 for each in lines)
-    assert len(re.findall(r"\d+ spectral lines between", read.words)) == 2 * heads
-
-
 def test_every_sample_is_in_the_file(read: Page, fitted: Fit) -> None:
     data = json.loads(read.scripts["samples-0"])
     kept = np.frombuffer(b64decode(data["channels"][0]["measured"]["data"]), "<f4")

@@ -439,9 +439,8 @@ def band_score_covariance(fit: LinearisedFit) -> Covariance:
     The sandwich (JᵀJ)⁻¹ Σ_runs Σ_bands ½ Re(C Cᴴ) (JᵀJ)⁻¹ with C = Σ_{f in band} J(f)* r(f): scores
     clustered by bands of frequency (Liang and Zeger 1986). Within a band the score is summed before
     it is squared, so that noise which comes with every step, or a ripple that meets ten reversals
-    at the same phase, counts in full. Residuals are divided by 1 - h, h the leverage there (HC3 of
-    MacKinnon and White 1985). Degrees of freedom are those of a sum of squares, two for each
-    band and run.
+    at the same phase, counts in full. Degrees of freedom are those of a sum of squares, two for
+    each band and run.
     """
     fit.spare_samples  # noqa: B018  refuses what tells nothing of the noise
     middle = fit.whitening.T @ fit.prior_middle @ fit.whitening
@@ -449,8 +448,7 @@ def band_score_covariance(fit: LinearisedFit) -> Covariance:
     squares = np.zeros(fit.variables.count)
     for run in fit.runs:
         grid, part = grid_of(run.time), _Spectrum(run, fit.whitening)
-        left = np.maximum(1.0 - part.leverage, LEAST_LEFT)
-        products = part.derivatives.conj() * (part.twice * part.residual / left)[:, None]
+        products = part.derivatives.conj() * (part.twice * part.residual)[:, None]
         width = min(BAND, 0.5 / grid.step / FEWEST_BANDS)
         band = (part.frequencies / width).astype(np.intp)
         scores = np.add.reduceat(products, np.flatnonzero(np.diff(band, prepend=-1)), axis=0)

@@ -424,7 +424,7 @@ def uncertainty(
     made = Uncertainty(
         with_handed(own, handed),
         own,
-        white_noise_covariance(fit),
+        replace(white_noise_covariance(fit), variables=bounded),
         colours,
         tuple(
             (run.label, run.time.size, worth[m].effective_samples(run.time.size))
