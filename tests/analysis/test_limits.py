@@ -19,7 +19,7 @@ def rms(values: np.ndarray) -> float:
     [
         ("dead zone", {"V_dz": 0.5}),
         ("dead zone", {"Z17": 0.5}),
-        ("current rate", {"lim1": 4.0, "lim2": 4.0, "I_t1": 1e-3}),
+        ("current rate", {"lim1": 0.06, "lim2": 0.06, "I_t1": 1e-5}),
         ("final decay", {"I_t2": 5.0, "a": 2.0, "I_t1": 6.0}),
         ("delay", {"tau": 0.3}),
         ("orifice", {"Z16": 2e-5}),
@@ -120,12 +120,12 @@ def test_a_speed_that_was_wanted(hoist: Drive) -> None:
 
 def overpowered() -> Drive:
     """Without the solenoids' dead zone of this drive they would overpower the spring."""
-    drive = Drive.preset("neutral").replace(Z17=0.5)
+    drive = Drive.preset("neutral").replace(Z17=0.0075)
     Z = drive.parameters.numbers
     full = drive.steady_current(10.0)
-    k = 0.99 * Z["Z4"] ** 0.5 / Z["Z5"] / (full - 0.5)
+    k = 0.99 * Z["Z4"] ** 0.5 / Z["Z5"] / (full - 0.0075)
     assert k * full * Z["Z5"] / Z["Z4"] ** 0.5 > 1.0
-    return drive.replace(Z19=k, Z20=0.0, Z21=0.0, Z22=0.0, Z16=2e-4)
+    return drive.replace(Z19=k, Z20=0.0, Z21=0.0, Z22=0.0, Z16=2e-5)
 
 
 def test_a_removal_outside_the_domain_is_said() -> None:

@@ -145,7 +145,7 @@ def test_a_solver_agrees_with_the_march(done, number):
     [
         (("crane",), "no packaged set, file or folder 'crane'"),
         (("none.toml", "step:9"), "There is no file none.toml"),
-        (("neutral",), "neutral: piston_mass on swash_arm alone has"),
+        (("neutral",), "neutral: spool_stroke (stroke of the spool, both ways) is inf m"),
         (("hoist", "stepp:9"), "'stepp' is no manoeuvre"),
         (("hoist", "step:11"), "the card takes ±10 V"),
         (("hoist", "--rate", "1"), "must be between 10 and 100000 Hz"),

@@ -49,7 +49,7 @@ def test_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Drive.preset("slew").to_toml("mine.toml")
     Path("log.csv").write_text("time [ms],voltage [mV]\n0,0\n100,5000\n400,0\n", "utf-8")
     commands = re.findall(r"^    swashplate (.*)$", README, re.MULTILINE)
-    assert len(commands) == 24
+    assert len(commands) == 23
     for command in commands:
         words = shlex.split(command.split("#")[0].split(">")[0])
         # a shell would have replaced the pattern by the files

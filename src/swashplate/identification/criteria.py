@@ -328,11 +328,12 @@ def misfit_criteria(misfit: LackOfFit, judged: Sequence[RunQuality]) -> list[Cri
                 )
             )
         elif isfinite(fault.plausible) and not fault.hidden:
-            wrong = significant and abs(fault.size) > fault.plausible / 3.0
+            beyond = abs(fault.size) > fault.plausible / 3.0
+            wrong = beyond and significant and fault.share > EXPLAINS
             made.append(
                 Criterion(
                     fault.name,
-                    size,
+                    size if wrong or not beyond else "not seen",
                     f"{fault.plausible / 3.0:.2g} {fault.unit}",
                     "an instrument that is off by more shows in these logs",
                     "values",
