@@ -130,8 +130,7 @@ def candidates(assessments):
             parameters = replace(problem.model, parameters=parameters).parameters_at(
                 problem.unknowns.targets(vector, "")
             )
-            values = np.array(list(problem.unknowns.values(vector).values()))
-            moved = replace(covariance, variables=replace(covariance.variables, values=values))
+            moved = replace(covariance, variables=covariance.variables.at(vector))
             covariances.append(covariance)
             results.append(estimates(moved))
         made.append((method, parameters if shifts.any() else None, results))
