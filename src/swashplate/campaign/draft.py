@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +67,7 @@ MANY = 4
 """Runs from which on one is held back for validation."""
 
 
-class Guess(NamedTuple):
+class ColumnGuess(NamedTuple):
     """What a column may be."""
 
     column: Column
@@ -86,7 +86,7 @@ class Guess(NamedTuple):
     """Cells without a number, in all logs."""
 
 
-def guess(column: Column) -> Guess:
+def guess(column: Column) -> ColumnGuess:
     """What a column's name and unit say."""
     name = re.sub(r"[\[(].*[\])]", "", column.name).strip()
     stem, _, ending = name.rpartition("_")
@@ -109,7 +109,7 @@ def guess(column: Column) -> Guess:
     return found
 
 
-def _by_name(column: Column, name: str) -> Guess:
+def _by_name(column: Column, name: str) -> ColumnGuess:
     name = re.sub(r"(?<=[a-z])(?=[A-Z])|[_./\-\s]+", " ", name).strip().lower()
 
     def before(words: str) -> str | None:
@@ -117,17 +117,17 @@ def _by_name(column: Column, name: str) -> Guess:
         return (match[1] or "") if match else None
 
     if re.fullmatch(TIME, name):
-        return Guess(column, "time")
+        return ColumnGuess(column, "time")
     if column.unit in ("V", "mV") or before(VOLTAGE) is not None:
-        return Guess(column, "input", "voltage", before(f"{VOLTAGE}|{COMMAND}") or "")
+        return ColumnGuess(column, "input", "voltage", before(f"{VOLTAGE}|{COMMAND}") or "")
     axis = before(COMMAND)
     if axis is not None:
-        return Guess(column, "input", "other", axis)
+        return ColumnGuess(column, "input", "other", axis)
     for kind, words in CHANNELS:
         axis = before(words)
         if axis is not None:
-            return Guess(column, "channel", kind, axis, words == ROD)
-    return Guess(column, "unknown")
+            return ColumnGuess(column, "channel", kind, axis, words == ROD)
+    return ColumnGuess(column, "unknown")
 
 
 def _seconds(unit: str) -> float | None:
@@ -144,11 +144,11 @@ class _Look(NamedTuple):
     """What a log shows at first sight."""
 
     log: Log
-    guesses: list[Guess]
+    guesses: list[ColumnGuess]
     values: dict[str, Array]
 
     @property
-    def time(self) -> Guess | None:
+    def time(self) -> ColumnGuess | None:
         return next((each for each in self.guesses if each.role == "time"), None)
 
 
@@ -241,7 +241,7 @@ def _look(log: Log, given: Mapping[str, str], units: Mapping[str, str]) -> _Look
             role = "time" if what == "time" else "channel"
             role = "input" if what in ("voltage", "current", "other") else role
             kind = None if what == "time" else what
-            guessed = guessed._replace(role=role, kind=kind)  # type: ignore[arg-type]
+            guessed = guessed._replace(role=role, kind=cast("InputKind | ChannelKind | None", kind))
         elif given and guessed.role in ("time", "input") and guessed.role in _given_roles(given):
             guessed = guessed._replace(role="unknown", kind=None)
         if column.name in units:
@@ -271,13 +271,13 @@ def _numbers(log: Log, names: list[str]) -> dict[str, Array]:
 
 def _refined(
     looks: Sequence[_Look], counts_per_turn: float | None, given: Mapping[str, str]
-) -> list[Guess]:
+) -> list[ColumnGuess]:
     """Guesses of all logs' columns with what their numbers say, each column once.
 
     A current has a sign if it goes to minus its peak in any log; two of them are plus and minus;
     whole numbers that begin anew at their end are an encoder's, whatever their name.
     """
-    met: dict[str, Guess] = {}
+    met: dict[str, ColumnGuess] = {}
     for look in looks:
         for each in look.guesses:
             met.setdefault(each.column.name, each)
@@ -309,7 +309,7 @@ def _refined(
     return list(met.values())
 
 
-def _by_axis(guesses: Iterable[Guess]) -> dict[str, list[Guess]]:
+def _by_axis(guesses: Iterable[ColumnGuess]) -> dict[str, list[ColumnGuess]]:
     """Inputs and channels under the axis that their names begin with.
 
     An axis needs an input and a channel; columns without a prefix belong to the only axis.
@@ -327,7 +327,7 @@ def _by_axis(guesses: Iterable[Guess]) -> dict[str, list[Guess]]:
 
 def _axis(
     name: str,
-    guesses: list[Guess],
+    guesses: list[ColumnGuess],
     look: _Look,
     drive: str | None,
     counts_per_turn: float | None,
@@ -389,7 +389,7 @@ def _clock(look: _Look) -> str:
     return f"time = {{ column = {_string(column.name)}{unit} }}"
 
 
-def _signal(guessed: Guess, look: _Look, counts_per_turn: float | None) -> list[str]:
+def _signal(guessed: ColumnGuess, look: _Look, counts_per_turn: float | None) -> list[str]:
     column, kind = guessed.column, str(guessed.kind)
     percent = kind == "other" and guessed.unit == "%"
     kind = "voltage" if percent else kind
@@ -439,7 +439,7 @@ class _Draft:
         self.role, self.why = ("fit", "") if testable else ("ignore", "    # it has no input")
 
 
-def _run(look: _Look, axes: Mapping[str, list[Guess]], folder: Path) -> _Draft:
+def _run(look: _Look, axes: Mapping[str, list[ColumnGuess]], folder: Path) -> _Draft:
     path, root = look.log.path.resolve(), folder.resolve()
     file = path.relative_to(root) if path.is_relative_to(root) else path
     seen, stratum, peak = _seen(look, axes)
@@ -470,7 +470,7 @@ def _run(look: _Look, axes: Mapping[str, list[Guess]], folder: Path) -> _Draft:
     return _Draft([*lines, *without], stratum, peak, testable=bool(tested))
 
 
-def _seen(look: _Look, axes: Mapping[str, list[Guess]]) -> tuple[str, str, float]:
+def _seen(look: _Look, axes: Mapping[str, list[ColumnGuess]]) -> tuple[str, str, float]:
     """Length, rate and manoeuvres of a run for a comment; their kind, direction and size."""
     time = None if look.time is None else look.values.get(look.time.column.name)
     if look.time is None or time is None or time.size < 2:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.code import Call, Choice, Code, Function, Item, Let, Rule
+from swashplate.equations.code import Call, Choice, Code, Function, Item, Let, Rule, fresh_name
 from swashplate.equations.expressions import ONE, ZERO, Node, make, minus, negative, times
 from swashplate.equations.writing import function_text, named_by_text
 from swashplate.errors import EquationError
@@ -155,15 +155,6 @@ class Derivatives:
         )
         self.partials = [found[o][by[i]] for o, i in self.entries]
 
-    def fresh(self, stem: str) -> str:
-        """A name that is not yet taken."""
-        name, count = stem, 1
-        while name in self.taken:
-            count += 1
-            name = f"{stem}_{count}"
-        self.taken.add(name)
-        return name
-
     def divide(self, node: Node) -> None:
         """Note what the forward sweep says, and what it divides by: that may be done again."""
         self.said.add(node.same)
@@ -226,7 +217,7 @@ class Derivatives:
         moved: dict[str, list[tuple[Node, Node]]] = {name: [] for name in call.results}
         for o, i in derived.entries:
             result = call.results[o]
-            partials.append(self.fresh(f"{result}_by_{_word(derived.inputs[i])}"))
+            partials.append(fresh_name(f"{result}_by_{_word(derived.inputs[i])}", self.taken))
             moved[result].append((ex.name(partials[-1]), call.arguments[by[i]]))
             self.active.add(result)
         out.append(Call(derived, call.arguments, (*call.results, *partials)))
@@ -281,7 +272,7 @@ class Derivatives:
         for name in {**one, **two}:
             first, second = one.get(name, ZERO), two.get(name, ZERO)
             if first is not second:
-                merged = self.fresh(f"d_{label}{_word(name)}")
+                merged = fresh_name(f"d_{label}{_word(name)}", self.taken)
                 made.merged.append((merged, first, second))
                 bars[name] = ex.name(merged)
             else:

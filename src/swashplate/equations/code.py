@@ -247,6 +247,16 @@ def live(items: Iterable[Item], needed: set[str]) -> list[Item]:
     return kept[::-1]
 
 
+def fresh_name(stem: str, taken: set[str]) -> str:
+    """A name that is not yet taken, and is from now on."""
+    name, times = stem, 1
+    while name in taken:
+        times += 1
+        name = f"{stem}_{times}"
+    taken.add(name)
+    return name
+
+
 class Code:
     """Straight code under construction.
 
@@ -279,11 +289,7 @@ class Code:
         stem = stem.replace(".", "_")
         if stem[0].isdigit():  # an item of a tuple without names
             stem = f"value_{stem}"
-        name, times = stem, 1
-        while name in self.taken:
-            times += 1
-            name = f"{stem}_{times}"
-        self.taken.add(name)
+        name = fresh_name(stem, self.taken)
         if self.under_way:
             self.origins[name] = self.under_way[-1].name
         return name

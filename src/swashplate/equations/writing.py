@@ -11,7 +11,18 @@ from dataclasses import replace
 from hashlib import blake2b
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.code import FUNCTIONS, Call, Choice, Code, Function, Item, Let, Rule, live
+from swashplate.equations.code import (
+    FUNCTIONS,
+    Call,
+    Choice,
+    Code,
+    Function,
+    Item,
+    Let,
+    Rule,
+    fresh_name,
+    live,
+)
 from swashplate.equations.expressions import Node
 
 WIDTH = 96
@@ -104,15 +115,6 @@ class Writer:
         self.lines = self.region(top, "")
         self.texts = self.results(results, top)
 
-    def fresh(self, stem: str) -> str:
-        """A name that is not yet taken."""
-        name, count = stem, 1
-        while name in self.taken:
-            count += 1
-            name = f"{stem}_{count}"
-        self.taken.add(name)
-        return name
-
     # -- what is shared ----------------------------------------------------------------------------
 
     def count(self, region: _Region, seen: set[Node], ends: Sequence[Node] = ()) -> None:
@@ -165,7 +167,7 @@ class Writer:
     def define(self, node: Node, region: _Region, pad: str, name: str | None = None) -> list[str]:
         """Lines that give an expression a name."""
         if name is None:
-            name = self.fresh(self.hints.get(node.same) or STEMS.get(node.op, "part"))
+            name = fresh_name(self.hints.get(node.same) or STEMS.get(node.op, "part"), self.taken)
         lines: list[str] = []
         text = self.fitted(node, region, pad, lines, len(name))
         if node.op not in ex.LEAVES:

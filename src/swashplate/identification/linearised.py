@@ -141,21 +141,24 @@ class LinearisedFit:
 
     @property
     def spare_samples(self) -> int:
-        """Samples more than combinations determined.
+        """Samples more than combinations determined; refused as by `check_spare_samples`."""
+        self.check_spare_samples()
+        return self.samples - self.rank
+
+    def check_spare_samples(self) -> None:
+        """Refuse a fit whose residual tells nothing of the noise.
 
         Raises
         ------
         InputError
-            If there are none: then the residual tells nothing of the noise.
+            If there are no more samples than combinations determined.
         """
-        spare = self.samples - self.rank
-        if spare < 1:
+        if self.samples - self.rank < 1:
             raise InputError(
                 f"{self.samples} sample{'s' if self.samples > 1 else ''} for {self.rank} "
                 f"unknown{'s' if self.rank > 1 else ''} leave nothing to tell the noise from; take "
                 "more samples or fewer unknowns."
             )
-        return spare
 
 
 def triangular_factor(matrix: Array) -> Array:

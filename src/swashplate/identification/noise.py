@@ -349,10 +349,7 @@ def spectral_covariance(fit: LinearisedFit) -> Covariance:
     of squares are divided by sums of 1 - h, as in HC2 of MacKinnon and White (1985). Degrees of
     freedom follow from the frequencies that an unknown's variance is an average over.
     """
-    fit.spare_samples  # noqa: B018  refuses what tells nothing of the noise
-    middle = fit.whitening.T @ fit.prior_middle @ fit.whitening
-    total = np.einsum("ki,ij,kj->k", fit.whitening, middle, fit.whitening)
-    squares = np.zeros(fit.variables.count)
+    sums = _Sums(fit)
     for channel in dict.fromkeys(run.channel for run in fit.runs):
         parts = [_Spectrum(run, fit.whitening) for run in fit.runs if run.channel == channel]
         frequencies = np.concatenate([part.frequencies for part in parts])
@@ -366,17 +363,38 @@ def spectral_covariance(fit: LinearisedFit) -> Covariance:
         weights = []
         for part, spectrum in zip(parts, np.split(shape, _ends(parts)), strict=True):
             density = part.level * spectrum * part.twice
-            middle = middle + ((part.derivatives.conj().T * density) @ part.derivatives).real
+            sums.middle += ((part.derivatives.conj().T * density) @ part.derivatives).real
             across = np.abs(part.derivatives @ fit.whitening.T) ** 2
             weights.append(across * (part.level * part.twice)[:, None])
         # what each frequency's square adds to the variances: the smoothing the other way round
         share = np.concatenate(weights)[order] / np.maximum(rest, LEAST_LEFT * NEIGHBOURS)[:, None]
         added = _smoothed(share) * power[order][:, None]
-        total += added.sum(axis=0)
-        squares += np.sum(added**2, axis=0)
-    freedom = np.divide(4.0 * total**2, squares, out=np.full_like(total, np.inf), where=squares > 0)
-    matrix = fit.whitening @ middle @ fit.whitening.T
-    return covariance_of("coloured", fit, matrix, np.maximum(freedom, 1.0))
+        sums.add(added)
+    return sums.covariance(4.0, np.inf)
+
+
+class _Sums:
+    """Sums of a sandwich: its middle, the unknowns' variances, and the squares of their parts."""
+
+    def __init__(self, fit: LinearisedFit) -> None:
+        fit.check_spare_samples()
+        self.fit = fit
+        self.middle: Array = fit.whitening.T @ fit.prior_middle @ fit.whitening
+        self.total: Array = np.einsum("ki,ij,kj->k", fit.whitening, self.middle, fit.whitening)
+        self.squares: Array = np.zeros(fit.variables.count)
+
+    def add(self, parts: Array) -> None:
+        """Add parts (n, K) of the variances, independent of each other."""
+        self.total += parts.sum(axis=0)
+        self.squares += np.sum(parts**2, axis=0)
+
+    def covariance(self, each: float, without: float) -> Covariance:
+        """The covariance, a part having `each` degrees of freedom; `without` any part."""
+        freedom = np.full_like(self.total, without)
+        some = self.squares > 0.0
+        np.divide(each * self.total**2, self.squares, out=freedom, where=some)
+        matrix = self.fit.whitening @ self.middle @ self.fit.whitening.T
+        return covariance_of("coloured", self.fit, matrix, np.maximum(freedom, 1.0))
 
 
 class _Spectrum:
@@ -442,23 +460,16 @@ def band_score_covariance(fit: LinearisedFit) -> Covariance:
     at the same phase, counts in full. Degrees of freedom are those of a sum of squares, two for
     each band and run.
     """
-    fit.spare_samples  # noqa: B018  refuses what tells nothing of the noise
-    middle = fit.whitening.T @ fit.prior_middle @ fit.whitening
-    total = np.einsum("ki,ij,kj->k", fit.whitening, middle, fit.whitening)
-    squares = np.zeros(fit.variables.count)
+    sums = _Sums(fit)
     for run in fit.runs:
         grid, part = grid_of(run.time), _Spectrum(run, fit.whitening)
         products = part.derivatives.conj() * (part.twice * part.residual)[:, None]
         width = min(BAND, 0.5 / grid.step / FEWEST_BANDS)
         band = (part.frequencies / width).astype(np.intp)
         scores = np.add.reduceat(products, np.flatnonzero(np.diff(band, prepend=-1)), axis=0)
-        middle = middle + 0.5 * (scores.conj().T @ scores).real
-        seen = 0.5 * np.abs(scores @ fit.whitening.T) ** 2
-        total += seen.sum(axis=0)
-        squares += np.sum(seen**2, axis=0)
-    freedom = np.divide(2.0 * total**2, squares, out=np.ones_like(total), where=squares > 0.0)
-    matrix = fit.whitening @ middle @ fit.whitening.T
-    return covariance_of("coloured", fit, matrix, np.maximum(freedom, 1.0))
+        sums.middle += 0.5 * (scores.conj().T @ scores).real
+        sums.add(0.5 * np.abs(scores @ fit.whitening.T) ** 2)
+    return sums.covariance(2.0, 1.0)
 
 
 def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:

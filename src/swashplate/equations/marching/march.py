@@ -416,16 +416,21 @@ class Sampler:
             read = self.read(part)
             constants = [node for _, node in leaves(part.known["k"])] if "k" in part.known else []
             wanted = [node for node in constants if node.reads & read]
-            outside = read | part.prologue.reads(wanted)
-            for names, array, prefix in (
-                (part.p, "params", self.numbers.parameters),
-                (part.given, "given", self.numbers.given),
-            ):
-                for path, node in leaves(names):
-                    if node.value in outside:
-                        lines.append(f"{node.value} = {array}[{prefix.index((part.part, path))}]")
+            lines += self.given(part, read | part.prologue.reads(wanted))
             lines += lines_of(part.prologue, wanted)
         return lines
+
+    def given(self, part: PartCode, read: set[str]) -> list[str]:
+        """Lines that take a part's parameters and givens, as far as they are read, from arrays."""
+        return [
+            f"{node.value} = {array}[{places.index((part.part, path))}]"
+            for names, array, places in (
+                (part.p, "params", self.numbers.parameters),
+                (part.given, "given", self.numbers.given),
+            )
+            for path, node in leaves(names)
+            if node.value in read
+        ]
 
     def constants(self, part: PartCode) -> list[str]:
         """Names of a part's constants that its sample reads."""
@@ -616,14 +621,7 @@ def advance_source(
             prepare.append(f"constants[{count}] = {name}")
             lines.append(f"{name} = constants[{count}]")
             count += 1
-        for names, array, prefix in (
-            (part.p, "params", sampler.numbers.parameters),
-            (part.given, "given", sampler.numbers.given),
-        ):
-            for path, node in leaves(names):
-                if node.value in read:
-                    lines.append(f"{node.value} = {array}[{prefix.index((part.part, path))}]")
-        lines += sampler.load(part)
+        lines += [*sampler.given(part, read), *sampler.load(part)]
         for tap in part.taps:
             lines.append(f"{part.fraction(tap)} = fraction[{tap.number}]")
             row = sampler.signals.index(tap.tap.signal)

@@ -8,7 +8,7 @@ from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment, Measures, RunQuality
 from swashplate.identification.spectral_lines import SpectralLine
 from swashplate.identification.validation import pooled
-from swashplate.identification.verdict import Statement, Verdict
+from swashplate.identification.verdict import Statement, Verdict, Weight
 from swashplate.report.display_units import display_unit
 from swashplate.report.fit_page.numbers import count, plain
 from swashplate.report.fit_page.runs import ShownRun, conditions
@@ -53,9 +53,11 @@ def statements(
         lines = (
             f"{'Met' if each.passed else 'NOT MET'}: {each.name}: {each.value} "
             f"(limit {each.limit}; {each.reason})."
-            for each in judged.criteria
+            for each in sorted(judged.criteria, key=lambda each: each.passed)
         )
-        made.append(Statement("Acceptance criteria", "plain", tuple(lines)))
+        failed = {each.rules for each in judged.criteria if not each.passed}
+        weight: Weight = "bad" if "use" in failed else "look" if failed else "good"
+        made.append(Statement("Acceptance criteria", weight, tuple(lines)))
     if judged.validity:
         made.append(Statement("Range of validity", "plain", (judged.validity,)))
     if judged.assumed:
