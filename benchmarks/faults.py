@@ -269,7 +269,8 @@ def campaign(name, axis, seed):
     ratio = max(misfit.ratios.values(), default="")
     cause = misfit.causes[0].name if misfit.causes and ratio > 1.2 else ""
     code = 0 if judged.usable else 1
-    validated = verdict((), predicted).headline.split(":")[0][:12]
+    judged = verdict((), predicted)
+    validated = "predicts" if judged.usable else judged.grade
     return (
         name, axis, seed, f"{found} findings" if found else "-", judged.grade, code, ratio, cause,
         error, worst, kind, validated,
