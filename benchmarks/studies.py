@@ -18,7 +18,7 @@ from swashplate.identification.bootstrap import bootstraps_of
 from swashplate.identification.fitting import fit
 from swashplate.identification.setup import load_setup
 from swashplate.identification.validation import predict
-from swashplate.report.fit_page import write_fit_report
+from swashplate.report.fit_report import write_fit_report
 
 ROUNDS = 5
 REFITS = 1000

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
@@ -9,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyBboxPatch
 
 from reproduction.content import Diagram, Figure, Panel, Role
-from swashplate.report.broken_lines import draw_broken
+from swashplate.report.lines import draw, draw_broken, fit_time
 from swashplate.report.style import (
     BLUE,
     CYCLE,
@@ -21,15 +23,22 @@ from swashplate.report.style import (
     THIN,
     VERMILION,
     MarginLabel,
-    Margins,
     dress,
     label_below,
     label_margin,
-    line_up_labels,
     new_figure,
     zero_line,
 )
-from swashplate.report.traces import draw, fit_time
+
+
+class Margins(NamedTuple):
+    """White space around the panels of a figure. [inch]"""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
 
 WIDTH, WIDE = 5.6, 8.6
 SINGLE, STACKED = 1.85, 1.15
@@ -94,22 +103,24 @@ def draw_figure(canvas: Canvas, figure: Figure, left: float, top: float, width: 
             width - AROUND.left - AROUND.right - beside,
             tall,
         )
-        draw_panel(canvas, ax, panel)
+        draw_panel(ax, panel, tall)
         ax.tick_params(labelbottom=index == len(panels) - 1)
         axes.append(ax)
     label_below(axes[-1], "time (s)")
-    line_up_labels(canvas, axes, 0.44)
+    for ax in axes:
+        inches = ax.get_position().width * canvas.get_size_inches()[0]
+        ax.yaxis.set_label_coords(-0.44 / inches, 0.5)
 
 
 def own_canvas(figure: Figure) -> Canvas:
     """A figure of the source by itself."""
     width = WIDE if is_wide(figure) else WIDTH
-    canvas = new_figure(width, height_of(figure))
+    canvas = new_figure(width, height_of(figure), layout="none")
     draw_figure(canvas, figure, 0.0, 0.0, width)
     return canvas
 
 
-def draw_panel(canvas: Canvas, ax: Axes, panel: Panel) -> None:
+def draw_panel(ax: Axes, panel: Panel, tall: float) -> None:
     """Draw the curves of one pair of axes, their names above."""
     dress(ax, panel.ordinate)
     lows, highs = zip(
@@ -127,7 +138,8 @@ def draw_panel(canvas: Canvas, ax: Axes, panel: Panel) -> None:
     for level in panel.levels:
         ax.axhline(level.height, color=GREY, linewidth=THIN, dashes=(5.0, 3.0), zorder=1.5)
     fit_time(ax, *(curve.time for curve in panel.curves))
-    label_margin(canvas, ax, [MarginLabel(each.height, each.words, GREY) for each in panel.levels])
+    labels = [MarginLabel(each.height, each.words, GREY) for each in panel.levels]
+    label_margin(ax, labels, tall)
     handles = [
         Line2D([], [], color=color, linewidth=_WIDTHS[curve.role], label=curve.name)
         for curve, color in zip(panel.curves, colors, strict=True)

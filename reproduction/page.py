@@ -58,7 +58,7 @@ def write_page(
         lstrip_blocks=True,
     )
     environment.filters["sub"] = as_html
-    look = files("swashplate.report.fit_page").joinpath("page.css").read_text("utf-8")
+    look = files("swashplate.report.fit_report").joinpath("page.css").read_text("utf-8")
     own = files("reproduction").joinpath("page.css").read_text("utf-8")
     text = environment.get_template("page.html").render(
         title=TITLE,

@@ -147,7 +147,7 @@ class Sheets:
 
     def _page(self) -> Canvas:
         if self._canvas is None:
-            self._canvas = new_figure(WIDTH, HEIGHT)
+            self._canvas = new_figure(WIDTH, HEIGHT, layout="none")
             self._used = TOP
         return self._canvas
 

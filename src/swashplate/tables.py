@@ -1,15 +1,23 @@
-"""Tables out: CSV and Parquet, whole or not at all."""
+"""Tables of numbers with names and units, and files that are written whole or not at all.
+
+A `Table` is made once, beside the result that it shows. The terminal, the report's page and a CSV
+or Parquet file render it: people get their units and as many digits as mean something, files all
+digits in SI.
+"""
 
 from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from math import floor, isfinite, isnan, log10
 from pathlib import Path
 from secrets import token_hex
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from swashplate.errors import FileError
+from swashplate.units import chosen_unit, display_unit
 
 if TYPE_CHECKING:
     import polars
@@ -23,6 +31,224 @@ class Form(NamedTuple):
     endings: tuple[str, ...]
     also: tuple[str, ...] = ()
     """Endings that are taken without being offered."""
+
+
+class Cell(NamedTuple):
+    """A value with words of its own: a file gets the value, people get the words."""
+
+    value: str | float | None
+    text: str
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a `Table`: its name, and how its numbers are shown."""
+
+    name: str
+    spec: str = ""
+    """Of numbers, as of `format`: ``".2f"``, ``".3g"``, ``".1%"``. Empty: words."""
+    unit: str = ""
+    """SI unit of its numbers, which people get converted and named behind the column's name; ``"1"``
+    for pure numbers in rows that have a unit of their own."""
+    none: str = ""
+    """What stands for no number."""
+    wrap: bool = False
+    """Whether it is the one broken into lines where the terminal is narrow."""
+    of: str = "tpf"
+    """Where it is shown: ``t`` terminal, ``p`` page, ``f`` file."""
+    key: str = ""
+    """Its name in a file, if that is another."""
+    shade: bool = False
+    """Whether a page shades its cells by their values, from 0 to 1."""
+
+
+UNIT = Column("unit")
+"""The column of the rows' own units."""
+
+
+class Row(NamedTuple):
+    """Values of a row, one a column without that of the unit."""
+
+    cells: tuple[Any, ...]
+    unit: str
+    """SI unit of all its numbers, where they have one of their own."""
+    spec: str
+    look: bool
+    """Whether someone should look at it."""
+    section: bool
+    """Whether a line is drawn above it."""
+    total: bool = False
+    """Whether it sums up the others; a file leaves it out."""
+
+
+@dataclass
+class Table:
+    """A result as numbers with names and units, for the terminal, a page or a file."""
+
+    title: str
+    columns: Sequence[Column]
+    caption: str = ""
+    rows: list[Row] = field(default_factory=list)
+    si: bool = False
+    """Whether rows with a unit are of parameters, which are shown in SI unless a unit is chosen."""
+
+    def add(
+        self,
+        *cells: str | float | Cell | None,
+        unit: str = "",
+        spec: str = "",
+        look: bool = False,
+        section: bool = False,
+        total: bool = False,
+    ) -> None:
+        """Add a row; see `Row`. NaN counts as no number."""
+        count = sum(each is not UNIT for each in self.columns)
+        assert len(cells) == count, f"{len(cells)} cells for {count} columns of {self.title}"
+        self.rows.append(Row(cells, unit, spec, look, section or total, total))
+
+    def of(self, place: str) -> Table:
+        """The table with the columns of a place: ``"t"`` terminal, ``"p"`` page, ``"f"`` file."""
+        kept = [place in each.of for each in self.columns if each is not UNIT]
+        rows = [
+            row._replace(cells=tuple(c for c, keep in zip(row.cells, kept, strict=True) if keep))
+            for row in self.rows
+        ]
+        columns = [each for each in self.columns if each is UNIT or place in each.of]
+        return Table(self.title, columns, self.caption, rows, self.si)
+
+    def heads(self) -> list[str]:
+        """The columns' names with their units, for people."""
+        return [
+            f"{each.name} {display_unit(each.unit).name if each.unit else ''}".strip()
+            for each in self.columns
+        ]
+
+    def texts(self, row: Row) -> list[str]:
+        """A row's cells as words for people."""
+        own = [each for each in self.columns if each is not UNIT]
+        pairs = [(c, v) for c, v in zip(own, row.cells, strict=True) if not c.unit]
+        # numbers of fixed decimals keep the large unit: 0.0450 A, but 45 mA
+        fixed = any((row.spec or each.spec).endswith("f") for each, _ in pairs if each.spec)
+        size = float("inf") if fixed else largest([value for _, value in pairs])
+        shown = chosen_unit(row.unit) if self.si else display_unit(row.unit, size)
+        texts = []
+        cells = iter(row.cells)
+        for column in self.columns:
+            if column is UNIT:
+                texts.append(shown.name)
+                continue
+            unit = display_unit(column.unit) if column.unit else shown
+            pure = column.unit or column.spec.endswith("%")
+            spec = column.spec if pure else row.spec or column.spec
+            texts.append(_text(next(cells), spec, column, unit.factor))
+        return texts
+
+    def to_polars(self) -> polars.DataFrame:
+        """The numbers of the file's columns, SI, each row's own unit in the column ``unit``."""
+        import polars as pl
+
+        made = self.of("f")
+        names = [each.key or each.name for each in made.columns if each is not UNIT]
+        records = []
+        for row in (each for each in made.rows if not each.total):
+            values = [each.value if isinstance(each, Cell) else each for each in row.cells]
+            record = dict(zip(names, map(_number, values), strict=True))
+            if UNIT in made.columns:
+                place = list(made.columns).index(UNIT)
+                pairs = [*record.items()]
+                record = dict([*pairs[:place], ("unit", row.unit), *pairs[place:]])
+            records.append(record)
+        return pl.DataFrame(records, infer_schema_length=None)
+
+    def write(self, path: str | Path) -> None:
+        """Write the table of `to_polars` as CSV or Parquet, by the path's ending."""
+        write_table(self.to_polars(), path)
+
+
+def joined(tables: Sequence[Table]) -> Table:
+    """One table of the rows of several that have the same columns."""
+    return Table("", tables[0].columns, rows=[row for each in tables for row in each.rows])
+
+
+def largest(cells: Sequence[Any]) -> float:
+    """The largest magnitude of some cells' numbers, by which their unit is chosen."""
+    values = [each.value if isinstance(each, Cell) else each for each in cells]
+    sizes = [abs(each) for each in values if isinstance(each, float) and isfinite(each)]
+    return max(sizes, default=0.0) or float("inf")
+
+
+def _number(value: Any) -> Any:
+    return None if isinstance(value, float) and isnan(value) else value
+
+
+def _text(value: Any, spec: str, column: Column, factor: float) -> str:
+    if isinstance(value, Cell):
+        return value.text
+    if value is None or (isinstance(value, float) and isnan(value)):
+        return column.none
+    if isinstance(value, str) or not spec:
+        return str(value)
+    if spec.endswith("%"):
+        return format(value, spec).replace("%", " %")
+    return format(factor * value if factor != 1.0 else value, spec)
+
+
+# --- numbers as an engineer's table shows them ----------------------------------------------------
+
+NONE = "–"
+"""Stands where a table has no number."""
+
+
+def plain(value: float, digits: int = 5) -> str:
+    """A number of some significant digits, trailing zeros kept."""
+    if not isfinite(value):
+        return "none" if value == float("inf") else NONE
+    return "0" if value == 0.0 else f"{value:#.{digits}g}".rstrip(".").replace(".e", "e")
+
+
+def spread(value: float, lower: float, upper: float) -> tuple[str, str, str]:
+    """A value and the ends of its interval, all to two digits of the interval's half width."""
+    half = 0.5 * (upper - lower)
+    if not (isfinite(half) and half > 0.0):
+        return plain(value), plain(lower), plain(upper)
+    power = floor(log10(max(abs(value), half)) + 1e-3)
+    power = 0 if -5 < power < 5 else power
+    decimals = min(max(1 - floor(log10(half / 10.0**power)), 0), 12)
+    tail = f"e{power:+03d}" if power else ""
+    middle, low, high = (
+        f"{each / 10.0**power:.{decimals}f}{tail}" for each in (value, lower, upper)
+    )
+    return middle, low, high
+
+
+def percent(part: float, whole: float, *, sign: bool = False) -> str:
+    """A part of a whole in per cent, two significant digits."""
+    if whole == 0.0 or not isfinite(part / whole):
+        return NONE
+    number = 100.0 * part / abs(whole)
+    size = abs(number)
+    decimals = 0 if size >= 10.0 else 1 if size >= 1.0 else 2 if size >= 0.1 else 3
+    return f"{number:+.{decimals}f} %" if sign else f"{number:.{decimals}f} %"
+
+
+def quantity(value: float, unit: str, digits: int = 3, spec: str = "") -> str:
+    """A number with the unit that people read it in: ``"7.60 mA"``; `spec` as of `format`."""
+    shown = display_unit(unit, abs(value))
+    number = shown.factor * value
+    return f"{format(number, spec) if spec else plain(number, digits)} {shown.name}".rstrip()
+
+
+def listed(words: Sequence[str]) -> str:
+    """``a, b and c``."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def count(number: int, what: str, several: str = "") -> str:
+    """``1 run``, ``13 runs``, ``110,605 samples``."""
+    return f"{number:,} {what if number == 1 else several or what + 's'}"
+
+
+# --- files ----------------------------------------------------------------------------------------
 
 
 class Tabular(ABC):
@@ -88,6 +314,36 @@ def check_place(path: str | Path) -> None:
         reason = error.strerror or str(error)
     if reason is not None:
         raise FileError(f"{target} cannot be written: {reason}.")
+
+
+def made_folder(folder: Path) -> Path:
+    """A folder, made where it is missing.
+
+    Raises
+    ------
+    FileError
+        If it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{folder} cannot be made: {error.strerror or error}.") from None
+    return folder
+
+
+def check_folder(folder: Path) -> None:
+    """See to it, before long work, that a folder can be made and written to; nothing is made yet.
+
+    Raises
+    ------
+    FileError
+        If it cannot.
+    """
+    there = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
+    if not there.is_dir():
+        raise FileError(f"{folder} cannot be made: {there} is no folder.")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise FileError(f"{folder} cannot be written to: {there} is read-only or another user's.")
 
 
 def write_whole(path: str | Path, write: Callable[[Path], None]) -> None:

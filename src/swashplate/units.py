@@ -1,9 +1,13 @@
-"""Units at the edge: what comes in with a unit is turned into SI, or refused by name."""
+"""Units at the edge: what comes in is turned into SI or refused, what goes out is for people."""
 
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from math import pi
 from tokenize import TokenError
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from swashplate.errors import InputError
 
@@ -93,3 +97,137 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
     ):
         # pint's parser meets unreadable text with any of these
         raise InputError(f"{what} has the unreadable unit '{unit}'; give it in {wanted}.") from None
+
+
+# --- units that people read -----------------------------------------------------------------------
+
+
+class DisplayUnit(NamedTuple):
+    """A unit that people read, and its size: displayed = factor * SI."""
+
+    name: str
+    """Empty for a number without unit."""
+    factor: float
+
+    def label(self, words: str) -> str:
+        """What an axis shows, with the unit in parentheses if there is one."""
+        return f"{words} ({self.name})" if self.name else words
+
+
+_USUAL: dict[str, tuple[tuple[float, DisplayUnit], ...]] = {
+    "rad": ((0.0, DisplayUnit("deg", 180.0 / pi)),),
+    "rad/s": ((0.0, DisplayUnit("deg/s", 180.0 / pi)),),
+    "rad/s^2": ((0.0, DisplayUnit("deg/s²", 180.0 / pi)),),
+    "m": ((10.0, DisplayUnit("m", 1.0)), (0.0, DisplayUnit("mm", 1e3))),
+    "m/s": ((10.0, DisplayUnit("m/s", 1.0)), (0.0, DisplayUnit("mm/s", 1e3))),
+    "m/s^2": ((10.0, DisplayUnit("m/s²", 1.0)), (0.0, DisplayUnit("mm/s²", 1e3))),
+    "Pa": ((1e4, DisplayUnit("bar", 1e-5)), (0.0, DisplayUnit("kPa", 1e-3))),
+    "A": ((0.1, DisplayUnit("A", 1.0)), (0.0, DisplayUnit("mA", 1e3))),
+    "1": ((0.0, DisplayUnit("", 1.0)),),
+}
+"""By SI unit: the smallest size that each unit is for, the largest first."""
+_TURNS = {
+    "rpm": (("rpm", 30.0 / pi), ("turns", 0.5 / pi), ("rpm/s", 30.0 / pi)),
+    "Hz": (("turns/s", 0.5 / pi), ("turns", 0.5 / pi), ("turns/s²", 0.5 / pi)),
+    "rad/s": (("rad/s", 1.0), ("rad", 1.0), ("rad/s²", 1.0)),
+    "deg/s": (("deg/s", 180.0 / pi), ("deg", 180.0 / pi), ("deg/s²", 180.0 / pi)),
+}
+"""Speed, position and acceleration that go together."""
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_chosen: ContextVar[Mapping[str, DisplayUnit]] = ContextVar(
+    "units of choice", default=MappingProxyType({})
+)
+
+
+def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str, DisplayUnit]:
+    """The units that someone names, by the SI unit that each is shown for.
+
+    Parameters
+    ----------
+    words : sequence of str
+        Such as ``"rpm"``, ``"bar"`` and ``"mm"``. Of a drum's rope also ``"m/min"`` and ``"m/s"``
+        stand for the shaft's speed.
+    drum : float, optional
+        Diameter of the drum on the shaft. [m]
+
+    Raises
+    ------
+    InputError
+        If a unit is unknown, or measures what no table shows.
+    """
+    chosen: dict[str, DisplayUnit] = {}
+    rope = {"m/min": 60.0, "m/s": 1.0}
+    for word in words:
+        if word == "m/min" and drum is None:
+            raise InputError("A speed in m/min of rope needs the drum's diameter: --drum 0.4.")
+        turns = _TURNS.get(speed_unit(word))
+        if turns is None and word in rope and drum is not None:
+            radius = 0.5 * drum
+            turns = ((word, rope[word] * radius), ("m", radius), ("m/s²", radius))
+        if turns is not None:
+            for si, (name, factor) in zip(("rad/s", "rad", "rad/s^2"), turns, strict=True):
+                chosen[si] = DisplayUnit(name, factor)
+            continue
+        for si in ("Pa", "m", "m/s", "A", "rad"):
+            try:
+                size = to_si(1.0, word, si, "--units")
+            except InputError:
+                continue
+            chosen[si] = DisplayUnit(word, 1.0 / size)
+            break
+        else:
+            raise InputError(
+                f"No table shows a quantity in '{word}': choose one of speed (rpm, rad/s, deg/s; "
+                "m/min of rope with a drum), pressure (bar), length (mm), angle (deg) or current."
+            )
+    return chosen
+
+
+@contextmanager
+def shown_in(words: Sequence[str], drum: float | None = None) -> Iterator[None]:
+    """Show tables, plots and pages in the units named, as of `units_of_choice`, for a while."""
+    token = _chosen.set({**_chosen.get(), **units_of_choice(words, drum)})
+    try:
+        yield
+    finally:
+        _chosen.reset(token)
+
+
+def display_unit(si: str, largest: float = float("inf")) -> DisplayUnit:
+    """Unit to show a quantity in: the one chosen, else the usual one.
+
+    Parameters
+    ----------
+    si : str
+        SI unit. Compounds such as ``"rad/s/V"`` and ``"V/(rad/s)"`` follow the speed's; an unknown
+        one is shown as it is, with its exponents raised.
+    largest : float
+        Largest magnitude of what is shown, in SI.
+    """
+    if si in _chosen.get():
+        return _chosen.get()[si]
+    for size, shown in _USUAL.get(si, ()):
+        if largest >= size or size == 0.0:
+            return shown
+    base, slash, of = si.partition("/s/")
+    if slash:
+        speed = display_unit(f"{base}/s")
+        return DisplayUnit(f"({speed.name})/{of}", speed.factor)
+    if si.endswith("/(rad/s)"):
+        speed = display_unit("rad/s")
+        return DisplayUnit(f"{si.removesuffix('(rad/s)')}({speed.name})", 1.0 / speed.factor)
+    return DisplayUnit(unit_text(si), 1.0)
+
+
+def chosen_unit(si: str) -> DisplayUnit:
+    """Unit to show a parameter in: the one chosen, else SI as its file has it."""
+    return _chosen.get().get(si) or DisplayUnit(unit_text(si), 1.0)
+
+
+def unit_text(unit: str) -> str:
+    """A unit of the parameter files as print shows it: ``A/V^2`` as ``A/V²``, ``1`` as nothing."""
+    base, *rest = unit.split("^") if unit != "1" else [""]
+    for part in rest:
+        length = len(part) - len(part.lstrip("-0123456789"))
+        base += part[:length].translate(_RAISED) + part[length:]
+    return base.replace("sqrt(Pa)", "√Pa")

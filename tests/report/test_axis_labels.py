@@ -1,7 +1,6 @@
 """Labels that fit beside their axes."""
 
 import pytest
-
 from swashplate.report.axis_labels import LINES, in_lines
 
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
+from swashplate.report.bode_view import plot_bode
 
 from swashplate import Drive, InputError
 from swashplate.linear import FrequencyResponse
-from swashplate.report.bode_view import plot_bode
 from swashplate.report.style import BLUE, VERMILION
 
 

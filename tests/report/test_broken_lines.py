@@ -2,7 +2,6 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
-
 from swashplate.report.broken_lines import (
     alone,
     broken,

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-
 from swashplate.report.campaign_marks import (
     IGNORED,
     MASKED,

@@ -3,10 +3,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
+from swashplate.report.campaign_marks import IGNORED, MASKED
 
 from swashplate import Drive, InputError, Simulation, maneuvers
 from swashplate.campaign import Channel, Source
-from swashplate.report.campaign_marks import IGNORED, MASKED
 from swashplate.report.figures import plot_current
 from swashplate.report.style import FAINT, INK
 

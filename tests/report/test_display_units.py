@@ -1,5 +1,4 @@
 import pytest
-
 from swashplate.report.display_units import display_unit
 
 

@@ -2,12 +2,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from swashplate.report.display_units import display_unit
+from swashplate.report.speed_lines import cut, reach_of, speed_handles, usable_methods
 
 from swashplate import InputError
 from swashplate.campaign import Channel, Encoder, Source, Speed
-from swashplate.report.display_units import display_unit
 from swashplate.report.figures import plot_encoder
-from swashplate.report.speed_lines import cut, reach_of, speed_handles, usable_methods
 
 SOURCE = Source(Path("hoistr6.csv"), "counts")
 TIME = np.arange(1025) / 512.0

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from swashplate.report.compensation_view import plot_compensation
+from swashplate.report.envelope_view import plot_envelope
 
 from swashplate import Drive, maneuvers
 from swashplate.analysis.compensation import inverse_map
 from swashplate.analysis.envelope import envelope
 from swashplate.analysis.tracking import improvement, wanted_of_stick
-from swashplate.report.compensation_view import plot_compensation
-from swashplate.report.envelope_view import plot_envelope
 
 
 def words(figure: Figure) -> str:

@@ -11,6 +11,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from swashplate.report.fit_page import (
+    save_fit_figures,
+    save_run_figures,
+    write_fit_report,
+    write_validation_report,
+)
+from swashplate.report.fit_page.files import plot_overlay
+from swashplate.report.fit_page.numbers import percent, plain, spread, unit_text
+from swashplate.report.fit_page.page import StageProfile
+from swashplate.report.fit_page.runs import Shown, ignored_words, off_scale, shown_runs
+from swashplate.report.fit_page.truth import in_the_fits_scales
 
 from swashplate import Campaign, Channel, Drive, FileError, InputError, maneuvers
 from swashplate.campaign import Source, rig
@@ -23,17 +34,6 @@ from swashplate.identification.staging import stage_problem
 from swashplate.identification.starts import StartResult
 from swashplate.identification.validation import predict
 from swashplate.identification.verdict import verdict
-from swashplate.report.fit_page import (
-    save_fit_figures,
-    save_run_figures,
-    write_fit_report,
-    write_validation_report,
-)
-from swashplate.report.fit_page.files import plot_overlay
-from swashplate.report.fit_page.numbers import percent, plain, spread, unit_text
-from swashplate.report.fit_page.page import StageProfile
-from swashplate.report.fit_page.runs import Shown, ignored_words, off_scale, shown_runs
-from swashplate.report.fit_page.truth import in_the_fits_scales
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
 SETUP = Setup.model_validate(

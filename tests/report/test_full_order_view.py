@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from swashplate.report.full_order_view import plot_full_order
 
 from swashplate import Drive, FullOrderDrive, maneuvers
 from swashplate.full_order.comparison import Comparison, compare
-from swashplate.report.full_order_view import plot_full_order
 
 
 @pytest.fixture(scope="module")

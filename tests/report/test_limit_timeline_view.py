@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from swashplate.report.limit_timeline_view import plot_limit_timeline
 
 from swashplate import Drive, InputError, Simulation
-from swashplate.report.limit_timeline_view import plot_limit_timeline
 
 
 def test_rows_are_the_limits_that_act(step: Simulation) -> None:

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
+from swashplate.report.sensitivity_view import plot_sobol, plot_tornado
 
 from swashplate import InputError, maneuvers
 from swashplate.analysis.outcomes import trial
 from swashplate.analysis.sensitivity import one_at_a_time, ranges_of, sobol
-from swashplate.report.sensitivity_view import plot_sobol, plot_tornado
 
 LEVERS = ("orifice", "pump", "relief")
 OUTCOMES = ("final_speed", "rise_time", "overshoot")

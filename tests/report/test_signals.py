@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from swashplate.report.shading import MOST_RUNS, SHADES, active_spans, merged
+from swashplate.report.traces import MOST_POINTS, envelope
 
 from swashplate import Drive, Limit, Simulation, maneuvers
 from swashplate.report.figures import plot_simulation
-from swashplate.report.shading import MOST_RUNS, SHADES, active_spans, merged
-from swashplate.report.traces import MOST_POINTS, envelope
 
 LABELS = [
     "voltage\n(V)",

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
+from swashplate.report.steady_values import last_holding, steady_values
 
 from swashplate import Drive, InputError
 from swashplate.report.figures import plot_steady_map
-from swashplate.report.steady_values import last_holding, steady_values
 
 
 def test_curves_are_the_steady_states(hoist: Drive) -> None:

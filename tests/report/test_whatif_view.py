@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
+from swashplate.report.bands_view import plot_bands
+from swashplate.report.whatif_view import plot_whatif
 
 from swashplate import maneuvers
 from swashplate.analysis.monte_carlo import bands, independent_drives
 from swashplate.analysis.outcomes import trial
 from swashplate.analysis.whatif import what_if
-from swashplate.report.bands_view import plot_bands
-from swashplate.report.whatif_view import plot_whatif
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
+from swashplate.report.windows import rows_within
 
 from swashplate import InputError
-from swashplate.report.windows import rows_within
 
 TIME = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
 

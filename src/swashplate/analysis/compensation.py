@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -16,6 +17,7 @@ from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, FileError, InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.tables import UNIT, Column, Table
 
 if TYPE_CHECKING:
     import polars
@@ -354,7 +356,7 @@ def _rising(values: list[float]) -> list[float]:
     return values
 
 
-Column = Annotated[
+Points = Annotated[
     list[FiniteFloat], Field(min_length=FEWEST, max_length=MOST), AfterValidator(_rising)
 ]
 Positive = Annotated[FiniteFloat, Field(ge=0.0)]
@@ -365,8 +367,8 @@ class BranchFile(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    speed: Column
-    voltage: Column
+    speed: Points
+    voltage: Points
 
     @model_validator(mode="after")
     def _fits(self) -> BranchFile:
@@ -455,3 +457,39 @@ def load_map(path: str | Path) -> InverseMap:
         content.lag,
         content.error,
     )
+
+
+def wanted_table(found: InverseMap, speeds: Sequence[float]) -> Table:
+    """The voltage for each wanted speed. [rad/s]"""
+    made = Table("", (Column("wanted speed", "g", "rad/s"), Column("voltage", "z.4f", "V")))
+    for speed, voltage in zip(speeds, found.voltage(speeds), strict=True):
+        made.add(speed, float(voltage))
+    return made
+
+
+def map_table(found: InverseMap, most: int = 5) -> Table:
+    """The map, at most so many points each way."""
+    made = Table("", (Column("speed", "z.3f", "rad/s"), Column("voltage", "z.4f", "V")))
+    for branch in (found.minus, None, found.plus):
+        if branch is None:
+            made.add(found.creep, 0.0)
+            continue
+        size = branch.speed.size
+        for n in np.unique(np.linspace(0, size - 1, min(most, size)).round().astype(int)):
+            made.add(float(branch.speed[n]), float(branch.voltage[n]))
+    total = found.minus.speed.size + found.plus.speed.size + 1
+    if len(made.rows) < total:
+        made.caption = f"{len(made.rows)} of {total} points shown"
+    return made
+
+
+def map_limits_table(found: InverseMap) -> Table:
+    """Between which speeds and accelerations the map holds, its lag and its error."""
+    up, down = found.acceleration
+    made = Table("", (Column("Limit"), Column("negative", ".3f"), Column("positive", ".3f"), UNIT))
+    made.add("speed", *found.limits, unit="rad/s")
+    made.add("slowest that can be held", *found.gap, unit="rad/s", spec="z.3f")
+    made.add("acceleration at rest", -down, up, unit="rad/s^2", spec=".2f")
+    made.add("lag", "", 1e3 * found.lag, unit="ms", spec=".1f")
+    made.add("error of the straight lines", "", found.error, unit="rad/s", spec=".2g")
+    return made

@@ -32,6 +32,8 @@ from swashplate.models.refinements import static_leakage
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import instance_of
 from swashplate.simulation.run import pressure_limits, settled_state
+from swashplate.tables import UNIT, Cell, Column, Table
+from swashplate.units import display_unit
 
 if TYPE_CHECKING:
     import polars
@@ -434,3 +436,41 @@ def _times(drive: Drive, before: float, after: float) -> Times | None:
             return Times(high - low, high)
         length *= 2.0
     return None
+
+
+def envelope_table(found: Envelope) -> Table:
+    """Dead zone, gains, limits and times of both ways."""
+    ways = (found.plus, found.minus)
+    made = Table(
+        "",
+        (
+            Column("Envelope"),
+            Column("positive", "z.3f", none="none"),
+            Column("negative", "z.3f", none="none"),
+            UNIT,
+        ),
+    )
+    gain = display_unit("rad/s/V").factor
+
+    def range_of(way: Way) -> Cell:
+        if way.gain_range is None:
+            return Cell(None, "none")
+        return Cell(None, " to ".join(f"{gain * each:.3f}" for each in way.gain_range))
+
+    made.add("dead zone up to", *(way.dead_zone for way in ways), unit="V")
+    made.add("smallest speed", *(way.smallest_speed for way in ways), unit="rad/s")
+    made.add("gain, mean", *(way.gain for way in ways), unit="rad/s/V")
+    made.add("gain, range", *map(range_of, ways), unit="rad/s/V")
+    saturation = (way.saturation_voltage for way in ways)
+    made.add("saturation voltage", *saturation, unit="V", spec=".2f")
+    made.add("speed at full voltage", *(way.top_speed for way in ways), unit="rad/s")
+    made.add("speed limit", *(way.speed_limit for way in ways), unit="rad/s")
+    acceleration = (way.acceleration for way in ways)
+    made.add("acceleration at rest", *acceleration, unit="rad/s^2", spec="z.2f")
+    made.add("... set by the", *(way.accelerated_by for way in ways))
+    for step in ("starting", "stopping"):
+        times: list[Times | None] = [getattr(way, step) for way in ways]
+        made.add(f"{step}, 10 to 90 %", *(t and t.rise for t in times), unit="s")
+        made.add(f"{step}, to 90 %", *(t and t.reach for t in times), unit="s")
+    made.add("creep at 0 V", found.creep, "", unit="rad/s", section=True)
+    return made

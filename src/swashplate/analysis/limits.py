@@ -20,6 +20,7 @@ from swashplate.errors import DomainError, SwashplateError
 from swashplate.parameters.parameter_set import Change
 from swashplate.simulation.result import Limit, Simulation
 from swashplate.simulation.run import simulate_drive
+from swashplate.tables import Cell, Column, Table, quantity
 
 if TYPE_CHECKING:
     import polars
@@ -269,6 +270,32 @@ class LimitShares:
         best = self.shares[0] if self.shares else None
         return best if best is not None and (best.error_share or 0.0) > 0.0 else None
 
+    def sentences(self) -> list[str]:
+        """What to change first, and what cannot be left out."""
+        first = self.first
+        if first is None or first.error is None or first.error_share is None:
+            said = ["No single change makes the error smaller."]
+        else:
+            error = quantity(first.error, "rad/s", spec=".3f")
+            said = [
+                f"Change first: {first.component}. Without this limit the error falls by "
+                f"{100.0 * first.error_share:.1f} % to {error} rms."
+            ]
+        failed = (each for each in self.shares if each.failure)
+        return said + [f"Not without the {each.limit}: {each.failure}" for each in failed]
+
+    def eased_sentence(self) -> str:
+        """What a change of the first limit buys, where it can be eased."""
+        first = self.first
+        assert first is not None
+        assert first.eased_error is not None
+        named = " and ".join(f"{name} x {factor:.4g}" for name, factor in first.eased_by.items())
+        fall = 100.0 * (1.0 - first.eased_error / self.error)
+        return (
+            f"With {named} it {'falls' if fall >= 0.0 else 'grows'} by {abs(fall):.1f} % to "
+            f"{quantity(first.eased_error, 'rad/s', spec='.3f')} rms."
+        )
+
     def to_polars(self) -> polars.DataFrame:
         """Table of the shares, SI, the costliest first."""
         import polars as pl
@@ -446,3 +473,23 @@ def _free_speed(unlimited: Drive, run: Simulation, start: Start) -> Array:
             f"Without its limits the drive cannot be simulated, so that there is no speed to "
             f"compare with; give the one that is wanted ({str(refusal).rstrip('.')})."
         ) from None
+
+
+def share_table(found: LimitShares) -> Table:
+    """What each limit costs that does anything, the costliest first."""
+    made = Table(
+        "",
+        (
+            Column("Limit"),
+            Column("share of time", ".1%"),
+            Column("error without it\n", ".3f", "rad/s", none="none"),
+            Column("share of error", "z.1%"),
+            Column("error if alone\n", ".3f", "rad/s", none="none"),
+        ),
+    )
+    for each in found.shares:
+        if not (each.time_share or each.error_share or each.failure or each.alone):
+            continue  # it does nothing here
+        time = Cell(0.0, "never") if each.time_share == 0.0 else each.time_share
+        made.add(each.limit, time, each.error, each.error_share, each.alone)
+    return made

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.analysis.whatif import pulled
+from swashplate.analysis.outcomes import batch_outcomes
+from swashplate.analysis.whatif import WhatIf, pulled
 from swashplate.campaign import Campaign
 from swashplate.documents import read_text
 from swashplate.drive import Drive
@@ -22,6 +23,7 @@ from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.storing import load_fit
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.rules import FULL_VOLTAGE
 
 # --- draws ----------------------------------------------------------------------------------------
 
@@ -470,3 +472,28 @@ def _quantile(ordered: Array, part: float) -> Array:
     above = min(below + 1, len(ordered) - 1)
     between: Array = ordered[below] + (place - below) * (ordered[above] - ordered[below])
     return between
+
+
+def half_widths(result: WhatIf, draws: Draws, level: float = 0.95) -> Array:
+    """Half of the intervals that hold most of the drives drawn.
+
+    Parameters
+    ----------
+    result : WhatIf
+        Whose outcomes are meant.
+    draws : Draws
+        Of one of its variants.
+    level : float
+        Part of the drives within the interval.
+
+    Returns
+    -------
+    (2 + m,) array
+        Of the speed limits, positive and negative [rad/s], and of each outcome in its unit.
+    """
+    found = batch_outcomes(draws.drives[0], draws.columns, result.trial, result.outcomes)
+    speeds = [each.steady_speed([FULL_VOLTAGE, -FULL_VOLTAGE]) for each in draws.drives]
+    values = np.column_stack([np.array(speeds), found.values])
+    low, high = np.quantile(values, [0.5 - 0.5 * level, 0.5 + 0.5 * level], axis=0)
+    widths: Array = 0.5 * (high - low)
+    return widths

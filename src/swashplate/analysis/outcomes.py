@@ -17,6 +17,7 @@ from swashplate.equations.marching.lanes import LANES
 from swashplate.errors import InputError
 from swashplate.executors import Serial, available_cores
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.units import DisplayUnit, display_unit
 
 # --- trial ----------------------------------------------------------------------------------------
 
@@ -154,7 +155,18 @@ class Outcome:
     undefined: str
     """Why there may be none, as a half sentence."""
     compute: Callable[[Array, Trial], Array]
+
+    @property
+    def words(self) -> str:
+        """Its name as words."""
+        return self.name.replace("_", " ")
+
     """From (m, n) speeds [rad/s] and the command to (m,) numbers, NaN where there is none."""
+
+
+def outcome_unit(outcome: Outcome) -> DisplayUnit:
+    """Unit to show an outcome in: that of its quantity, and per cent for a share."""
+    return DisplayUnit("%", 100.0) if outcome.unit == "1" else display_unit(outcome.unit)
 
 
 def outcome_matrix(speed: Array, trial: Trial, outcomes: Sequence[Outcome]) -> Array:

@@ -16,11 +16,13 @@ from swashplate.analysis.outcomes import (
     Trial,
     batch_outcomes,
     find_outcomes,
+    outcome_unit,
     undefined_sentences,
 )
 from swashplate.analysis.whatif import find_lever, pulled_columns
 from swashplate.drive import Drive
 from swashplate.errors import InputError
+from swashplate.tables import Cell, Column, Table
 
 # --- sensitivity ----------------------------------------------------------------------------------
 
@@ -169,6 +171,12 @@ class SobolIndices:
     sentences: tuple[str, ...]
     """Which outcomes have no indices, and why."""
 
+    @property
+    def largest_error(self) -> float:
+        """Largest half width of an index that there is."""
+        errors = np.concatenate([self.first_error.ravel(), self.total_error.ravel()])
+        return float(np.max(errors[np.isfinite(errors)], initial=0.0))
+
 
 def sobol(
     drive: Drive,
@@ -272,3 +280,64 @@ def _salib(part: str) -> Any:
             "Sobol's indices need SALib, which is not installed: pip install "
             "'swashplate[sensitivity]'."
         ) from None
+
+
+FAINTEST = 5e-4
+"""A lever that moves an outcome by less than this part has no row of its own."""
+
+
+def outcome_table(single: OneAtATime, indices: SobolIndices | None, number: int) -> Table:
+    """Levers that move an outcome, the strongest first; those that do not stand in the caption."""
+    outcome, base = single.outcomes[number], float(single.base[number])
+    shown = outcome_unit(outcome)
+    decimals = ".3f" if outcome.unit == "s" else ".2f"
+
+    def words(value: float) -> str:
+        return "none" if np.isnan(value) else f"{shown.factor * value:z{decimals}}"
+
+    heads = () if indices is None else ("by itself", "in total")
+    made = Table(
+        f"{outcome.words}, {words(base)} {shown.name} as it is",
+        (
+            Column("lever"),
+            Column("factors", "s"),
+            Column("down", "s"),
+            Column("up", "s"),
+            Column("swing", ".1%"),
+            *(Column(head, "z.3f", none="none") for head in heads),
+        ),
+    )
+    swings = np.nan_to_num(single.swings[:, number], nan=0.0)
+    shares = np.zeros(swings.size) if indices is None else indices.total[:, number]
+    quiet = []
+    for k in np.argsort(-swings, kind="stable"):
+        lever = single.levers[k]
+        ends = [float(single.low[k, number]), float(single.high[k, number])]
+        missing = np.isnan(ends).any()
+        if not missing and swings[k] <= FAINTEST * abs(base) and not shares[k] > FAINTEST:
+            quiet.append(lever)
+            continue
+        low, high = single.ranges[lever]
+        swing = None if missing or base == 0.0 else swings[k] / abs(base)
+        values = () if indices is None else (indices.first[k, number], indices.total[k, number])
+        made.add(lever, f"{low:g} {high:g}", *(Cell(e, words(e)) for e in ends), swing, *values)
+    if quiet:
+        made.caption = f"not moved by {', '.join(quiet)}"
+    return made
+
+
+def sensitivity_table(single: OneAtATime, indices: SobolIndices | None) -> Table:
+    """Every number, a row for each outcome and lever, SI."""
+    heads = ["lower factor", "upper factor", "as it is", "at lower factor", "at upper factor"]
+    if indices is not None:
+        heads += ["first order", "first order, half width", "total", "total, half width"]
+    words = (Column("outcome"), Column("unit"), Column("lever"))
+    made = Table("", (*words, *(Column(head, ".6g") for head in heads)))
+    for k, outcome in enumerate(single.outcomes):
+        for j, lever in enumerate(single.levers):
+            row = [*single.ranges[lever], single.base[k], single.low[j, k], single.high[j, k]]
+            if indices is not None:
+                found = (indices.first, indices.first_error, indices.total, indices.total_error)
+                row += [each[j, k] for each in found]
+            made.add(outcome.name, outcome.unit, lever, *map(float, row))
+    return made

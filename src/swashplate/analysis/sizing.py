@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
+from math import ceil, copysign
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,8 @@ from swashplate.analysis.outcomes import Direction, Performance, Wanted, perform
 from swashplate.analysis.whatif import find_lever, pulled
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.tables import UNIT, Cell, Column, Table
+from swashplate.units import display_unit
 
 # --- search ---------------------------------------------------------------------------------------
 
@@ -381,3 +384,59 @@ def _check(requirements: Requirements, ranges: Mapping[str, Range], follow: Want
                 f"The factors on {name} must reach from at most 1 to at least 1, not from {low:g} "
                 f"to {high:g}."
             )
+
+
+def levers_table(found: Sizing) -> Table:
+    """How far each lever moves, and how far it would have to by itself."""
+    made = Table(
+        "",
+        (
+            Column("lever"),
+            Column("factor", ".4f"),
+            Column("change", "+z.2%"),
+            Column("enough by itself", ".4f", none="no"),
+        ),
+    )
+    for name, factor in found.factors.items():
+        made.add(name, factor, factor - 1.0, found.alone[name])
+    return made
+
+
+def performance_table(found: Sizing, required: Requirements) -> Table:
+    """What is required, what the drive does as it is, and what it does when changed."""
+    columns = (Column(each, ".2f") for each in ("required", "as it is", "changed"))
+    made = Table("", (Column(""), *columns, UNIT))
+    for name, sign, unit in (
+        ("speed", ">=", "rad/s"),
+        ("acceleration", ">=", "rad/s^2"),
+        ("tracking_error", "<=", "rad/s"),
+    ):
+        before, after = getattr(found.before, name), getattr(found.after, name)
+        if before is None or after is None:
+            continue
+        wanted = getattr(required, name)
+        limit = wanted and Cell(wanted, f"{sign} {display_unit(unit).factor * wanted:.2f}")
+        made.add(name.replace("_", " "), limit, before, after, unit=unit)
+    return made
+
+
+def typed_factors(
+    found: Sizing, drive: Drive, required: Requirements, follow: Wanted | None
+) -> dict[str, float]:
+    """Factors that someone can type: short, and still enough.
+
+    Each is rounded away from 1, to as few decimals, four or more, as meet what is required.
+    """
+    moved = {name: factor for name, factor in found.factors.items() if factor != 1.0}
+    for decimals in range(4, 9):
+        factors = {name: _away_from_one(factor, decimals) for name, factor in moved.items()}
+        after = performance(pulled(drive, factors), follow, direction=required.direction)
+        if min(required.slacks(after).values()) >= 0.0:
+            return factors
+    return moved
+
+
+def _away_from_one(factor: float, decimals: int) -> float:
+    # round() drops what only the factor's last bits are off a number of so many decimals
+    steps = ceil(round(abs(factor - 1.0) * 10.0**decimals, 6))
+    return 1.0 + copysign(steps, factor - 1.0) / 10.0**decimals

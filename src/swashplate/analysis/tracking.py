@@ -14,6 +14,7 @@ from swashplate.drive import Drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import InputError
 from swashplate.linear import FEWEST_STEPS, SLOWEST_CYCLE, slowest_lag
+from swashplate.tables import Cell, Column, Table
 
 if TYPE_CHECKING:
     import polars
@@ -318,3 +319,43 @@ def sine_errors(
         float(np.sqrt(other + shifted)) / amplitude,
         float(np.sqrt(other + in_time)) / amplitude,
     )
+
+
+def sine_table(sines: LargestSine) -> Table:
+    """The largest sine at each frequency that a drive follows."""
+    made = Table(
+        f"Largest sine followed within {100.0 * sines.error:g} %",
+        (
+            Column("frequency", "g", "Hz"),
+            Column("lag forgiven", ".2f", "rad/s"),
+            Column("lag counted", ".2f", "rad/s"),
+        ),
+    )
+    for frequency, *amplitudes in zip(sines.frequencies, sines.shifted, sines.in_time, strict=True):
+        made.add(frequency, *(a if a > 0.0 else Cell(0.0, "none") for a in amplitudes))
+    return made
+
+
+def improvement_table(bought: Improvement, name: str) -> Table:
+    """Errors of the speed under a command, controller by controller.
+
+    Raises
+    ------
+    InputError
+        If the command asks for standstill only.
+    """
+    plainest = bought.ways[0].error.rms
+    if plainest == 0.0:
+        raise InputError(f"{name} asks for nothing but standstill; take one that moves the drive.")
+    made = Table(
+        f"Error of the speed under {name}",
+        (
+            Column("Controller"),
+            Column("rms", ".3f", "rad/s"),
+            Column("largest", ".3f", "rad/s"),
+            Column("rms", ".1%"),
+        ),
+    )
+    for way in bought.ways:
+        made.add(way.name, way.error.rms, way.error.largest, way.error.rms / plainest)
+    return made

@@ -15,6 +15,7 @@ from swashplate.errors import InputError
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.result import Simulation
+from swashplate.tables import UNIT, Column, Table
 
 # --- levers ---------------------------------------------------------------------------------------
 
@@ -290,3 +291,50 @@ def what_if(
         values = outcome_matrix(run.shaft_speed[None, :], trial, chosen)[0]
         variants[name] = Variant(each, run, values)
     return WhatIf(dict(factors), trial, chosen, variants)
+
+
+def levers_table() -> Table:
+    """The levers, which parameters each multiplies, and what it is."""
+    made = Table("", (Column("lever"), Column("multiplies"), Column("what it is", wrap=True)))
+    for lever in LEVERS.values():
+        if lever.meaning.startswith("The same"):
+            continue
+        by = ", ".join(
+            symbol if power == 1.0 else f"{symbol} by its square"
+            for symbol, power in lever.powers.items()
+        )
+        ways = " _plus _minus" if f"{lever.name}_plus" in LEVERS else ""
+        made.add(f"{lever.name}{ways}", by, lever.meaning)
+    return made
+
+
+def before_and_after(result: WhatIf, widths: Mapping[str, Array] | None = None) -> Table:
+    """Speed limits and outcomes of the drive as it is and changed.
+
+    Parameters
+    ----------
+    result : WhatIf
+        What was compared.
+    widths : mapping of str to (2 + m,) array-like, optional
+        By variant, half of the interval of each speed limit and of each outcome, SI, as
+        `monte_carlo.half_widths` gives them.
+    """
+    error = () if widths is None else (Column("±", "z.2f", none="none"),)
+    names = ("as it is", "changed")
+    columns = [each for name in names for each in (Column(name, "z.2f", none="none"), *error)]
+    made = Table("", (Column(""), *columns, Column("change", "+z.1%"), UNIT))
+    rows = [("speed limit, positive", "rad/s"), ("speed limit, negative", "rad/s")]
+    rows += [(each.words, each.unit) for each in result.outcomes]
+    values = [
+        [*map(float, variant.speed_limits), *map(float, variant.values)]
+        for variant in (result.before, result.after)
+    ]
+    for k, (words, unit) in enumerate(rows):
+        before, after = (each[k] for each in values)
+        cells = [before, after]
+        if widths is not None:
+            cells = [before, float(widths[AS_IS][k]), after, float(widths[CHANGED][k])]
+        change = after / before - 1.0 if before else None
+        spec = {"s": "z.3f", "1": "z.2%"}.get(unit, "")
+        made.add(words, *cells, change, unit="" if unit == "1" else unit, spec=spec)
+    return made

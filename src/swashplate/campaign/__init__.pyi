@@ -21,11 +21,13 @@ from .experiment import Source as Source
 from .guess import Guess as Guess
 from .guess import fit_configuration as fit_configuration
 from .guess import guess_drive as guess_drive
+from .guess import guess_table as guess_table
 from .guess import guessed_set as guessed_set
 from .quality import Quality as Quality
 from .quality import beyond_the_card as beyond_the_card
 from .quality import campaign_findings as campaign_findings
 from .quality import examine as examine
+from .quality import quality_table as quality_table
 from .quality import spikes as spikes
 from .quality import unsigned_currents as unsigned_currents
 from .recognition import Recognised as Recognised

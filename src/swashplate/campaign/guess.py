@@ -22,6 +22,7 @@ from swashplate.drive import Drive
 from swashplate.equations.cache import kernel
 from swashplate.errors import InputError
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.tables import UNIT, Cell, Column, Table
 
 Array = NDArray[np.float64]
 
@@ -432,3 +433,24 @@ def fit_configuration(guess: Guess, start: ParameterSet) -> str:
         f"tau = {{ bounds = [0.0, {max(2.0 * guess.delay, guess.delay + 0.1):.4g}] }}    # delay",
     ]
     return "\n".join(lines) + "\n"
+
+
+def guess_table(found: Guess) -> Table:
+    """What was guessed, each way."""
+    columns = (Column(each, ".4g", none="not seen") for each in ("plus", "minus"))
+    made = Table(f"Axis {found.axis}, at first sight", (Column(""), *columns, UNIT))
+    rows = (
+        ("dead zone", found.dead_zone, "V", ".3g"),
+        ("gain beyond it", found.gain, f"{found.unit}/V", ""),
+        ("top speed", found.top_speed, found.unit, ""),
+        ("acceleration", found.acceleration, f"{found.unit}^2", ""),
+    )
+    for name, values, unit, spec in rows:
+        cells = (
+            Cell(None, "not tried") if not tried else value if isfinite(value) else None
+            for value, tried in zip(values, found.command, strict=True)
+        )
+        made.add(name, *cells, unit=unit, spec=spec)
+    made.add("delay", 1e3 * found.delay, "", unit="ms", spec=".3g")
+    made.add("lag", 1e3 * found.lag, "", unit="ms", spec=".3g")
+    return made

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,8 @@ from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.schema import applying, inside
 from swashplate.campaign.stamps import StampStatistics, stamp_statistics
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.tables import Column, Table
+from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -467,3 +470,55 @@ def _unused(
                 time = next(iter(held[0].channels.values())).time
                 of = f"{held[0].name}, which goes from {time[0]:.4g} to {time[-1]:.4g} s"
             yield f"{where}: the window from {first} to {last} holds no sample of {of}"
+
+
+def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table:
+    """The signals of one experiment: rate, jitter, gaps, range, clipping and lost counts."""
+    stamps = qualities[0].stamps
+    made = Table(
+        f"{experiment.name}: {experiment.maneuver}, to {experiment.role}, "
+        f"{experiment.duration:.4g} s, {stamps.rows} samples",
+        (
+            Column("run", of="p"),
+            Column("signal", wrap=True),
+            Column("kind", of="p"),
+            Column("samples", ",d", of="p"),
+            Column("Hz", ".4g"),
+            Column("jitter", "s", of="t"),
+            Column("gap", "s"),
+            Column("range"),
+            Column("clip", "s"),
+            Column("stuck", ".2f"),
+            Column("lost", "d"),
+            Column("ignored", "s", of="p"),
+        ),
+    )
+    for each in qualities:
+        stamps = each.stamps
+        clipped = "" if isnan(each.clipped) else f"{100.0 * each.clipped:.2g}"
+        made.add(
+            experiment.name,
+            each.signal,
+            each.kind.replace("_", " "),
+            stamps.rows,
+            stamps.rate,
+            _milliseconds(stamps.jitter),
+            _milliseconds(stamps.longest) if stamps.gaps.size else "-",
+            _range(each),
+            clipped,
+            each.stuck,
+            each.lost_counts,
+            f"{100.0 * each.ignored:.3g} %",
+            look=bool(each.findings),
+        )
+    return made
+
+
+def _milliseconds(seconds: float) -> str:
+    return f"{round(1e3 * seconds, 4):.3g}"
+
+
+def _range(quality: Quality) -> str:
+    shown = display_unit(quality.unit, max(abs(quality.low), abs(quality.high)))
+    low, high = shown.factor * quality.low, shown.factor * quality.high
+    return f"{low:z.4g} to {high:z.4g} {shown.name}".rstrip()

@@ -15,28 +15,15 @@ from typer.core import TyperGroup
 from swashplate.__about__ import __version__
 from swashplate.cli import (
     advise,
-    bode,
     campaign,
-    compare,
-    compensate,
-    demo,
     doctor,
-    excite,
     fit,
     full_order,
-    guess,
-    limits,
-    linearize,
-    parameters,
-    report,
-    rig,
-    sensitivity,
+    linear,
     simulate,
-    size,
-    tour,
-    validate,
-    whatif,
+    understand,
 )
+from swashplate.cli.options import command
 from swashplate.cli.terminal import say_error
 from swashplate.errors import SwashplateError
 
@@ -56,12 +43,13 @@ Manoeuvres, and some of the options that may follow their numbers:
   chirp:4,0.05,2          4 V from 0.05 to 2 Hz       length
   multisine:4,0.1:2:8     8 sines from 0.1 to 2 Hz    seed, length
   step:9,stop=4,length=8  an option is written name=value
-  "step +9 V"             a test of the source, by its name
+  "step +9 V"             a test of Kruse (2001), by its name
 """
 EPILOG = """\
 Examples:
   swashplate axes                                     the packaged drives
   swashplate simulate hoist step:9 --plot step.png    one run, drawn
+  swashplate simulate hoist step:9 --units rpm,bar    in other units
   swashplate simulate hoist log.csv --interpolation previous --out run.csv
   swashplate show hoist --toml > mine.toml            a drive of your own
   swashplate compare hoist mine.toml                  what that changes
@@ -121,39 +109,35 @@ def options(
     """Options before the command."""
 
 
-app.command("demo", epilog=demo.EXAMPLES, rich_help_panel="Everything at once")(demo.demo)
-app.command("tour", epilog=tour.EXAMPLES, rich_help_panel="Everything at once")(tour.tour)
-app.command("simulate", epilog=simulate.EXAMPLES, rich_help_panel="Simulate")(simulate.simulate)
-app.command("compare", epilog=compare.EXAMPLES, rich_help_panel="Simulate")(compare.compare)
-app.command("axes", epilog=parameters.AXES_EXAMPLES, rich_help_panel="Simulate")(parameters.axes)
-app.command("show", epilog=parameters.SHOW_EXAMPLES, rich_help_panel="Simulate")(
-    parameters.show_parameters
-)
-app.command("rig", epilog=rig.EXAMPLES, rich_help_panel="Test")(rig.rig)
-app.add_typer(campaign.app, name="campaign", rich_help_panel="Test")
-app.command("guess", epilog=guess.EXAMPLES, rich_help_panel="Identify")(guess.guess)
-app.command("excitation", epilog=excite.EXAMPLES, rich_help_panel="Identify")(excite.excitation)
-app.command("fit", epilog=fit.EXAMPLES, rich_help_panel="Identify")(fit.fit)
-app.command("validate", epilog=validate.EXAMPLES, rich_help_panel="Identify")(validate.validate)
-app.command("advise", epilog=advise.EXAMPLES, rich_help_panel="Identify")(advise.advise)
-app.command("report", epilog=report.EXAMPLES, rich_help_panel="Identify")(report.report)
-app.command("limits", epilog=limits.EXAMPLES, rich_help_panel="Understand")(limits.limits)
-app.command("whatif", epilog=whatif.EXAMPLES, rich_help_panel="Understand")(whatif.whatif)
-app.command("size", epilog=size.EXAMPLES, rich_help_panel="Understand")(size.size)
-app.command("sensitivity", epilog=sensitivity.EXAMPLES, rich_help_panel="Understand")(
-    sensitivity.sensitivity
-)
-app.command("compensate", epilog=compensate.EXAMPLES, rich_help_panel="Understand")(
-    compensate.compensate
-)
-app.command("linearize", epilog=linearize.EXAMPLES, rich_help_panel="Understand")(
-    linearize.linearize
-)
-app.command("bode", epilog=bode.EXAMPLES, rich_help_panel="Understand")(bode.bode)
-app.command("full-order", epilog=full_order.EXAMPLES, rich_help_panel="Understand")(
-    full_order.full_order
-)
-app.command("doctor", epilog=doctor.EXAMPLES, rich_help_panel="This installation")(doctor.doctor)
+for name, panel, function, examples in (
+    ("demo", "Everything at once", fit.demo, fit.DEMO_EXAMPLES),
+    ("tour", "Everything at once", simulate.tour, simulate.TOUR_EXAMPLES),
+    ("simulate", "Simulate", simulate.simulate, simulate.SIMULATE_EXAMPLES),
+    ("compare", "Simulate", simulate.compare, simulate.COMPARE_EXAMPLES),
+    ("axes", "Simulate", simulate.axes, simulate.AXES_EXAMPLES),
+    ("show", "Simulate", simulate.show_parameters, simulate.SHOW_EXAMPLES),
+    ("rig", "Test", campaign.rig, campaign.RIG_EXAMPLES),
+    ("campaign", "Test", campaign.app, ""),
+    ("guess", "Identify", campaign.guess, campaign.GUESS_EXAMPLES),
+    ("excitation", "Identify", advise.excitation, advise.EXCITATION_EXAMPLES),
+    ("fit", "Identify", fit.fit, fit.FIT_EXAMPLES),
+    ("validate", "Identify", fit.validate, fit.VALIDATE_EXAMPLES),
+    ("advise", "Identify", advise.advise, advise.ADVISE_EXAMPLES),
+    ("report", "Identify", fit.report, fit.REPORT_EXAMPLES),
+    ("limits", "Understand", understand.limits, understand.LIMITS_EXAMPLES),
+    ("whatif", "Understand", understand.whatif, understand.WHATIF_EXAMPLES),
+    ("size", "Understand", understand.size, understand.SIZE_EXAMPLES),
+    ("sensitivity", "Understand", understand.sensitivity, understand.SENSITIVITY_EXAMPLES),
+    ("compensate", "Understand", understand.compensate, understand.COMPENSATE_EXAMPLES),
+    ("linearize", "Understand", linear.linearize, linear.LINEARIZE_EXAMPLES),
+    ("bode", "Understand", linear.bode, linear.BODE_EXAMPLES),
+    ("full-order", "Understand", full_order.full_order, full_order.EXAMPLES),
+    ("doctor", "This installation", doctor.doctor, doctor.EXAMPLES),
+):
+    if isinstance(function, typer.Typer):
+        app.add_typer(function, name=name, rich_help_panel=panel)
+    else:
+        command(app, name, examples, panel)(function)
 
 
 def main() -> None:

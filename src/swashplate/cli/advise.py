@@ -1,4 +1,4 @@
-"""``swashplate advise``: which test to make next, and which sensor to add."""
+"""``swashplate excitation`` and ``advise``: what the runs tell, and which test to make next."""
 
 from __future__ import annotations
 
@@ -7,101 +7,171 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from swashplate.cli.advice_tables import (
-    described,
-    sensors_table,
-    tests_table,
-    unknowns_table,
-    write_advice,
+from swashplate.cli.options import (
+    AxisName,
+    CampaignPath,
+    SetupWord,
+    StartWord,
+    TableFile,
+    argument,
+    option,
 )
-from swashplate.cli.arguments import AxisName
-from swashplate.cli.inputs import maneuver_of, parameters_of
-from swashplate.cli.outputs import check_outputs
-from swashplate.cli.terminal import note, say, show, working
-from swashplate.cli.validate import chosen_axis
+from swashplate.cli.terminal import Outputs, note, say, show, working
+from swashplate.cli.words import campaign_of, file_kind, maneuver_of, parameters_of, runs_to_fit
 from swashplate.errors import InputError
-from swashplate.tables import TABLE
+from swashplate.tables import TABLE, write_text
 
 if TYPE_CHECKING:
     from swashplate.campaign import ChannelKind
     from swashplate.identification.experiment_design import Bench, Sensor
+    from swashplate.identification.identifiability import Identifiability
     from swashplate.parameters.parameter_set import ParameterSet
 
-EXAMPLES = """\
+EXCITATION_EXAMPLES = """\
+Examples:
+  swashplate excitation virtual/campaign.toml
+  swashplate excitation harbour/campaign.toml --setup mine.toml --from worn.toml
+  swashplate excitation harbour/campaign.toml --write fewer.toml --out runs.csv
+  swashplate fit harbour/campaign.toml --setup fewer.toml
+"""
+ADVISE_EXAMPLES = """\
 Examples:
   swashplate advise hoist                                      a fresh plan
   swashplate advise harbour/campaign.toml --drive fitted/drive.toml
   swashplate advise harbour/campaign.toml --maneuver step:-9 --top 1
   swashplate advise hoist --free Z9 --noise stroker_pressure=0.2bar
 """
+LEGEND = (
+    "Under 'runs', one letter a run: # tells much of what is known (20 % and more), + tells "
+    "something, o has what is needed but no sample that counts shows it, . has it not, - is not "
+    "fitted here. 's' is how long it happens in all runs, 'effect' how much 1 % of the value "
+    "changes all residuals together; 1 is one standard deviation of noise."
+)
+
+
+def excitation(
+    path: CampaignPath = Path("campaign.toml"),
+    axis: AxisName = None,
+    setup: SetupWord = None,
+    begin: StartWord = None,
+    faint: Annotated[
+        bool,
+        option(
+            "Propose to fix what is hardly determined as well: only for values you know.", "--faint"
+        ),
+    ] = False,
+    write: Annotated[
+        Path | None,
+        option("Write a fit configuration with the proposal taken.", metavar="FILE"),
+    ] = None,
+    out: TableFile = None,
+) -> None:
+    """Say before a fit what the runs can tell of each unknown, and what to fix.
+
+    Simulates the runs with the drive as it is: which thresholds and limits they
+    reach, how much each unknown changes what was measured, and which unknowns
+    can move together unseen. Proposes a set-up in which all is determined.
+    """
+    from swashplate.identification.data_checks import check_sound, refuse_unsound
+    from swashplate.identification.excitation import outlook, propose, proposed_setup
+    from swashplate.identification.fitting import smooth
+    from swashplate.identification.setup import setup_text
+    from swashplate.identification.staging import setup_of
+    from swashplate.identification.tables import outlook_rows, outlook_table
+
+    files = Outputs((write, None), (out, TABLE))
+    with working(f"Reading {path}"):
+        campaign, chosen = campaign_of(path, axis)
+        plan = setup_of(campaign, chosen, setup)
+        drive = parameters_of(begin) if begin is not None else campaign.drive(chosen).parameters
+        runs = runs_to_fit(campaign, chosen)
+    with working("Simulating"):
+        doubts = refuse_unsound(check_sound(runs, smooth(drive), plan, rank=False))
+        looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
+        proposals = [propose(each, faint=faint) for each in looks]
+    comments = {each.stage.name: each.comments() for each in proposals}
+    proposed = setup_text(proposed_setup(plan, proposals), comments)
+    changed = any(each.changes for each in proposals)
+    files.write(write, "Set-up", lambda path: write_text(proposed, path))
+    files.write(out, "Table", outlook_rows(looks).write)
+    for sentence in doubts:
+        say(f"! {sentence}")
+    names = [each.name for each in runs]
+    for look, proposal in zip(looks, proposals, strict=True):
+        show(outlook_table(look, names))
+        say(_singular_values(look.identifiability))
+        for sentence in (*_said(look.identifiability), *look.sentences()):
+            say(f"- {sentence}")
+        for sentence in proposal.sentences():
+            say(f"* {sentence}")
+    note("")
+    for number, name in enumerate(names, start=1):
+        note(f"run {number}: {name}")
+    say(LEGEND)
+    if not changed:
+        note("The set-up can stay as it is.")
+    elif write is None and any(each.proposed is not None for each in proposals):
+        note("With the starred lines (*) taken, the set-up is (--write FILE keeps it):")
+        note("")
+        note(proposed.rstrip())
+    files.say()
+
+
+def _singular_values(verdict: Identifiability) -> str:
+    sizes = verdict.singular_values
+    if not sizes.size:
+        return "No unknown changes anything: there is no singular value."
+    said = ", ".join(f"{each:.2g}" for each in sizes[: verdict.rank] / sizes[0])
+    none = sizes.size - verdict.rank
+    more = f", and {none} of nothing" if none else ""
+    return f"Singular values of the scaled derivatives, over the largest: {said}{more}."
+
+
+def _said(verdict: Identifiability) -> tuple[str, ...]:
+    """The verdict without what no run exercises, which is said with its reason."""
+    from dataclasses import replace
+
+    return replace(verdict, unexcited=()).sentences()
 
 
 def advise(
     word: Annotated[
         str,
-        typer.Argument(
-            metavar="CAMPAIGN.toml|AXIS|SET.toml",
-            help="Tests made so far; or only a drive, for a fresh plan.",
-            show_default=False,
+        argument(
+            "CAMPAIGN.toml|AXIS|SET.toml", "Tests made so far; or only a drive, for a fresh plan."
         ),
     ],
     drive: Annotated[
         str | None,
-        typer.Option(
-            help="The fitted drive: noise is then that of its residuals.",
-            metavar="SET.toml",
-            show_default=False,
-        ),
+        option("The fitted drive: noise is then that of its residuals.", metavar="SET.toml"),
     ] = None,
     axis: AxisName = None,
-    setup: Annotated[
-        str | None,
-        typer.Option(
-            help="What is to be found: hoist, slew, luff, or your own TOML file; by default the "
-            "one of the axis's drive.",
-            metavar="NAME|FILE",
-            show_default=False,
-        ),
-    ] = None,
+    setup: SetupWord = None,
     free: Annotated[
         list[str] | None,
-        typer.Option(
-            help="A parameter to be found besides, such as Z9. May be repeated.", metavar="SYMBOL"
-        ),
+        option("A parameter to be found besides, such as Z9. May be repeated.", metavar="SYMBOL"),
     ] = None,
     maneuver: Annotated[
         list[str] | None,
-        typer.Option(
-            help="A test to judge instead of the usual ones. May be repeated.", metavar="MANEUVER"
-        ),
+        option("A test to judge instead of the usual ones. May be repeated.", metavar="MANEUVER"),
     ] = None,
     sensor: Annotated[
         list[str] | None,
-        typer.Option(
-            help="A sensor to judge as an addition, such as swash_angle; by default all that the "
-            "model knows. May be repeated.",
+        option(
+            "A sensor to judge as an addition, such as swash_angle; by default all that the model "
+            "knows. May be repeated.",
             metavar="KIND",
         ),
     ] = None,
     noise: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Standard deviation of a sensor, with its unit. May be repeated.",
-            metavar="KIND=VALUE",
+        option(
+            "Standard deviation of a sensor, with its unit. May be repeated.", metavar="KIND=VALUE"
         ),
     ] = None,
-    top: Annotated[int, typer.Option(help="Tests to list.", min=1)] = 10,
-    tests: Annotated[int, typer.Option(help="Tests in the plan.", min=0)] = 4,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Write all that was computed as .csv or .parquet.",
-            metavar="FILE",
-            show_default=False,
-        ),
-    ] = None,
+    top: Annotated[int, option("Tests to list.", min=1)] = 10,
+    tests: Annotated[int, option("Tests in the plan.", min=0)] = 4,
+    out: TableFile = None,
 ) -> None:
     """Say which test, or which added sensor, would tell most of which parameter.
 
@@ -110,6 +180,7 @@ def advise(
     drive that differs from its model is known less well.
     """
     from swashplate.drive import Drive
+    from swashplate.identification import tables
     from swashplate.identification.experiment_design import (
         ADDED,
         assumed_sensors,
@@ -121,7 +192,7 @@ def advise(
     )
     from swashplate.identification.experiment_design import advise as judged
 
-    check_outputs((out, TABLE))
+    files = Outputs((out, TABLE))
     with working("Judging tests"):
         bench = _bench(word, drive, axis, setup, free or [], noise or [])
         machine = Drive(bench.parameters)
@@ -136,30 +207,39 @@ def advise(
         ranked = judged(bench.present, at_hand, bench.variables)
         plan = in_turn(bench.present, at_hand, bench.variables, tests)
         sensors = judge_sensors(bench, trials, added, beside=[each.candidate for each in plan])
-        best = best_for_each(ranked)
-    if out is not None:
-        write_advice(ranked, sensors, out)
-    show(tests_table("Tests, with the sensors at hand", ranked[:top]))
+    files.write(out, "Table", tables.advice_rows(ranked, sensors).write)
+    show(tables.advice_table("Tests, with the sensors at hand", ranked[:top]))
     for each in ranked[: min(top, 3)]:
         say(f"- {each.sentence}")
     if plan:
-        show(tests_table("A plan, each test chosen beside those before it", plan))
+        show(tables.advice_table("A plan, each test chosen beside those before it", plan))
         undetermined = [gain.name for gain in plan[-1].gains if not gain.after <= 1.0]
         if undetermined:
             say(f"- After these, {', '.join(undetermined)} would still not be known to 100 %.")
     if sensors:
         known = "what is known" if len(bench.present) else "the plan"
-        show(sensors_table(f"Sensors to add, beside {known}, where they tell most", sensors))
-    show(unknowns_table(ranked[0].gains, best))
+        best = sorted(sensors, key=lambda each: each.advice.rank)
+        show(tables.advice_table(f"Sensors to add, beside {known}, where they tell most", best))
+    show(tables.best_tests_table(ranked[0].gains, best_for_each(ranked)))
     for each_sensor in (*bench.sensors, *added):
-        note(described(each_sensor))
+        note(_described(each_sensor))
     say(
         "Errors are standard errors in per cent of the value, from noise alone and at these values "
         "of the drive; '-' is not determined (100 % and more). 'better' is by how much what is "
         "known already would be known better, on the mean."
     )
-    if out is not None:
-        note(f"Table: {out}")
+    files.say()
+
+
+def _described(sensor: Sensor) -> str:
+    """A sensor in a line: its noise, and where that is known from."""
+    from swashplate.campaign import KINDS
+
+    unit = KINDS[sensor.kind].units[0]
+    return (
+        f"{sensor.kind}: noise {sensor.noise:.3g} {unit} ({sensor.origin}), one independent sample "
+        f"every {sensor.memory:.3g} s"
+    )
 
 
 def _bench(
@@ -170,36 +250,24 @@ def _bench(
     free: Sequence[str],
     noise: Sequence[str],
 ) -> Bench:
-    from swashplate.campaign import Campaign
     from swashplate.identification.experiment_design import bench
     from swashplate.identification.fitting import smooth
     from swashplate.identification.setup import load_setup
     from swashplate.identification.staging import setup_of
 
-    if not _is_campaign(word):
+    if file_kind(Path(word)) != "campaign":
         if axis is not None:
             raise InputError("--axis belongs to a campaign; a drive is one axis.")
         parameters = parameters_of(drive or word)
         plan = load_setup(setup or parameters.name)
         return bench(smooth(parameters), plan, free=free, sensors=_noises(noise, fresh=parameters))
-    campaign = Campaign.from_toml(word)
-    chosen = chosen_axis(campaign, axis)
+    campaign, chosen = campaign_of(Path(word), axis)
     plan = setup_of(campaign, chosen, setup)
-    runs = campaign.select(axis=chosen, role="fit")
-    if not runs:
-        raise InputError(f"{word}: no run of the axis '{chosen}' has the role 'fit'.")
+    runs = runs_to_fit(campaign, chosen)
     parameters = parameters_of(drive) if drive else campaign.drive(chosen).parameters
     kinds = {channel.kind for each in runs for channel in each.channels.values()}
     own = [each for each in _noises(noise) if each.kind in kinds]
     return bench(smooth(parameters), plan, runs, fitted=drive is not None, free=free, sensors=own)
-
-
-def _is_campaign(word: str) -> bool:
-    from swashplate.documents import parse_toml, read_text
-
-    if not word.lower().endswith(".toml"):
-        return False
-    return "runs" in parse_toml(read_text(word), word)
 
 
 def _kind(word: str) -> ChannelKind:

@@ -1,23 +1,46 @@
-"""``swashplate campaign``: a first draft, a check and a picture of measured tests."""
+"""``swashplate campaign``, ``rig`` and ``guess``: measured tests, virtual ones, a first guess."""
 
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
+from math import radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from swashplate.cli.inputs import drive_file
-from swashplate.cli.outputs import check_outputs
-from swashplate.cli.quality_table import LEGEND, heading, quality_table, widths_of
-from swashplate.cli.terminal import counted, note, say, show, working
+from swashplate.cli.options import (
+    AxisName,
+    CampaignPath,
+    DriveWord,
+    Force,
+    Seed,
+    Values,
+    command,
+    option,
+)
+from swashplate.cli.terminal import (
+    Outputs,
+    note,
+    say,
+    show,
+    show_in,
+    widths_of,
+    working,
+)
+from swashplate.cli.words import (
+    campaign_of,
+    drive_file,
+    drive_of,
+    maneuver_of,
+    pairs_of,
+    runs_to_fit,
+)
 from swashplate.errors import InputError
-from swashplate.tables import FIGURE, write_text
+from swashplate.tables import FIGURE, count, write_text
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from swashplate.campaign import Campaign
 
 INIT_EXAMPLES = """\
@@ -40,63 +63,67 @@ SCHEMA_EXAMPLES = """\
 Example:
   swashplate campaign schema > campaign.schema.json
 """
+RIG_EXAMPLES = """\
+Examples:
+  swashplate rig hoist --out virtual-hoist
+  swashplate rig slew --out worn --seed 7 --severity harsh --backlash-deg 0.1
+  swashplate rig hoist --out loaded --set load_torque=30kNm --set motor_leakage=1e-6
+  swashplate rig hoist --out short --maneuver step:4 --maneuver sine:6,0.2 --perturb 0.1
+  swashplate campaign check virtual-hoist/campaign.toml
+"""
+GUESS_EXAMPLES = """\
+Examples:
+  swashplate campaign init logs/*.csv --drive neutral
+  swashplate guess logs/campaign.toml
+  swashplate fit logs/campaign.toml --from logs/start.toml --setup logs/setup.toml
+"""
+LEGEND = (
+    "jitter and longest gap in ms; clip: % of the samples at the ends of the instrument's range;\n"
+    "stuck: longest standstill of a noisy signal in s; lost: jumps that no motion explains"
+)
+Severity = Literal["clean", "realistic", "harsh"]
+CAMPAIGN = Path("campaign.toml")
 
 app = typer.Typer(
     help="Measured tests: make, check and look at a campaign file.",
     no_args_is_help=True,
     rich_markup_mode="rich",
 )
-CampaignArgument = Annotated[
-    Path, typer.Argument(metavar="CAMPAIGN.toml", help="The campaign file, beside its logs.")
-]
 
 
-@app.command("init", epilog=INIT_EXAMPLES)
 def init(
     logs: Annotated[
         list[Path], typer.Argument(metavar="LOGS...", help="The logs, one run of the machine each.")
     ],
     out: Annotated[
         Path | None,
-        typer.Option(
-            help="The campaign file; by default campaign.toml beside the first log.",
-            metavar="FILE",
-            show_default=False,
-        ),
+        option("The campaign file; by default campaign.toml beside the first log.", metavar="FILE"),
     ] = None,
     drive: Annotated[
         str | None,
-        typer.Option(
-            help="A packaged drive or a parameter file that the tests belong to.",
+        option(
+            "A packaged drive or a parameter file that the tests belong to.",
             metavar="AXIS|SET.toml",
-            show_default=False,
         ),
     ] = None,
     counts_per_turn: Annotated[
         float | None,
-        typer.Option(
-            help="Of the encoder, quadrature included; else it is left to be filled in.",
+        option(
+            "Of the encoder, quadrature included; else it is left to be filled in.",
             metavar="COUNTS",
-            show_default=False,
         ),
     ] = None,
     column: Annotated[
         list[str] | None,
-        typer.Option(
-            help="What a column is: time, voltage, shaft_speed or another kind; may be repeated.",
+        option(
+            "What a column is: time, voltage, shaft_speed or another kind; may be repeated.",
             metavar="KIND=COLUMN",
-            show_default=False,
         ),
     ] = None,
     unit: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Unit of a column; may be repeated.",
-            metavar="COLUMN=UNIT",
-            show_default=False,
-        ),
+        list[str] | None, option("Unit of a column; may be repeated.", metavar="COLUMN=UNIT")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace an older file.")] = False,
+    force: Force = False,
 ) -> None:
     """Write the first draft of a campaign file from the headers of logs.
 
@@ -107,39 +134,32 @@ def init(
     from swashplate.campaign.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
 
     target = out or logs[0].parent / "campaign.toml"
-    if target.exists() and not force:
-        raise InputError(f"{target} exists already; name another with --out, or say --force.")
-    check_outputs((target, None))
+    _keep(force, target, "another with --out")
+    Outputs((target, None))
     with working("Reading"):
         text = draft_campaign(
             logs,
             target.parent,
             _from(target.parent, drive),
             counts_per_turn,
-            columns={name: kind for kind, name in _pairs("--column", column, "voltage=u")},
-            units=dict(_pairs("--unit", unit, "u=mV")),
+            columns={name: kind for kind, name in pairs_of("--column", column, "voltage=u")},
+            units=dict(pairs_of("--unit", unit, "u=mV")),
         )
     write_text(text, target)
     note(f"Draft: {target}")
     guessed = text.count("# guessed")
-    note(f"{counted(guessed, 'entry is', 'entries are')} guessed: look for '# guessed'.")
+    note(f"{count(guessed, 'entry is', 'entries are')} guessed: look for '# guessed'.")
     for line in text.splitlines():
-        if (
-            line.startswith((UNUSED, NO_ENCODER))
-            or f"# {FIXME}" in line
-            or f'column = "{FIXME}"' in line
-        ):
+        open_ends = (f"# {FIXME}", f'column = "{FIXME}"')
+        if line.startswith((UNUSED, NO_ENCODER)) or any(each in line for each in open_ends):
             note(f"  {line.lstrip('# ')}")
     note("Then run")
     note(f"  swashplate campaign check {shlex.quote(str(target))}")
 
 
-def _pairs(option: str, given: list[str] | None, example: str) -> list[tuple[str, str]]:
-    """What stands before and behind the equals sign of each."""
-    for each in given or ():
-        if "=" not in each:
-            raise InputError(f"{option} {each} has no equals sign: write {option} {example}.")
-    return [(each.partition("=")[0], each.partition("=")[2]) for each in given or ()]
+def _keep(force: bool, path: Path, instead: str) -> None:
+    if path.exists() and not force:
+        raise InputError(f"{path} exists already; name {instead}, or say --force.")
 
 
 def _from(folder: Path, drive: str | None) -> str | None:
@@ -151,11 +171,10 @@ def _from(folder: Path, drive: str | None) -> str | None:
     return (place.relative_to(root) if place.is_relative_to(root) else place).as_posix()
 
 
-@app.command("check", epilog=CHECK_EXAMPLES)
 def check(
-    path: CampaignArgument = Path("campaign.toml"),
+    path: CampaignPath = CAMPAIGN,
     strict: Annotated[
-        bool, typer.Option("--strict", help="End with exit code 1 if there are findings.")
+        bool, option("End with exit code 1 if there are findings.", "--strict")
     ] = False,
 ) -> None:
     """Read a campaign with all its logs and say what the measurements are like.
@@ -165,21 +184,33 @@ def check(
     whatever someone should look into: also windows that no run takes, and runs
     that are far from what the axis's drive would do.
     """
-    from swashplate.campaign import Campaign, campaign_findings, examine, unsigned_currents
+    from swashplate.campaign import (
+        Campaign,
+        campaign_findings,
+        examine,
+        quality_table,
+        unsigned_currents,
+    )
+    from swashplate.cli.words import check_kind
+    from swashplate.identification.data_checks import beside_the_drives
 
+    check_kind(path, "campaign")
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
         unsigned = {name for _, name in unsigned_currents(campaign)}
         qualities = {each.name: examine(each, unsigned) for each in campaign}
-        of_file = dict.fromkeys((*campaign_findings(campaign), *_beside_the_drives(campaign)))
-    note(heading(campaign))
-    widths = widths_of(qualities.values())
+        of_file = dict.fromkeys((*campaign_findings(campaign), *beside_the_drives(campaign)))
+    roles = [each.role for each in campaign]
+    counted = ", ".join(f"{roles.count(role)} to {role}" for role in dict.fromkeys(roles))
+    virtual = " (virtual)" if campaign.virtual else ""
+    note(f"{campaign.title}{virtual}: {len(campaign)} experiments ({counted})")
+    tables = {each.name: quality_table(each, qualities[each.name]) for each in campaign}
+    widths = widths_of(tables.values())
     for experiment in campaign:
-        found = qualities[experiment.name]
-        show(quality_table(experiment, found, widths))
+        show_in(widths, tables[experiment.name])
         for text in experiment.notes:
             say(f"- {text}.")
-        for each in found:
+        for each in qualities[experiment.name]:
             for text in each.findings:
                 say(f"! {each.signal}: {text}{'' if text.endswith('?') else '.'}")
     note(LEGEND)
@@ -191,64 +222,30 @@ def check(
         note(f"Ignored, and not opened: {', '.join(campaign.ignored)}.")
     if not campaign.select(role="fit"):
         note("No run has the role 'fit'.")
-    note(
-        f"{counted(findings, 'finding', 'findings')}, marked by '!'."
-        if findings
-        else "Nothing to look into."
-    )
+    note(f"{count(findings, 'finding')}, marked by '!'." if findings else "Nothing to look into.")
     if strict and findings:
         raise typer.Exit(1)
 
 
-def _beside_the_drives(campaign: Campaign) -> list[str]:
-    """What stands out when each axis's drive is simulated under the runs' commands."""
-    from swashplate.campaign import beyond_the_card
-    from swashplate.identification.data_checks import check_runs
-    from swashplate.identification.fitting import smooth
-
-    found = []
-    for name, axis in campaign.axes.items():
-        if axis.drive is None:
-            continue
-        nominal = smooth(campaign.drive(name).parameters)
-        runs = campaign.select(axis=name)
-        beyond = [said for each in runs for said in beyond_the_card(each)]
-        found += [f"{said}; this run is not held against the drive" for said in beyond]
-        runs = tuple(each for each in runs if not beyond_the_card(each))
-        # a drive that is made up says nothing of what a machine does
-        made_up = all(each.status == "assumed" for each in nominal.values())
-        if runs and not made_up and all(each.input.kind != "other" for each in runs):
-            found += [each.sentence.rstrip(".") for each in check_runs(runs, nominal)]
-    return found
-
-
-@app.command("plot", epilog=PLOT_EXAMPLES)
 def plot(
-    path: CampaignArgument = Path("campaign.toml"),
-    out: Annotated[
-        Path, typer.Option(help="The figure: .png, .svg or .pdf.", metavar="FILE")
-    ] = Path("campaign.png"),
+    path: CampaignPath = CAMPAIGN,
+    out: Annotated[Path, option("The figure: .png, .svg or .pdf.", metavar="FILE")] = Path(
+        "campaign.png"
+    ),
     run: Annotated[
         str | None,
-        typer.Option(
-            help="Look at one experiment closely; --channel must be given.",
-            metavar="NAME",
-            show_default=False,
-        ),
+        option("Look at one experiment closely; --channel must be given.", metavar="NAME"),
     ] = None,
     channel: Annotated[
         str | None,
-        typer.Option(
-            help="An encoder or position: raw against smoothed, and its speed. A rectified "
-            "current: measured against simulated.",
+        option(
+            "An encoder or position: raw against smoothed, and its speed. A rectified current: "
+            "measured against simulated.",
             metavar="NAME",
-            show_default=False,
         ),
     ] = None,
-    begin: Annotated[
-        float | None, typer.Option("--from", help="Show from here on.", metavar="S")
-    ] = None,
-    end: Annotated[float | None, typer.Option("--to", help="Show up to here.", metavar="S")] = None,
+    begin: Annotated[float | None, option("Show from here on.", "--from", metavar="S")] = None,
+    end: Annotated[float | None, option("Show up to here.", "--to", metavar="S")] = None,
 ) -> None:
     """Draw all runs and channels of a campaign, or one channel closely.
 
@@ -256,9 +253,9 @@ def plot(
     are several.
     """
     from swashplate.campaign import Campaign
-    from swashplate.report.figures import plot_campaign, save_figure
+    from swashplate.report.figures import plot_campaign
 
-    check_outputs((out, FIGURE))
+    files = Outputs((out, FIGURE))
     with working(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
     channels = () if run is None else campaign[run].channels
@@ -267,51 +264,146 @@ def plot(
         raise InputError(
             f"--run and --channel go together: give both, or none for the overview{known}."
         )
-    with working("Drawing"):
-        if run is not None and channel is not None:
-            targets = [out]
-            save_figure(_close_look(campaign, run, channel, begin, end), out)
-        else:
-            title = f"{campaign.title} (virtual)" if campaign.virtual else campaign.title
-            figures = plot_campaign(campaign.experiments, title=title)
-            targets = [
-                out if len(figures) == 1 else out.with_stem(f"{out.stem}-{number}")
-                for number in range(1, len(figures) + 1)
-            ]
-            for figure, target in zip(figures, targets, strict=True):
-                save_figure(figure, target)
-    for target in targets:
-        note(f"Figure: {target}")
+    if run is not None and channel is not None:
+        _close_look(files, out, campaign, run, channel, begin, end)
+    else:
+        title = f"{campaign.title} (virtual)" if campaign.virtual else campaign.title
+        figures = plot_campaign(campaign.experiments, title=title)
+        for number, figure in enumerate(figures, start=1):
+            several = out.with_stem(f"{out.stem}-{number}")
+            files.draw(out if len(figures) == 1 else several, figure)
+    files.say()
 
 
 def _close_look(
-    campaign: Campaign, run: str, channel: str, begin: float | None, end: float | None
-) -> Figure:
-    from swashplate.report.figures import plot_current, plot_encoder
-
-    experiment = campaign[run]
-    chosen = experiment[channel]
-    window = None
-    if begin is not None or end is not None:
-        first, last = float(chosen.time[0]), float(chosen.time[-1])
-        window = (first if begin is None else begin, last if end is None else end)
-    title = f"{run}, {channel}"
-    if chosen.is_position:
-        return plot_encoder(chosen, window=window, title=title)
-    if chosen.kind != "rectified_current":
+    files: Outputs,
+    out: Path,
+    campaign: Campaign,
+    run: str,
+    name: str,
+    begin: float | None,
+    end: float | None,
+) -> None:
+    channel = campaign[run][name]
+    first, last = float(channel.time[0]), float(channel.time[-1])
+    window = (first if begin is None else begin, last if end is None else end)
+    how = {"window": None if begin is end is None else window, "title": f"{run}, {name}"}
+    if channel.is_position:
+        files.draw(out, "plot_encoder", channel, **how)
+        return
+    if channel.kind != "rectified_current":
         raise InputError(
-            f"{run} {channel} is a {chosen.kind}; a close look is for encoders, positions and "
+            f"{run} {name} is a {channel.kind}; a close look is for encoders, positions and "
             "rectified currents."
         )
-    drive = campaign.drive(experiment.axis)
-    signal = experiment.input
+    signal, drive = campaign[run].input, campaign.drive(campaign[run].axis)
     simulation = drive.simulate(signal.values, time=signal.time, interpolation=signal.interpolation)
-    return plot_current(chosen, simulation, window=window, title=title)
+    files.draw(out, "plot_current", channel, simulation, **how)
 
 
-@app.command("schema", epilog=SCHEMA_EXAMPLES)
 def schema() -> None:
     """Print a campaign file's JSON Schema, for editors that check while one writes."""
     from swashplate.campaign import json_schema
 
     typer.echo(json_schema(), nl=False)
+
+
+command(app, "init", INIT_EXAMPLES)(init)
+command(app, "check", CHECK_EXAMPLES)(check)
+command(app, "plot", PLOT_EXAMPLES)(plot)
+command(app, "schema", SCHEMA_EXAMPLES)(schema)
+
+
+def rig(
+    drive: DriveWord,
+    out: Annotated[Path, option("A new or empty folder for logs and campaign.", metavar="DIR")],
+    seed: Seed = 1,
+    severity: Annotated[
+        Severity,
+        option("The instruments: perfect, as in a good campaign, or with everything wrong."),
+    ] = "realistic",
+    values: Values = None,
+    backlash_deg: Annotated[float, option("Play between shaft and encoder.", metavar="DEG")] = 0.0,
+    perturb: Annotated[
+        float, option("Draw all true parameters, fixed ones too, within this share: 0.1.")
+    ] = 0.0,
+    maneuver: Annotated[
+        list[str] | None,
+        option(
+            "A test instead of those of Kruse (2001), such as step:4. May be repeated.",
+            metavar="MANEUVER",
+        ),
+    ] = None,
+    force: Annotated[bool, option("Write into a folder that is not empty.", "--force")] = False,
+) -> None:
+    """Write a virtual test campaign: logs, campaign.toml and, apart, the truth.
+
+    A drive with known parameters is simulated over the tests of Kruse (2001)
+    and read by instruments with chosen errors. --set changes the drive that is
+    simulated, not the one that a fit starts from. Fit it as you would your
+    machine's logs, then look into truth/. Every file says that it is virtual.
+    """
+    from swashplate.campaign import rig as bench
+    from swashplate.tables import Column, Table
+
+    with working("Simulating"):
+        nominal = drive_of(drive)
+        tests = bench.run(
+            drive if drive_file(drive) is None else nominal,
+            None if not maneuver else [maneuver_of(each, nominal) for each in maneuver],
+            seed=seed,
+            severity=severity,
+            instruments=replace(bench.SEVERITIES[severity], backlash=radians(backlash_deg)),
+            truth=drive_of(drive, values) if values else None,
+            perturb=perturb,
+        )
+    with working("Writing"):
+        path = bench.write(tests, out, overwrite=force)
+    numbers = (Column("rows", "d"), Column("s", ".4g"))
+    words = (Column("log"), Column("manoeuvre", wrap=True), Column("role"))
+    made = Table("", (*words, *numbers))
+    for run in tests.runs.values():
+        time = run.columns["time"]
+        made.add(f"{run.stem}.csv", run.name, run.role, time.size, float(time[-1] - time[0]))
+    show(made)
+    note(f"Campaign: {path}")
+    note(f"Truth:    {path.parent / 'truth'} (look only after the fit)")
+
+
+def guess(
+    path: CampaignPath = CAMPAIGN,
+    axis: AxisName = None,
+    out: Annotated[
+        Path | None,
+        option("Folder for start.toml and setup.toml; by default the campaign's.", metavar="DIR"),
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Read a machine's dead zones, gains, limits, delay and lag off its logs.
+
+    For a machine of unknown numbers: needs the command and a speed or a position,
+    no current. Writes a drive to start a fit from, start.toml, and what the fit
+    is to change within which bounds, setup.toml.
+    """
+    from swashplate.campaign import fit_configuration, guess_drive, guess_table, guessed_set
+    from swashplate.drive import Drive
+
+    with working(f"Reading {path}"):
+        campaign, chosen = campaign_of(path, axis)
+        runs = runs_to_fit(campaign, chosen)
+        folder = path.parent if out is None else out
+        start, setup = folder / "start.toml", folder / "setup.toml"
+        for each in (start, setup):
+            _keep(force, each, "a folder with --out")
+        found = guess_drive(runs)
+        parameters = guessed_set(found, path.name)
+        folder.mkdir(parents=True, exist_ok=True)
+        Drive(parameters).to_toml(start)
+        write_text(fit_configuration(found, parameters), setup)
+    show(guess_table(found))
+    note(f"These numbers alone follow the mean speeds to {found.fit_percent:.1f} %.")
+    note(f"Start:             {start}")
+    note(f"Fit configuration: {setup}")
+    note("Then run")
+    words = ["swashplate", "fit", str(path), "--from", str(start), "--setup", str(setup)]
+    note(f"  {shlex.join(words)}")

@@ -7,15 +7,13 @@ import platform
 import sys
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import typer
 
 from swashplate.__about__ import __version__
-from swashplate.cli.terminal import note, say, show, table, working
-
-if TYPE_CHECKING:
-    from rich.table import Table
+from swashplate.cli.terminal import note, say, show, working
+from swashplate.tables import Column, Table
 
 EXAMPLES = """\
 Examples:
@@ -74,24 +72,24 @@ def _version(library: str) -> str | None:
 
 
 def _versions() -> Table:
-    made = table("Versions", "what", "version")
-    made.add_row("swashplate", __version__)
-    made.add_row("Python", f"{platform.python_version()} ({platform.python_implementation()})")
+    made = Table("Versions", (Column("what"), Column("version")))
+    made.add("swashplate", __version__)
+    made.add("Python", f"{platform.python_version()} ({platform.python_implementation()})")
     for library in LIBRARIES:
-        made.add_row(library, _version(library) or "missing: install swashplate again")
+        made.add(library, _version(library) or "missing: install swashplate again")
     return made
 
 
 def _machine() -> Table:
-    made = table("Machine", "what", "found")
-    made.add_row("system", f"{platform.system()} {platform.machine()}")
-    made.add_row("cores", _cores())
+    made = Table("Machine", (Column("what"), Column("found")))
+    made.add("system", f"{platform.system()} {platform.machine()}")
+    made.add("cores", _cores())
     threads = os.environ.get("OPENBLAS_NUM_THREADS")
     if threads:
-        made.add_row("OPENBLAS_NUM_THREADS", threads)
+        made.add("OPENBLAS_NUM_THREADS", threads)
     if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
-        made.add_row("NUMBA_DISABLE_JIT", "set: nothing is compiled, all is a hundred times slower")
-    made.add_row("installed in", str(Path(sys.prefix)))
+        made.add("NUMBA_DISABLE_JIT", "set: nothing is compiled, all is a hundred times slower")
+    made.add("installed in", str(Path(sys.prefix)))
     return made
 
 
@@ -102,9 +100,10 @@ def _cores() -> str:
 
 
 def _extras() -> Table:
-    made = table("Extras: pip install 'swashplate[NAME]'", "name", "version", "enables")
+    columns = (Column("name"), Column("version"), Column("enables"))
+    made = Table("Extras: pip install 'swashplate[NAME]'", columns)
     for extra in EXTRAS:
-        made.add_row(extra.name, _version(extra.library) or "-", extra.enables)
+        made.add(extra.name, _version(extra.library) or "-", extra.enables)
     return made
 
 

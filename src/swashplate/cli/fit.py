@@ -1,35 +1,64 @@
-"""``swashplate fit``: from a campaign to an identified drive."""
+"""``swashplate fit``, ``validate``, ``report`` and ``demo``: from tests to a judged drive."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from swashplate.cli.arguments import AxisName, CampaignPath, OwnModel
-from swashplate.cli.fit_output import (
-    estimates_table,
-    folds_table,
-    held_line,
-    quality_table,
-    written,
+from swashplate.cli.options import (
+    AxisName,
+    CampaignPath,
+    Figures,
+    OwnModel,
+    PrintFigures,
+    Required,
+    Seed,
+    SetupWord,
+    StartWord,
+    argument,
+    option,
 )
-from swashplate.cli.inputs import parameters_of
-from swashplate.cli.judging import Wanted, judged_fit
-from swashplate.cli.terminal import Shown, Timing, long_work, note, say, show, waiting, working
-from swashplate.cli.validate import check_folder, chosen_axis
-from swashplate.cli.validation_tables import shown_verdict
+from swashplate.cli.terminal import (
+    Shown,
+    Timing,
+    long_work,
+    note,
+    progress,
+    say,
+    show,
+    side,
+    waiting,
+    working,
+)
+from swashplate.cli.words import (
+    DRIVE,
+    NUMBERS,
+    campaign_of,
+    model_parameters_of,
+    parameters_of,
+    runs_to_fit,
+)
 from swashplate.errors import InputError
+from swashplate.tables import check_folder, joined, made_folder, write_text
 
 if TYPE_CHECKING:
+    from swashplate.campaign import Campaign
+    from swashplate.drive import Drive
+    from swashplate.identification.assessment import RunQuality
     from swashplate.identification.fitting import Search
+    from swashplate.identification.judging import Judged
     from swashplate.identification.solving import Progress
     from swashplate.identification.staging import Parameters
     from swashplate.identification.starts import StartResult
+    from swashplate.identification.storing import StoredFit
+    from swashplate.identification.verdict import Verdict
+    from swashplate.parameters.parameter_set import ParameterSet
 
-EXAMPLES = """\
+FIT_EXAMPLES = """\
 Examples:
   swashplate rig hoist --out virtual --perturb 0.1
   swashplate fit virtual/campaign.toml --out fitted
@@ -38,86 +67,79 @@ Examples:
   swashplate fit valve/campaign.toml --model valve.py
   swashplate simulate fitted/drive.toml step:9
 """
-
+VALIDATE_EXAMPLES = """\
+Examples:
+  swashplate validate fitted/drive.toml virtual/campaign.toml
+  swashplate validate hoist harbour/campaign.toml --role all --out validation
+"""
+REPORT_EXAMPLES = """\
+Examples:
+  swashplate fit virtual/campaign.toml --out fitted
+  swashplate report fitted virtual/campaign.toml --truth virtual/truth
+  swashplate report fitted virtual/campaign.toml --figures pdf
+"""
+DEMO_EXAMPLES = """\
+Examples:
+  swashplate demo
+  swashplate demo --out results --seed 3
+"""
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as of other programs."""
 FEWEST_DRAWS = 40
 """Of a bootstrap: one beyond each end of a 95 % interval."""
+STORED = "fit.json"
+"""What a fit keeps of itself, beside the drive that it found."""
+MEASURES = (
+    "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - NRMSE); "
+    "'of its range' below means RMSE over the largest less the smallest value measured."
+)
+RESIDUALS = (
+    "'own' is how long residuals stay correlated, 'input' their largest correlation with the "
+    "command, at that lag (positive: after it). Residuals that owe nothing to the command stay "
+    "within the band at 95 % of the lags; * marks what lies beyond, as the largest may by chance."
+)
 
 Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
-Figures = Literal["svg", "pdf"]
+Role = Literal["validate", "fit", "all"]
+CAMPAIGN = Path("campaign.toml")
 
 
 def fit(
-    path: CampaignPath = Path("campaign.toml"),
+    path: CampaignPath = CAMPAIGN,
     out: Annotated[
-        Path, typer.Option(help="Folder for the fitted drive and its tables.", metavar="DIR")
+        Path, option("Folder for the fitted drive and its tables.", metavar="DIR")
     ] = Path("fitted"),
     axis: AxisName = None,
-    setup: Annotated[
-        str | None,
-        typer.Option(
-            help="What is free: a packaged set-up (hoist, slew, luff, hoist-source ...) or your "
-            "own TOML file; by default the one of the axis's drive.",
-            metavar="NAME|FILE",
-            show_default=False,
-        ),
-    ] = None,
+    setup: SetupWord = None,
     model: OwnModel = None,
     joint: Annotated[
-        bool,
-        typer.Option("--joint", help="After the stages all unknowns at once, through the chain."),
+        bool, option("After the stages all unknowns at once, through the chain.", "--joint")
     ] = False,
-    begin: Annotated[
-        str | None,
-        typer.Option(
-            "--from",
-            help="Start from this drive instead of the campaign's.",
-            metavar="AXIS|SET.toml",
-            show_default=False,
-        ),
-    ] = None,
-    starts: Annotated[int, typer.Option(help="More starts, spread over the bounds.", min=0)] = 0,
+    begin: StartWord = None,
+    starts: Annotated[int, option("More starts, spread over the bounds.", min=0)] = 0,
     folds: Annotated[
-        int, typer.Option(help="Cross-validate over so many parts of the runs; 0: not.", min=0)
+        int, option("Cross-validate over so many parts of the runs; 0 = off.", min=0)
     ] = 0,
-    bootstrap: Annotated[
-        int, typer.Option(help="Fit again to so many draws of the noise.", min=0)
-    ] = 0,
+    bootstrap: Annotated[int, option("Fit again to so many draws of the noise.", min=0)] = 0,
     profile: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Follow the cost along this unknown, or 'all'; may be repeated.",
-            metavar="NAME",
-            show_default=False,
-        ),
+        option("Follow the cost along this unknown, or 'all'; may be repeated.", metavar="NAME"),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of starts, folds and bootstrap.", min=0)] = 0,
-    jobs: Annotated[int, typer.Option(help="Processes for all of these; 0: all cores.", min=0)] = 0,
+    seed: Seed = 0,
+    jobs: Annotated[int, option("Processes for all of these; 0 = all cores.", min=0)] = 0,
     dask: Annotated[
-        str | None,
-        typer.Option(
-            help="Run them on the cluster of this scheduler.",
-            metavar="ADDRESS",
-            show_default=False,
-        ),
+        str | None, option("Run them on the cluster of this scheduler.", metavar="ADDRESS")
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the starts that DIR holds already.")
+        bool, option("Continue a search: keep the starts that DIR holds already.", "--resume")
     ] = False,
-    loss: Annotated[Loss, typer.Option(help="Robust losses forgive outliers.")] = "linear",
-    require: Annotated[
-        float,
-        typer.Option(help="Largest error of held-out runs, in % of their range.", min=0.0),
-    ] = 10.0,
-    report: Annotated[
-        bool, typer.Option(help="Write report.html, one file that works offline.")
-    ] = True,
-    figures: Annotated[
-        Figures | None,
-        typer.Option(help="Figures for print as well, in DIR/figures.", show_default=False),
-    ] = None,
-    timing: Annotated[bool, typer.Option("--timing", help="Say how long each part took.")] = False,
+    loss: Annotated[
+        Loss, option("Robust loss functions reduce the weight of outliers.")
+    ] = "linear",
+    require: Required = 10.0,
+    report: Annotated[bool, option("Write report.html, one file that works offline.")] = True,
+    figures: PrintFigures = None,
+    timing: Annotated[bool, option("Say how long each part took.", "--timing")] = False,
 ) -> None:
     """Identify a drive, or a model of your own, from its tests.
 
@@ -138,20 +160,17 @@ def fit(
     if model is not None and (setup is not None or begin is not None or joint):
         raise InputError(f"{model} says what is free and where it begins: leave out the others.")
     with working("Starting"):
-        from swashplate.campaign import Campaign
         from swashplate.executors import Dask, Processes
         from swashplate.identification.fitting import fit as fitted
         from swashplate.identification.fitting import refined
+        from swashplate.identification.judging import Wanted, judge_fit
         from swashplate.identification.own_model import ModelSetup
         from swashplate.identification.solving import longest_left
         from swashplate.identification.staging import setup_of
     clock.ended("start")
     with working(f"Reading {path}"):
-        campaign = Campaign.from_toml(path)
-        chosen = chosen_axis(campaign, axis)
-        runs = campaign.select(axis=chosen, role="fit")
-        if not runs:
-            raise InputError(f"{path}: no run of the axis '{chosen}' has the role 'fit'.")
+        campaign, chosen = campaign_of(path, axis)
+        runs = runs_to_fit(campaign, chosen)
         nominal: Parameters
         if model is not None:
             nominal = ModelSetup.from_file(model).nominal(runs)
@@ -185,43 +204,13 @@ def fit(
         )
         raise typer.Exit(INTERRUPTED)
     wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, loss, require / 100.0)
-    found = judged_fit(campaign, chosen, runs, nominal, plan, result, wanted)
+    with working("Judging") as status:
+        found = judge_fit(campaign, chosen, runs, nominal, plan, result, wanted, status.update)
     clock.ended("judging")
-    lines = [
-        *written(result, found.assessments, campaign, out, found.bootstraps),
-        found.stored(out),
-    ]
-    if report:
-        lines.append(found.reported(out))
-    if figures is not None:
-        lines.append(found.drawn(out, figures))
+    lines = [*_written(found, out), *_shown(found, out, report=report, figures=figures)]
     clock.ended("report and files")
     note(f"{campaign.title}{' (virtual)' if campaign.virtual else ''}: fitted in {seconds:.2f} s")
-    for each_run in runs:
-        for sentence in each_run.notes:
-            say(f"- {each_run.name}: {sentence}.")
-    for sentence in result.doubts:
-        say(f"! {sentence}")
-    for each in found.assessments:
-        name, solution = each.stage.stage.name, each.stage.solution
-        show(estimates_table(each, found.bootstraps.get(name)))
-        say(f"{name}: {solution.message} after {solution.evaluations} evaluations.")
-        said = (*each.identifiability.sentences(), *each.uncertainty.sentences())
-        drawn = found.bootstraps[name].sentences() if name in found.bootstraps else ()
-        for sentence in (*said, *drawn):
-            say(f"- {sentence}")
-    for each_profile in found.profiles:
-        for sentence in each_profile.profile.sentences(found.name_of(each_profile)):
-            say(f"- {sentence}")
-    say(held_line(result))
-    fitted_runs = [quality for each in found.assessments for quality in each.runs]
-    show(quality_table("Runs that were fitted", fitted_runs))
-    if found.predicted:
-        show(quality_table("Runs that were held back and predicted", found.predicted))
-    if found.folds is not None:
-        show(folds_table(found.folds))
-        for sentence in found.folds.sentences():
-            say(f"- {sentence}")
+    _say_fit(found)
     for line in lines:
         note(line)
     if timing:
@@ -230,7 +219,7 @@ def fit(
     if result.interrupted:
         note("Interrupted: this is the best so far, not an optimum.")
         raise typer.Exit(INTERRUPTED)
-    shown_verdict(found.verdict)
+    _say_verdict(found.verdict)
 
 
 def _search(
@@ -254,3 +243,367 @@ def _search(
         )
 
     return Search(starts, seed, executor, out / "starts", resume, watch)
+
+
+def _say_fit(found: Judged) -> None:
+    """What was found, stage by stage, and how well each run is followed."""
+    from swashplate.identification.tables import (
+        estimates_table,
+        fixed_line,
+        folds_tables,
+        runs_tables,
+    )
+
+    for run in found.runs:
+        for sentence in run.notes:
+            say(f"- {run.name}: {sentence}.")
+    for sentence in found.result.doubts:
+        say(f"! {sentence}")
+    for each in found.assessments:
+        name, solution = each.stage.stage.name, each.stage.solution
+        bootstrap = found.bootstraps.get(name)
+        show(estimates_table(each, bootstrap=bootstrap))
+        say(f"{name}: {solution.message} after {solution.evaluations} evaluations.")
+        drawn = () if bootstrap is None else bootstrap.sentences()
+        _listed(each.identifiability.sentences(), each.uncertainty.sentences(), drawn)
+    for profile in found.profiles:
+        _listed(profile.profile.sentences(found.name_of(profile)))
+    say(fixed_line(found.result))
+    note("")
+    note("Runs that were fitted")
+    show(*runs_tables([quality for each in found.assessments for quality in each.runs]))
+    if found.predicted:
+        note("Runs that were held out and predicted")
+        show(*runs_tables(found.predicted))
+    if found.folds is not None:
+        show(folds_tables(found.folds, found.assessments)[0])
+        _listed(found.folds.sentences())
+
+
+def _listed(*groups: Sequence[str]) -> None:
+    for group in groups:
+        for sentence in group:
+            say(f"- {sentence}")
+
+
+def _written(found: Judged, out: Path) -> list[str]:
+    """Write drive, estimates and what the report can be made from; lines that say so."""
+    from tomlkit import dumps
+
+    from swashplate.drive import Drive
+    from swashplate.identification.own_model import ModelParameters
+    from swashplate.identification.tables import estimates_table
+
+    made_folder(out)
+    parameters = found.result.parameters
+    if isinstance(parameters, ModelParameters):
+        numbers = {name: float(value) for name, value in parameters.numbers.items()}
+        write_text(dumps({parameters.name: numbers}), out / NUMBERS)
+        lines = [f"Numbers:   {out / NUMBERS}"]
+    else:
+        Drive(found.fitted_set()).to_toml(out / DRIVE)
+        lines = [f"Drive:     {out / DRIVE}"]
+    tables = [
+        estimates_table(each, bootstrap=found.bootstraps.get(each.stage.stage.name), own=own)
+        for each in found.assessments
+        for own in (False, True)
+    ]
+    joined(tables).write(out / "estimates.csv")
+    found.store(out / STORED)
+    return [*lines, f"Estimates: {out / 'estimates.csv'}", f"Fit:       {out / STORED}"]
+
+
+def _shown(
+    found: Judged,
+    out: Path,
+    *,
+    report: bool = True,
+    figures: Figures | None = None,
+    truth: ParameterSet | None = None,
+) -> list[str]:
+    """Write the report and the figures for print; lines that say so."""
+    from swashplate.report.figures import save_fit_figures
+    from swashplate.report.fit_report import write_fit_report
+
+    what, lines = (found.result, found.campaign), []
+    shared = {"assessments": found.assessments, "validation": found.predicted}
+    if report:
+        with working("Writing the report"):
+            write_fit_report(
+                *what,
+                out / "report.html",
+                profiles=found.profiles,
+                folds=found.folds,
+                truth=truth,
+                judged=found.verdict,
+                notes=found.notes,
+                **shared,  # type: ignore[arg-type]
+            )
+        lines.append(f"Report:    {out / 'report.html'}")
+    if figures is not None:
+        with working("Drawing"):
+            paths = save_fit_figures(*what, out / "figures", figures, **shared)  # type: ignore[arg-type]
+        lines.append(f"Figures:   {len(paths)} in {out / 'figures'}")
+    return lines
+
+
+def _say_verdict(verdict: Verdict) -> None:
+    """Print criteria, range of validity, what is assumed, and the headline.
+
+    Raises
+    ------
+    Exit
+        With code 1 if what was judged is not usable.
+    """
+    from swashplate.identification.tables import criteria_table
+
+    show(criteria_table(verdict))
+    if verdict.assumed:
+        say("Assumed, cannot be checked from these logs:")
+    _listed(verdict.assumed)
+    if not verdict.usable:
+        side.print(verdict.headline)
+        raise typer.Exit(1)
+    say(verdict.headline)
+    if verdict.validity:
+        say(verdict.validity)
+
+
+def validate(
+    drive: Annotated[
+        str,
+        argument(
+            "SET.toml", "The drive: a parameter file, the folder of a fit, or a packaged one."
+        ),
+    ],
+    path: CampaignPath = CAMPAIGN,
+    axis: AxisName = None,
+    model: OwnModel = None,
+    role: Annotated[Role, option("Runs that were held out, those to fit, or both.")] = "validate",
+    out: Annotated[
+        Path | None, option("Folder for report.html and measures.csv.", metavar="DIR")
+    ] = None,
+    require: Required = 10.0,
+    figures: PrintFigures = None,
+) -> None:
+    """Predict runs from their command alone and judge the drive by them.
+
+    Prints errors run by run, the error tables of Kruse (2001) with what they
+    leave out, what is left in the residuals, and a verdict. The exit code is 1
+    if the drive is not usable for these runs.
+    """
+    from swashplate.identification import tables
+    from swashplate.identification.validation import (
+        channel_errors,
+        predict,
+        source_rules,
+        with_speeds,
+    )
+    from swashplate.identification.verdict import verdict
+
+    if figures is not None and out is None:
+        raise InputError("--figures needs a folder to write them to: give --out DIR.")
+    with working(f"Reading {path}"):
+        parameters: Parameters | None = None if model else parameters_of(drive)
+        campaign, chosen = campaign_of(path, axis)
+        wanted = ("fit", "validate") if role == "all" else (role,)
+        runs = [each for each in campaign.select(axis=chosen) if each.role in wanted]
+    if not runs:
+        raise InputError(
+            f"{path}: no run of the axis '{chosen}' has the role {' or '.join(map(repr, wanted))}; "
+            "another one is asked for with --role."
+        )
+    with working("Predicting"):
+        if parameters is None:
+            assert model is not None
+            parameters = model_parameters_of(drive, model, runs)
+        predicted = predict(parameters, runs)
+        if not predicted:
+            raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
+        judged = verdict((), predicted, required=require / 100.0)
+        qualities = with_speeds(predicted)
+        errors = channel_errors(qualities, source_rules(parameters.name))
+    lines = []
+    if out is not None:
+        with working("Writing the report"):
+            lines = _validation_written(
+                parameters, campaign, predicted, judged, out, figures, drive
+            )
+    virtual = " (virtual)" if campaign.virtual else ""
+    note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
+    show(*tables.runs_tables(qualities))
+    say(MEASURES)
+    show(*(tables.errors_table(each) for each in errors))
+    _listed(tables.left_out(errors))
+    show(tables.residual_table(predicted))
+    say(RESIDUALS)
+    _listed(judged.sentences)
+    for line in lines:
+        note(line)
+    _say_verdict(judged)
+
+
+def _validation_written(
+    parameters: Parameters,
+    campaign: Campaign,
+    predicted: Sequence[RunQuality],
+    judged: Verdict,
+    out: Path,
+    figures: Figures | None,
+    drive: str,
+) -> list[str]:
+    """Write the report and its tables; lines that say so."""
+    from swashplate.identification.judging import versions
+    from swashplate.identification.tables import runs_tables
+    from swashplate.identification.validation import with_speeds
+    from swashplate.report.figures import save_run_figures
+    from swashplate.report.fit_report import write_validation_report
+
+    made_folder(out)
+    joined(runs_tables(with_speeds(predicted))).write(out / "measures.csv")
+    notes = {**versions(), "drive from": drive}
+    write_validation_report(
+        parameters, campaign, out / "report.html", predicted, judged=judged, notes=notes
+    )
+    lines = [f"Measures:  {out / 'measures.csv'}", f"Report:    {out / 'report.html'}"]
+    if figures is not None:
+        paths = save_run_figures(predicted, campaign, out / "figures", figures)
+        lines.append(f"Figures:   {len(paths)} in {out / 'figures'}")
+    return lines
+
+
+def report(
+    fitted: Annotated[Path, argument("FITTED", "The folder that 'fit' wrote, or its drive.toml.")],
+    path: CampaignPath = CAMPAIGN,
+    model: OwnModel = None,
+    out: Annotated[
+        Path | None,
+        option("Folder for report.html; by default where the fit is.", metavar="DIR"),
+    ] = None,
+    figures: PrintFigures = None,
+    truth: Annotated[
+        str | None,
+        option(
+            "Of virtual tests: the folder or parameter file of what was simulated, to stand "
+            "beside the estimates.",
+            metavar="TRUTH",
+        ),
+    ] = None,
+) -> None:
+    """Write the report of a fit again, from what the fit stored.
+
+    Nothing is fitted. The campaign must be the one that was fitted: if its
+    samples, weights or ignored windows have changed, the report is refused.
+    """
+    from swashplate.campaign import Campaign
+    from swashplate.identification.judging import judge_stored
+
+    folder = fitted if fitted.is_dir() else fitted.parent
+    with working(f"Reading {path}"):
+        if not (folder / STORED).is_file():
+            raise InputError(
+                f"There is no {STORED} in {folder}: give a folder that 'swashplate fit' wrote, or "
+                "judge a drive alone with 'swashplate validate'."
+            )
+        true = None if truth is None else parameters_of(truth)
+        campaign = Campaign.from_toml(path)
+        if true is not None and not campaign.virtual:
+            raise InputError(f"{path} is not virtual: nobody knows its truth, leave out --truth.")
+        stored = _stored(fitted, folder / STORED, campaign, model)
+    with working("Judging"):
+        found = judge_stored(campaign, stored)
+    for line in _shown(found, made_folder(out or folder), figures=figures, truth=true):
+        note(line)
+    say(found.verdict.headline)
+
+
+def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -> StoredFit:
+    """The stored fit; of a drive that is named, the one beside it that found it."""
+    from swashplate.identification.own_model import ModelSetup
+    from swashplate.identification.storing import load_fit
+
+    own = None if model is None else ModelSetup.from_file(model)
+    stored = load_fit(place, campaign, model=own)
+    if fitted.suffix.lower() == ".toml":
+        given, numbers = parameters_of(str(fitted)).numbers, stored.fit.parameters.numbers
+        other = [name for name, value in numbers.items() if given[name] != value]
+        if other:
+            raise InputError(
+                f"{fitted} is not the drive that {place} found ({', '.join(other[:3])} differ): "
+                "judge it with 'swashplate validate'."
+            )
+    return stored
+
+
+def demo(
+    out: Annotated[Path, option("Folder for logs, drive and report.", metavar="FOLDER")] = Path(
+        "demo"
+    ),
+    seed: Seed = 1,
+) -> None:
+    """Identify a virtual hoist from its tests, and compare it with the truth.
+
+    Draws a hoist that differs from the published one, logs the 13 tests of
+    Kruse (2001) through a 12-bit command, an ammeter and an encoder, fits card,
+    pump and motor to ten of them, predicts the other three and writes a report.
+    Takes less than a minute.
+    """
+    from swashplate.campaign import Campaign, rig
+    from swashplate.drive import Drive
+    from swashplate.identification.fitting import fit
+    from swashplate.identification.judging import Wanted, judge_fit
+    from swashplate.identification.setup import load_setup
+    from swashplate.identification.staging import drawn
+    from swashplate.identification.tables import estimates_table, runs_tables, truth_count
+
+    setup = load_setup("hoist")
+    with progress(5) as begin:
+        begin("testing the virtual hoist")
+        truth = drawn(Drive.preset("hoist"), setup, seed)
+        tests = rig.run("hoist", truth=truth, seed=seed)
+        path = rig.write(tests, out / "virtual", overwrite=True)
+        begin("reading its logs")
+        campaign = Campaign.from_toml(path)
+        begin("fitting the card, then pump and motor")
+        begun = perf_counter()
+        runs = campaign.select(role="fit")
+        start = campaign.drive("hoist").parameters
+        result = fit(start, runs, setup)
+        seconds = perf_counter() - begun
+        begin("judging what the data tell")
+        found = judge_fit(campaign, "hoist", runs, start, setup, result, Wanted(seed=seed))
+        tables = [estimates_table(each, truth=truth.parameters) for each in found.assessments]
+        begin("writing the report")
+        lines = [*_written(found, out), *_shown(found, out, truth=truth.parameters)]
+        lines.append(_result_drawn(found, truth, out))
+    note(f"Campaign:  {path}")
+    show(*tables)
+    inside, counted = truth_count(tables)
+    say(f"The truth lies within the 95 % interval for {inside} of {counted} unknowns.")
+    note("")
+    note("Held out of the fit, and predicted")
+    show(*runs_tables(found.predicted))
+    say(found.verdict.headline)
+    note(f"Fitted in {seconds:.2f} s, compiling included where it was the first time.")
+    for line in lines:
+        note(line)
+
+
+def _result_drawn(found: Judged, truth: Drive, out: Path) -> str:
+    """Draw a predicted run and the estimates beside the truth; a line that says so."""
+    from swashplate.identification.truth import true_values
+    from swashplate.identification.validation import with_speeds
+    from swashplate.report.figures import plot_fit, save_figure
+
+    speeds = [
+        each
+        for each in with_speeds(found.predicted)
+        if each.experiment[each.channel].kind == "shaft_speed"
+    ]
+    values = {
+        name: value
+        for each in found.assessments
+        for name, value in true_values(each.stage, truth.parameters).items()
+    }
+    save_figure(plot_fit(speeds[-1], found.assessments, values), out / "result.png")
+    return f"Figure:    {out / 'result.png'}"

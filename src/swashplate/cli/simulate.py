@@ -1,4 +1,4 @@
-"""``swashplate simulate``: one drive over one command."""
+"""``swashplate simulate``, ``compare``, ``axes``, ``show`` and ``tour``: drives under commands."""
 
 from __future__ import annotations
 
@@ -7,82 +7,59 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swashplate.cli.arguments import Clip, DriveWord, Figure, StartFrom, TimeColumn, VoltageColumn
-from swashplate.cli.inputs import (
-    Interpolation,
-    Options,
-    changes_said,
-    drive_of,
-    simulated,
-    title_of,
+from swashplate.cli.options import (
+    CommandWord,
+    DriveChoice,
+    DriveWord,
+    FigureFile,
+    Rate,
+    Simulating,
+    TableFile,
+    argument,
+    option,
 )
-from swashplate.cli.outputs import check_outputs
-from swashplate.cli.terminal import note, show, table, working
-from swashplate.tables import FIGURE, TABLE
+from swashplate.cli.terminal import Outputs, note, progress, say, show, working
+from swashplate.cli.words import drive_of, maneuver_of, parameters_of, simulated
+from swashplate.tables import FIGURE, TABLE, made_folder
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
+    from swashplate.drive import Drive
     from swashplate.simulation.result import Simulation
 
-EXAMPLES = """\
+SIMULATE_EXAMPLES = """\
 Examples:
   swashplate simulate hoist step:9
-  swashplate simulate hoist "step +9 V" --plot step.png
+  swashplate simulate hoist "step +9 V" --plot step.png --units rpm
   swashplate simulate hoist sine:6.5,0.1 --set Z16_plus=0.12mm --out sine.csv
   swashplate simulate mine.toml log.csv --interpolation previous --out run.csv
+"""
+COMPARE_EXAMPLES = """\
+Examples:
+  swashplate compare hoist luff
+  swashplate compare hoist mine.toml --maneuver sine:6.5,0.1 --plot both.png
+"""
+AXES_EXAMPLES = """\
+Example:
+  swashplate axes
+"""
+SHOW_EXAMPLES = """\
+Examples:
+  swashplate show hoist
+  swashplate show hoist --toml > mine.toml    (a start for your own drive)
+"""
+TOUR_EXAMPLES = """\
+Examples:
+  swashplate tour
+  swashplate tour --out results/tour
 """
 
 
 def simulate(
-    drive: DriveWord,
-    command: Annotated[
-        str,
-        typer.Argument(
-            metavar="MANEUVER|FILE",
-            help='A manoeuvre such as step:9 or "step +9 V", or a log with columns of time and '
-            "voltage: text such as .csv, .parquet, .mat, .h5, .tdms or .mf4; a column may carry "
-            "its unit: 'time \\[ms]'.",
-            show_default=False,
-        ),
-    ],
-    rate: Annotated[
-        float, typer.Option(help="Samples a second of the result, 10 to 100000.", metavar="HZ")
-    ] = 512.0,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Write all signals, in SI, to a .csv or .parquet file.", metavar="FILE"),
-    ] = None,
-    plot: Figure = None,
-    values: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            help="Another value for a parameter: Z16=1.2e-4 in SI, Z16=1.2e-4/1.5e-4 for plus and "
-            "minus, Z16_plus=0.12mm with a unit. May be repeated.",
-            metavar="NAME=VALUE",
-        ),
-    ] = None,
-    factors: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--scale",
-            help="A factor on a parameter, after --set: Z16=1.5. May be repeated.",
-            metavar="NAME=FACTOR",
-        ),
-    ] = None,
-    interpolation: Annotated[
-        Interpolation | None,
-        typer.Option(
-            help="The voltage between rows or samples: a straight line, or the earlier one held. "
-            "Must be given with a FILE.",
-            show_default=False,
-        ),
-    ] = None,
-    start: StartFrom = "rest",
-    clip: Clip = False,
-    time_column: TimeColumn = "time",
-    column: VoltageColumn = "voltage",
+    drive: DriveChoice,
+    command: CommandWord,
+    sampling: Simulating,
+    out: TableFile = None,
+    plot: FigureFile = None,
 ) -> None:
     """Simulate a drive over a manoeuvre or a measured voltage.
 
@@ -91,54 +68,158 @@ def simulate(
     command is not 0 V. --out writes every signal of the chain, --plot draws
     them. 'swashplate --help' lists the manoeuvres.
     """
-    check_outputs((out, TABLE), (plot, FIGURE))
-    options = Options(rate, interpolation, start, clip, time_column, column)
+    files = Outputs((out, TABLE), (plot, FIGURE))
     with working("Simulating"):
-        chosen = drive_of(drive, values or (), factors or ())
-        name, run = simulated(chosen, command, options)
-        tables = (_what_it_did(run), _limits(run))
-    title = f"{title_of(drive, chosen)}, {name}"
-    if out is not None:
-        with working(f"Writing {out}"):
-            run.write(out)
-    if plot is not None:
-        with working(f"Drawing {plot}"):
-            from swashplate.report.figures import plot_simulation, save_figure
+        from swashplate.analysis.runs import run_tables
 
-            save_figure(plot_simulation(run, title=title), plot)
-    note(f"{title}: {run.time.size} samples at {rate:g} Hz, {run.time[-1] - run.time[0]:.6g} s")
-    for line in changes_said(drive, chosen):
+        name, run = simulated(drive.chosen, command, sampling)
+        tables, title = run_tables(run), f"{drive.title}, {name}"
+    files.write(out, "All signals, in SI", run.write)
+    files.draw(plot, "plot_simulation", run, title=title)
+    duration = f"{run.time[-1] - run.time[0]:.6g} s"
+    note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
+    for line in drive.changes:
         note(line)
     show(*tables)
-    if out is not None:
-        note(f"All signals, in SI: {out}")
-    if plot is not None:
-        note(f"Figure: {plot}")
+    files.say()
 
 
-def _what_it_did(run: Simulation) -> Table:
-    import numpy as np
+def compare(
+    first: Annotated[str, argument("A", "A packaged drive or a TOML file.")],
+    second: Annotated[str, argument("B", "Another, compared with the first.")],
+    maneuver: Annotated[
+        str, option('Manoeuvre for both, such as step:9 or "step +9 V".', metavar="NAME")
+    ] = "step:9",
+    rate: Rate = 512.0,
+    plot: FigureFile = None,
+    out: TableFile = None,
+) -> None:
+    """Compare two drives over the same manoeuvre.
 
-    from swashplate.cli.measures import peak_speeds_deg_s, peaks
+    The settled speed is the one that the manoeuvre's largest voltage would lead
+    to if it were held. The time to 90 % of it counts from the moment at which
+    the voltage first changes. --out writes the voltage and both speeds.
+    """
+    from swashplate.equations.marching.record import least_substeps
 
-    speed, current = peak_speeds_deg_s(run), peaks(run.current)
-    travel_deg = float(np.degrees(run.shaft_position[-1]))
-    made = table(None, "Shaft", ">", "")
-    made.add_row("peak speed, positive", f"{speed.positive:z.2f}", "deg/s")
-    made.add_row("peak speed, negative", f"{speed.negative:z.2f}", "deg/s")
-    made.add_row("speed at the end", f"{np.degrees(run.shaft_speed[-1]):z.2f}", "deg/s")
-    made.add_row("position at the end", f"{travel_deg:z.1f}", "deg")
-    made.add_row("", f"{travel_deg / 360.0:z.3f}", "turns")
-    made.add_section()
-    made.add_row("peak current, positive", f"{current.positive:z.4f}", "A")
-    made.add_row("peak current, negative", f"{current.negative:z.4f}", "A")
-    return made
+    files = Outputs((out, TABLE), (plot, FIGURE))
+    least_substeps(rate)  # a rate out of range is refused before anything is sampled
+    with working("Simulating"):
+        from swashplate.analysis.runs import rms_difference, side_by_side
+        from swashplate.tables import quantity
+
+        drives = _labelled(first, second)
+        command = maneuver_of(maneuver, *drives.values())
+        voltage = command.sample(rate)
+        runs = {label: drive.simulate(voltage, rate) for label, drive in drives.items()}
+        made = side_by_side(drives, runs)
+        rms = rms_difference(*runs.values())
+    title = f"{' and '.join(runs)}, {command.name}"
+    files.write(out, "Voltage and both speeds, in SI", lambda path: _write_speeds(runs, path))
+    files.draw(plot, "plot_comparison", runs, title=title)
+    note(title)
+    show(made)
+    note(f"rms difference of the speeds: {quantity(rms, 'rad/s', spec='.2f')}")
+    files.say()
 
 
-def _limits(run: Simulation) -> Table:
-    from swashplate.cli.measures import limit_shares
+def _labelled(first: str, second: str) -> dict[str, Drive]:
+    """Both drives by name, or by what was typed where they have the same name."""
+    drives = (drive_of(first), drive_of(second))
+    labels = (drives[0].name, drives[1].name)
+    if labels[0] == labels[1]:
+        labels = (first, second if second != first else f"{second} (2)")
+    return dict(zip(labels, drives, strict=True))
 
-    made = table(None, "Limit", ">share of time")
-    for limit, share in limit_shares(run).items():
-        made.add_row(limit, f"{100.0 * share:.1f} %" if share else "never")
-    return made
+
+def _write_speeds(runs: dict[str, Simulation], path: Path) -> None:
+    import polars as pl
+
+    from swashplate.tables import write_table
+
+    run = next(iter(runs.values()))
+    speeds = {f"shaft_speed {label}": each.shaft_speed for label, each in runs.items()}
+    write_table(pl.DataFrame({"time": run.time, "voltage": run.voltage, **speeds}), path)
+
+
+def axes() -> None:
+    """List the packaged drives, their speeds and control cards."""
+    from swashplate.drive import Drive
+    from swashplate.parameters.files import preset_names
+    from swashplate.tables import Column, Table
+
+    with working("Reading"):
+        drives = [Drive.preset(name) for name in preset_names()]
+        columns = [Column(f"at {volts:+d} V" if volts else "at 0 V", "z.2f", "rad/s") for volts in (-10, 0, 10)]
+        made = Table(
+            "Settled speeds", (Column("name"), Column("drive and card", wrap=True), *columns)
+        )
+        for drive in drives:
+            what = f"{drive.parameters.title}\n{drive.parameters.card}"
+            made.add(drive.name, what, *drive.steady_speed([-10.0, 0.0, 10.0]), section=True)
+    show(made)
+
+
+def show_parameters(
+    drive: DriveWord,
+    toml: Annotated[
+        bool, option("Print a TOML file, complete and ready to edit.", "--toml")
+    ] = False,
+) -> None:
+    """Show every parameter of a drive, with its unit and where it comes from.
+
+    A parameter with a plus and a minus value has one for each direction; both
+    are magnitudes. Units are SI.
+    """
+    parameters = parameters_of(drive)
+    if toml:
+        from swashplate.parameters.files import dump_set
+
+        typer.echo(dump_set(parameters), nl=False)
+        return
+    say(f"{parameters.name}: {parameters.title}")
+    show(*parameters.tables())
+    rate = "any rate" if parameters.rate is None else f"{parameters.rate:g} Hz"
+    say(
+        f"Variants of the equations: pressure_root {parameters.pressure_root}, coulomb_sign "
+        f"{parameters.coulomb_sign}, card_switch {parameters.card_switch}, card's filter for "
+        f"{rate}, options {', '.join(sorted(parameters.options)) or 'none'}"
+    )
+
+
+def tour(
+    out: Annotated[
+        Path, option("Folder for tables and figures, made if missing.", metavar="FOLDER")
+    ] = Path("tour"),
+) -> None:
+    """Simulate the three packaged axes over all tests of Kruse (2001).
+
+    Writes one table a run, such as hoist/step +9 V.csv, and two figures: all
+    runs at a glance, and the settled speeds over the voltage. Takes some seconds.
+    """
+    from swashplate.analysis.runs import overview_table
+    from swashplate.drive import Drive
+    from swashplate.maneuvers import source_tests
+    from swashplate.parameters.files import AXES
+
+    drives = {axis: Drive.preset(axis) for axis in AXES}
+    tests = {axis: source_tests(axis) for axis in AXES}
+    runs: dict[str, dict[str, Simulation]] = {axis: {} for axis in AXES}
+    with progress(sum(map(len, tests.values())) + 2) as begin:
+        for axis in AXES:
+            folder = made_folder(out / axis)
+            for name, maneuver in tests[axis].items():
+                begin(f"{axis}, {name}")
+                run = drives[axis].simulate(maneuver.sample())
+                run.write(folder / f"{name.replace('/', ' per ')}.csv")
+                runs[axis][name] = run
+        from swashplate.report.figures import plot_maneuvers_overview, plot_steady_map, save_figure
+
+        begin("drawing all runs")
+        save_figure(plot_maneuvers_overview(runs), out / "overview.png")
+        begin("drawing the settled speeds")
+        save_figure(plot_steady_map(drives), out / "steady.png")
+    show(overview_table(runs))
+    note(f"All signals of each run, in SI: {out}/AXIS/MANOEUVRE.csv")
+    note(f"All runs at a glance: {out / 'overview.png'}")
+    note(f"Settled speed over voltage: {out / 'steady.png'}")

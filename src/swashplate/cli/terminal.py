@@ -1,46 +1,54 @@
 """What reaches the terminal: tables and notes, and a sign of life while a person waits."""
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from time import perf_counter
-from typing import Protocol
+from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Protocol
+
+import rich.table
 from rich import box
 from rich.console import Console
 from rich.status import Status
-from rich.table import Table
+
+from swashplate.tables import UNIT, Column, Form, Table, check_place, ending
 
 BEGUN = perf_counter()
+LINE, BETWEEN = 80, 2
+"""Characters of a line, and those between two columns."""
 # names of files and manoeuvres are printed as they are, whatever brackets and colons they hold
 output = Console(markup=False, highlight=False, emoji=False)
 side = Console(stderr=True, markup=False, highlight=False, emoji=False)
 """Standard error: what a pipe must not carry."""
 
 
-def table(title: str | None, *columns: str, wrap: str = "") -> Table:
-    """An empty table for 80 columns and more.
-
-    Parameters
-    ----------
-    title : str or None
-        A line above it.
-    *columns : str
-        Headers; one that begins with ``>`` is right-aligned.
-    wrap : str
-        The column that is broken into lines where the terminal is narrow.
-    """
-    made = Table(
-        title=title,
+def _rich(table: Table, widths: Sequence[int] = ()) -> rich.table.Table:
+    made = rich.table.Table(
+        title=table.title or None,
         title_justify="left",
         title_style="bold",
+        caption=table.caption or None,
+        caption_justify="left",
         box=box.SIMPLE_HEAD,
         show_edge=False,
         pad_edge=False,
         collapse_padding=True,
     )
-    for column in columns:
-        right, header = column.startswith(">"), column.removeprefix(">")
-        made.add_column(header, justify="right" if right else "left", no_wrap=header != wrap)
+    for place, (column, head) in enumerate(zip(table.columns, table.heads(), strict=True)):
+        made.add_column(
+            "" if column is UNIT else head,
+            justify="right" if column.spec else "left",
+            no_wrap=not column.wrap,
+            width=widths[place] if widths else None,
+            # a name that is too long goes on in the next line
+            overflow="fold" if column.wrap and widths else "ellipsis",
+        )
+    for row in table.rows:
+        if row.section:
+            made.add_section()
+        made.add_row(*table.texts(row))
     return made
 
 
@@ -48,7 +56,26 @@ def show(*tables: Table) -> None:
     """Print tables, empty lines around them."""
     for each in tables:
         output.print()
-        output.print(each)
+        output.print(_rich(each.of("t")))
+    output.print()
+
+
+def widths_of(tables: Iterable[Table]) -> list[int]:
+    """Widths of columns that fit all of several like tables; the first takes what the others leave.
+
+    They stand one above the other when each is printed with `show_in`.
+    """
+    shown = [each.of("t") for each in tables]
+    rows = [shown[0].heads(), *(each.texts(row) for each in shown for row in each.rows)]
+    names, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
+    left = LINE - sum(others) - BETWEEN * len(others)
+    return [max(min(names, left), len(rows[0][0])), *others]
+
+
+def show_in(widths: Sequence[int], table: Table) -> None:
+    """Print a table in columns of given widths."""
+    output.print()
+    output.print(_rich(table.of("t"), widths))
     output.print()
 
 
@@ -106,9 +133,9 @@ class Timing:
 
     def table(self) -> Table:
         """The parts, and all together."""
-        made = table("Wall time", "part", ">s")
+        made = Table("Wall time", (Column("part"), Column("s", ".2f")))
         for part, seconds in {**self.parts, "all": sum(self.parts.values())}.items():
-            made.add_row(part, f"{seconds:.2f}")
+            made.add(part, seconds)
         return made
 
 
@@ -142,11 +169,6 @@ def long_work(text: str) -> Iterator[Shown]:
         yield show
 
 
-def counted(number: int, one: str, several: str) -> str:
-    """A number and what it counts: ``"1 finding"``, ``"2 findings"``."""
-    return f"{number} {one if number == 1 else several}"
-
-
 def waiting(seconds: float | None, sort: str = "about") -> str:
     """A time left in words a person takes in at once: ``"about 12 s left"``."""
     if seconds is None:
@@ -154,3 +176,49 @@ def waiting(seconds: float | None, sort: str = "about") -> str:
     if seconds < 90.0:
         return f"{sort} {max(seconds, 0.0):.0f} s left"
     return f"{sort} {seconds / 60.0:.0f} min left"
+
+
+class Outputs:
+    """Files of a command: refused before anything is computed, and named when all is printed."""
+
+    def __init__(self, *wanted: tuple[Path | None, Form | None]) -> None:
+        """See to it that all can be written, so that none is left of a command that fails.
+
+        Parameters
+        ----------
+        *wanted : (path or None, Form or None)
+            What was asked for, and the endings that it may have; None for any.
+
+        Raises
+        ------
+        FileError
+            For a wrong ending, a folder that does not exist, or a folder in the file's place.
+        """
+        for path, form in wanted:
+            if path is not None and form is not None:
+                ending(path, form)
+            if path is not None:
+                check_place(path)
+        self._lines: list[str] = []
+
+    def write(self, path: Path | None, what: str, write: Callable[[Path], object]) -> None:
+        """Write a file, if it was asked for."""
+        if path is not None:
+            with working(f"Writing {path}"):
+                write(path)
+            self._lines.append(f"{what}: {path}")
+
+    def draw(self, path: Path | None, figure: Any, *shown: Any, **how: Any) -> None:
+        """Save a figure, or one of `swashplate.report.figures` by its name, if asked for."""
+        if path is not None:
+            with working(f"Drawing {path}"):
+                from swashplate.report import figures
+
+                made = getattr(figures, figure)(*shown, **how) if shown else figure
+                figures.save_figure(made, path)
+            self._lines.append(f"Figure: {path}")
+
+    def say(self) -> None:
+        """Print what was written."""
+        for line in self._lines:
+            note(line)

@@ -21,7 +21,8 @@ from swashplate.equations.marching.record import SOURCE_RATE, least_substeps
 from swashplate.equations.marching.run import Start
 from swashplate.full_order.drive import FullOrderDrive, FullOrderSimulation, Method
 from swashplate.simulation.result import read_only
-from swashplate.tables import Tabular
+from swashplate.tables import Cell, Column, Table, Tabular
+from swashplate.units import display_unit
 
 if TYPE_CHECKING:
     import polars
@@ -238,3 +239,118 @@ def validity(
             )
         )
     return pl.DataFrame(rows, schema=VALIDITY, orient="row")
+
+
+# --- tables and verdicts --------------------------------------------------------------------------
+
+LAG_SHARE = 0.5
+"""Share of the difference from which a lag explains it."""
+
+
+def usual_rate(rate: float) -> float:
+    """Steps a second of the reduced model's march at a rate of samples. [Hz]"""
+    return rate * least_substeps(rate)
+
+
+def modes_table(full: FullOrderDrive) -> Table:
+    """Natural modes at rest."""
+    modes = full.modes()
+    heads = (Column("Mode"), Column("Hz", ".4g"), Column("damping", ".3f"), Column(""))
+    made = Table("Modes at rest", heads)
+    slow = f"τ = {-1.0 / modes.slow.real:.4g} s, " if modes.slow.real < 0.0 else ""
+    for name, mode, words in (
+        ("spool", modes.spool, "on its feedback spring"),
+        ("swash plate", modes.swash, "on its spring and the trapped oil"),
+        ("swash plate, held pressure", modes.swash_at_held_pressure, "on its spring alone"),
+        ("slow pole", modes.slow, f"{slow}which one state keeps"),
+    ):
+        made.add(name, modes.frequency_hz(mode), modes.damping_ratio(mode), words)
+    return made
+
+
+def comparison_table(found: Comparison) -> Table:
+    """Both models under one command."""
+    differ = found.difference
+    columns = (Column("Shaft speed"), Column("", ".4f", "rad/s"), Column("% of top speed", ".3f"))
+    made = Table("Reduced model less full-order one", columns)
+    top, steps = differ.top_speed, usual_rate(found.full.record.rate)
+    made.add("top speed", Cell(top, f"{display_unit('rad/s').factor * top:.2f}"), None)
+    for name, value in (
+        ("largest difference", differ.largest),
+        ("rms difference", differ.rms),
+        (f"step error of the march at {steps:g} Hz", differ.step_error),
+    ):
+        made.add(name, value, 100.0 * value / top if differ.moves else None)
+    for band in reversed(BANDS) if differ.moves else ():
+        made.add(f"within {100.0 * band:g} %", None, "yes" if differ.relative <= band else "no")
+    drop = 1e-6 * found.full.motor_pressure_drop
+    ends = (Cell(drop.min(), f"{drop.min():z.3f}"), f"to {drop.max():z.3f}")
+    made.add("motor pressure drop, MPa", *ends, section=True)
+    return made
+
+
+def comparison_verdict(found: Comparison) -> list[str]:
+    """Whether one state is enough under a command, and what it leaves out."""
+    differ = found.difference
+    if not differ.moves:
+        return ["The shaft does not move under this command, so nothing can be said of one state."]
+    largest, rms = (
+        f"{100.0 * each / differ.top_speed:.2f} %" for each in (differ.largest, differ.rms)
+    )
+    if differ.within is not None:
+        said = (
+            f"One state is enough here: within {100.0 * differ.within:g} % of the top speed, at "
+            f"most {largest} and {rms} rms off."
+        )
+    else:
+        said = (
+            f"One state is not enough here: up to {largest} of the top speed off, {rms} rms, where "
+            "1 % is allowed."
+        )
+    lag, left_out = found.lag, "the masses of spool and swash plate"
+    if lag is not None and lag.share >= LAG_SHARE:
+        left_out += (
+            f", which make the speed {1e3 * abs(lag.time):.2g} ms "
+            f"{'later' if lag.time > 0.0 else 'earlier'} ({100.0 * lag.share:.0f} % of the mean "
+            "squared difference)"
+        )
+    return [said, f"It leaves out {left_out}, and the motor's pressure drop."]
+
+
+def validity_table(found: polars.DataFrame, rate: float) -> Table:
+    """The manoeuvres of `validity` for people."""
+    made = Table(
+        "Reduced model less full-order one, in % of the top speed",
+        (
+            Column("Manoeuvre"),
+            Column("top", ".2f", "rad/s"),
+            Column("largest", ".2f"),
+            Column("rms", ".2f"),
+            Column(f"step error at {usual_rate(rate):g} Hz", ".2f"),
+            Column("within"),
+        ),
+    )
+    for row in found.iter_rows(named=True):
+        shares = (row[f"{key}_percent"] for key in ("largest", "rms", "step_error"))
+        within = "1 %" if row["within_1_percent"] else "no"
+        within = "0.1 %" if row["within_0_1_percent"] else within
+        still = row["largest_percent"] is None
+        made.add(row["maneuver"], row["top_speed"], *shares, "does not move" if still else within)
+    return made
+
+
+def validity_verdict(found: polars.DataFrame) -> str:
+    """For how many of the manoeuvres one state is enough, and for which it is not."""
+    moving = found.drop_nulls("within_1_percent")
+    beyond = moving.filter(~moving["within_1_percent"])["maneuver"].to_list()
+    if not moving.height:
+        return "The shaft does not move under any of these, so nothing can be said of one state."
+    if not beyond:
+        return "One state is enough for all of these that move the drive, to 1 % of the top speed."
+    if len(beyond) == moving.height:
+        return "One state is enough for none of these, to 1 % of the top speed."
+    within = moving.height - len(beyond)
+    return (
+        f"One state is enough for {within} of {moving.height}, to 1 % of the top speed; not for "
+        f"{', '.join(beyond)}."
+    )

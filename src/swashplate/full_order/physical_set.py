@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
-from math import sqrt, tan
+from math import pi, sqrt, tan
 from pathlib import Path
 from types import MappingProxyType
 from typing import Literal
@@ -38,7 +38,8 @@ from swashplate.parameters.parameter_set import (
 )
 from swashplate.parameters.rules import out_of_range, range_sentence
 from swashplate.parameters.schema import Entry
-from swashplate.units import to_si
+from swashplate.tables import Column, Table
+from swashplate.units import chosen_unit, to_si, unit_text
 
 QUANTITIES: Mapping[str, Definition] = {
     each.symbol: definition_of(each, "physical") for each in declared_by(Machine)
@@ -563,3 +564,42 @@ def _value(quantity: Definition, entry: Entry) -> Parameter:
     change = (first, second[0]) if second else first
     value = value_of(quantity.symbol, quantity, change)
     return Parameter(quantity, value, entry.source, entry.status)
+
+
+# --- for people -----------------------------------------------------------------------------------
+
+SHOWN = {
+    "kg": ("g", 1e3),
+    "m": ("mm", 1e3),
+    "m^2": ("cm²", 1e4),
+    "m^3": ("cm³", 1e6),
+    "Pa": ("MPa", 1e-6),
+    "rad/s": ("Hz", 0.5 / pi),
+}
+"""Unit that people read a physical value in and the factor to it, by SI unit, unless chosen."""
+
+
+def choices_table(axis: str, given: Mapping[str, Change]) -> Table:
+    """What a physical set is completed from: assumed values, and given ones."""
+    columns = (Column("Physical value"), Column("", "s"), Column(""), Column(""))
+    made = Table("What the drive's parameters do not say", columns)
+    entries = chosen_over(load_choices(axis), given)
+    for name, entry in entries.items():
+        unit, factor = SHOWN.get(entry.unit, (unit_text(entry.unit), 1.0))
+        if chosen_unit(entry.unit).factor != 1.0:
+            unit, factor = chosen_unit(entry.unit)
+        numbers = "/".join(f"{factor * value:.5g}" for value in entry.values)
+        made.add(name, numbers, unit, "given" if entry.status == "user" else "assumed")
+    return made
+
+
+def assumed_words(axis: str, given: Mapping[str, Change]) -> str:
+    """How much of the physical set is assumed, in a sentence."""
+    entries = chosen_over(load_choices(axis), given)
+    assumed = sum(entry.status != "user" for entry in entries.values())
+    if not assumed:
+        return "All physical values are given."
+    return (
+        f"{assumed} of {len(entries)} physical values are assumed, as of the packaged {axis}; "
+        "--physical gives what you know."
+    )

@@ -9,8 +9,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.quality import unsigned_currents
+from swashplate.campaign.quality import beyond_the_card, unsigned_currents
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import SIGNALS
@@ -619,3 +620,26 @@ def _variables(unknowns: Unknowns) -> Unknowns:
 
 def _count(samples: int) -> str:
     return f"{samples} sample{'' if samples == 1 else 's'}"
+
+
+def beside_the_drives(campaign: Campaign) -> list[str]:
+    """What stands out when each axis's drive is simulated under the runs' commands."""
+    from swashplate.identification.fitting import smooth
+
+    found = []
+    for name, axis in campaign.axes.items():
+        if axis.drive is None:
+            continue
+        nominal = smooth(campaign.drive(name).parameters)
+        runs = campaign.select(axis=name)
+        beyond = {each.name: beyond_the_card(each) for each in runs}
+        found += [
+            f"{said}; this run is not held against the drive"
+            for said in chain.from_iterable(beyond.values())
+        ]
+        runs = tuple(each for each in runs if not beyond[each.name])
+        # a drive that is made up says nothing of what a machine does
+        made_up = all(each.status == "assumed" for each in nominal.values())
+        if runs and not made_up and all(each.input.kind != "other" for each in runs):
+            found += [each.sentence.rstrip(".") for each in check_runs(runs, nominal)]
+    return found

@@ -3,12 +3,14 @@
 from swashplate.linear.discrete import linearize as linearize
 from swashplate.linear.drive import OUTPUTS as OUTPUTS
 from swashplate.linear.drive import linearize_drive as linearize_drive
+from swashplate.linear.drive import model_tables as model_tables
 from swashplate.linear.drive import slowest_lag as slowest_lag
 from swashplate.linear.frequency_response import FEWEST_STEPS as FEWEST_STEPS
 from swashplate.linear.frequency_response import SLOWEST_CYCLE as SLOWEST_CYCLE
 from swashplate.linear.frequency_response import FrequencyResponse as FrequencyResponse
 from swashplate.linear.frequency_response import SweptInput as SweptInput
 from swashplate.linear.frequency_response import SweptOutput as SweptOutput
+from swashplate.linear.frequency_response import response_table as response_table
 from swashplate.linear.frequency_response import sweep as sweep
 from swashplate.linear.margins import LoopMargins as LoopMargins
 from swashplate.linear.margins import loop_margins as loop_margins

@@ -14,7 +14,7 @@ from swashplate.equations.marching.record import Interpolation, least_substeps
 from swashplate.equations.marching.run import Instance, Started
 from swashplate.errors import InputError
 from swashplate.linear.discrete import Recurrence, recurrence
-from swashplate.linear.model import Coulomb, LinearDrive, Matrices, with_line
+from swashplate.linear.model import UNITS, Coulomb, LinearDrive, Matrices, with_line
 from swashplate.linear.operating_point import (
     COMMANDS,
     INPUTS,
@@ -33,6 +33,8 @@ from swashplate.simulation.instance import (
     instance_of,
     without_ripple,
 )
+from swashplate.tables import UNIT, Cell, Column, Table
+from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
 
@@ -350,3 +352,86 @@ def _lifted(
     longer[:n] = z[:, : n + k]
     into = np.vstack((z[:, n + k :], np.eye(k)))
     return longer, into, y[:, : n + k], y[:, n + k :]
+
+
+# --- tables ---------------------------------------------------------------------------------------
+
+
+def model_tables(
+    model: LinearDrive, frequency: float, loop_gain: float | None = None
+) -> list[Table]:
+    """Operating point, small motion and poles of a model, and margins of a loop closed over it.
+
+    Parameters
+    ----------
+    model : LinearDrive
+        From voltage, current or force to the shaft's speed.
+    frequency : float
+        At which gain and phase are given. [Hz]
+    loop_gain : float, optional
+        Of a proportional speed loop. [V, A or N / (rad/s)]
+    """
+    tables = [_point_table(model), _motion_table(model, frequency), _pole_table(model)]
+    return tables if loop_gain is None else [*tables, _loop_table(model, loop_gain)]
+
+
+def _key_values(title: str) -> Table:
+    return Table("", (Column(title), Column("", "z.4f", none="no limit"), UNIT))
+
+
+def _finite(value: float) -> float | None:
+    return None if np.isinf(value) else float(value)
+
+
+def _point_table(model: LinearDrive) -> Table:
+    point, made = model.operating_point, _key_values("Operating point")
+    if point.voltage is not None:
+        made.add("voltage", point.voltage, unit="V")
+    made.add("current", Cell(point.current, f"{point.current:z.4f}"), unit="A")
+    made.add("swash angle", point.swash_angle, unit="rad", spec="z.3f")
+    made.add("shaft speed", point.shaft_speed, unit="rad/s", spec="z.3f")
+    return made
+
+
+def _motion_table(model: LinearDrive, frequency: float) -> Table:
+    unit, made = UNITS[model.input], _key_values("Small motion")
+    answer = complex(model.response(frequency)[0])
+    made.add("steady gain", model.gain, unit=f"rad/s/{unit}", spec="z.5g")
+    made.add("time constant of the pump", model.time_constant, unit="s")
+    if model.input == "voltage":
+        delay = 1e3 * model.parameters.numbers["tau"]
+        made.add("delay of the card", delay, unit="ms", spec="z.3f")
+    made.add("bandwidth (-3 dB)", _finite(model.bandwidth), unit="Hz", spec=".4g")
+    at = f"at {frequency:g} Hz"
+    made.add(f"gain {at}", abs(answer), unit=f"rad/s/{unit}", spec=".5g")
+    made.add(f"phase {at}", float(np.angle(answer, deg=True)), unit="deg", spec="z.2f")
+    largest = _finite(model.largest_gain)
+    made.add("largest proportional gain", largest, unit=f"{unit}/(rad/s)", spec=".4g")
+    return made
+
+
+def _pole_table(model: LinearDrive) -> Table:
+    heads = (("real", "z.5g"), ("imaginary", "s"), ("Hz", ".4g"), ("damping", ".3f"))
+    made = Table("", (Column("Poles"), *(Column(*each) for each in heads)))
+    for pole in model.poles:
+        if pole.imag < 0.0:
+            continue  # its conjugate stands for both
+        s = pole if model.sample_time is None else np.log(pole) / model.sample_time
+        made.add(
+            "rad/s" if model.sample_time is None else "z",
+            float(pole.real),
+            f"±{pole.imag:.5g}" if pole.imag else "",
+            float(abs(s) / (2.0 * np.pi)),
+            float(-s.real / abs(s)),
+        )
+    return made
+
+
+def _loop_table(model: LinearDrive, loop_gain: float) -> Table:
+    margins, shown = model.margins(loop_gain), display_unit(f"{UNITS[model.input]}/(rad/s)")
+    made = _key_values(f"Proportional loop, {shown.factor * loop_gain:g} {shown.name}")
+    made.add("crossover", margins.crossover or Cell(None, "none"), unit="Hz", spec=".4g")
+    made.add("phase margin", _finite(np.degrees(margins.phase_margin)), unit="deg", spec=".1f")
+    made.add("delay margin", _finite(1e3 * margins.delay_margin), unit="ms", spec=".2f")
+    made.add("gain margin", _finite(margins.gain_margin), spec=".3g")
+    return made

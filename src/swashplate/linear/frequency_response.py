@@ -21,7 +21,7 @@ from swashplate.models.pump import Pump
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import check_filter_stability, instance_of, without_ripple
-from swashplate.tables import Tabular
+from swashplate.tables import Column, Table, Tabular
 
 if TYPE_CHECKING:
     import polars
@@ -284,3 +284,36 @@ def _checked(values: ArrayLike, what: str) -> Array:
     if data.ndim != 1 or data.size == 0 or not (np.isfinite(data) & (data > 0.0)).all():
         raise InputError(f"The {what} must be one or more finite numbers above 0, in one row.")
     return data
+
+
+def response_table(response: FrequencyResponse) -> Table:
+    """Gain, phase, lag and distortion of a drive by the amplitude of the sine.
+
+    Parameters
+    ----------
+    response : FrequencyResponse
+        From voltage to the shaft's speed, at one frequency (`FrequencyResponse.at`).
+    """
+    (frequency,) = response.frequencies
+    made = Table(
+        "",
+        (
+            Column("amplitude", "g", "V"),
+            Column("gain", ".3f", "rad/s/V", none="none"),
+            Column("phase", "z.1f", "deg"),
+            Column("lag", "z.1f", "ms"),
+            Column("distortion %", ".1f"),
+            Column("mean speed", "z.2f", "rad/s"),
+        ),
+    )
+    for k, amplitude in enumerate(response.amplitudes):
+        mean = float(response.mean[k, 0])
+        if not response.moves[k, 0]:
+            made.add(float(amplitude), None, None, None, None, mean)
+            continue
+        phase = float(response.phase[k, 0])
+        lag = -1e3 * phase / (2.0 * np.pi * frequency)
+        distortion = 100.0 * float(response.distortion[k, 0])
+        answer = (float(response.gain[k, 0]), np.degrees(phase), lag, distortion)
+        made.add(float(amplitude), *answer, mean)
+    return made

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
@@ -17,6 +18,7 @@ from swashplate.parameters.definitions import (
     unknown_parameter,
 )
 from swashplate.parameters.rules import check_bounds, check_options, check_rules
+from swashplate.tables import UNIT, Column, Table
 
 PressureRoot = Literal["published", "symmetric"]
 CoulombSign = Literal["smooth", "literal"]
@@ -195,6 +197,33 @@ class ParameterSet(Mapping[str, Parameter]):
                 f"{'are' if len(self.refinements) > 1 else 'is'} on; take the drive without them "
                 "(its .plain), or simulate it."
             )
+
+    def tables(self) -> list[Table]:
+        """Every parameter with its unit and status, a table for each block that the set has.
+
+        Parameters next to each other stand below the source that they share.
+        """
+        titles = {
+            "control_card": f"Control card {self.card}",
+            "pump_motor": "Pump and motor",
+            "refinements": "Refinements",
+        }
+        numbers = (Column("plus", ".6g"), Column("minus", ".6g"))
+        made = []
+        for block, title in titles.items():
+            columns = (Column("symbol"), Column("name", wrap=True), *numbers)
+            table = Table(title, (*columns, UNIT, Column("status")), si=True)
+            members = [each for each in self.values() if each.definition.block == block]
+            for source, group in groupby(members, key=lambda each: each.source):
+                if source:
+                    table.add("", f"{source}:", None, None, "", section=True)
+                for number, each in enumerate(group):
+                    values = (*each.values, None)[:2]
+                    start = not source and number == 0
+                    cells = (each.symbol, each.name, *values, each.status)
+                    table.add(*cells, unit=each.unit, section=start)
+            made += [table] if members else []
+        return made
 
     def replace(
         self, changes: Mapping[str, Change], options: frozenset[str] | None = None

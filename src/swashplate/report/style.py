@@ -1,14 +1,19 @@
-"""How figures look: colours, sizes, axes. Nothing here reads or sets matplotlib's global state."""
+"""How figures look: colours, sheets of panels, axes, legends. Matplotlib's global state is left."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from swashplate.tables import FIGURE, ending, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 INK = "#222222"
 GREY = "#767676"
@@ -24,6 +29,17 @@ ORANGE = "#E69F00"
 SKY = "#56B4E9"
 CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, INK)
 
+SMALL, NORMAL, LARGE = 8.0, 9.0, 11.5
+"""Sizes of letters. [pt]"""
+THIN, LINE = 0.8, 1.3
+"""Widths of lines. [pt]"""
+DPI = 150
+"""A picture's dots an inch: 8 pt letters stay readable where a page shows it at half its size."""
+POINTS_PER_INCH = 72.0
+WIDTH = 8.6
+"""Of a sheet. [inch]"""
+GAP, HEAD, FOOT, ROW = 0.24, 0.38, 0.42, 0.18
+"""Between panels, for the title, for the abscissa, for a row of a legend. [inch]"""
 
 Dashes = Literal["solid", "dashed", "dotted"]
 
@@ -44,59 +60,54 @@ def strokes(names: Iterable[str]) -> dict[str, Stroke]:
     }
 
 
-SMALL, NORMAL, LARGE = 8.0, 9.0, 11.5
-"""Sizes of letters. [pt]"""
-THIN, LINE = 0.8, 1.3
-"""Widths of lines. [pt]"""
-DPI = 150
-"""A picture's dots an inch: 8 pt letters stay readable where a page shows it at half its size."""
-
-POINTS_PER_INCH = 72.0
-
-
-class Margins(NamedTuple):
-    """White space around the panels of a figure. [inch]"""
-
-    left: float
-    right: float
-    bottom: float
-    top: float
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """An empty white figure of a size. [inch]"""
+def new_figure(
+    width: float, height: float, *, layout: Literal["constrained", "none"] = "constrained"
+) -> Figure:
+    """An empty white figure of a size [inch], whose panels find their places by themselves."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), dpi=DPI, facecolor="white")
+    made = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
+    if layout == "constrained":
+        made.set_layout_engine("constrained", w_pad=0.06, h_pad=0.04, hspace=0.02, wspace=0.02)
+    return made
 
 
-def margins(figure: Figure, around: Margins) -> dict[str, float]:
-    """Margins as the fractions of the figure that a grid of panels takes."""
-    width, height = figure.get_size_inches()
-    return {
-        "left": around.left / width,
-        "right": 1.0 - around.right / width,
-        "bottom": around.bottom / height,
-        "top": 1.0 - around.top / height,
-    }
+def sheet(
+    heights: Sequence[float], title: str, *, legend: Sequence[Artist] = (), lines: int = 0
+) -> tuple[Figure, list[Axes]]:
+    """A figure of panels over one abscissa, with a title and a legend.
+
+    Parameters
+    ----------
+    heights : sequence of float
+        Of the panels, from the top. [inch]
+    title : str
+        At the top.
+    legend : sequence of Artist
+        Handles of what stands above the first panel.
+    lines : int
+        Lines of words above the first panel besides.
+    """
+    rows = lines + (legend_rows(legend) if legend else 0)
+    inside = sum(heights) + GAP * (len(heights) - 1)
+    figure = new_figure(WIDTH, HEAD + ROW * rows + inside + FOOT)
+    ratios = {"height_ratios": heights}
+    axes = list(figure.subplots(len(heights), sharex=True, squeeze=False, gridspec_kw=ratios)[:, 0])
+    write_title(figure, title)
+    if legend:
+        put_legend(axes[0], legend)
+    figure.align_ylabels(axes)
+    return figure, axes
 
 
-def write_title(figure: Figure, title: str, left: float) -> None:
-    """Write a title at the top, starting `left` of the edge. [inch]"""
-    width, height = figure.get_size_inches()
-    figure.text(
-        left / width,
-        1.0 - 0.14 / height,
-        title,
-        fontsize=LARGE,
-        fontweight="bold",
-        color=INK,
-        va="top",
-    )
+def write_title(figure: Figure, title: str) -> None:
+    """Write a title at the top left."""
+    how = {"fontsize": LARGE, "fontweight": "bold", "color": INK}
+    figure.suptitle(title, x=0.012, ha="left", **how)
 
 
-def dress(ax: Axes, label: str = "") -> None:
-    """Give a panel its light grid, quiet axes and the label of its ordinate."""
+def dress(ax: Axes, label: str = "", below: str = "") -> None:
+    """Give a panel its light grid, quiet axes and the labels of ordinate and abscissa."""
     from matplotlib.ticker import MaxNLocator
 
     ax.set_axisbelow(True)
@@ -112,13 +123,8 @@ def dress(ax: Axes, label: str = "") -> None:
     ax.yaxis.get_offset_text().set_fontsize(SMALL)
     if label:
         ax.set_ylabel(label, fontsize=NORMAL, color=INK)
-
-
-def line_up_labels(figure: Figure, axes: Iterable[Axes], away: float) -> None:
-    """Put the labels of ordinates at one distance from their panels, whatever the ticks. [inch]"""
-    for ax in axes:
-        inches = ax.get_position().width * figure.get_size_inches()[0]
-        ax.yaxis.set_label_coords(-away / inches, 0.5)
+    if below:
+        label_below(ax, below)
 
 
 def label_below(ax: Axes, label: str) -> None:
@@ -126,16 +132,67 @@ def label_below(ax: Axes, label: str) -> None:
     ax.set_xlabel(label, fontsize=NORMAL, color=INK)
 
 
-def put_legend(figure: Figure, handles: Sequence[Artist], left: float, top: float) -> None:
-    """Write a legend on one line or more, its corner at a distance from the figure's. [inch]"""
-    width, height = figure.get_size_inches()
-    figure.legend(
+def right_axis(ax: Axes, factor: float, label: str) -> Any:
+    """A second ordinate on the right, on which values are a factor of those on the left."""
+    import numpy as np
+
+    functions = (lambda y: factor * np.asarray(y), lambda v: np.asarray(v) / factor)
+    made = ax.secondary_yaxis("right", functions=functions)
+    made.tick_params(length=3.0, width=0.6, color=FAINT, labelsize=SMALL, labelcolor=GREY)
+    made.spines["right"].set_color(FAINT)
+    made.set_ylabel(label, fontsize=NORMAL, color=GREY)
+    return made
+
+
+def in_lines(label: str, letters: int, most_lines: int = 3) -> str:
+    """A label broken into lines: after words, and after underscores where a word is too long.
+
+    Parameters
+    ----------
+    label : str
+        In one line; a unit in parentheses at its end is never left out.
+    letters : int
+        That fit along the axis.
+    most_lines : int
+        That it may take.
+    """
+    most = max(letters, 8)
+    pieces = list[str]()
+    for word in re.findall(r"\([^()]*\)$|\S+", label):
+        whole = f"{word} "
+        pieces += [whole] if len(word) <= most else re.findall(r"[^_]*_|[^_]+", whole)
+    lines = [""]
+    for piece in pieces:
+        if lines[-1] and len(lines[-1]) + len(piece.rstrip()) > most:
+            lines.append("")
+        lines[-1] += piece
+    lines = [each.strip() for each in lines]
+    if len(lines) > most_lines:
+        last = f"{lines[most_lines - 2].rstrip('_')}…"
+        lines = [*lines[: most_lines - 2], last, lines[-1]]
+    # a single word that is too long loses its middle
+    half = most // 2
+    return "\n".join(
+        each if len(each) <= most else f"{each[:half]}…{each[1 - half :]}" for each in lines
+    )
+
+
+def handle(name: str, color: str, dashes: Dashes = "solid", width: float = 2.0) -> Line2D:
+    """A line's handle for a legend."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], color=color, linestyle=dashes, linewidth=width, label=name)
+
+
+def put_legend(ax: Axes, handles: Sequence[Artist], *, beyond: bool = False) -> None:
+    """Write a legend above a panel, on one line or more, `beyond` its right end if need be."""
+    made = ax.legend(
         handles=handles,
-        loc="upper left",
-        bbox_to_anchor=(left / width, 1.0 - top / height),
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.01),
         borderaxespad=0.0,
-        borderpad=0.0,
-        ncols=legend_columns([str(handle.get_label()) for handle in handles], width - left),
+        borderpad=0.2,
+        ncols=legend_columns([str(each.get_label()) for each in handles]),
         frameon=False,
         fontsize=SMALL,
         labelcolor=INK,
@@ -144,22 +201,53 @@ def put_legend(figure: Figure, handles: Sequence[Artist], left: float, top: floa
         columnspacing=1.4,
         labelspacing=0.35,
     )
+    made.set_in_layout(not beyond)
 
 
-def legend_columns(names: Sequence[str], room: float) -> int:
-    """Columns of a legend that surely fit into some room, all names on one line if they do."""
+def legend_columns(names: Sequence[str], room: float = WIDTH - 1.2) -> int:
+    """Columns of a legend that surely fit into some room [inch], all on one line if they do."""
     widths = [0.39 + 0.056 * len(name) for name in names]
     return len(names) if sum(widths) <= room else max(1, int(room / max(widths)))
 
 
-def legend_rows(names: Sequence[str], room: float) -> int:
-    """Lines of the legend of these names."""
-    return -(-len(names) // legend_columns(names, room)) if names else 0
+def legend_rows(handles: Sequence[Artist]) -> int:
+    """Lines of the legend of these handles."""
+    names = [str(each.get_label()) for each in handles]
+    return -(-len(names) // legend_columns(names))
 
 
-def zero_line(ax: Axes) -> None:
+def zero_line(ax: Axes, *, upright: bool = False) -> None:
     """Mark zero a little stronger than the grid."""
     ax.axhline(0.0, color=FAINT, linewidth=0.8, zorder=1.2)
+    if upright:
+        ax.axvline(0.0, color=FAINT, linewidth=0.8, zorder=1.2)
+
+
+def write(
+    ax: Axes,
+    words: str,
+    place: tuple[float, float],
+    shift: tuple[float, float] = (4.0, 3.0),
+    *,
+    coords: Any = "axes fraction",
+    color: str = INK,
+    ha: str = "left",
+    va: str = "baseline",
+    **how: Any,
+) -> None:
+    """Write small words at a place, shifted by some points."""
+    ax.annotate(
+        words,
+        place,
+        xycoords=coords,
+        xytext=shift,
+        textcoords="offset points",
+        fontsize=SMALL,
+        color=color,
+        ha=ha,
+        va=va,
+        **how,
+    )
 
 
 def signed(value: float, decimals: int) -> str:
@@ -176,30 +264,20 @@ class MarginLabel(NamedTuple):
     color: str
 
 
-def label_margin(figure: Figure, ax: Axes, labels: Sequence[MarginLabel]) -> None:
-    """Write labels beside a panel, each near its height but never over one another.
+def label_margin(ax: Axes, labels: Sequence[MarginLabel], inches: float) -> None:
+    """Write labels beside a panel of a height, each near its place but never over one another.
 
     The panel's limits must be final.
     """
     low, high = ax.get_ylim()
-    inches = ax.get_position().height * figure.get_size_inches()[1]
     gap = 1.25 * SMALL / POINTS_PER_INCH / inches
     # of two at the same height, hair's breadths apart, the first is above
     heights = [round((label.height - low) / (high - low), 2) for label in labels]
     order = sorted(range(len(labels)), key=lambda index: (heights[index], -index))
     for place, index in zip(spread([heights[i] for i in order], gap), order, strict=True):
         label = labels[index]
-        ax.annotate(
-            label.words,
-            (1.0, place),
-            xycoords="axes fraction",
-            xytext=(5.0, 0.0),
-            textcoords="offset points",
-            fontsize=SMALL,
-            color=label.color,
-            va="center",
-            annotation_clip=False,
-        )
+        how: dict[str, Any] = {"va": "center", "annotation_clip": False}
+        write(ax, label.words, (1.0, place), (5.0, 0.0), color=label.color, **how)
 
 
 def spread(wanted: Sequence[float], gap: float) -> list[float]:
@@ -208,17 +286,44 @@ def spread(wanted: Sequence[float], gap: float) -> list[float]:
     Neighbours that come too near form a group, which is centred on what its members want.
     """
     groups: list[list[float]] = []
+
+    def bottom(group: Sequence[float]) -> float:
+        return sum(group) / len(group) - 0.5 * gap * (len(group) - 1)
+
     for place in wanted:
         groups.append([place])
-        while len(groups) > 1 and _bottom(groups[-1], gap) < _top(groups[-2], gap) + gap:
+        while len(groups) > 1 and bottom(groups[-1]) < bottom(groups[-2]) + gap * len(groups[-2]):
             last = groups.pop()
             groups[-1].extend(last)
-    return [_bottom(group, gap) + gap * index for group in groups for index in range(len(group))]
+    return [bottom(group) + gap * index for group in groups for index in range(len(group))]
 
 
-def _bottom(group: Sequence[float], gap: float) -> float:
-    return sum(group) / len(group) - 0.5 * gap * (len(group) - 1)
+_METADATA: dict[str, dict[str, None]] = {
+    "png": {},
+    "svg": {"Date": None},
+    "pdf": {"CreationDate": None},
+}
+"""What to leave out, because it would differ between two runs on the same figure."""
 
 
-def _top(group: Sequence[float], gap: float) -> float:
-    return _bottom(group, gap) + gap * (len(group) - 1)
+def save_figure(figure: Figure, path: str | Path) -> None:
+    """Write a figure as PNG, SVG or PDF, by the path's ending.
+
+    The file appears whole or not at all: it is written beside and renamed. The same figure gives
+    the same bytes.
+
+    Raises
+    ------
+    FileError
+        For another ending, or a folder that cannot be written.
+    """
+    import matplotlib
+
+    kind = ending(path, FIGURE).removeprefix(".")
+
+    def write(beside: Path) -> None:
+        # without a salt of its own, an SVG's clip paths get random names
+        with matplotlib.rc_context({"svg.hashsalt": "swashplate"}):
+            figure.savefig(beside, format=kind, metadata=_METADATA[kind])
+
+    write_whole(path, write)

@@ -1,0 +1,235 @@
+"""Arguments and options that several commands share, and groups of them that go together.
+
+A command whose parameter is one of the groups here gets the group's fields as options: `command`
+spreads them in its signature and gathers them again.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+
+import typer
+
+from swashplate.units import shown_in
+
+if TYPE_CHECKING:
+    from swashplate.drive import Drive
+
+Interpolation = Literal["linear", "previous"]
+Start = Literal["rest", "steady"]
+Figures = Literal["svg", "pdf"]
+
+
+def option(help: str, *names: str, metavar: str | None = None, **more: Any) -> Any:
+    """An option of Typer's, its help first; one without a value is a switch by its name."""
+    return typer.Option(*names, help=help, metavar=metavar, **more)
+
+
+def argument(metavar: str, help: str) -> Any:
+    """A positional argument of Typer's."""
+    return typer.Argument(metavar=metavar, help=help, show_default=False)
+
+
+DriveWord = Annotated[
+    str,
+    argument(
+        "AXIS|SET.toml",
+        "A packaged drive (see 'swashplate axes'), your own TOML file, or the folder of a fit.",
+    ),
+]
+CommandWord = Annotated[
+    str,
+    argument(
+        "MANEUVER|FILE",
+        'A manoeuvre such as step:9 or "step +9 V", or a log with columns of time and voltage: '
+        "text such as .csv, .parquet, .mat, .h5, .tdms or .mf4; a column may carry its unit: "
+        "'time \\[ms]'.",
+    ),
+]
+CampaignPath = Annotated[Path, argument("CAMPAIGN.toml", "The campaign file, beside its logs.")]
+AxisName = Annotated[str | None, option("The axis, where the campaign has several.")]
+SetupWord = Annotated[
+    str | None,
+    option(
+        "What is free: a packaged fit configuration (hoist, slew, luff, neutral ...) or your own "
+        "TOML file; by default the one of the axis's drive.",
+        metavar="NAME|FILE",
+    ),
+]
+StartWord = Annotated[
+    str | None,
+    option("Begin at this drive instead of the campaign's.", "--from", metavar="AXIS|SET.toml"),
+]
+OwnModel = Annotated[
+    Path | None,
+    option(
+        "A Python file with a model of your own and what is free of it.",
+        "--model",
+        metavar="FILE.py",
+    ),
+]
+Rate = Annotated[float, option("Samples a second, 10 to 100000.", metavar="HZ")]
+TableFile = Annotated[
+    Path | None, option("Write all numbers, in SI, to a .csv or .parquet file.", metavar="FILE")
+]
+SetFile = Annotated[
+    Path | None, option("Write the changed drive as a parameter file.", metavar="SET.toml")
+]
+FigureFile = Annotated[Path | None, option("Draw a figure: .png, .svg or .pdf.", metavar="FILE")]
+PrintFigures = Annotated[
+    Figures | None, option("Figures for print as well, in the folder figures.")
+]
+Required = Annotated[float, option("Largest error of held-out runs, in % of their range.", min=0.0)]
+Force = Annotated[bool, option("Replace older files.", "--force")]
+Seed = Annotated[int, option("Of everything drawn at random.", min=0)]
+Levers = Annotated[
+    list[str] | None,
+    option(
+        "A lever or parameter, by itself or with its lowest and highest factor; may be repeated. "
+        "'swashplate whatif --levers' lists them.",
+        "--lever",
+        metavar="LEVER[=LOW/HIGH]",
+    ),
+]
+Values = Annotated[
+    list[str] | None,
+    option(
+        "Another value for a parameter: Z16=1.2e-4 in SI, Z16=1.2e-4/1.5e-4 for plus and minus, "
+        "Z16_plus=0.12mm with a unit. May be repeated.",
+        "--set",
+        metavar="NAME=VALUE",
+    ),
+]
+Factors = Annotated[
+    list[str] | None,
+    option(
+        "A factor on a parameter or a lever, after --set: Z16=1.5, orifice=1.5. May be repeated.",
+        "--scale",
+        metavar="NAME=FACTOR",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class DriveChoice:
+    """A drive as the command line names it, with values set and then scaled."""
+
+    drive: DriveWord
+    values: Values = None
+    factors: Factors = None
+
+    @cached_property
+    def chosen(self) -> Drive:
+        """The drive."""
+        from swashplate.cli.words import drive_of
+
+        return drive_of(self.drive, self.values or (), self.factors or ())
+
+    @property
+    def title(self) -> str:
+        """Its name for a heading; one from a file of another name goes by that, too."""
+        path, name = Path(self.drive), self.chosen.name
+        return name if path.stem == name else f"{path.name or self.drive} ({name})"
+
+    @property
+    def changes(self) -> list[str]:
+        """A line for each parameter that is not as its file has it."""
+        from swashplate.cli.words import changes_between, parameters_of
+
+        return changes_between(parameters_of(self.drive), self.chosen.parameters)
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How a command is sampled, and read where it is a file."""
+
+    rate: Rate = 512.0
+    interpolation: Annotated[
+        Interpolation | None,
+        option(
+            "The voltage between rows or samples: a straight line, or the earlier one held. Must "
+            "be given with a FILE."
+        ),
+    ] = None
+    time_column: Annotated[str, option("Column of the time in FILE.", metavar="NAME")] = "time"
+    column: Annotated[str, option("Column of the voltage in FILE.", metavar="NAME")] = "voltage"
+
+    start = "rest"
+    clip = False
+
+
+@dataclass(frozen=True)
+class Simulating(Sampling):
+    """How a command is sampled, and simulated."""
+
+    start: Annotated[Start, option("Start from rest at 0 V, or settled at the first voltage.")] = (
+        "rest"
+    )
+    clip: Annotated[
+        bool, option("Clip a voltage beyond ±10 V instead of refusing it.", "--clip")
+    ] = False
+
+
+@dataclass(frozen=True)
+class ShownUnits:
+    """Units that tables and figures are shown in."""
+
+    units: Annotated[
+        str, option("Units to show, such as rpm,bar; m/min is of rope, with --drum.")
+    ] = ""
+    drum: Annotated[
+        float | None, option("Diameter of the drum on the shaft.", metavar="M", min=0.0)
+    ] = None
+
+
+def command(
+    app: typer.Typer, name: str, examples: str, panel: str | None = None
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Register a command with its examples, its groups of options spread and the units' added."""
+
+    def register(function: Callable[..., None]) -> Callable[..., None]:
+        hints = get_type_hints(function, include_extras=True)
+        given = inspect.signature(function).parameters.values()
+        groups = {each.name: hints[each.name] for each in given if is_dataclass(hints[each.name])}
+        flat = []
+        for each in given:
+            if each.name in groups:
+                flat += _spread(groups[each.name])
+            else:
+                kind = inspect.Parameter.KEYWORD_ONLY
+                flat.append(each.replace(annotation=hints[each.name], kind=kind))
+        flat += _spread(ShownUnits)
+
+        def run(**words: Any) -> None:
+            units, drum = words.pop("units"), words.pop("drum")
+            for name, group in groups.items():
+                own = [each.name for each in fields(group)]
+                words[name] = group(**{each: words.pop(each) for each in own})
+            with shown_in([each.strip() for each in units.split(",") if each.strip()], drum):
+                function(**words)
+
+        run.__doc__ = function.__doc__
+        run.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
+        run.__annotations__ = {each.name: each.annotation for each in flat}
+        app.command(name, epilog=examples, rich_help_panel=panel)(run)
+        return function
+
+    return register
+
+
+def _spread(group: Any) -> list[inspect.Parameter]:
+    hints = get_type_hints(group, include_extras=True)
+    return [
+        inspect.Parameter(
+            each.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=inspect.Parameter.empty if each.default is MISSING else each.default,
+            annotation=hints[each.name],
+        )
+        for each in fields(group)
+    ]

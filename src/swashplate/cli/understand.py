@@ -1,0 +1,525 @@
+"""``swashplate limits``, ``whatif``, ``size``, ``sensitivity`` and ``compensate``."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from math import radians
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from swashplate.cli.options import (
+    DriveChoice,
+    DriveWord,
+    FigureFile,
+    Levers,
+    Sampling,
+    Seed,
+    SetFile,
+    Simulating,
+    TableFile,
+    argument,
+    option,
+)
+from swashplate.cli.terminal import Outputs, note, say, show, working
+from swashplate.cli.words import (
+    changes_between,
+    factors_of,
+    maneuver_of,
+    ranges_of,
+    simulated,
+    trial_of,
+)
+from swashplate.errors import DomainError, InputError
+from swashplate.tables import FIGURE, TABLE, Form, quantity
+
+if TYPE_CHECKING:
+    from swashplate.analysis.limits import LimitShares
+    from swashplate.analysis.monte_carlo import Bands
+
+LIMITS_EXAMPLES = """\
+Examples:
+  swashplate limits hoist
+  swashplate limits hoist --plot envelope.png --error 0.05 --frequency 0.3
+  swashplate limits luff sine:9,0.1 --plot timeline.png
+  swashplate limits mine.toml log.csv --interpolation previous --out shares.csv
+"""
+WHATIF_EXAMPLES = """\
+Examples:
+  swashplate whatif hoist --scale orifice=1.5 --scale pump=1.5
+  swashplate whatif slew --scale orifice_diameter=1.2 --maneuver step:6 --plot w.png
+  swashplate whatif fitted --scale dead_zone=0 --uncertainty fitted
+  swashplate whatif mine.toml --scale pump=1.2 --maneuver log.csv --interpolation previous
+  swashplate whatif --levers
+"""
+SIZE_EXAMPLES = """\
+Examples:
+  swashplate size hoist --speed-deg-s 250 --lever pump
+  swashplate size hoist --acceleration-deg-s2 200 --lever orifice=1/2 --lever pump=1/1.5
+  swashplate size hoist --tracking-deg-s 19 --maneuver sine:9,0.1 --out larger.toml
+"""
+SENSITIVITY_EXAMPLES = """\
+Examples:
+  swashplate sensitivity hoist
+  swashplate sensitivity hoist --lever orifice --lever pump=0.8/1.5 --plot tornado.png
+  swashplate sensitivity slew --maneuver step:4 --sobol 1024 --plot sobol.png
+"""
+COMPENSATE_EXAMPLES = """\
+Examples:
+  swashplate compensate hoist --out hoist-inverse.toml
+  swashplate compensate hoist --speed-deg-s 5 --speed-deg-s -120
+  swashplate compensate luff sine:4,0.1 --plot inverse.png
+"""
+ERROR = 0.1
+FREQUENCIES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
+LEVEL = 0.95
+CHOSEN = ("final_speed", "rise_time", "largest_acceleration", "tracking_error", "creep", "travel")
+SIZED = ("orifice", "pump")
+PULLED = (
+    "orifice",
+    "pump",
+    "supply_pressure",
+    "rate_limits",
+    "dead_zone",
+    "spool_stroke",
+    "relief",
+    "plussing",
+)
+OUTCOMES = ("final_speed", "rise_time", "largest_acceleration", "tracking_error", "creep")
+INVERSE_MAP = Form("an inverse map", (".toml", ".csv", ".parquet"), (".pq",))
+
+Direction = Literal["both", "positive", "negative"]
+
+
+def limits(
+    drive: DriveChoice,
+    command: Annotated[
+        str | None,
+        argument(
+            "MANEUVER|FILE",
+            "A manoeuvre or a log, as in 'swashplate simulate': what limits the drive under it. "
+            "Without one, what the drive can do at all.",
+        ),
+    ] = None,
+    error: Annotated[
+        float | None,
+        option(
+            "Error within which a sine counts as followed, rms by rms, above 0 and below 1.",
+            show_default=f"{ERROR:g}",
+        ),
+    ] = None,
+    frequencies: Annotated[
+        list[float] | None,
+        option(
+            "Frequency of a sine to follow, up to 64; may be repeated. By default 0.02 to 1.",
+            "--frequency",
+            metavar="HZ",
+        ),
+    ] = None,
+    out: TableFile = None,
+    plot: FigureFile = None,
+    *,
+    sampling: Simulating,
+) -> None:
+    """Say what a drive can do, or what limits it under a command.
+
+    Without a command: dead zone, gain, limits of speed and acceleration, rise
+    times, and the largest sine that it follows at each frequency. With one: how
+    often each limit acts, by how much the error falls without it, and so which
+    component to change first. The error is the rms of the speed less that of a
+    drive without limits. The shares need not add up to 100 %.
+    """
+    files = Outputs((out, TABLE), (plot, FIGURE))
+    if command is not None and (error is not None or frequencies):
+        raise InputError(
+            "--error and --frequency belong to the sines that a drive can follow, which are said "
+            f"without a command: leave them out, or '{command}'."
+        )
+    if command is None:
+        within = ERROR if error is None else error
+        _say_envelope(drive, within, tuple(frequencies or FREQUENCIES), files, out, plot)
+    else:
+        _say_shares(drive, command, sampling, files, out, plot)
+    files.say()
+
+
+def _say_envelope(
+    drive: DriveChoice,
+    error: float,
+    frequencies: tuple[float, ...],
+    files: Outputs,
+    out: Path | None,
+    plot: Path | None,
+) -> None:
+    with working("Measuring"):
+        from swashplate.analysis.envelope import envelope, envelope_table
+        from swashplate.analysis.tracking import largest_sine, sine_table
+
+        found, refusal = envelope(drive.chosen), ""
+        tables = [envelope_table(found)]
+        try:
+            tables.append(sine_table(largest_sine(drive.chosen, frequencies, error)))
+        except DomainError as no_inverse:
+            refusal = f"No sine can be commanded: {no_inverse}"
+    files.write(out, "Envelope, in SI", found.write)
+    files.draw(plot, "plot_envelope", found)
+    note(f"{drive.title}: what it can do")
+    for line in drive.changes:
+        note(line)
+    show(*tables)
+    if refusal:
+        say(refusal)
+
+
+def _say_shares(
+    drive: DriveChoice,
+    command: str,
+    sampling: Simulating,
+    files: Outputs,
+    out: Path | None,
+    plot: Path | None,
+) -> None:
+    with working("Simulating"):
+        from swashplate.analysis.limits import limit_shares, share_table
+
+        name, run = simulated(drive.chosen, command, sampling)
+        assert run.voltage is not None  # the command line simulates voltages only
+        how = {"interpolation": sampling.interpolation, "start": sampling.start}
+        found = limit_shares(drive.chosen, run.voltage, run.record.rate, **how)  # type: ignore[arg-type]
+    title = f"{drive.title}, {name}"
+    files.write(out, "Shares of each limit, in SI", found.write)
+    files.draw(plot, "plot_limit_timeline", run, wanted=found.wanted, title=title)
+    error = quantity(found.error, "rad/s", spec=".3f")
+    note(f"{title}: {error} rms from a drive without limits")
+    for line in drive.changes:
+        note(line)
+    shares = share_table(found)
+    if shares.rows:
+        show(shares)
+    for sentence in found.sentences():
+        say(sentence)
+    first = found.first
+    if first is None or first.eased_error is None or drive.changes:
+        return
+    if sampling.start == "rest" and not sampling.clip:
+        say(found.eased_sentence())
+        note(f"See more of it: {_whatif_words(drive.drive, command, sampling, found)}")
+
+
+def _whatif_words(drive: str, command: str, sampling: Sampling, found: LimitShares) -> str:
+    """The command that shows more of what easing the first limit buys."""
+    assert found.first is not None
+    words = ["swashplate", "whatif", drive]
+    for name, factor in found.first.eased_by.items():
+        words += ["--scale", f"{name}={factor:.6g}"]
+    words += ["--maneuver", command]
+    for name, given, usual in (
+        ("--rate", f"{sampling.rate:g}", "512"),
+        ("--interpolation", sampling.interpolation, None),
+        ("--time-column", sampling.time_column, "time"),
+        ("--column", sampling.column, "voltage"),
+    ):
+        if given is not None and given != usual:
+            words += [name, given]
+    return shlex.join(words)
+
+
+def _list_levers(asked: bool) -> None:
+    if asked:
+        from swashplate.analysis.whatif import levers_table
+
+        show(levers_table())
+        raise typer.Exit
+
+
+def whatif(
+    drive: DriveWord,
+    factors: Annotated[
+        list[str],
+        option(
+            "A factor on a lever: orifice=1.5, pump=1.5, dead_zone=0 ... (see --levers), or on a "
+            "parameter: Z16_plus=1.2. May be repeated.",
+            "--scale",
+            metavar="LEVER=FACTOR",
+            show_default=False,
+        ),
+    ],
+    maneuver: Annotated[
+        str,
+        option(
+            'Command for both: a manoeuvre such as step:9 or "step +9 V", or a log.',
+            metavar="NAME|FILE",
+        ),
+    ] = "sine:9,0.1",
+    uncertainty: Annotated[
+        Path | None,
+        option("Folder that 'fit' wrote: bands from the errors of its estimates.", metavar="DIR"),
+    ] = None,
+    campaign: Annotated[
+        Path | None,
+        option("The campaign of that fit, if it is not where it was.", metavar="CAMPAIGN.toml"),
+    ] = None,
+    draws: Annotated[int, option("Drives drawn for the bands, 20 or more.")] = 200,
+    seed: Seed = 0,
+    plot: FigureFile = None,
+    out: SetFile = None,
+    levers: Annotated[
+        bool, option("List the levers and end.", "--levers", callback=_list_levers, is_eager=True)
+    ] = False,
+    *,
+    sampling: Sampling,
+) -> None:
+    """See what a change of the machine does.
+
+    Simulates the drive as it is and with its levers moved, over one command.
+    The speed that is wanted is in proportion to the voltage, at the ratio of
+    the drive as it is. With --uncertainty outcomes get intervals and the figure
+    bands: drives are drawn from the errors of a fit's estimates.
+    """
+    from swashplate.analysis.whatif import AS_IS, CHANGED, before_and_after, what_if
+
+    files = Outputs((out, None), (plot, FIGURE))
+    moved = factors_of(factors)
+    if uncertainty is not None and draws < 20:
+        raise InputError(f"--draws is {draws}, but bands need 20 or more.")
+    choice = DriveChoice(drive)
+    with working("Simulating"):
+        name, trial = trial_of(choice.chosen, maneuver, sampling)
+        result = what_if(choice.chosen, moved, trial, outcomes=CHOSEN)
+    drawn, widths, bands, said = {}, None, {}, list[str]()
+    if uncertainty is not None:
+        with working("Drawing drives"):
+            from swashplate.analysis import monte_carlo
+
+            before = monte_carlo.stored_draws(
+                uncertainty, drive=choice.chosen, campaign=campaign, draws=draws, seed=seed
+            )
+            drawn = {AS_IS: before, CHANGED: before.pulled(moved)}
+            widths = {k: monte_carlo.half_widths(result, v, LEVEL) for k, v in drawn.items()}
+            bands = {
+                name: monte_carlo.bands(each, trial.voltage, trial.rate, level=LEVEL)
+                for name, each in drawn.items()
+            }
+            said = [*_band_sentences(bands), *before.sentences()]
+    made = before_and_after(result, widths)
+    title = f"{choice.title}, {name}"
+    files.write(out, "Changed drive", result.after.drive.to_toml)
+    words = ", ".join(f"{name} x {factor:g}" for name, factor in moved.items())
+    files.draw(plot, "plot_whatif", result, bands=bands, title=f"{title}: {words}")
+    note(title)
+    for line in changes_between(result.before.drive.parameters, result.after.drive.parameters):
+        note(line)
+    show(made)
+    for sentence in (*result.sentences(), *said):
+        say(f"- {sentence}")
+    files.say()
+
+
+def _band_sentences(bands: Mapping[str, Bands]) -> list[str]:
+    said = [f"± is half of the interval that holds {100.0 * LEVEL:g} % of the drives."]
+    for name, band in bands.items():
+        width, when = band.widest
+        said.append(
+            f"Band of {band.draws} drives, {name}: at most {quantity(width, 'rad/s', spec='.3g')} "
+            f"wide, at {when:.3g} s."
+        )
+    return said
+
+
+def size(
+    drive: DriveWord,
+    speed_deg_s: Annotated[float | None, option("Speed that is required.", metavar="DEG/S")] = None,
+    acceleration_deg_s2: Annotated[
+        float | None,
+        option(
+            "Acceleration that is required, after a full step from rest.",
+            "--acceleration-deg-s2",
+            metavar="DEG/S2",
+        ),
+    ] = None,
+    tracking_deg_s: Annotated[
+        float | None,
+        option("Largest RMS error that is allowed while following the manoeuvre.", metavar="DEG/S"),
+    ] = None,
+    maneuver: Annotated[
+        str | None,
+        option(
+            "What is to be followed: the speed in proportion to this manoeuvre's voltage, at the "
+            "ratio of the drive as it is. Each candidate is commanded in proportion to it, at its "
+            "own ratio.",
+            metavar="NAME",
+        ),
+    ] = None,
+    direction: Annotated[Direction, option("Where speed and acceleration are required.")] = "both",
+    levers: Levers = None,
+    out: SetFile = None,
+) -> None:
+    """Find the smallest change that meets what is required.
+
+    Smallest is the least sum of squares of the changes, each in per cent. What
+    cannot be met is refused, with what can be reached. Levers are orifice and
+    pump, from half to twice, unless others are named.
+    """
+    from swashplate.analysis import sizing
+    from swashplate.analysis.outcomes import proportional_speed, wanted
+
+    files = Outputs((out, None))
+    if (tracking_deg_s is None) != (maneuver is None):
+        raise InputError("--tracking-deg-s and --maneuver belong together: give both or neither.")
+    given = (speed_deg_s, acceleration_deg_s2, tracking_deg_s)
+    speed, acceleration, error = (None if each is None else radians(each) for each in given)
+    required = sizing.Requirements(speed, acceleration, error, direction)
+    choice = DriveChoice(drive)
+    with working("Sizing"):
+        follow, ranges = None, ranges_of(levers or SIZED, sizing.WIDEST)
+        if maneuver is not None:
+            voltage = maneuver_of(maneuver, choice.chosen).sample()
+            follow = wanted(proportional_speed(choice.chosen, voltage))
+        found = sizing.size(choice.chosen, required, ranges, follow=follow)
+    files.write(out, "Changed drive", found.drive.to_toml)
+    note(choice.title)
+    show(sizing.levers_table(found), sizing.performance_table(found, required))
+    if found.change == 0.0:
+        say("The drive meets it as it is; nothing needs to be changed.")
+    else:
+        words = ["swashplate", "whatif", drive]
+        typed = sizing.typed_factors(found, choice.chosen, required, follow)
+        for name, factor in typed.items():
+            words += ["--scale", f"{name}={factor:.9g}"]
+        note(f"See it over a command: {shlex.join(words)}")
+    files.say()
+
+
+def sensitivity(
+    drive: DriveChoice,
+    levers: Levers = None,
+    span: Annotated[float, option("Levers without factors go this part down and up.")] = 0.1,
+    outcomes: Annotated[
+        list[str] | None,
+        option(
+            "final_speed, peak_speed, rise_time, response_time, largest_acceleration, overshoot, "
+            "tracking_error, creep or travel; may be repeated.",
+            "--outcome",
+            metavar="NAME",
+        ),
+    ] = None,
+    maneuver: Annotated[
+        str,
+        option(
+            'Command: a manoeuvre such as step:9 or "step +9 V", or a log.', metavar="NAME|FILE"
+        ),
+    ] = "step:9",
+    samples: Annotated[
+        int | None,
+        option(
+            "Sobol's indices as well, from N base samples, a power of 2 (1024 is usual): N times "
+            "the number of levers and two simulations.",
+            "--sobol",
+            metavar="N",
+        ),
+    ] = None,
+    seed: Seed = 0,
+    plot: FigureFile = None,
+    out: TableFile = None,
+    *,
+    sampling: Sampling,
+) -> None:
+    """See which lever moves which outcome.
+
+    Each lever is moved down and up by itself. With --sobol all are moved at once,
+    and the variance of each outcome is shared out among them: by itself, and in
+    total with what a lever does together with others.
+    """
+    from swashplate.analysis import sensitivity as analysis
+
+    files = Outputs((out, TABLE), (plot, FIGURE))
+    wanted, indices = tuple(outcomes) if outcomes else OUTCOMES, None
+    if not 0.0 < span < 1.0:
+        raise InputError(f"--span is {span:g}, but must lie between 0 and 1.")
+    with working("Simulating"):
+        name, trial = trial_of(drive.chosen, maneuver, sampling)
+        ranges = ranges_of(levers or PULLED, (1.0 - span, 1.0 + span))
+        single = analysis.one_at_a_time(drive.chosen, ranges, trial, outcomes=wanted)
+        if samples is not None:
+            how = {"outcomes": wanted, "samples": samples, "seed": seed}
+            indices = analysis.sobol(drive.chosen, ranges, trial, **how)  # type: ignore[arg-type]
+    title = f"{drive.title}, {name}"
+    files.write(out, "All numbers, in SI", analysis.sensitivity_table(single, indices).write)
+    if indices is None:
+        files.draw(plot, "plot_tornado", single, title=f"{title}: each lever by itself")
+    else:
+        files.draw(plot, "plot_sobol", indices, title=f"{title}: shares of the variance")
+    note(title)
+    for line in drive.changes:
+        note(line)
+    show(*(analysis.outcome_table(single, indices, k) for k in range(len(single.outcomes))))
+    for sentence in dict.fromkeys((*single.sentences, *(indices.sentences if indices else ()))):
+        say(f"- {sentence}")
+    if indices is not None:
+        error = indices.largest_error
+        say(f"- {indices.runs} simulations; indices are good to {error:.2g} or better.")
+    files.say()
+
+
+def compensate(
+    drive: DriveChoice,
+    stick: Annotated[
+        str | None,
+        argument(
+            "MANEUVER|FILE",
+            "What the stick does: ±10 V asks for the full speed of that way, in proportion. A "
+            "manoeuvre or a log as in 'swashplate simulate'. Says what the map buys under it.",
+        ),
+    ] = None,
+    speeds_deg_s: Annotated[
+        list[float] | None,
+        option(
+            "A wanted speed to print the voltage of; may be repeated.",
+            "--speed-deg-s",
+            metavar="DEG/S",
+        ),
+    ] = None,
+    points: Annotated[int, option("Points of the map each way, 2 to 10001.", metavar="N")] = 101,
+    out: Annotated[
+        Path | None,
+        option(
+            "Write the map, in SI: .toml for a controller, .csv or .parquet as a table.",
+            metavar="FILE",
+        ),
+    ] = None,
+    plot: FigureFile = None,
+    *,
+    sampling: Sampling,
+) -> None:
+    """Invert a drive's steady map: the voltage for a wanted speed.
+
+    The map crosses the dead zone at once, ends where the speed saturates, and
+    is straight between its points, so that any controller can follow it. With
+    what a stick does, compares three controllers in simulation: a straight
+    line, the map, and the map with the drive's lag made up for.
+    """
+    files = Outputs((out, INVERSE_MAP), (plot, FIGURE))
+    with working("Inverting"):
+        from swashplate.analysis import compensation, tracking
+
+        found = compensation.inverse_map(drive.chosen, points)
+        tables = [compensation.map_table(found), compensation.map_limits_table(found)]
+        if speeds_deg_s:
+            speeds = [radians(each) for each in speeds_deg_s]
+            tables.insert(0, compensation.wanted_table(found, speeds))
+        bought = None
+        if stick is not None:
+            name, run = simulated(drive.chosen, stick, sampling)
+            assert run.voltage is not None  # the command line simulates voltages only
+            wanted = tracking.wanted_of_stick(found, run.voltage)
+            bought = tracking.improvement(drive.chosen, wanted, run.record.rate, inverse=found)
+            tables.append(tracking.improvement_table(bought, name))
+    files.write(out, "Inverse map, in SI", found.write)
+    files.draw(plot, "plot_compensation", found, bought)
+    note(f"{drive.title}: voltage for a wanted speed")
+    for line in drive.changes:
+        note(line)
+    show(*tables)
+    files.say()

@@ -1,0 +1,413 @@
+"""From the words of a command line to drives, commands, campaigns, levers and simulations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from difflib import get_close_matches
+from math import isfinite, isnan, nan
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from swashplate.errors import FileError, InputError
+
+if TYPE_CHECKING:
+    from swashplate.analysis.outcomes import Trial
+    from swashplate.analysis.sensitivity import Range
+    from swashplate.campaign import Campaign, Experiment
+    from swashplate.cli.options import Sampling
+    from swashplate.drive import Drive
+    from swashplate.identification.own_model import ModelParameters
+    from swashplate.maneuvers import Maneuver
+    from swashplate.parameters.parameter_set import Change, ParameterSet
+    from swashplate.simulation.result import Simulation
+
+    Value = TypeVar("Value")
+
+_NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
+_VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
+_ENDING = re.compile(r"\.[A-Za-z]\w*$")
+DRIVE = "drive.toml"
+"""The drive in a folder that a fit wrote."""
+NUMBERS = "parameters.toml"
+"""What a fit of a model of one's own writes in the place of a drive."""
+SURPRISING = 1000.0
+"""Factor from which a value that is set is questioned."""
+
+# --- files and what they are ----------------------------------------------------------------------
+
+_INSTEAD = {
+    ("log", "campaign"): "make a campaign of it with 'swashplate campaign init {}'",
+    ("log", "drive"): "a drive is a packaged name, a parameter file or the folder of a fit",
+    ("drive", "campaign"): "name the campaign first; a fit begins at a drive given with --from",
+    ("setup", "campaign"): "name the campaign first, and this file with --setup",
+    ("campaign", "drive"): "name a drive here, and the campaign where CAMPAIGN.toml stands",
+    ("setup", "drive"): "name a drive here, and this file with --setup",
+}
+_NAMES = {
+    "log": "a log",
+    "campaign": "a campaign",
+    "drive": "a drive",
+    "setup": "a fit configuration",
+}
+
+
+def file_kind(path: Path) -> str:
+    """What a file is: ``"log"``, ``"campaign"``, ``"drive"``, ``"setup"``, or empty."""
+    from swashplate.logs import SUFFIXES
+
+    if path.name.lower().endswith((*SUFFIXES, ".xlsx", ".xls")):
+        return "log"
+    try:
+        import tomllib
+
+        found = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return ""
+    marks = {"runs": "campaign", "stages": "setup", "control_card": "drive", "pump_motor": "drive"}
+    return next((kind for mark, kind in marks.items() if mark in found), "")
+
+
+def check_kind(path: Path, wanted: str) -> None:
+    """Refuse a file that is plainly of another kind than the one wanted.
+
+    Raises
+    ------
+    InputError
+        If it is; the sentence says what it is, and where such a file goes.
+    """
+    kind = file_kind(path)
+    instead = _INSTEAD.get((kind, wanted))
+    if path.is_file() and instead is not None:
+        raise InputError(f"{path} is {_NAMES[kind]}, not {_NAMES[wanted]}: {instead.format(path)}.")
+
+
+def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
+    """A campaign, and its axis of a name or its only one."""
+    from swashplate.campaign import Campaign
+
+    if not path.exists():
+        raise FileError(
+            f"There is no file {path}: name a campaign, or make one of your logs with 'swashplate "
+            "campaign init LOGS'."
+        )
+    check_kind(path, "campaign")
+    campaign = Campaign.from_toml(path)
+    if axis is None and len(campaign.axes) > 1:
+        raise InputError(f"{path} has the axes {', '.join(campaign.axes)}; name one with --axis.")
+    if axis is not None:
+        campaign.select(axis=axis)
+    return campaign, axis or next(iter(campaign.axes))
+
+
+def runs_to_fit(campaign: Campaign, axis: str) -> tuple[Experiment, ...]:
+    """The runs of an axis with the role 'fit', at least one."""
+    runs = campaign.select(axis=axis, role="fit")
+    if not runs:
+        raise InputError(f"{campaign.path}: no run of the axis '{axis}' has the role 'fit'.")
+    return tuple(runs)
+
+
+def drive_file(word: str) -> Path | None:
+    """The parameter file that a word means, None for a packaged set.
+
+    A folder means the drive.toml that 'fit' wrote into it; a packaged name goes before a folder of
+    that name, which can be written ``./hoist``.
+
+    Raises
+    ------
+    InputError
+        If it is none of these, or a folder without a drive.
+    """
+    from swashplate.parameters.files import preset_names
+
+    place = Path(word)
+    if word in preset_names():
+        return None
+    if place.is_dir():
+        if not (place / DRIVE).is_file():
+            raise InputError(
+                f"There is no {DRIVE} in {word}: give a folder that 'swashplate fit' wrote, or a "
+                "parameter file."
+            )
+        return place / DRIVE
+    if place.suffix.lower() == ".toml" or len(place.parts) > 1 or place.is_file():
+        check_kind(place, "drive")
+        return place
+    raise InputError(
+        f"There is no packaged set, file or folder '{word}'; packaged are "
+        f"{', '.join(preset_names())}."
+    )
+
+
+def parameters_of(word: str) -> ParameterSet:
+    """The packaged set of a name, the set in a TOML file, or the one that a fit's folder holds."""
+    from swashplate.parameters.files import load_preset, load_set
+
+    file = drive_file(word)
+    return load_preset(word) if file is None else load_set(file)
+
+
+def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelParameters:
+    """A model of one's own with the numbers that a fit wrote into its folder.
+
+    Raises
+    ------
+    InputError
+        If the folder has none of this model.
+    """
+    from dataclasses import replace
+
+    from swashplate.documents import parse_toml, read_text
+    from swashplate.identification.own_model import ModelSetup
+
+    setup = ModelSetup.from_file(file)
+    place = Path(folder) / NUMBERS if Path(folder).is_dir() else Path(folder)
+    table = parse_toml(read_text(place), str(place)).get(setup.name)
+    nominal = setup.nominal(runs)
+    if not isinstance(table, dict) or table.keys() != nominal.numbers.keys():
+        raise InputError(
+            f"{place} has no table [{setup.name}] with {', '.join(nominal.numbers)}: give the "
+            f"folder that 'swashplate fit --model {file}' wrote."
+        )
+    return replace(nominal, numbers={name: float(value) for name, value in table.items()})
+
+
+# --- changes and levers ---------------------------------------------------------------------------
+
+
+def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:
+    """The drive of a name or file, with values set and then scaled, by parameter or by lever."""
+    from swashplate.drive import Drive
+
+    drive = Drive(parameters_of(word)).replace(**_named("--set", values, _change))
+    scaled = _named("--scale", factors, _change)
+    own = {name: change for name, change in scaled.items() if not _is_lever(name)}
+    drive = drive.scale(**own)
+    if len(own) < len(scaled):
+        from swashplate.analysis.whatif import pulled
+
+        pulls = {name: change for name, change in scaled.items() if name not in own}
+        for name, change in pulls.items():
+            if not isinstance(change, float):
+                raise InputError(f"--scale {name} takes one factor, not two.")
+        drive = pulled(drive, {name: float(change) for name, change in pulls.items()})  # type: ignore[arg-type]
+    return drive
+
+
+def _is_lever(name: str) -> bool:
+    from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS
+
+    if name in CATALOGUE or name in COLUMNS or name in REFINEMENTS:
+        return False
+    from swashplate.analysis.whatif import LEVERS
+
+    return name in LEVERS
+
+
+def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
+    """A line for each parameter of two sets that differs, with a question where it surprises."""
+    lines = []
+    for old in before.values():
+        new = after[old.symbol]
+        if new.value == old.value:
+            continue
+        words = ("/".join(f"{v:g}" for v in each.values) for each in (old, new))
+        lines.append(f"{old.symbol} ({old.name}): {' -> '.join(words)} {old.unit}")
+        ratios = [b / a for a, b in zip(old.values, new.values, strict=False) if a and isfinite(a)]
+        far = [r for r in ratios if isfinite(r) and not 1.0 / SURPRISING < abs(r) < SURPRISING]
+        if any(far):
+            lines.append(
+                f"! {old.symbol} is {max(far):.3g} times what it was: is it meant in {old.unit}?"
+            )
+    return lines
+
+
+def _named(
+    option: str, words: Iterable[str], read: Callable[[str, str], tuple[str, Value]]
+) -> dict[str, Value]:
+    """What words such as ``Z16=1.2`` say, by name, each given once."""
+    found: dict[str, Value] = {}
+    for word in words:
+        name, value = read(option, word)
+        if name in found:
+            raise InputError(f"{option} gives {name} twice; give it once.")
+        found[name] = value
+    return found
+
+
+def numbers_and_unit(given: str) -> tuple[list[float], str] | None:
+    """One number or two, and their unit, from ``1.2e-4``, ``0.12mm`` or ``1.2/1.5``."""
+    match = _VALUE.fullmatch(given)
+    if match is None:
+        return None
+    return [float(number) for number in match.group(1, 2) if number], (match[3] or "").strip()
+
+
+def _one_or_both(numbers: Sequence[float]) -> Change:
+    return numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
+
+
+def _change(option: str, word: str) -> tuple[str, Change]:
+    from swashplate.parameters.definitions import find
+    from swashplate.units import to_si
+
+    scaled = option == "--scale"
+    name, equals, given = (part.strip() for part in word.partition("="))
+    read = numbers_and_unit(given) if equals else None
+    if read is None or (scaled and read[1]):
+        examples = (
+            "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
+            if scaled
+            else "Z16=1.2e-4, Z16=1.2e-4/1.5e-4 (plus/minus) or Z16_plus=0.12mm"
+        )
+        raise InputError(f"{option} cannot read '{word}'; write it as {examples}.")
+    numbers, unit = read
+    if not (scaled and _is_lever(name)):
+        definition = find(name)
+        if unit:
+            what = f"{name} ({definition.name})"
+            numbers = [to_si(number, unit, definition.unit, what) for number in numbers]
+    return name, _one_or_both(numbers)
+
+
+def physical_values(words: Sequence[str]) -> dict[str, Change]:
+    """Physical values in SI from words such as ``oil_volume=100cm^3``."""
+    from swashplate.full_order.physical_set import chosen_quantity, si_value
+
+    def read(option: str, word: str) -> tuple[str, Change]:
+        name, _, given = (part.strip() for part in word.partition("="))
+        found = numbers_and_unit(given)
+        if found is None:
+            raise InputError(
+                f"{option} cannot read '{word}'; write it as oil_volume=1e-4 or oil_volume=100cm^3."
+            )
+        quantity, (numbers, unit) = chosen_quantity(name), found
+        if unit:
+            numbers = [si_value(quantity, number, unit) for number in numbers]
+        return name, _one_or_both(numbers)
+
+    return _named("--physical", words, read)
+
+
+def factors_of(words: Sequence[str]) -> dict[str, float]:
+    """Factors by lever or parameter from words such as ``orifice=1.5``."""
+    from swashplate.analysis.whatif import find_lever
+
+    def read(option: str, word: str) -> tuple[str, float]:
+        name, _, given = (part.strip() for part in word.partition("="))
+        try:
+            factor = float(given)
+        except ValueError:
+            raise InputError(f"{option} cannot read '{word}'; write it as orifice=1.5.") from None
+        find_lever(name)
+        return name, factor
+
+    return _named("--scale", words, read)
+
+
+def ranges_of(words: Sequence[str], usual: Range) -> dict[str, Range]:
+    """Ranges of factors by lever from words such as ``pump`` or ``pump=0.8/1.5``."""
+    from swashplate.analysis.whatif import find_lever
+
+    def read(option: str, word: str) -> tuple[str, Range]:
+        name, equals, given = (part.strip() for part in word.partition("="))
+        find_lever(name)
+        low, slash, high = given.partition("/")
+        try:
+            ends = (float(low), float(high) if slash else nan) if equals else usual
+        except ValueError:
+            ends = nan, nan
+        if any(map(isnan, ends)):
+            raise InputError(f"{option} cannot read '{word}'; write it as pump or pump=0.8/1.5.")
+        return name, ends
+
+    return _named("--lever", words, read)
+
+
+def pairs_of(option: str, given: Sequence[str] | None, example: str) -> list[tuple[str, str]]:
+    """What stands before and behind the equals sign of each."""
+    for each in given or ():
+        if "=" not in each:
+            raise InputError(f"{option} {each} has no equals sign: write {option} {example}.")
+    return [(each.partition("=")[0], each.partition("=")[2]) for each in given or ()]
+
+
+# --- commands -------------------------------------------------------------------------------------
+
+
+def maneuver_of(word: str, *drives: Drive) -> Maneuver:
+    """A manoeuvre such as ``step:9``, or the thesis's test of that name for these drives."""
+    from swashplate.maneuvers import parse, source_tests
+    from swashplate.parameters.files import AXES
+
+    axes = [drive.name for drive in drives if drive.name in AXES]
+    tests = {name: test for axis in reversed(axes) for name, test in source_tests(axis).items()}
+    if word in tests:
+        return tests[word]
+    try:
+        return parse(word)
+    except InputError as error:
+        if ":" in word or not tests:
+            raise
+        said = str(error).rstrip(".")
+        near = get_close_matches(word, tests, 1) or [*tests]
+        raise InputError(
+            f'{said}; or name one of the tests of {" or ".join(axes)}, such as "{near[0]}".'
+        ) from None
+
+
+def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simulation]:
+    """Name of a command, a manoeuvre or a file, and the drive's simulation over it."""
+    from swashplate.equations.marching.record import least_substeps
+    from swashplate.logs import read_series
+
+    least_substeps(options.rate)  # a rate out of range is refused before anything is sampled
+    how = {"interpolation": options.interpolation, "start": options.start, "clip": options.clip}
+    if not _is_file(command):
+        maneuver = maneuver_of(command, drive)
+        run = drive.simulate(maneuver.sample(options.rate), options.rate, **how)  # type: ignore[arg-type]
+        return maneuver.name, run
+    _check_columns(command, options)
+    series = read_series(command, options.column, "V", time_column=options.time_column)
+    if options.interpolation is None:
+        raise InputError(
+            f"{command} needs --interpolation linear (a straight line from row to row) or "
+            "--interpolation previous (each row held until the next)."
+        )
+    try:
+        run = drive.simulate(series.values, options.rate, time=series.time, **how)  # type: ignore[arg-type]
+    except InputError as error:
+        raise InputError(f"{command}: {error}") from None
+    return Path(command).name, run
+
+
+def trial_of(drive: Drive, command: str, options: Sampling) -> tuple[str, Trial]:
+    """Name of a command, a manoeuvre or a log, and the trial that it makes."""
+    from swashplate.analysis.outcomes import trial
+
+    name, run = simulated(drive, command, options)
+    assert run.voltage is not None  # the command line simulates voltages only
+    return name, trial(drive, run.voltage, options.rate)
+
+
+def _is_file(word: str) -> bool:
+    head = word.partition(":")[0]  # stairs:2/4/0 is no path
+    return "/" in head or _ENDING.search(head) is not None or Path(word).is_file()
+
+
+def _check_columns(path: str, options: Sampling) -> None:
+    """Say with which option another column is named, if one is not there."""
+    from swashplate.logs import open_log
+
+    kind = file_kind(Path(path))
+    if kind in ("campaign", "drive", "setup"):
+        raise InputError(
+            f"{path} is {_NAMES[kind]}, not a command: name a manoeuvre such as step:9, or a log."
+        )
+    log = open_log(path)
+    for option, name in (("--time-column", options.time_column), ("--column", options.column)):
+        try:
+            log.find(name)
+        except InputError as error:
+            raise InputError(f"{str(error).rstrip('.')}, with {option}.") from None

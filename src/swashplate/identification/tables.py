@@ -1,0 +1,722 @@
+"""Tables of a fit and of a validation: estimates, runs, errors, residuals, folds, criteria, advice.
+
+Each is made once; the terminal, the report's page and the files render it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from math import isfinite
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from swashplate.errors import InputError
+from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.experiment_design import Advice, Gain, SensorAdvice
+from swashplate.identification.identifiability import GAUGES
+from swashplate.identification.own_model import ModelParameters
+from swashplate.identification.truth import SCALES, moved_columns, true_values
+from swashplate.identification.uncertainty import Estimate, estimates
+from swashplate.identification.validation import ignored_windows, pooled, with_speeds
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS
+from swashplate.simulation.instance import START_PRESSURE
+from swashplate.tables import (
+    NONE,
+    UNIT,
+    Cell,
+    Column,
+    Table,
+    listed,
+    percent,
+    plain,
+    quantity,
+    spread,
+)
+from swashplate.units import chosen_unit, display_unit
+
+if TYPE_CHECKING:
+    from swashplate.campaign.experiment import Channel, Experiment
+    from swashplate.identification.assessment import Assessment, Measures, RunQuality
+    from swashplate.identification.bootstrap import Bootstrap
+    from swashplate.identification.cross_validation import CrossValidation
+    from swashplate.identification.excitation import Outlook
+    from swashplate.identification.fitting import Fit, StageFit
+    from swashplate.identification.unknowns import Unknown
+    from swashplate.identification.validation import ChannelErrors
+    from swashplate.identification.verdict import Verdict
+    from swashplate.parameters.parameter_set import ParameterSet
+
+# --- estimates ------------------------------------------------------------------------------------
+
+
+def estimates_table(
+    assessment: Assessment,
+    *,
+    truth: ParameterSet | None = None,
+    bootstrap: Bootstrap | None = None,
+    own: bool = False,
+) -> Table:
+    """Estimates of a stage with their intervals.
+
+    Parameters
+    ----------
+    assessment : Assessment
+        Of the stage.
+    truth : ParameterSet, optional
+        Of virtual tests, in the scales that the fit kept fixed (`truth.in_the_fits_scales`).
+    bootstrap : Bootstrap, optional
+        Whose intervals stand beside.
+    own : bool
+        Whether the unknowns of single runs are meant, instead of those of the machine.
+    """
+    stage = assessment.stage
+    unknowns = stage.problem.unknowns
+    true = {} if truth is None else true_values(stage, truth)
+    refitted = None if bootstrap is None else bootstrap.intervals()
+    level, quoted, white = _intervals(assessment)
+    ends = f"{100.0 * level:g} %"
+    head = " white noise," if _alternating(quoted, white) else " white noise, too small,"
+    number = ".5g"
+    made = Table(
+        f"Stage {stage.stage.name}",
+        (
+            Column("stage", of="f"),
+            Column("unknown"),
+            Column("meaning", of="p"),
+            UNIT if truth is None else Column("unit", of="pf"),
+            Column("nominal", number),
+            Column("estimate", number),
+            Column("change", "s", of="p"),
+            Column("truth", number, of="tpf" if true else ""),
+            Column("holds", of="tpf" if true else ""),
+            Column(f"lower {ends}", number, none=NONE),
+            Column(f"upper {ends}", number, none=NONE),
+            Column("half width", "s", of="p"),
+            Column(f"{ends}{head} from", number, of="p", none=NONE),
+            Column("to", number, of="p", none=NONE),
+            Column(f"bootstrap lower {ends}", number, none="-", of="tpf" if refitted else ""),
+            Column(f"bootstrap upper {ends}", number, none="-", of="tpf" if refitted else ""),
+            Column("standard error", number, of="f"),
+            Column("status", of="pf"),
+        ),
+        si=True,
+    )
+    at_bounds = _at_bounds(stage)
+    for k, (name, unknown) in enumerate(zip(unknowns.names, unknowns, strict=True)):
+        if (unknown.run is None) == own:
+            continue
+        estimate, narrow = quoted[k], white[k]
+        value, factor = stage.values[name], chosen_unit(unknown.unit).factor
+        status = at_bounds.get(name, "estimated") if estimate is None else estimate.status
+        low, high = (None, None) if estimate is None else (estimate.lower, estimate.upper)
+        shown = (f"{factor * value:.5g}", "", "")
+        if low is not None and high is not None:
+            shown = spread(factor * value, factor * low, factor * high)
+        lower, upper = _end(low, shown[1], factor, "below"), _end(high, shown[2], factor, "above")
+        if low is None and high is None:
+            lower, upper = Cell(None, status), Cell(None, "")
+        known = true.get(name)
+        redrawn = (None if refitted is None else refitted[k]) or (None, None)
+        made.add(
+            stage.stage.name,
+            name,
+            meaning_of(unknown.name, stage),
+            *(() if truth is None else (Cell(unknown.unit, chosen_unit(unknown.unit).name),)),
+            unknown.start,
+            Cell(value, shown[0]),
+            "" if own else percent(value - unknown.start, unknown.start, sign=True),
+            known,
+            "" if known is None else _holds(estimate, known),
+            lower,
+            upper,
+            NONE if low is None or high is None else f"±{percent(0.5 * (high - low), value)}",
+            *((None, None) if narrow is None else (narrow.lower, narrow.upper)),
+            *redrawn,
+            None if estimate is None else estimate.standard_error,
+            status,
+            unit=unknown.unit,
+            look=status != "estimated",
+        )
+    return made
+
+
+def _end(value: float | None, shown: str, factor: float, side: str) -> Cell:
+    if value is None:
+        return Cell(None, f"none {side}")
+    return Cell(value, shown or f"{factor * value:.5g}")
+
+
+def _intervals(
+    assessment: Assessment,
+) -> tuple[float, Sequence[Estimate | None], Sequence[Estimate | None]]:
+    """Level, intervals and those for white noise; none where the verdict says why."""
+    try:
+        found = assessment.uncertainty
+        return found.level, found.estimates, estimates(found.white, level=found.level)
+    except InputError:
+        nothing = [None] * len(assessment.stage.problem.unknowns)
+        return 0.95, nothing, nothing
+
+
+def _alternating(quoted: Sequence[Estimate | None], white: Sequence[Estimate | None]) -> bool:
+    """Whether white noise would give the wider intervals, as for residuals that alternate."""
+    pairs = [
+        (wide.standard_error, narrow.standard_error)
+        for wide, narrow in zip(quoted, white, strict=True)
+        if wide is not None and narrow is not None
+    ]
+    ratios = sorted(narrow / wide for wide, narrow in pairs if wide and narrow)
+    return bool(ratios) and ratios[len(ratios) // 2] > 1.0
+
+
+def _at_bounds(stage: StageFit) -> dict[str, str]:
+    point = stage.problem.unknowns.at(stage.solution.vector)
+    sides = {-1: "at its lower bound", 1: "at its upper bound"}
+    ends = zip(point.names, point.at_bound, strict=True)
+    return {name: sides[int(k)] for name, k in ends if int(k) in sides}
+
+
+def _holds(estimate: Estimate | None, truth: float) -> str:
+    if estimate is None or (estimate.lower is None and estimate.upper is None):
+        return ""
+    low = -np.inf if estimate.lower is None else estimate.lower
+    high = np.inf if estimate.upper is None else estimate.upper
+    return "yes" if low <= truth <= high else "no"
+
+
+def truth_count(tables: Sequence[Table]) -> tuple[int, int]:
+    """How many intervals of tables with a truth hold it, and of how many."""
+    names = [each.name for each in tables[0].columns if each is not UNIT]
+    place = names.index("holds")
+    said = [row.cells[place] for table in tables for row in table.rows]
+    return said.count("yes"), said.count("yes") + said.count("no")
+
+
+def meaning_of(name: str, stage: StageFit | None = None) -> str:
+    """What an unknown is, in words; empty if nothing is known of the name."""
+    kind, _, channel = name.partition(" ")
+    if kind == "offset":
+        return f"free zero of {channel}"
+    if kind == "clock":
+        return f"lead of the input's clock before that of {channel}"
+    if stage is not None and stage.stage.part == "model":
+        return "number of the state at the first sample" if name.startswith("start.") else ""
+    if name == START_PRESSURE:
+        return "stroking pressure at the first sample"
+    if name.startswith("force_"):
+        return _force_words(name, stage)
+    definition = CATALOGUE.get(COLUMNS.get(name, name))
+    if definition is None:
+        return ""
+    way = {"plus": ", positive", "minus": ", negative"}.get(name.rpartition("_")[2], "")
+    return definition.name + (way if definition.directional else "")
+
+
+def _force_words(name: str, stage: StageFit | None) -> str:
+    _, side, number = name.split("_")
+    way = "positive" if side == "plus" else "negative"
+    model = stage.problem.model if stage is not None else None
+    if isinstance(model, DriveModel) and model.forces is not None:
+        current = (model.forces.plus if side == "plus" else model.forces.minus)[int(number) - 1]
+        return f"solenoid force {current:g} A beyond the dead zone, {way}"
+    return f"solenoid force, {way}"
+
+
+def fixed_table(fit: Fit, truth: ParameterSet | None = None) -> Table:
+    """The parameters that no stage moved; `truth` as it is, in no other scales."""
+    made = Table(
+        "Fixed at their nominal values",
+        (
+            Column("parameter"),
+            Column("meaning"),
+            Column("value", ".5g"),
+            UNIT,
+            Column("truth", ".5g", of="" if truth is None else "tpf"),
+            Column("why, as far as can be told"),
+            Column("source"),
+        ),
+        si=True,
+    )
+    moved, parameters = moved_columns(fit), fit.parameters
+    if isinstance(parameters, ModelParameters):
+        for name, value in parameters.numbers.items():
+            if name not in moved:
+                made.add(name, "", value, None, "given with the model", "")
+        return made
+    for column, symbol in COLUMNS.items():
+        if column in moved:
+            continue
+        one, value = parameters[symbol], parameters.numbers[column]
+        why = _why_fixed(parameters, column, symbol, moved)
+        true = None if truth is None else truth.numbers[column]
+        made.add(column, meaning_of(column), value, true, why, one.source, unit=one.unit)
+    return made
+
+
+def _why_fixed(parameters: ParameterSet, column: str, symbol: str, moved: set[str]) -> str:
+    """Why nothing was to be found out about a parameter, as far as that can be told."""
+    for gauge in GAUGES:
+        fixed = next((each for each in gauge.hold if not _is_moved(each, moved)), None)
+        others = [each for each in gauge.moves if each != symbol and _is_moved(each, moved)]
+        if gauge.name in SCALES and fixed == symbol and others:
+            return f"fixes the {gauge.name}: {gauge.determined}"
+    if parameters[symbol].status == "inactive":
+        return "inactive: no test reaches it"
+    return "0: this effect is left out" if parameters.numbers[column] == 0.0 else ""
+
+
+def _is_moved(symbol: str, moved: Collection[str]) -> bool:
+    return any(column in moved for column in (symbol, f"{symbol}_plus", f"{symbol}_minus"))
+
+
+def fixed_line(fit: Fit) -> str:
+    """The symbols that kept their nominal values, in a sentence."""
+    moved = moved_columns(fit)
+    plain_names = (n.removesuffix("_plus").removesuffix("_minus") for n in fit.nominal.numbers)
+    kept = [name for name in dict.fromkeys(plain_names) if not _is_moved(name, moved)]
+    return f"Fixed at their nominal values: {', '.join(kept) or 'none'}."
+
+
+def bounds_table(fit: StageFit) -> Table:
+    """Within which bounds each unknown could move, and what was known of it beforehand."""
+    made = Table(
+        f"Bounds of stage {fit.stage.name}",
+        (
+            Column("unknown"),
+            Column("start", ".5g"),
+            Column("lowest", ".5g"),
+            Column("highest", ".5g"),
+            UNIT,
+            Column("moved by"),
+            Column("prior"),
+        ),
+        si=True,
+    )
+    for each in fit.problem.unknowns:
+        if each.run is None:
+            by = "logarithm" if each.log else "value"
+            made.add(each.name, each.start, each.low, each.high, by, _prior(each), unit=each.unit)
+    return made
+
+
+def _prior(unknown: Unknown) -> str:
+    prior = unknown.prior
+    return "" if prior is None else f"{plain(prior.mean)} ± {plain(prior.deviation)}"
+
+
+# --- runs -----------------------------------------------------------------------------------------
+
+
+def runs_tables(
+    qualities: Sequence[RunQuality], *, stages: Mapping[int, str] | None = None
+) -> list[Table]:
+    """Errors of each run, a table for each channel with all of its runs in the last row.
+
+    Parameters
+    ----------
+    qualities : sequence of RunQuality
+        Of runs that were fitted, or of runs that were predicted.
+    stages : mapping of int to str, optional
+        Names of the stages that fitted each, by `id` of the quality.
+    """
+    whole, made = pooled(qualities), []
+    for name, together in whole.items():
+        alike = [each for each in qualities if each.channel == name]
+        table = Table(
+            name,
+            (
+                Column("run", wrap=True),
+                Column("manoeuvre", of="pf"),
+                Column("role", of="pf"),
+                Column("channel", of="pf"),
+                Column("initial state", key="initial_state"),
+                Column("ignored"),
+                Column("samples", ",d", "1", of="pf"),
+                Column("RMSE", ".3g", key="rmse"),
+                UNIT,
+                Column("NRMSE", ".3g", "1", none="-", key="nrmse"),
+                Column("fit %", ".2f", "1", none="-", key="fit_percent"),
+                Column("R²", ".4f", "1", none="-", key="r_squared"),
+                Column("residuals_correlated_s", ".2g", "1", of="f"),
+                Column("correlation_with_input", "+.2f", "1", of="f"),
+                Column("correlation_band", ".2f", "1", of="f"),
+                Column("correlation_lag_s", "+.2f", "1", of="f"),
+            ),
+        )
+        unit = alike[0].experiment[name].unit
+        for each in alike:
+            run, test = each.experiment, each.test
+            tested = (None,) * 4
+            if test is not None:
+                tested = (test.duration, test.peak[1], test.cross_band, test.peak[0])  # type: ignore[assignment]
+            table.add(
+                *(run.name, run.maneuver, run.role, name, start_words(run)),
+                Cell(
+                    "; ".join(f"{a:.6g} to {b:.6g} s" for a, b in ignored_windows(run[name])),
+                    ignored_words(run, run[name]),
+                ),
+                *_measures(each.measures),
+                *tested,
+                unit=unit,
+            )
+        if len(alike) > 1:
+            cells = ("all", "", "", name, "", "", *_measures(together), *(None,) * 4)
+            table.add(*cells, unit=unit, total=True)
+        made.append(table)
+    return made
+
+
+def _measures(found: Measures) -> tuple[float | None, ...]:
+    return found.samples, found.rmse, found.nrmse, found.fit_percent, found.r_squared
+
+
+def start_words(experiment: Experiment) -> str:
+    """How a run's initial state comes about."""
+    if experiment.start == "given" and experiment.start_pressure is not None:
+        return f"given, {1e-5 * experiment.start_pressure:.4g} bar"
+    return {"steady": "steady", "estimated": "pressure estimated"}.get(
+        experiment.start, experiment.start
+    )
+
+
+def ignored_words(experiment: Experiment, channel: Channel) -> str:
+    """What of a channel does not count, and why as far as the campaign says."""
+    said = []
+    for first, last in ignored_windows(channel):
+        reasons = [why for a, b, why in experiment.ignored if why and a <= last and first <= b]
+        why = f" ({listed(list(dict.fromkeys(reasons)))})" if reasons else ""
+        # to the millisecond: jitter of the stamps is no information
+        said.append(f"{round(first, 3) + 0.0:g} to {round(last, 3):g} s{why}")
+    return "; ".join(said) or "nothing"
+
+
+def conditions(runs: Sequence[Experiment], channel: str) -> str:
+    """Initial states and ignored windows of several runs in a few words, for beside a fit %."""
+    starts = list(dict.fromkeys(start_words(each) for each in runs))
+    parts = [ignored_words(each, each[channel]) for each in runs]
+    left_out = [words for words in dict.fromkeys(parts) if words != "nothing"]
+    ignored = "nothing ignored"
+    if len(left_out) == 1 and "nothing" not in parts:
+        ignored = f"ignored {left_out[0]}"
+    elif left_out:
+        ignored = "ignored windows differ by run and stand in the table of runs"
+    return f"start {listed(starts)}; {ignored}"
+
+
+def residual_table(qualities: Sequence[RunQuality]) -> Table:
+    """How long residuals stay correlated, and how far they follow the input."""
+    made = Table(
+        "Residuals: correlation with themselves and with the input",
+        (
+            Column("run", wrap=True),
+            Column("role", of="p"),
+            Column("channel"),
+            Column("own", ".2g", "s"),
+            Column("input", "+.2f"),
+            Column(""),
+            Column("95 % band", ".2f"),
+            Column("lag", "+.2f", "s"),
+            Column("verdict", of="p"),
+        ),
+    )
+    for each in qualities:
+        if (test := each.test) is None:
+            continue
+        lag, value = test.peak
+        star = "*" if abs(value) > test.cross_band else ""
+        run = each.experiment
+        start = (run.name, run.role, each.channel, test.duration, value, star)
+        made.add(*start, test.cross_band, lag, test.verdict)
+    return made
+
+
+def errors_table(found: ChannelErrors) -> Table:
+    """The thesis's error table of one channel: the largest error of each kind of test."""
+    made = Table(
+        f"Largest per cent error of {found.channel}, by kind of test",
+        (
+            Column("kind"),
+            Column("error", ".2f", none="-"),
+            Column(""),
+            Column("in", wrap=True),
+            Column("at", ".2f", "s", none="-"),
+            Column("samples", ",d"),
+            Column("runs", "d"),
+        ),
+    )
+    for row in found.table.rows:
+        where = row.run or "no sample is left"
+        sign = "" if row.percent is None else "%"
+        made.add(row.kind, row.percent, sign, where, row.time, row.samples, row.runs)
+    return made
+
+
+def left_out(errors: Sequence[ChannelErrors]) -> list[str]:
+    """What error tables leave out, each rule that acted once, and what else belongs to them."""
+    said = ["Per cent of what is measured at that instant."] if errors else []
+    acted = {rule for each in errors for rule in each.table.acted}
+    for rule in dict.fromkeys(rule for each in errors for rule in each.table.rules):
+        if rule not in acted:
+            continue
+        runs = dict.fromkeys(
+            run for each in errors for run, by in each.table.left_out if by == rule.name
+        )
+        whole = f" All of: {', '.join(runs)}." if runs else ""
+        said.append(f"Left out ({rule.name}): {rule.why}{whole}")
+    averages = {each.average for each in errors if each.average}
+    said += [f"Differences of currents are averaged over {a:g} s: they dither." for a in averages]
+    if any(each.channel.startswith("speed from ") for each in errors):
+        said.append("Measured and simulated positions are filtered alike to become speeds.")
+    unjudged = dict.fromkeys(run for each in errors for run in each.unjudged)
+    if unjudged:
+        said.append(f"Neither ramp, step nor sine, or too short: {listed([*unjudged])}.")
+    return said
+
+
+def criteria_table(verdict: Verdict) -> Table:
+    """The acceptance criteria, those that are not met first."""
+    columns = (Column("criterion", wrap=True), Column("value", "s"), Column("limit", "s"))
+    made = Table("Acceptance criteria", (*columns, Column(""), Column("reason", of="p")))
+    for each in sorted(verdict.criteria, key=lambda each: each.passed):
+        met = "met" if each.passed else "NOT MET"
+        made.add(each.name, each.value, each.limit, met, each.reason, look=not each.passed)
+    return made
+
+
+# --- cross-validation -----------------------------------------------------------------------------
+
+
+def folds_tables(found: CrossValidation, assessments: Sequence[Assessment]) -> list[Table]:
+    """Errors held out beside those of the fit to all runs, the folds, and the estimates' spread."""
+    whole = pooled(with_speeds(each for stage in assessments for each in stage.runs))
+    held_out = Table(
+        "Cross-validation: each part predicted by a fit to the others",
+        (
+            Column("channel"),
+            Column("fit %", ".2f", "1", none="-"),
+            Column("RMSE held out", ".3g"),
+            Column("RMSE fitted", ".3g", none=NONE),
+            UNIT,
+            Column("ratio", ".2f", "1", none=NONE),
+            Column("R²", ".5f", "1", none=NONE, of="pf"),
+            Column("samples", ",d", "1", of="pf"),
+        ),
+    )
+    for name, measures in found.measures.items():
+        fitted = whole[name].rmse if name in whole else None
+        ratio = measures.rmse / fitted if fitted else None
+        cells = (name, measures.fit_percent, measures.rmse, fitted, ratio, measures.r_squared)
+        held_out.add(*cells, measures.samples, unit=found.units[name])
+    columns = (Column("fold", "d"), Column("held out", wrap=True), Column("fit to the others"))
+    folds = Table("Folds", (*columns, Column("fit % of those held out")))
+    for fold in found.folds:
+        state = "not fitted" if fold.failure else "converged" if fold.converged else "not converged"
+        state = f"{state}; loses {', '.join(fold.lost)}" if fold.lost else state
+        measured = type(found)(found.seed, 1, (fold,)).measures
+        fits = (
+            f"{name} {'-' if each.fit_percent is None else f'{each.fit_percent:.2f}'} %"
+            for name, each in measured.items()
+        )
+        folds.add(fold.number + 1, ", ".join(fold.held), state, ", ".join(fits) or NONE)
+    return [held_out, folds, _spreads(found, assessments)]
+
+
+def _spreads(found: CrossValidation, assessments: Sequence[Assessment]) -> Table:
+    errors = ("jackknife", "quoted")
+    made = Table(
+        "Estimates over the folds",
+        (
+            Column("unknown"),
+            UNIT,
+            Column("all runs", ".5g"),
+            *(Column(each, none=NONE) for each in errors),
+            Column("lowest", ".5g"),
+            Column("highest", ".5g"),
+            Column("folds", "d", "1"),
+        ),
+        si=True,
+    )
+    values = {
+        (each.stage.stage.name, name): value
+        for each in assessments
+        for name, value in each.stage.values.items()
+    }
+    quoted = {
+        (each.stage.stage.name, one.name): one.standard_error
+        for each in assessments
+        for one in _intervals(each)[1]
+        if one is not None
+    }
+    for each in found.spreads:
+        key = (each.stage, each.name)
+        value = values.get(key, each.mean)
+        shares = (
+            Cell(error, f"±{percent(error, value)}") if error is not None else None
+            for error in (each.error, quoted.get(key))
+        )
+        ends = (each.lowest, each.highest, each.folds)
+        made.add(each.name, value, *shares, *ends, unit=each.unit)
+    return made
+
+
+# --- information of runs and of tests to come -----------------------------------------------------
+
+_LETTERS = {"most": "#", "some": "+", "unseen": "o", "none": "."}
+
+
+def outlook_table(look: Outlook, runs: Sequence[str]) -> Table:
+    """What runs can tell of each unknown of a stage, one letter a run."""
+    made = Table(
+        f"Stage {look.stage.name}",
+        (
+            Column("unknown"),
+            Column("needs", wrap=True),
+            Column("s", ".3g"),
+            Column("effect", ".3g"),
+            Column("runs"),
+        ),
+    )
+    own = look.activation
+    for k, name in enumerate(own.names):
+        letters = dict(zip(own.runs, (_LETTERS[each] for each in look.marks(name)), strict=True))
+        marks = "".join(letters.get(run, "-") for run in runs)
+        made.add(name, own.needs[k], float(own.seconds[:, k].sum()), look.effect(name), marks)
+    return made
+
+
+def outlook_rows(looks: Sequence[Outlook]) -> Table:
+    """The same for a file, a row for each unknown and run."""
+    columns = ("seconds", "share", "effect of 1 %")
+    words = ("stage", "unknown", "needs", "run")
+    made = Table("", (*map(Column, words), *(Column(each, ".6g") for each in columns)))
+    for look in looks:
+        own = look.activation
+        for k, name in enumerate(own.names):
+            share = look.shares[:, look.linearised.variables.index(name)]
+            for r, run in enumerate(own.runs):
+                effect = look.effect(name) * float(share[r]) ** 0.5
+                start = (look.stage.name, name, own.needs[k], run)
+                made.add(*start, float(own.seconds[r, k]), float(share[r]), effect)
+    return made
+
+
+def excitation_table(assessment: Assessment) -> tuple[Table, list[str]]:
+    """Share of each unknown's information by run, at the optimum, and sentences on it."""
+    from swashplate.identification.excitation import excitation
+
+    fit = assessment.linearised
+    found = excitation(fit)
+    unknowns = assessment.stage.problem.unknowns
+    samples = np.array([run.time.size for run in fit.runs], dtype=np.float64)
+    # rows of one channel need not name it
+    several = len({run.channel for run in fit.runs}) > 1
+    runs = [run.label if several else run.name for run in fit.runs]
+    heads = (Column(run, ".0f", shade=True) for run in runs)
+    made = Table(
+        f"Stage {assessment.stage.stage.name}",
+        (Column("unknown"), Column("change for 1 %", ".2g"), *heads),
+    )
+    for k, unknown in enumerate(unknowns):
+        if unknown.run is not None:
+            continue
+        share = found.share[:, k]
+        change = float(np.sqrt(samples @ found.sensitivity[:, k] ** 2 / samples.sum()))
+        cells = (Cell(float(p), f"{100.0 * p:.0f}" if p >= 0.005 else "") for p in share)
+        alone = len(runs) > 1 and float(share.max(initial=0.0)) >= 0.9
+        made.add(found.names[k], change, *cells, look=alone or not share.any())
+    own = [f"{found.names[k]}:" for k, each in enumerate(unknowns) if each.run is not None]
+    return made, [words for words in found.sentences() if not words.startswith(tuple(own))]
+
+
+NAMED = 4
+"""Unknowns that a row of advice names."""
+WORTH = 1e-3
+"""Relative gain below which none is shown."""
+
+
+def advice_table(title: str, judged: Sequence[Advice | SensorAdvice]) -> Table:
+    """Tests, or sensors to add and the test that they tell most in, in the order given."""
+    rows: list[tuple[str, str, Advice]] = []
+    for each in judged:
+        if isinstance(each, SensorAdvice):
+            rows.append((each.sensor.kind, each.maneuver, each.advice))
+        else:
+            rows.append(("", each.candidate, each))
+    new = any(advice.newly_determined for _, _, advice in rows)
+    sensors = any(sensor for sensor, _, _ in rows)
+    made = Table(
+        title,
+        (
+            Column("sensor", of="tpf" if sensors else ""),
+            Column("test", wrap=not new),
+            Column("s", "g", of="" if sensors else "tpf"),
+            Column("first to determine", wrap=True, of="tpf" if new else ""),
+            Column("gains most"),
+            Column("better", "s"),
+        ),
+    )
+    for sensor, test, advice in rows:
+        first = ", ".join(advice.newly_determined[:NAMED])
+        more = len(advice.newly_determined) - NAMED
+        first = f"{first} + {more}" if more > 0 else first
+        best, times = advice.best, f"{advice.d_gain:.2f}x" if advice.d_gain > 1.0 + WORTH else ""
+        gained = (
+            "" if best is None else f"{best.name} {_error(best.before)} to {_error(best.after)}"
+        )
+        made.add(sensor, test, advice.duration, first, gained, times)
+    return made
+
+
+def best_tests_table(gains: Sequence[Gain], best: Mapping[str, tuple[str, Gain]]) -> Table:
+    """What is known of each unknown, and which test would tell most of it."""
+    errors = (Column("error now", "s"), Column("then", "s"))
+    made = Table("For each unknown", (Column("unknown"), *errors, Column("best test", wrap=True)))
+    for gain in gains:
+        test, after = best.get(gain.name, ("none tells more", gain))
+        made.add(gain.name, _error(gain.before), _error(after.after), test)
+    return made
+
+
+def _gained(gain: Gain) -> str:
+    return f"{gain.name} {_error(gain.before)} to {_error(gain.after)}"
+
+
+def _error(error: float) -> str:
+    return f"{100.0 * error:.2g} %" if error <= 1.0 else "-"
+
+
+def advice_rows(ranked: Sequence[Advice], sensors: Sequence[SensorAdvice]) -> Table:
+    """All that was judged for a file, a row for each test, sensor and unknown."""
+    heads = ("relative error before", "relative error after", "first to determine", "D-gain")
+    start = ("test", "added sensor", "duration", "unknown")
+    made = Table("", tuple(map(Column, (*start, *heads))))
+    judged = [("", each.candidate, each) for each in ranked]
+    judged += [(each.sensor.kind, each.maneuver, each.advice) for each in sensors]
+    for kind, test, advice in judged:
+        for gain in advice.gains:
+            errors = (e if isfinite(e) else None for e in (gain.before, gain.after))
+            first = gain.name in advice.newly_determined
+            made.add(test, kind, advice.duration, gain.name, *errors, first, advice.d_gain)
+    return made
+
+
+# --- sentences ------------------------------------------------------------------------------------
+
+
+def measures_words(name: str, unit: str, found: Measures) -> str:
+    """``current: fit 96.1 % (RMSE 7.6 mA, R² 0.9985)``."""
+    rmse = f"RMSE {quantity(found.rmse, unit)}"
+    if found.fit_percent is None or found.r_squared is None:
+        return f"{name}: {rmse}; what was measured is constant, so there is no fit %"
+    return f"{name}: fit {found.fit_percent:.2f} % ({rmse}, R² {found.r_squared:.4f})"
+
+
+def scales_words(fit: StageFit) -> str:
+    """What one unit of residual is, channel by channel."""
+    parts = []
+    for name, size in fit.problem.scales.items():
+        having = next(each for each in fit.problem.experiments if name in each.channels)
+        unit = display_unit(having[name].unit, size)
+        parts.append(f"{plain(unit.factor * size, 3)} {unit.name} of {name}")
+    return f"One unit of residual is {listed(parts)}."

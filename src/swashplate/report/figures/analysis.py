@@ -1,0 +1,572 @@
+"""Figures of analyses: envelope, limits over time, what-ifs, bands, sensitivities, inverse maps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.typing import ColorType
+from numpy.typing import ArrayLike
+
+from swashplate.analysis.compensation import InverseMap
+from swashplate.analysis.envelope import AcceleratedBy, AccelerationCurve, Envelope, Way
+from swashplate.analysis.limits import LimitTimeline, limit_timeline
+from swashplate.analysis.monte_carlo import Bands
+from swashplate.analysis.outcomes import Outcome, outcome_unit
+from swashplate.analysis.sensitivity import OneAtATime, SobolIndices
+from swashplate.analysis.tracking import Improvement, proportional_command
+from swashplate.analysis.whatif import AS_IS, CHANGED, WhatIf
+from swashplate.errors import InputError
+from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.report.lines import (
+    MOST_POINTS,
+    MOST_RUNS,
+    SHADES,
+    Array,
+    draw,
+    fit_time,
+    merged,
+)
+from swashplate.report.style import (
+    BLUE,
+    FAINT,
+    FOOT,
+    GREEN,
+    GREY,
+    HEAD,
+    INK,
+    LINE,
+    NORMAL,
+    ORANGE,
+    PURPLE,
+    ROW,
+    SKY,
+    SMALL,
+    VERMILION,
+    WIDTH,
+    Dashes,
+    Stroke,
+    dress,
+    handle,
+    label_below,
+    new_figure,
+    put_legend,
+    sheet,
+    signed,
+    write,
+    write_title,
+    zero_line,
+)
+from swashplate.simulation.result import Simulation
+from swashplate.units import display_unit
+
+# --- envelope -------------------------------------------------------------------------------------
+
+ROOM = 1.12
+"""How far the axes go beyond the speeds that are reached, and the accelerations there."""
+DASHES: dict[AcceleratedBy, Dashes] = {
+    "orifice": "solid",
+    "spool stop": "dashed",
+    "valve": "dotted",
+}
+WORDS: dict[AcceleratedBy, str] = {
+    "orifice": "limited by the orifice",
+    "spool stop": "limited by the spool's stop",
+    "valve": "limited by the valve's opening",
+}
+
+
+def plot_envelope(envelope: Envelope, *, title: str | None = None) -> Figure:
+    """Figure of acceleration over speed with the limits labelled.
+
+    The upper line is what +10 V gives, the lower one -10 V; between them everything can be
+    reached. How a line is drawn says what limits it. The grey one is the stick let go.
+
+    Parameters
+    ----------
+    envelope : Envelope
+        What to show.
+    title : str, optional
+        By default it says what is shown.
+    """
+    curves = (*envelope.accelerating, envelope.released)
+    volts = f"{FULL_VOLTAGE:g} V"
+    looks = ((BLUE, f"+{volts}"), (VERMILION, f"−{volts}"), (FAINT, "let go"))
+    legend = [handle(name, color) for color, name in looks]
+    drawn = {by for curve in curves for by in curve.by}
+    legend += [handle(WORDS[by], INK, d, LINE) for by, d in DASHES.items() if by in drawn]
+    words = f"{envelope.name}: acceleration that each speed allows" if title is None else title
+    figure, (ax,) = sheet([3.8], words, legend=legend)
+    speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
+    dress(ax, acceleration.label("acceleration"), speed.label("speed"))
+    zero_line(ax, upright=True)
+    low, high = (speed.factor * way.top_speed for way in (envelope.minus, envelope.plus))
+    span = (high - low) or 1.0
+    ax.set_xlim(low - (ROOM - 1.0) * span, high + (ROOM - 1.0) * span)
+    most = []
+    for curve, sign, (color, _) in zip(curves, (1.0, -1.0, 0.0), looks, strict=True):
+        across, up = speed.factor * curve.speed, acceleration.factor * curve.acceleration
+        if sign:  # of the full commands only what speeds up their own way counts
+            up = sign * np.maximum(sign * up, 0.0)
+            ax.fill_between(across, up, color=color, alpha=0.08, linewidth=0.0)
+        most.append(float(np.abs(up).max()))
+        # part of the grey line lies under another, and is wider
+        how = {"linewidth": LINE, "zorder": 2.0} if sign else {"linewidth": 3.0, "zorder": 1.7}
+        for by, start, stop in _causes(curve):
+            part = slice(start, stop)
+            ax.plot(across[part], up[part], color=color, linestyle=DASHES[by], **how)  # type: ignore[arg-type]
+    height = 1.3 * max(most[:2]) or 1.0
+    ax.set_ylim(-height, height)
+    for way, color in ((envelope.plus, BLUE), (envelope.minus, VERMILION)):
+        _mark_way(ax, way, color, height)
+    return figure
+
+
+def _causes(curve: AccelerationCurve) -> list[tuple[AcceleratedBy, int, int]]:
+    """Stretches of one cause; each reaches to the first point of the next."""
+    parts = curve.by
+    starts = [n for n in range(len(parts)) if n == 0 or parts[n] != parts[n - 1]]
+    stops = [*(start + 1 for start in starts[1:]), len(parts)]
+    return [(parts[start], start, stop) for start, stop in zip(starts, stops, strict=True)]
+
+
+def _mark_way(ax: Axes, way: Way, color: str, height: float) -> None:
+    """The speed that a way ends at, and the acceleration that it begins with."""
+    units = display_unit("rad/s"), display_unit("rad/s^2")
+    speed, acceleration = units[0].factor * way.top_speed, units[1].factor * way.acceleration
+    up, stopped = way.acceleration > 0.0, way.top_speed == way.speed_limit
+    ax.axvline(speed, color=color, linewidth=1.0, linestyle="solid" if stopped else "dotted")
+    what = "swash stop" if stopped else f"at {'+' if up else '−'}{FULL_VOLTAGE:g} V"
+    write(
+        ax,
+        f"{what}\n{signed(speed, 3 if abs(speed) < 10.0 else 1)} {units[0].name}",
+        (speed, -0.96 * height if up else 0.96 * height),
+        (-4.0 if up else 4.0, 0.0),
+        coords="data",
+        color=color,
+        ha="right" if up else "left",
+        va="bottom" if up else "top",
+    )
+    ax.plot([0.0], [acceleration], "o", color=color, markersize=4.5)
+    number = signed(acceleration, 2 if abs(acceleration) < 10.0 else 1)
+    write(
+        ax,
+        f"{way.accelerated_by}, at rest\n{number} {units[1].name}",
+        (0.0, acceleration),
+        (5.0, 6.0) if up else (-5.0, -6.0),  # away from where the line falls
+        coords="data",
+        color=color,
+        ha="left" if up else "right",
+        va="bottom" if up else "top",
+    )
+
+
+# --- limits over time -----------------------------------------------------------------------------
+
+BAR = 0.72
+"""Height of a bar as part of its row."""
+
+
+def plot_limit_timeline(
+    run: Simulation, *, wanted: ArrayLike | None = None, title: str | None = None
+) -> Figure:
+    """Figure of voltage and speed over time, and below a row for each limit that acts.
+
+    Parameters
+    ----------
+    run : Simulation
+        What to show.
+    wanted : (n,) array_like, optional
+        The speed of a drive without limits, or another wanted one, to draw dashed. [rad/s]
+    title : str, optional
+        By default the name of the drive.
+
+    Raises
+    ------
+    InputError
+        If the wanted speed has another length than the run.
+    """
+    timeline, unit = limit_timeline(run), display_unit("rad/s")
+    asked = None if wanted is None else np.asarray(wanted, dtype=np.float64)
+    if asked is not None and asked.shape != run.time.shape:
+        raise InputError(
+            f"The wanted speed has shape {asked.shape}, but the run has {run.time.size} samples."
+        )
+    legend = [handle("speed", BLUE)]
+    if asked is not None:
+        legend.append(handle("without limits", GREY, "dashed"))
+    heights = [1.1, 2.2, 0.27 * max(len(timeline.limits), 1)]
+    figure, axes = sheet(heights, run.name if title is None else title, legend=legend)
+    command, speed, rows = axes
+    volts = run.voltage
+    dress(command, "current (A)" if volts is None else "voltage (V)")
+    draw(command, run.time, run.current if volts is None else volts, INK)
+    dress(speed, unit.label("speed"))
+    if asked is not None:
+        draw(speed, run.time, unit.factor * asked, GREY, dashes="dashed")
+    draw(speed, run.time, unit.factor * run.shaft_speed, BLUE)
+    for ax in (command, speed):
+        zero_line(ax)
+    _bars(rows, timeline, float(run.time[-1] - run.time[0]))
+    fit_time(rows, run.time)
+    label_below(rows, "time (s)")
+    return figure
+
+
+def _bars(ax: Axes, timeline: LimitTimeline, length: float) -> None:
+    dress(ax)
+    count = len(timeline.limits)
+    ax.set_ylim(max(count, 1) - 0.5, -0.5)
+    ax.set_yticks(range(count), [SHADES[limit].name for limit in timeline.limits])
+    ax.grid(False, axis="y")
+    for row, (limit, spans) in enumerate(zip(timeline.limits, timeline.spans, strict=True)):
+        ax.broken_barh(
+            [(begin, end - begin) for begin, end in merged(spans, length / MOST_RUNS).tolist()],
+            (row - 0.5 * BAR, BAR),
+            facecolor=SHADES[limit].color,
+            edgecolor=GREY,
+            linewidth=0.4,
+        )
+    for row, share in enumerate(timeline.shares):
+        how = {"coords": ax.get_yaxis_transform(), "va": "center", "annotation_clip": False}
+        write(ax, f"{100.0 * share:.1f} %", (1.0, row), (5.0, 0.0), **how)  # type: ignore[arg-type]
+    if not count:
+        ax.text(0.5, 0.5, "no limit acts", transform=ax.transAxes, fontsize=SMALL, ha="center")
+
+
+# --- what-ifs and bands ---------------------------------------------------------------------------
+
+MOST_ALONE = 5
+"""Levers that are drawn by themselves, too; more would hide the answer."""
+NO_BANDS: Mapping[str, Bands] = MappingProxyType({})
+
+
+def plot_whatif(
+    result: WhatIf, *, bands: Mapping[str, Bands] = NO_BANDS, title: str | None = None
+) -> Figure:
+    """Figure of the command, the speeds and the accelerations of a drive before and after.
+
+    Parameters
+    ----------
+    result : WhatIf
+        What `analysis.whatif.what_if` found. The wanted speed is drawn dotted, the speed limits
+        before and after as thin lines.
+    bands : mapping of str to Bands, optional
+        By variant (``"as it is"``, ``"changed"``) the band that its speed lies in; a panel more
+        shows it enlarged, about its median.
+    title : str, optional
+        By default it says what was moved.
+    """
+    alone = [name for name in result.variants if name not in (AS_IS, CHANGED)][:MOST_ALONE]
+    colors = (GREEN, PURPLE, ORANGE, SKY, FAINT)
+    looks = {AS_IS: Stroke(BLUE, "solid")}
+    looks |= {name: Stroke(color, "dashed") for name, color in zip(alone, colors, strict=False)}
+    looks[CHANGED] = Stroke(VERMILION, "solid")
+    legend = [handle(name, *look) for name, look in looks.items()]
+    legend.append(handle("wanted", GREY, "dotted"))
+    moved = ", ".join(f"{name} x {factor:g}" for name, factor in result.factors.items())
+    words = f"{result.before.drive.name}: {moved}" if title is None else title
+    heights = [1.2, 2.8, 1.8, 1.3] if bands else [1.2, 2.8, 1.8]
+    figure, axes = sheet(heights, words, legend=legend)
+    speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
+    labels = ("voltage (V)", speed.label("shaft speed"), acceleration.label("acceleration"))
+    for ax, label in zip(axes, (*labels, speed.label("about the median")), strict=False):
+        dress(ax, label)
+        zero_line(ax)
+    time = result.before.run.time
+    draw(axes[0], time, result.trial.voltage, INK, zorder=3.0)
+    _speed_limits(axes[1], result, looks)
+    for name, band in bands.items():
+        shade_band(axes[1], band, looks[name].color)
+        shade_band(axes[3], band, looks[name].color, about=band.median)
+    draw(axes[1], time, speed.factor * result.trial.wanted, GREY, dashes="dotted", zorder=1.9)
+    middle = 0.5 * (time[1:] + time[:-1])
+    for name, look in looks.items():
+        found = result.variants[name].run.shaft_speed
+        rising = acceleration.factor * np.diff(found) * result.trial.rate
+        order = 3.0 if name in (AS_IS, CHANGED) else 2.0
+        draw(axes[1], time, speed.factor * found, look.color, dashes=look.dashes, zorder=order)
+        draw(axes[2], middle, rising, look.color, dashes=look.dashes, zorder=order)
+    fit_time(axes[-1], time)
+    label_below(axes[-1], "time (s)")
+    return figure
+
+
+def _speed_limits(ax: Axes, result: WhatIf, looks: Mapping[str, Stroke]) -> None:
+    """Speed limits of the two drives, as far as the command's direction goes."""
+    voltage, factor = result.trial.voltage, display_unit("rad/s").factor
+    for name in (AS_IS, CHANGED):
+        up, down = result.variants[name].speed_limits
+        for limit, used in ((up, (voltage > 0.0).any()), (down, (voltage < 0.0).any())):
+            if used:
+                ax.axhline(factor * limit, color=looks[name].color, linewidth=0.6, alpha=0.5)
+
+
+def plot_bands(band: Bands, *, title: str | None = None) -> Figure:
+    """Figure of the median speed with its band, and of the band about the median, enlarged.
+
+    Parameters
+    ----------
+    band : Bands
+        See `analysis.monte_carlo.bands`.
+    title : str, optional
+        By default it says what is shown.
+    """
+    words = "Shaft speed that the tests allow" if title is None else title
+    figure, axes = sheet([2.8, 1.4], words)
+    unit = display_unit("rad/s")
+    for ax, label in zip(axes, ("shaft speed", "about the median"), strict=True):
+        dress(ax, unit.label(label))
+        zero_line(ax)
+    shade_band(axes[0], band, BLUE)
+    draw(axes[0], band.time, unit.factor * band.median, BLUE)
+    shade_band(axes[1], band, BLUE, about=band.median)
+    width, when = band.widest
+    said = (
+        f"{100.0 * band.level:g} % of {band.draws} drives; widest {unit.factor * width:.3g} "
+        f"{unit.name} at {when:.3g} s"
+    )
+    write(axes[1], said, (0.0, 1.0))
+    fit_time(axes[-1], band.time)
+    label_below(axes[-1], "time (s)")
+    return figure
+
+
+def shade_band(ax: Axes, band: Bands, color: ColorType, *, about: Array | float = 0.0) -> None:
+    """Shade a band of speeds; a long one by every so many samples."""
+    step, factor = max(-(-band.time.size // MOST_POINTS), 1), display_unit("rad/s").factor
+    lower, upper = (factor * (each - about)[::step] for each in (band.lower, band.upper))
+    how = {"alpha": 0.25, "linewidth": 0.0, "zorder": 1.6}
+    ax.fill_between(band.time[::step], lower, upper, color=color, **how)  # type: ignore[arg-type]
+
+
+# --- sensitivities --------------------------------------------------------------------------------
+
+THICK = 0.72
+NOTHING = 1e-9
+"""Swings below this part of the largest are not drawn."""
+
+
+def plot_tornado(result: OneAtATime, *, title: str | None = None) -> Figure:
+    """Figure of what each lever does by itself, a panel an outcome, the strongest at the top.
+
+    Parameters
+    ----------
+    result : OneAtATime
+        See `analysis.sensitivity.one_at_a_time`.
+    title : str, optional
+        By default it says what is shown.
+
+    Raises
+    ------
+    InputError
+        If no outcome is defined.
+    """
+    shown = [k for k in range(len(result.outcomes)) if np.isfinite(result.base[k])]
+    if not shown:
+        raise InputError("None of the outcomes is defined for this command: nothing to draw.")
+    legend = [
+        Patch(color=BLUE, label=_ends(result, 0, "lower")),
+        Patch(color=VERMILION, label=_ends(result, 1, "upper")),
+    ]
+    words = "Each lever by itself" if title is None else title
+    figure, panels = _outcome_panels(len(shown), len(result.levers), words, legend)
+    for ax, k in zip(panels, shown, strict=True):
+        outcome, swings = result.outcomes[k], np.nan_to_num(result.swings[:, k])
+        order = np.argsort(swings, kind="stable")
+        factor = outcome_unit(outcome).factor
+        base = factor * result.base[k]
+        for place, lever in enumerate(order):
+            for values, color in ((result.low, BLUE), (result.high, VERMILION)):
+                change = factor * values[lever, k] - base
+                if np.isfinite(change):
+                    ax.barh(place, change, THICK, left=base, color=color, zorder=2.0)
+        if not (swings > NOTHING * abs(result.base[k])).any():
+            half = max(abs(base), 1.0) * 0.1
+            ax.set_xlim(base - half, base + half)
+            ax.text(0.5, 0.5, "no lever moves it", transform=ax.transAxes, fontsize=SMALL)
+        ax.axvline(base, color=INK, linewidth=0.8, zorder=3.0)
+        _name_levers(ax, [result.levers[lever] for lever in order])
+        _head(ax, outcome, _outcome_words(outcome, result.base[k]))
+    return figure
+
+
+def plot_sobol(result: SobolIndices, *, title: str | None = None) -> Figure:
+    """Figure of Sobol's indices, a panel an outcome: in total, and of first order within.
+
+    Parameters
+    ----------
+    result : SobolIndices
+        See `analysis.sensitivity.sobol`; outcomes without indices are left out.
+    title : str, optional
+        By default it says what is shown.
+
+    Raises
+    ------
+    InputError
+        If no outcome has indices.
+    """
+    shown = [k for k in range(len(result.outcomes)) if np.isfinite(result.total[:, k]).all()]
+    if not shown:
+        raise InputError("No outcome has Sobol indices: nothing to draw.")
+    legend: list[Artist] = [
+        Patch(color=SKY, label="in total"),
+        Patch(color=BLUE, label="by itself"),
+        handle("95 % interval", INK, width=0.8),
+    ]
+    words = f"Shares of the variance, {result.runs} runs" if title is None else title
+    figure, panels = _outcome_panels(len(shown), len(result.levers), words, legend)
+    for ax, k in zip(panels, shown, strict=True):
+        order = np.argsort(result.total[:, k], kind="stable")
+        total, error = result.total[order, k], result.total_error[order, k]
+        places = np.arange(order.size)
+        ax.barh(places, total, THICK, color=SKY, zorder=2.0)
+        ax.barh(places, np.maximum(result.first[order, k], 0.0), 0.4, color=BLUE, zorder=2.1)
+        how = {"fmt": "none", "ecolor": INK, "elinewidth": 0.8, "capsize": 2.0, "zorder": 3.0}
+        ax.errorbar(total, places, xerr=error, **how)  # type: ignore[arg-type]
+        ax.set_xlim(0.0, max(1.0, 1.03 * float((total + error).max())))
+        _name_levers(ax, [result.levers[lever] for lever in order])
+        outcome = result.outcomes[k]
+        mean, deviation = (_outcome_words(outcome, x[k]) for x in (result.mean, result.deviation))
+        _head(ax, outcome, f"{mean} ± {deviation}")
+        label_below(ax, "share of the variance")
+    return figure
+
+
+def _outcome_panels(
+    count: int, levers: int, title: str, legend: Sequence[Artist]
+) -> tuple[Figure, list[Axes]]:
+    """A figure with a panel an outcome, two beside each other."""
+    columns = min(count, 2)
+    rows = -(-count // columns)
+    figure = new_figure(WIDTH, HEAD + ROW + rows * (0.22 * levers + 0.75) + 0.5 * FOOT)
+    grid = figure.subplots(rows, columns, squeeze=False)
+    panels = list(grid.flat)
+    for ax in panels[count:]:
+        ax.axis("off")
+    for ax in panels[:count]:
+        dress(ax)
+    write_title(figure, title)
+    figure.legend(
+        handles=list(legend), loc="outside lower left", ncols=3, frameon=False, fontsize=SMALL
+    )
+    return figure, panels[:count]
+
+
+def _outcome_words(outcome: Outcome, value: float) -> str:
+    number = outcome_unit(outcome).factor * value
+    return "none" if np.isnan(value) else f"{number:z.{3 if outcome.unit == 's' else 2}f}"
+
+
+def _name_levers(ax: Axes, levers: list[str]) -> None:
+    ax.set_yticks(range(len(levers)), labels=[each.replace("_", " ") for each in levers])
+    ax.set_ylim(-0.6, len(levers) - 0.4)
+    ax.grid(False, axis="y")
+    ax.spines["left"].set_color(FAINT)
+    ax.tick_params(axis="y", length=0.0, labelsize=SMALL)
+
+
+def _head(ax: Axes, outcome: Outcome, words: str) -> None:
+    unit = outcome_unit(outcome)
+    ax.set_title(f"{outcome.words}, {words} {unit.name}", loc="left", fontsize=NORMAL, color=INK)
+    label_below(ax, unit.label(outcome.words))
+
+
+def _ends(result: OneAtATime, index: int, words: str) -> str:
+    """The factor of that end, if it is the same for all levers."""
+    factors = {pair[index] for pair in result.ranges.values()}
+    return f"factor {factors.pop():g}" if len(factors) == 1 else f"{words} factor"
+
+
+# --- inverse map ----------------------------------------------------------------------------------
+
+COLORS = (VERMILION, ORANGE, GREEN)
+"""Of a straight line, the map, and the map with a lead."""
+CLOSE_UP = 0.06
+"""The panel on the right shows speeds up to this part of the smaller limit, or twice the gap."""
+POINTS = 2001
+MAP, RUNS = 2.9, 1.7
+"""Heights. [inch]"""
+
+
+def plot_compensation(
+    inverse: InverseMap, improvement: Improvement | None = None, *, title: str | None = None
+) -> Figure:
+    """Figure of the voltage over the wanted speed, with a close-up at standstill.
+
+    Parameters
+    ----------
+    inverse : InverseMap
+        The map.
+    improvement : Improvement, optional
+        Runs to show below: the speeds and their errors.
+    title : str, optional
+        By default it says what is shown.
+    """
+    heights = [MAP] if improvement is None else [MAP, RUNS, RUNS]
+    figure = new_figure(WIDTH, HEAD + ROW + sum(heights) + 2.0 * FOOT)
+    how = {"width_ratios": (1.5, 1.0), "height_ratios": heights}
+    grid = figure.add_gridspec(len(heights), 2, **how)
+    whole, close = (figure.add_subplot(grid[0, column]) for column in (0, 1))
+    _draw_map(whole, close, inverse)
+    legend = [handle("inverse map", INK), handle("straight line", GREY, "dashed")]
+    if improvement is not None:
+        pairs = zip(improvement.ways, COLORS, strict=True)
+        legend = [handle("map, wanted speed", INK)]
+        legend += [handle(f"with {way.name}", color) for way, color in pairs]
+        speed = figure.add_subplot(grid[1, :])
+        error = figure.add_subplot(grid[2, :], sharex=speed)
+        _draw_improvement(speed, error, improvement)
+        figure.align_ylabels([whole, speed, error])
+    words = f"{inverse.name}: voltage for a wanted speed" if title is None else title
+    write_title(figure, words)
+    put_legend(whole, legend, beyond=True)
+    whole.set_title(" ", fontsize=NORMAL, pad=8.0)
+    return figure
+
+
+def _draw_map(whole: Axes, close: Axes, inverse: InverseMap) -> None:
+    unit, (low, high) = display_unit("rad/s"), inverse.limits
+    narrow = max(CLOSE_UP * min(-low, high), 2.0 * max(map(abs, inverse.gap)))
+    for ax, ends in ((whole, (low, high)), (close, (max(low, -narrow), min(high, narrow)))):
+        speed = np.union1d(np.linspace(*ends, POINTS), np.clip(inverse.gap, *ends))
+        straight, across = proportional_command(inverse, speed), unit.factor * speed
+        ax.plot(across, straight, color=GREY, linestyle="dashed", linewidth=1.0)
+        ax.plot(across, inverse.voltage(speed), color=INK, linewidth=LINE)
+        dress(ax, "", unit.label("wanted speed"))
+        zero_line(ax, upright=True)
+    volts = [float(inverse.voltage(end)) for end in (low, high)]
+    whole.set_ylim(1.25 * volts[0], 1.25 * volts[1])  # room for the words there
+    whole.set_ylabel("voltage (V)", fontsize=NORMAL, color=INK)
+    below, above = (unit.factor * each for each in inverse.gap)
+    close.axvspan(below, above, color="#ededed", linewidth=0.0, zorder=0.5)
+    how = {"coords": close.get_xaxis_transform(), "color": GREY, "ha": "center"}
+    write(close, "cannot be held", (0.5 * (below + above), 0.0), (0.0, 4.0), **how)  # type: ignore[arg-type]
+    write(close, "close-up around standstill", (0.0, 1.0), (4.0, -10.0), color=GREY)
+    for end, height, side, shift in zip(
+        (low, high), volts, ("left", "right"), (-10.0, 10.0), strict=True
+    ):
+        place = (unit.factor * end, height)
+        whole.plot(*([each] for each in place), "o", color=INK, markersize=4.5)
+        words = f"{place[0]:.4g} {unit.name}, {height:.3g} V".replace("-", "−")
+        write(whole, words, place, (0.0, shift), coords="data", ha=side, va="center")
+
+
+def _draw_improvement(speed: Axes, error: Axes, improvement: Improvement) -> None:
+    unit, time = display_unit("rad/s"), improvement.time
+    dress(speed, unit.label("speed"))
+    dress(error, unit.label("error"), "time (s)")
+    for ax in (speed, error):
+        zero_line(ax)
+    for way, color in zip(improvement.ways, COLORS, strict=True):
+        done = way.run.shaft_speed
+        draw(speed, time, unit.factor * done, color)
+        draw(error, time, unit.factor * (done - improvement.wanted), color)
+    draw(speed, time, unit.factor * improvement.wanted, INK, width=1.0, zorder=3.0)
+    fit_time(error, time)
+    speed.tick_params(labelbottom=False)

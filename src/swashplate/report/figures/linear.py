@@ -1,0 +1,159 @@
+"""Bode figure: gain, phase and distortion over the frequency, a line for each amplitude."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter, NullLocator
+from numpy.typing import NDArray
+
+from swashplate.errors import InputError
+from swashplate.linear import UNITS, FrequencyResponse, LinearDrive
+from swashplate.report.style import (
+    FAINT,
+    GREY,
+    LINE,
+    Stroke,
+    dress,
+    handle,
+    label_below,
+    sheet,
+    strokes,
+    write,
+)
+from swashplate.units import DisplayUnit, display_unit
+
+Array = NDArray[np.float64]
+
+DECADE = 10.0
+DEEPEST = 2e3
+"""Gains this far below the largest are not shown: lines that end in a dead zone fall for ever."""
+STEPS = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0)
+"""Distances of the phase's grid lines. [deg]"""
+MOST_STEPS = 7
+WORDS = {"shaft_speed": "speed"}
+
+
+def plot_bode(
+    response: FrequencyResponse,
+    *,
+    linear: LinearDrive | None = None,
+    mark: float | None = 0.3,
+    title: str | None = None,
+) -> Figure:
+    """Figure of gain, phase and distortion over the frequency, a line for each amplitude.
+
+    Lines end where nothing moves any more.
+
+    Parameters
+    ----------
+    response : FrequencyResponse
+        What was swept.
+    linear : LinearDrive, optional
+        Its first output is drawn dashed, for comparison.
+    mark : float, optional
+        A frequency to mark. [Hz]
+    title : str, optional
+        By default it says what is shown.
+
+    Raises
+    ------
+    InputError
+        If the linear model has another input or first output than the sweep.
+    """
+    ends = (response.input, response.output)
+    if linear is not None and (linear.input, linear.outputs[0]) != ends:
+        raise InputError(
+            f"The sweep leads from {response.input} to {response.output}, but the linear model "
+            f"from {linear.input} to {linear.outputs[0]}."
+        )
+    unit = UNITS[response.input]
+    looks = strokes(f"{amplitude:g} {unit}" for amplitude in response.amplitudes)
+    legend = [handle(name, *look) for name, look in looks.items()]
+    if linear is not None:
+        point = linear.operating_point
+        where = f"{point.current:.4g} A" if point.voltage is None else f"{point.voltage:.4g} V"
+        legend.append(handle(f"small motions about {where}", GREY, "dashed"))
+    output = WORDS.get(response.output, response.output.replace("_", " "))
+    words = f"{response.name}: {response.input} to {output}, sines about {response.bias:g} {unit}"
+    figure, axes = sheet([2.3, 2.3, 1.3], words if title is None else title, legend=legend)
+    shown = display_unit(UNITS[response.output], float(response.gain.max()))
+    _draw(axes, response, list(looks.values()), shown)
+    if linear is not None:
+        _draw_linear(axes, linear, response.frequencies, shown)
+    _scale(axes, response, shown)
+    if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
+        for ax in axes:
+            ax.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
+        how = {"coords": ("data", "axes fraction"), "color": GREY, "ha": "left", "va": "bottom"}
+        write(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), **how)  # type: ignore[arg-type]
+    return figure
+
+
+def _draw(
+    axes: list[Axes], response: FrequencyResponse, looks: Sequence[Stroke], shown: DisplayUnit
+) -> None:
+    phase = np.degrees(response.phase)
+    values = (shown.factor * response.gain, phase, 100.0 * response.distortion)
+    few = response.frequencies.size == 1
+    for ax, rows in zip(axes, values, strict=True):
+        for row, moves, look in zip(rows, response.moves, looks, strict=True):
+            ax.plot(
+                response.frequencies,
+                np.where(moves, row, np.nan),
+                color=look.color,
+                linestyle=look.dashes,
+                linewidth=LINE,
+                marker="o" if few else None,
+                markersize=4.0,
+            )
+
+
+def _draw_linear(
+    axes: list[Axes], linear: LinearDrive, frequencies: Array, shown: DisplayUnit
+) -> None:
+    highest = np.inf if linear.sample_time is None else 0.5 / linear.sample_time
+    fine = np.geomspace(frequencies[0], min(frequencies[-1], highest), 400)
+    ratio = linear.response(fine)[0]
+    rows = (shown.factor * np.abs(ratio), np.degrees(np.unwrap(np.angle(ratio))))
+    for ax, row in zip(axes, rows, strict=False):
+        ax.plot(fine, row, color=GREY, linestyle="dashed", linewidth=LINE, zorder=1.8)
+
+
+def _scale(axes: list[Axes], response: FrequencyResponse, shown: DisplayUnit) -> None:
+    gain, phase, distortion = axes
+    unit = UNITS[response.input]
+    by = f"({shown.name})/{unit}" if "/" in shown.name else f"{shown.name or '1'}/{unit}"
+    dress(gain, f"gain ({by})")
+    dress(phase, "phase (deg)")
+    dress(distortion, "distortion (%)")
+    for ax in axes:
+        ax.set_xscale("log")
+    gain.set_yscale("log")
+    ends = response.frequencies[0], response.frequencies[-1]
+    if ends[0] < ends[1]:
+        gain.set_xlim(*ends)
+    _number(gain, "x", ends[1] / ends[0])
+    low, high = gain.get_ylim()
+    low = max(low, high / DEEPEST)
+    gain.set_ylim(low, high)
+    _number(gain, "y", high / low)
+    low, high = phase.get_ylim()
+    step = next((each for each in STEPS if (high - low) / each <= MOST_STEPS), STEPS[-1])
+    phase.yaxis.set_major_locator(MultipleLocator(step))
+    distortion.set_ylim(0.0, max(1.05 * 100.0 * float(response.distortion.max()), 1e-3))
+    label_below(distortion, "frequency (Hz)")
+
+
+def _number(ax: Axes, which: str, span: float) -> None:
+    """Plain numbers along a logarithmic axis, as many as fit."""
+    axis = ax.xaxis if which == "x" else ax.yaxis
+    room = DECADE**3 if which == "x" else DECADE**2
+    subs = (1.0, 2.0, 5.0) if span < room else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=15))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())

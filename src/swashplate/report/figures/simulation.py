@@ -1,0 +1,387 @@
+"""Figures of simulations: one with its chain of signals, several compared, many at a glance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from swashplate.errors import InputError
+from swashplate.full_order import Comparison
+from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.report.lines import (
+    NARROW,
+    WIDE,
+    Array,
+    Mark,
+    Trace,
+    active_spans,
+    draw,
+    fill_panel,
+    fit_time,
+    shade_handle,
+    shade_stretches,
+    stretches,
+)
+from swashplate.report.style import (
+    BLUE,
+    FAINT,
+    GAP,
+    INK,
+    LINE,
+    NORMAL,
+    SMALL,
+    THIN,
+    VERMILION,
+    Stroke,
+    dress,
+    handle,
+    label_below,
+    new_figure,
+    right_axis,
+    sheet,
+    signed,
+    strokes,
+    write,
+    write_title,
+    zero_line,
+)
+from swashplate.simulation.result import Limit, Simulation
+from swashplate.units import display_unit
+
+Flags = NDArray[np.int8]
+Stops = tuple[float, float]
+
+# --- one simulation -------------------------------------------------------------------------------
+
+
+class Panel(NamedTuple):
+    """What one panel of the chain shows: signals in SI, drawn in the units that people read."""
+
+    words: str
+    si: str
+    traces: tuple[Trace, ...]
+    limits: tuple[tuple[Limit, Array], ...] = ()
+    """Limits with the stretches in which they act."""
+    marks: tuple[Mark, ...] = ()
+    height: float = 1.3
+    least: float = 0.0
+    """Range that is shown at least, SI, so that rounding looks like nothing."""
+
+
+def plot_simulation(simulation: Simulation, *, title: str | None = None) -> Figure:
+    """Figure of the chain's signals over time, with the active limits shaded.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        What to show. Voltage has a panel only if the simulation was driven by one.
+    title : str, optional
+        By default the name of the parameter set.
+    """
+    pump, run = simulation.pump, simulation
+
+    def acting(*limits: Limit) -> tuple[tuple[Limit, Array], ...]:
+        return tuple((limit, active_spans(run, limit)) for limit in limits)
+
+    ends = (pump.Z16_plus, -pump.Z16_minus)
+    current = (
+        Trace(run.current_positive, BLUE, "positive"),
+        Trace(run.current_negative, VERMILION, "negative"),
+    )
+    dead_zone = (Mark(pump.Z17, f"dead zone {pump.Z17:.2f} A"),)
+    electric = acting(Limit.DEAD_ZONE, Limit.CURRENT_RATE)
+    panels = [
+        Panel("current", "A", current, electric, dead_zone),
+        _spool(run.spool_position, run.orifice_opening, ends)._replace(
+            limits=acting(Limit.ORIFICE, Limit.SPOOL)
+        ),
+        Panel("stroker pressure", "Pa", (Trace(run.stroker_pressure, BLUE),), acting(Limit.RELIEF)),
+        _swash(run.swash_angle, (pump.Z13_plus, -pump.Z13_minus))._replace(
+            limits=acting(Limit.SWASH_STOP)
+        ),
+        Panel("shaft speed", "rad/s", (Trace(run.shaft_speed, BLUE),), acting(Limit.SWASH_STOP)),
+    ]
+    if run.voltage is not None:
+        panels.insert(0, Panel("voltage", "V", (Trace(run.voltage, INK),)))
+    return _chain(panels, run.time, run.name if title is None else title)
+
+
+def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
+    """Figure of both models over one command: speeds, their difference, and what lies between.
+
+    Parameters
+    ----------
+    found : Comparison
+        What `swashplate.full_order.compare` found. Limits that hold are shaded.
+    title : str, optional
+        By default the name of the physical set.
+    """
+    full, differ = found.full, found.difference
+    machine = full.case.p.machine
+
+    def holding(limit: Limit, held: Flags) -> tuple[tuple[Limit, Array], ...]:
+        return ((limit, stretches(held != 0, found.time, full.record.rate)),)
+
+    command = (
+        Panel("current", "A", (Trace(full.current, INK),))
+        if found.voltage is None
+        else Panel("voltage", "V", (Trace(found.voltage, INK),))
+    )
+    error = (
+        Panel("difference", "% of top", (Trace(100.0 * found.error / differ.top_speed, INK),))
+        if differ.moves
+        else Panel("difference", "rad/s", (Trace(found.error, INK),))
+    )
+    speeds = (
+        # where the two are the same, the wide line shows on both sides of the narrow one
+        Trace(full.shaft_speed, BLUE, "five states", WIDE),
+        Trace(found.reduced_speed, VERMILION, "one state", NARROW),
+    )
+    openings = (machine.orifice_opening_plus, -machine.orifice_opening_minus)
+    stops = (machine.swash_stop_plus, -machine.swash_stop_minus)
+    pressure = (Trace(full.stroker_pressure, BLUE),)
+    drop = (Trace(full.motor_pressure_drop, BLUE),)
+    relief = holding(Limit.RELIEF, full.relief_hold)
+    panels = [
+        command,
+        Panel("shaft speed", "rad/s", speeds, height=1.8),
+        error,
+        _spool(full.spool_position, full.orifice_opening, openings)._replace(
+            limits=holding(Limit.SPOOL, full.spool_hold)
+        ),
+        _swash(full.swash_angle, stops)._replace(limits=holding(Limit.SWASH_STOP, full.plate_hold)),
+        Panel("stroker pressure", "Pa", pressure, relief, least=1e5),
+        Panel("motor\npressure drop", "Pa", drop, least=1e5),
+    ]
+    return _chain(panels, found.time, full.name if title is None else title)
+
+
+def _spool(position: Array, opening: Array, ends: Stops) -> Panel:
+    unit = display_unit("m", 0.0)
+    marks = (Mark(x, f"orifice {signed(unit.factor * x, 2)} {unit.name}") for x in ends)
+    traces = (
+        Trace(position, BLUE, "position", WIDE),
+        Trace(opening, VERMILION, "opening", NARROW),
+    )
+    return Panel("spool", "m", traces, marks=tuple(marks))
+
+
+def _swash(angle: Array, stops: Stops) -> Panel:
+    marks = (Mark(x, f"stop {signed(float(np.degrees(x)), 1)}°") for x in stops)
+    return Panel("swash angle", "swash", (Trace(angle, BLUE),), marks=tuple(marks))
+
+
+def _chain(panels: Sequence[Panel], time: Array, title: str) -> Figure:
+    """The panels one under another, with a legend of the limits that act anywhere."""
+    acting = {limit for panel in panels for limit, spans in panel.limits if spans.size}
+    legend = [shade_handle(limit) for limit in Limit if limit in acting]
+    figure, axes = sheet([panel.height for panel in panels], title, legend=legend)
+    for ax, panel in zip(axes, panels, strict=True):
+        for limit, spans in panel.limits:
+            shade_stretches(ax, spans, limit)
+        largest = max(float(np.abs(trace.values).max()) for trace in panel.traces)
+        # an angle within the machine stays in degrees, whatever the shaft's is shown in
+        unit = display_unit(panel.si, max(largest, panel.least) or inf)
+        name, factor = ("deg", float(np.degrees(1.0))) if panel.si == "swash" else unit
+        fill_panel(
+            ax,
+            f"{panel.words}\n({name})",
+            time,
+            [each._replace(values=factor * each.values) for each in panel.traces],
+            [each._replace(level=factor * each.level) for each in panel.marks],
+            height=panel.height,
+            least=factor * panel.least,
+        )
+    fit_time(axes[-1], time)
+    label_below(axes[-1], "time (s)")
+    return figure
+
+
+# --- several simulations of one command -----------------------------------------------------------
+
+
+def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None = None) -> Figure:
+    """Figure of the speeds of several drives under the same command, and of their differences.
+
+    Parameters
+    ----------
+    simulations : mapping
+        Name to simulation. The first is what the others are compared with. A command that is not
+        the first one's is drawn in the colour of its simulation.
+    title : str, optional
+        By default it says what is shown.
+
+    Raises
+    ------
+    InputError
+        If there is no simulation.
+    """
+    if not simulations:
+        raise InputError("A comparison needs at least one simulation.")
+    looks, speed = strokes(simulations), display_unit("rad/s")
+    words = "Shaft speed under the same command" if title is None else title
+    legend = [handle(name, *look) for name, look in looks.items()]
+    heights = [1.2, 2.6, 1.6] if len(simulations) > 1 else [1.2, 2.6]
+    figure, axes = sheet(heights, words, legend=legend)
+    _commands(axes[0], simulations, looks)
+    dress(axes[1], speed.label("shaft speed"))
+    zero_line(axes[1])
+    for name, each in simulations.items():
+        color, dashes = looks[name]
+        draw(axes[1], each.time, speed.factor * each.shaft_speed, color, dashes=dashes)
+    if len(simulations) > 1:
+        dress(axes[2], speed.label("difference"))
+        _differences(axes[2], simulations, looks, speed.factor)
+    fit_time(axes[-1], *(simulation.time for simulation in simulations.values()))
+    label_below(axes[-1], "time (s)")
+    return figure
+
+
+def _commands(ax: Axes, simulations: Mapping[str, Simulation], looks: Mapping[str, Stroke]) -> None:
+    """The voltage, or the current where not all were driven by voltage."""
+    volts = all(simulation.driven_by_voltage for simulation in simulations.values())
+    dress(ax, "voltage (V)" if volts else "current (A)")
+    zero_line(ax)
+    first: Array | None = None
+    for name, simulation in simulations.items():
+        voltage = simulation.voltage if volts else None
+        command = simulation.current if voltage is None else voltage
+        if first is None:
+            first = command
+            draw(ax, simulation.time, command, INK, zorder=3.0)
+        elif not np.array_equal(first, command):
+            look = looks[name]
+            draw(ax, simulation.time, command, look.color, dashes=look.dashes)
+
+
+def _differences(
+    ax: Axes, simulations: Mapping[str, Simulation], looks: Mapping[str, Stroke], factor: float
+) -> None:
+    """Speeds less the first one's, where both records have samples."""
+    (reference, first), *others = simulations.items()
+    zero_line(ax)
+    write(ax, f"speed less that of {reference}", (0.0, 1.0), color=looks[reference].color)
+    for name, other in others:
+        both = (first.time >= other.time[0]) & (first.time <= other.time[-1])
+        time, (color, dashes) = first.time[both], looks[name]
+        if time.size:
+            difference = other.at(time, "shaft_speed") - first.shaft_speed[both]
+            draw(ax, time, factor * difference, color, dashes=dashes)
+
+
+# --- many runs of several axes --------------------------------------------------------------------
+
+KINDS = ("ramp", "step", "sine")
+"""Kinds of manoeuvre in the order of their columns; others follow as they come."""
+PANEL = 1.45
+"""Height of a panel. [inch]"""
+_ROOM = 1.12
+"""The ordinate reaches this much beyond the largest speed, and beyond ±10 V."""
+_SCALE = LinearSegmentedColormap.from_list(
+    "command", ("#f0b429", "#e0631a", "#b0205b", "#5b1a7a", "#1a1446")
+)
+
+
+def plot_maneuvers_overview(
+    runs: Mapping[str, Mapping[str, Simulation]], *, title: str | None = None
+) -> Figure:
+    """Figure of the speeds of several axes, over thin lines of the commands.
+
+    Parameters
+    ----------
+    runs : mapping
+        Name of an axis to its runs, by names whose first word is the kind of manoeuvre: ``"step"``
+        of ``"step +9 V"``. Runs of one kind are drawn over one another, each in the colour of its
+        largest command; all commands are drawn to one scale.
+    title : str, optional
+        By default it says what is shown.
+
+    Raises
+    ------
+    InputError
+        If there is no run.
+    """
+    cells: dict[str, dict[str, list[Simulation]]] = {}
+    for axis, of_axis in runs.items():
+        for name, run in of_axis.items():
+            kind = (name.split() or [""])[0]
+            cells.setdefault(axis, {}).setdefault(kind, []).append(run)
+    if not cells:
+        raise InputError("An overview needs at least one run.")
+    met = list(dict.fromkeys(kind for of_axis in cells.values() for kind in of_axis))
+    kinds = [kind for kind in KINDS if kind in met] + [kind for kind in met if kind not in KINDS]
+    columns = {kind: [r for each in cells.values() for r in each.get(kind, ())] for kind in kinds}
+    lengths = [max(run.time[-1] - run.time[0] for run in columns[kind]) for kind in kinds]
+    figure = new_figure(28.0 / 3.0, 1.3 + len(cells) * (PANEL + GAP))
+    axes = figure.subplots(
+        len(cells),
+        len(kinds),
+        sharex="col",
+        sharey="row",
+        squeeze=False,
+        gridspec_kw={"width_ratios": np.sqrt(np.maximum(lengths, 1.0))},
+    )
+    for row, (axis, by_kind) in zip(axes, cells.items(), strict=True):
+        _fill_row(list(row), kinds, axis, by_kind)
+    for column, kind in zip(axes.T, kinds, strict=True):
+        column[0].set_title(kind, fontsize=NORMAL, fontweight="bold", color=INK, pad=6.0)
+        label_below(column[-1], "time (s)")
+        fit_time(column[-1], *(run.time for run in columns[kind]))
+    write_title(figure, "Simulated shaft speed" if title is None else title)
+    shades = ScalarMappable(Normalize(0.0, FULL_VOLTAGE), _SCALE)
+    bar = figure.colorbar(shades, ax=axes, orientation="horizontal", aspect=60, fraction=0.03)
+    bar.outline.set_visible(False)
+    bar.ax.tick_params(length=2.0, width=0.6, color=FAINT, labelsize=SMALL, labelcolor=INK)
+    bar.set_label("line colour: largest command (V)", fontsize=SMALL, color=INK)
+    return figure
+
+
+def _fill_row(
+    row: Sequence[Axes], kinds: Sequence[str], axis: str, runs: Mapping[str, Sequence[Simulation]]
+) -> None:
+    """Draw the runs of one axis, all to the same scales of speed and voltage."""
+    unit = display_unit("rad/s")
+    fastest = max(float(np.abs(run.shaft_speed).max()) for each in runs.values() for run in each)
+    bound = _ROOM * (unit.factor * fastest or 1.0)
+    speed_per_volt = bound / (_ROOM * FULL_VOLTAGE)
+    for ax, kind in zip(row, kinds, strict=True):
+        dress(ax)
+        zero_line(ax)
+        ax.set_ylim(-bound, bound)
+        for run, width in _widths(runs.get(kind, ())):
+            if run.voltage is not None:
+                draw(ax, run.time, speed_per_volt * run.voltage, FAINT, width=0.7, zorder=1.8)
+            color = _SCALE(_largest_command(run) / FULL_VOLTAGE)
+            draw(ax, run.time, unit.factor * run.shaft_speed, color, width=width)
+    row[0].set_ylabel(f"{axis}\n{unit.label('speed')}", fontsize=NORMAL, color=INK)
+    volts = right_axis(row[-1], 1.0 / speed_per_volt, "command (V)")
+    volts.set_yticks([-FULL_VOLTAGE, 0.0, FULL_VOLTAGE])
+
+
+def _widths(runs: Sequence[Simulation]) -> list[tuple[Simulation, float]]:
+    """The runs with the widths of their lines, the largest command first.
+
+    So what is smaller lies over it and stays visible. A run of the same extremes as one before it,
+    such as a sine of another frequency, has the same colour and is therefore drawn thinner.
+    """
+    widths = []
+    met: set[tuple[float, float]] = set()
+    for run in runs:
+        volts = np.zeros(1) if run.voltage is None else run.voltage
+        extremes = (round(float(volts.min()), 1), round(float(volts.max()), 1))
+        widths.append((run, THIN if extremes in met else LINE))
+        met.add(extremes)
+    return sorted(widths, key=lambda pair: _largest_command(pair[0]), reverse=True)
+
+
+def _largest_command(run: Simulation) -> float:
+    """The largest voltage either way; that of a run driven by current counts as none. [V]"""
+    return 0.0 if run.voltage is None else float(np.abs(run.voltage).max())

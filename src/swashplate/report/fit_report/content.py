@@ -1,0 +1,630 @@
+"""What a report says: the sections of a fit's page and of a validation's, from the results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from swashplate.campaign import Campaign, examine, quality_table
+from swashplate.errors import InputError
+from swashplate.identification import tables
+from swashplate.identification.assessment import Assessment, RunQuality, assess
+from swashplate.identification.cross_validation import CrossValidation
+from swashplate.identification.fitting import Fit, StageFit
+from swashplate.identification.own_model import ModelParameters
+from swashplate.identification.spectral_lines import SpectralLine
+from swashplate.identification.staging import Parameters
+from swashplate.identification.starts import StartResult
+from swashplate.identification.storing import StageProfile
+from swashplate.identification.truth import in_the_fits_scales
+from swashplate.identification.validation import channel_errors, pooled, source_rules
+from swashplate.identification.verdict import Statement, Verdict, Weight, starts_of, verdict
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.report.fit_report import plots
+from swashplate.report.fit_report.page import Block, Section, listed_block, page, text
+from swashplate.report.fit_report.plots import stack_item, stack_of
+from swashplate.report.fit_report.runs import (
+    ShownRun,
+    predicted_runs,
+    run_data,
+    run_words,
+    shown_runs,
+)
+from swashplate.tables import Column, Table, count, joined, listed, write_text
+
+Role = Literal["fit", "validate"]
+_PARTS = {
+    "card": "the control card alone, from the command to the currents",
+    "pump": "pump and motor, driven by the current",
+    "chain": "the whole chain, from the command to the speed",
+    "model": "a model of one's own, from its inputs to its channels",
+}
+
+
+def write_fit_report(
+    fit: Fit,
+    campaign: Campaign,
+    path: str | Path,
+    *,
+    assessments: Sequence[Assessment] | None = None,
+    validation: Sequence[RunQuality] = (),
+    starts: Sequence[StartResult] = (),
+    profiles: Sequence[StageProfile] = (),
+    folds: CrossValidation | None = None,
+    truth: ParameterSet | None = None,
+    judged: Verdict | None = None,
+    notes: Mapping[str, str] | None = None,
+) -> None:
+    """Write the report of a fit: one HTML file, whole or not at all, that needs no network.
+
+    Parameters
+    ----------
+    fit : Fit
+        What was fitted.
+    campaign : Campaign
+        The tests that it was fitted to.
+    path : path
+        The file, which replaces an older one.
+    assessments : sequence of Assessment, optional
+        One for each stage; made here by default.
+    validation : sequence of RunQuality
+        Of runs that were held out.
+    starts : sequence of StartResult
+        Of a search that is not kept in the fit's stages.
+    profiles : sequence of StageProfile
+        Profiles that were computed.
+    folds : CrossValidation, optional
+        Of the same runs and set-up.
+    truth : ParameterSet, optional
+        What virtual tests were simulated with; it stands beside the estimates.
+    judged : Verdict, optional
+        The verdict; made here by default.
+    notes : mapping of str to str, optional
+        What belongs to the report besides: versions, seed, command.
+
+    Raises
+    ------
+    InputError
+        If there is an assessment too many or too few, or a profile of no stage.
+    FileError
+        If the file cannot be written.
+
+    Notes
+    -----
+    Every sample is in the file, in single precision. A figure shows the lowest and the highest
+    sample of each of 1,000 stretches of what is in view, and all of them up to 4,000.
+    """
+    assessed = assess(fit.stages) if assessments is None else tuple(assessments)
+    if [each.stage.stage.name for each in assessed] != [each.stage.name for each in fit.stages]:
+        raise InputError("The report needs one assessment for each stage of the fit, in order.")
+    if judged is None:
+        planned = [each.name for each in fit.setup.stages]
+        judged = verdict(assessed, validation, starts=starts, planned=planned)
+    several = starts_of(assessed, starts)
+    runs = shown_runs(assessed, validation)
+    items: dict[str, Any] = {}
+    held_out = sum(run.validates for run in runs)
+    samples = sum(each.problem.samples for each in fit.stages)
+    facts = (
+        f"{count(len(fit.stages), 'stage')}: {', '.join(each.stage.name for each in fit.stages)} · "
+        f"{count(len(runs) - held_out, 'run')} fitted, {held_out} held out · "
+        f"{count(samples, 'sample')} that count"
+    )
+    head, shared = _shared(campaign, runs, fit.nominal, items)
+    sections = [
+        _verdict_section(judged, assessed, runs, head["findings"]),
+        _parameter_section(fit, assessed, truth),
+        *shared[:4],
+        _excitation_section(assessed),
+        _identifiability_section(assessed, items),
+        _starts_section(several, items),
+        _profile_section(fit, profiles, items),
+        _folds_section(folds, assessed),
+        shared[4],
+        _setup_section(campaign, fit.nominal, fit.setup.title, notes, fit.stages),
+    ]
+    content = {**head, "what": "Fit", "facts": f"{head['drive']} · {facts}"}
+    write_text(page([each for each in sections if each.blocks], content), path)
+
+
+def write_validation_report(
+    drive: Parameters,
+    campaign: Campaign,
+    path: str | Path,
+    predicted: Sequence[RunQuality],
+    *,
+    judged: Verdict | None = None,
+    notes: Mapping[str, str] | None = None,
+) -> None:
+    """Write the report of a validation: one HTML file, whole or not at all, without network.
+
+    Parameters
+    ----------
+    drive : ParameterSet or ModelParameters
+        The drive, or the model of one's own, that was held against the runs.
+    campaign : Campaign
+        The tests.
+    path : path
+        The file, which replaces an older one.
+    predicted : sequence of RunQuality
+        At least one, as `validation.predict` gives them.
+    judged : Verdict, optional
+        The verdict; made here by default.
+    notes : mapping of str to str, optional
+        What belongs to the report besides.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written.
+    """
+    runs = predicted_runs(predicted)
+    found = judged if judged is not None else verdict((), predicted)
+    samples = sum(each.measures.samples for each in predicted)
+    head, shared = _shared(campaign, runs, drive, {})
+    facts = (
+        f"{head['drive']} · {count(len(runs), 'run')} predicted from the command alone · "
+        f"{count(samples, 'sample')} that count"
+    )
+    sections = [
+        _verdict_section(found, (), runs, head["findings"]),
+        *shared,
+        _setup_section(campaign, drive, "", notes, ()),
+    ]
+    write_text(page(sections, {**head, "what": "Validation", "facts": facts}), path)
+
+
+# --- what every page has --------------------------------------------------------------------------
+
+
+def _shared(
+    campaign: Campaign, runs: Sequence[ShownRun], drive: Parameters, items: dict[str, Any]
+) -> tuple[dict[str, Any], list[Section]]:
+    """Head of a page, and its sections on runs, errors, residuals and data; figures to `items`."""
+    stacks = {stack_of(run): "" for run in runs}
+    for number, stack in enumerate(stacks):
+        stacks[stack] = f"stack-{number}"
+        items[f"stack-{number}"] = stack_item(stack)
+    axes = {run.experiment.axis for run in runs}
+    examined = {each: examine(each) for each in campaign if each.axis in axes}
+    findings = [
+        f"{each.experiment}, {each.signal}: {words}."
+        for found in examined.values()
+        for each in found
+        for words in each.findings
+    ]
+    words = f"Drive {drive.name}"
+    if isinstance(drive, ModelParameters):
+        words = f"Model {drive.name}"
+    elif drive.title:
+        words += f" ({drive.title})"
+    head = {
+        "title": campaign.title,
+        "virtual": campaign.virtual,
+        "drive": words,
+        "findings": len(findings),
+        "items": items,
+        "run_data": [run_data(run) for run in runs],
+    }
+    quality = joined([quality_table(each, found) for each, found in examined.items()])
+    said = "The check of the logs finds nothing to look into."
+    data = [
+        text(f"{count(len(findings), 'finding')}:" if findings else said),
+        *listed_block(findings),
+        Block("details", [Block("table", quality, "data")], count(len(quality.rows), "signal")),
+    ]
+    sections = [
+        _agreement_section(runs),
+        _runs_section(runs, stacks, campaign.virtual),
+        _errors_section(runs, drive.name),
+        _residual_section(runs),
+        Section("data", "Data quality", data),
+    ]
+    return head, sections
+
+
+def _qualities(runs: Sequence[ShownRun], role: Role | None = None) -> list[RunQuality]:
+    """Of all runs, or of those of a role, each with the role that it has in the report."""
+    return [
+        replace(each.quality, experiment=replace(each.quality.experiment, role=run.role))
+        for run in runs
+        if role in (None, run.role)
+        for each in run.channels
+    ]
+
+
+def _agreement_section(runs: Sequence[ShownRun]) -> Section:
+    made = [t for role in get_args(Role) for t in tables.runs_tables(_qualities(runs, role))]
+    words = (
+        "RMSE is the root of the mean squared difference of the samples that count; NRMSE is RMSE "
+        "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE); R² is "
+        "1 − NRMSE². A part of a channel's range, as in the verdict, is RMSE over the largest less "
+        "the smallest value measured."
+    )
+    blocks = [text(words), Block("table", joined(made), "agreement")]
+    return Section("agreement", "Agreement by run", blocks)
+
+
+def _runs_section(runs: Sequence[ShownRun], stacks: Mapping[Any, str], virtual: bool) -> Section:
+    measured = "virtual test" if virtual else "measured"
+    words = (
+        "Drag to zoom in time, Ctrl and wheel to zoom about the pointer, double-click for all of "
+        "it. Every sample is there: a wide view shows the lowest and highest of each stretch. "
+        f"Residuals are simulated less {measured}. Grey stretches do not count."
+    )
+    blocks = [text(words)]
+    for number, run in enumerate(runs):
+        content = {
+            "number": number,
+            "name": run.name,
+            "role": run.role,
+            "maneuver": run.experiment.maneuver,
+            "measures": [(each.quality.channel, run_words(each.quality)) for each in run.channels],
+            "measured": measured,
+            "stack": stacks[stack_of(run)],
+        }
+        blocks.append(Block("run", content))
+    return Section("runs", "Overlays", blocks)
+
+
+def _errors_section(runs: Sequence[ShownRun], drive: str) -> Section:
+    words = (
+        "The largest per cent error of each kind of test, of what is measured at that instant. "
+        "What is left out is listed with each table."
+    )
+    blocks = [text(words)]
+    keys = dict.fromkeys((run.role, each.stage) for run in runs for each in run.channels)
+    for role, stage in keys:
+        alike = [
+            each.quality for run in runs if run.role == role for each in run.channels
+            if each.stage == stage
+        ]  # fmt: skip
+        for found in channel_errors(alike, source_rules(drive)):
+            blocks.append(Block("heading", f"{found.channel} ({role})", "h3"))
+            blocks.append(Block("table", tables.errors_table(found), "errors"))
+            said = tables.left_out([found])[1:]
+            if said:
+                rules = ", ".join(rule.name for rule in found.table.acted) or "remarks"
+                blocks.append(Block("details", listed_block(said), f"Left out: {rules}"))
+    return Section("errors", "Errors by kind of test", blocks)
+
+
+def _residual_section(runs: Sequence[ShownRun]) -> Section:
+    words = (
+        "Left: correlation of the residuals with themselves, and the 95 % band of white noise. "
+        "Right: with the input, positive lags where the residual comes after it, and the 95 % "
+        "band of residuals, coloured as these are, that have no relation to the input."
+    )
+    heads = ("run", "role", "channel", "autocorrelation", "cross-correlation with the input")
+    made = Table("", tuple(map(Column, (*heads, "verdict"))))
+    for each in _qualities(runs):
+        if (test := each.test) is not None:
+            charts = plots.autocorrelation_chart(test), plots.cross_correlation_chart(test)
+            run = each.experiment
+            made.add(run.name, run.role, each.channel, *charts, test.verdict)
+    return Section("residuals", "Residuals", [text(words), Block("table", made, "residuals")])
+
+
+def _setup_section(
+    campaign: Campaign,
+    drive: Parameters,
+    title: str,
+    notes: Mapping[str, str] | None,
+    stages: Sequence[StageFit],
+) -> Section:
+    made = Table("", (Column(""), Column("")))
+    made.add("campaign", str(campaign.path))
+    if isinstance(drive, ModelParameters):
+        made.add("model", drive.name)
+    else:
+        made.add("drive", f"{drive.name}, card {drive.card}" if drive.card else drive.name)
+    if title:
+        made.add("set-up", title)
+    for key, words in (notes or {}).items():
+        if key != "campaign":
+            made.add(key, words)
+    blocks = [Block("table", made, "notes")]
+    for each in stages:
+        bounds = tables.bounds_table(each)
+        blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
+        blocks += listed_block(_stage_words(each))
+        summary = f"Bounds of {count(len(bounds.rows), 'unknown')}"
+        blocks.append(Block("details", [Block("table", bounds, "bounds")], summary))
+    return Section("setup", "Set-up and versions", blocks)
+
+
+def _stage_words(fit: StageFit) -> list[str]:
+    """What a stage was asked to do."""
+    stage, problem = fit.stage, fit.problem
+    words = [f"Simulates {_PARTS[stage.part]}."]
+    if stage.part == "pump":
+        words.append(f"The current is the {stage.current} one.")
+    words.append(f"Fits {listed(list(problem.channels))}.")
+    words.append(tables.scales_words(fit))
+    for kind, windows in stage.weights.items():
+        words += [f"Weight on {kind.replace('_', ' ')}: {_window(each)}." for each in windows]
+    own = sum(each.run is not None for each in problem.unknowns)
+    if own:
+        words.append(f"Besides there are {own} unknowns of single runs, bounded out of reach.")
+    return words
+
+
+def _window(weight: object) -> str:
+    given = {key: value for key, value in vars(weight).items() if value not in (None, "")}
+    factor, start, stop = given.pop("factor"), given.get("start"), given.get("stop")
+    when = "all of the run"
+    if start is not None or stop is not None:
+        first = "the start" if start is None else f"{start:g} s"
+        when = f"{first} to {'the end' if stop is None else f'{stop:g} s'}"
+    where = f" in '{given['maneuver']}'" if "maneuver" in given else ""
+    why = f" ({given['why']})" if "why" in given else ""
+    return f"{factor:g} on {when}{where}{why}"
+
+
+# --- verdict --------------------------------------------------------------------------------------
+
+
+def _verdict_section(
+    judged: Verdict, assessments: Sequence[Assessment], runs: Sequence[ShownRun], findings: int
+) -> Section:
+    looks = {"Usable": "good", "Usable for prediction": "look"}
+    said = statements(judged, assessments, runs, findings)
+    blocks = [
+        text(judged.headline, f"headline {looks.get(judged.grade, 'bad')}"),
+        Block("terms", said, "verdict"),
+    ]
+    return Section("verdict", "Verdict", blocks)
+
+
+def statements(
+    judged: Verdict, assessments: Sequence[Assessment], runs: Sequence[ShownRun], findings: int
+) -> tuple[Statement, ...]:
+    """The statements of a verdict in the order in which the report gives them.
+
+    Parameters
+    ----------
+    judged : Verdict
+        The judgement.
+    assessments : sequence of Assessment
+        One for each stage; none for a drive that was only held against runs.
+    runs : sequence of ShownRun
+        Fitted and held out.
+    findings : int
+        Findings about the campaign's data.
+    """
+    held = _qualities(runs, "validate")
+    measured = {
+        "Agreement": quality_sentences(_qualities(runs, "fit" if assessments else None)),
+        "Validation": quality_sentences(held),
+    }
+    made = [
+        each._replace(sentences=(*measured.get(each.subject, ()), *each.sentences))
+        for each in judged.statements
+    ]
+    if assessments:
+        said = tuple(
+            f"{each.stage.stage.name}: {words}"
+            for each in assessments
+            for words in uncertainty_sentences(each)
+        )
+        made.append(Statement("Errors", "plain", said))
+    if judged.criteria:
+        lines = (
+            f"{'Met' if each.passed else 'NOT MET'}: {each.name}: {each.value} "
+            f"(limit {each.limit}; {each.reason})."
+            for each in sorted(judged.criteria, key=lambda each: each.passed)
+        )
+        failed = {each.rules for each in judged.criteria if not each.passed}
+        weight: Weight = "bad" if "use" in failed else "look" if failed else "good"
+        made.append(Statement("Acceptance criteria", weight, tuple(lines)))
+    if judged.validity:
+        made.append(Statement("Range of validity", "plain", (judged.validity,)))
+    if judged.assumed:
+        made.append(Statement("Assumed, cannot be checked", "plain", judged.assumed))
+    if findings:
+        words = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
+        made.append(Statement("Data", "look", (words,)))
+    return tuple(made)
+
+
+def quality_sentences(qualities: Sequence[RunQuality]) -> tuple[str, ...]:
+    """One sentence for each channel: fit %, and what must stand beside it."""
+    said = []
+    for name, found in pooled(qualities).items():
+        runs = [each.experiment for each in qualities if each.channel == name]
+        words = tables.measures_words(name, runs[0][name].unit, found)
+        said.append(
+            f"{words} over {count(len(runs), 'run')}, {count(found.samples, 'sample')}; "
+            f"{tables.conditions(runs, name)}."
+        )
+    return tuple(said)
+
+
+def uncertainty_sentences(assessment: Assessment) -> tuple[str, ...]:
+    """What the intervals rest on, or why there are none."""
+    try:
+        return assessment.uncertainty.sentences()
+    except InputError as error:
+        return (f"There are no intervals: {error}",)
+
+
+# --- what the data tell ---------------------------------------------------------------------------
+
+
+def _parameter_section(
+    fit: Fit, assessments: Sequence[Assessment], truth: ParameterSet | None
+) -> Section:
+    scaled = None if truth is None else in_the_fits_scales(truth, fit)
+    made = [tables.estimates_table(each, truth=scaled) for each in assessments]
+    words = (
+        "In SI units, as the parameter files have them, unless others were chosen. Change is from "
+        "the nominal value. Intervals are for residuals that are correlated over time; those for "
+        "white noise stand beside them because other programs quote them. An unknown at a bound "
+        "has no symmetric interval."
+    )
+    blocks = [text(words)]
+    if truth is not None:
+        inside, counted = tables.truth_count(made)
+        blocks.append(
+            text(
+                "Truth is what was simulated, in the scales that the fit kept fixed: it was moved "
+                "to the fixed values along those directions that the tests cannot tell. Other "
+                "fixed parameters that are not true shift the estimates, and no interval covers "
+                f"that. {inside} of {counted} intervals hold it."
+            )
+        )
+    for table, each in zip(made, assessments, strict=True):
+        blocks += [Block("heading", table.title, "h3"), Block("table", table, "parameters")]
+        own = tables.estimates_table(each, own=True)
+        if own.rows:
+            summary = f"{count(len(own.rows), 'unknown')} of single runs"
+            blocks.append(Block("details", [Block("table", own, "parameters")], summary))
+    fixed = tables.fixed_table(fit, truth)
+    if fixed.rows:
+        blocks += [Block("heading", fixed.title, "h3"), Block("table", fixed, "held")]
+    return Section("parameters", "Parameters", blocks)
+
+
+def _excitation_section(assessments: Sequence[Assessment]) -> Section:
+    words = (
+        "Per cent of what is known of an unknown (its squared derivatives) that comes from each "
+        "run, at the optimum. A row with one dark cell rests on one run."
+    )
+    blocks = [text(words)]
+    for each in assessments:
+        table, said = tables.excitation_table(each)
+        blocks += [Block("heading", table.title, "h3"), Block("table", table, "excitation")]
+        blocks += listed_block(said)
+    last = (
+        "The change for 1 % is the root mean square of the change of the weighted residuals, in "
+        "units of each channel's noise."
+    )
+    return Section("excitation", "Information per run", [*blocks, text(last, "remark")])
+
+
+def _identifiability_section(assessments: Sequence[Assessment], items: dict[str, Any]) -> Section:
+    blocks = []
+    for number, each in enumerate(assessments):
+        found = each.identifiability
+        general = [unknown.run is None for unknown in each.stage.problem.unknowns]
+        items[f"sensitivity-{number}"] = plots.sensitivity_item(found, general)
+        items[f"singular-{number}"] = plots.singular_value_item(found)
+        blocks.append(Block("heading", f"Stage {each.stage.stage.name}", "h3"))
+        blocks += listed_block(found.sentences())
+        columns = (Column("direction"), Column("effect", ".2g"), Column("moves together"))
+        directions = Table("", (*columns, Column("fix")))
+        for way in found.null + found.faint:
+            kind = way.gauge.name if way.gauge else "faint" if way.sharpness else "null"
+            moves = ", ".join(f"{name} {change:+.2g} %" for name, change in way.changes.items())
+            known = f"{way.hold} if known" if way.sharpness else way.hold
+            directions.add(kind, way.sharpness, moves, known)
+        if directions.rows:
+            blocks.append(Block("table", directions, "directions"))
+        without = f"; none: {', '.join(found.unexcited)}" if found.unexcited else ""
+        pair = [
+            Block(
+                "figure",
+                f"sensitivity-{number}",
+                f"Sensitivity of each unknown that all runs share{without}",
+            ),
+            Block(
+                "figure",
+                f"singular-{number}",
+                "Singular values; below the solid line counts as none, below the dashed one as "
+                "faint",
+            ),
+        ]
+        blocks.append(Block("pair", pair))
+        blocks += _errors_rest_on(each, number, general, items)
+    return Section("identifiability", "Identifiability", blocks)
+
+
+def _errors_rest_on(
+    assessment: Assessment, number: int, general: Sequence[bool], items: dict[str, Any]
+) -> list[Block]:
+    """Correlations of the estimates, what the intervals rest on, and tones of the residuals."""
+    blocks, lines = [], list[SpectralLine]()
+    try:
+        covariance = assessment.uncertainty.quoted
+        lines = list(assessment.uncertainty.lines)
+        drawn = plots.correlation_item(covariance, general)
+    except InputError:  # the sentences below say why there are none
+        drawn = None
+    if drawn is not None:
+        items[f"correlation-{number}"] = drawn
+        words = "Correlations of the estimates, of the covariance that is quoted"
+        blocks.append(Block("figure", f"correlation-{number}", words))
+    blocks.append(Block("heading", "What the intervals rest on", "h4"))
+    blocks += listed_block(uncertainty_sentences(assessment))
+    if len(lines) > 1:
+        share = "share of the residuals' variance"
+        columns = (Column("channel"), Column("frequency", ".3g", "Hz"), Column(share, ".1%"))
+        made = Table("", columns)
+        for line in lines:
+            made.add(line.channel, line.frequency, line.share)
+        summary = f"The {count(len(lines), 'spectral line')} in the residuals"
+        blocks.append(Block("details", [Block("table", made, "lines")], summary))
+    return blocks
+
+
+def _starts_section(several: Mapping[str, Sequence[StartResult]], items: dict[str, Any]) -> Section:
+    blocks = []
+    for number, (stage, results) in enumerate(several.items()):
+        items[f"waterfall-{number}"] = plots.waterfall_item(results)
+        failed = sum(not each.cost < 1e300 for each in results)
+        more = f"; {failed} left the model's domain" if failed else ""
+        blocks += [Block("heading", f"Stage {stage}", "h3")] if stage else []
+        words = f"Where each of {len(results)} starts ended; hollow points did not converge{more}."
+        blocks.append(Block("figure", f"waterfall-{number}", words))
+    return Section("starts", "Starts", blocks)
+
+
+def _profile_section(fit: Fit, profiles: Sequence[StageProfile], items: dict[str, Any]) -> Section:
+    tiles = []
+    for number, given in enumerate(profiles):
+        unknowns = _stage(fit, given.stage).problem.unknowns
+        index = given.profile.index
+        name = unknowns.names[index]
+        items[f"profile-{number}"] = plots.profile_item(given.profile, unknowns.items[index], name)
+        drawn = Block("figure", f"profile-{number}", f"{name} ({given.stage})")
+        said = [text(words, "remark") for words in given.profile.sentences(name)]
+        tiles.append(Block("tile", [drawn, *said]))
+    words = (
+        "The least cost with one unknown fixed, above that of the optimum; the dashed line ends "
+        "the interval."
+    )
+    blocks = [text(words), Block("tiles", tiles)] if tiles else []
+    return Section("profiles", "Profiles", blocks)
+
+
+def _stage(fit: Fit, name: str) -> StageFit:
+    for each in fit.stages:
+        if each.stage.name == name:
+            return each
+    known = ", ".join(each.stage.name for each in fit.stages)
+    raise InputError(f"The profile of stage '{name}' belongs to no stage; there are {known}.")
+
+
+def _folds_section(folds: CrossValidation | None, assessments: Sequence[Assessment]) -> Section:
+    if folds is None:
+        return Section("folds", "Cross-validation", [])
+    held_out, parts, spreads = tables.folds_tables(folds, assessments)
+    words = (
+        f"The runs were dealt into {folds.planned} folds, kinds of test and directions apart (seed "
+        f"{folds.seed}). Each fold was predicted from the command alone by a fit to the others "
+        "that began at the nominal values."
+    )
+    note = (
+        "The jackknife's standard error takes in that the model is not exact; from a few folds it "
+        "is itself known to a third or so."
+    )
+    blocks = [
+        text(words),
+        *(text(each, "remark") for each in folds.sentences()),
+        Block("table", held_out, "held-out"),
+        Block("table", parts, "folds"),
+        Block("details", [text(note, "remark"), Block("table", spreads, "spreads")], spreads.title),
+    ]
+    return Section("folds", "Cross-validation", blocks)
