@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from swashplate.cli.inputs import drive_file
+from swashplate.cli.words import drive_file
 
 NUMBER = re.compile(r"(?<!\S)[-+]?\d[\d.e+-]*(?!\S)")
 

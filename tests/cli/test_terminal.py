@@ -2,7 +2,8 @@
 
 import pytest
 
-from swashplate.cli.terminal import counted, long_work, waiting
+from swashplate.cli.terminal import long_work, waiting
+from swashplate.tables import count
 
 
 @pytest.mark.parametrize(
@@ -17,8 +18,8 @@ def test_an_upper_bound_is_called_one() -> None:
     assert waiting(30.0, "at most") == "at most 30 s left"
 
 
-def test_what_is_counted() -> None:
-    assert [counted(number, "finding", "findings") for number in (0, 1, 2)] == [
+def test_what_is_count() -> None:
+    assert [count(number, "finding", "findings") for number in (0, 1, 2)] == [
         "0 findings",
         "1 finding",
         "2 findings",

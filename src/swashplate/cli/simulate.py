@@ -150,7 +150,10 @@ def axes() -> None:
 
     with working("Reading"):
         drives = [Drive.preset(name) for name in preset_names()]
-        columns = [Column(f"at {volts:+d} V" if volts else "at 0 V", "z.2f", "rad/s") for volts in (-10, 0, 10)]
+        columns = [
+            Column(f"at {volts:+d} V" if volts else "at 0 V", "z.2f", "rad/s")
+            for volts in (-10, 0, 10)
+        ]
         made = Table(
             "Settled speeds", (Column("name"), Column("drive and card", wrap=True), *columns)
         )

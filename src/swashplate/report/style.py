@@ -119,7 +119,7 @@ def dress(ax: Axes, label: str = "", below: str = "") -> None:
         spine.set_visible(side in ("left", "bottom"))
         spine.set_color(FAINT)
         spine.set_linewidth(0.8)
-    ax.ticklabel_format(axis="y", scilimits=(-3, 5))
+    ax.ticklabel_format(axis="y", scilimits=(-3, 5), useOffset=False)
     ax.yaxis.get_offset_text().set_fontsize(SMALL)
     if label:
         ax.set_ylabel(label, fontsize=NORMAL, color=INK)

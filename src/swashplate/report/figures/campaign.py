@@ -428,9 +428,9 @@ def _page(experiments: Sequence[Experiment], columns: Sequence[Column], title: s
         fill_row(list(row), columns, experiment, panel)
         # room for the heading, and in the first row for the columns' names
         for ax, column in zip(row, columns, strict=True):
-            heads = (_cut(column.name, panel, 0.085), _cut(column.words, panel, 0.066), "")
-            words = "\n".join(heads) if number == 0 else " "
-            ax.set_title(words, loc="left", fontsize=SMALL, color=INK, pad=10.0)
+            heads = (_cut(column.name, panel, 0.085), _cut(column.words, panel, 0.066))
+            words, pad = ("\n".join(heads), 20.0) if number == 0 else (" ", 6.0)
+            ax.set_title(words, loc="left", fontsize=SMALL, color=INK, pad=pad)
     for ax in grid[-1]:
         label_below(ax, "time (s)")
     reasons = [why for each in experiments for _, _, why in each.ignored]

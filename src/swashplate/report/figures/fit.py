@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from textwrap import wrap
 from typing import Literal
 
 import numpy as np
@@ -51,6 +52,8 @@ from swashplate.units import display_unit
 
 HEIGHTS = {"input": 1.0, "overlay": 1.75, "residual": 1.1}
 """Of panels with their ticks. [inch]"""
+LETTERS = 110
+"""In a line of words above the panels."""
 LETTER = 0.065
 """Width of a letter of a label. [inch]"""
 
@@ -138,7 +141,8 @@ def plot_overlay(run: ShownRun, *, virtual: bool = False) -> Figure:
     kinds = ["input", *(["overlay", "residual"] * len(run.channels))]
     what, test = ("virtual test, ", "virtual test") if virtual else ("", "measured")
     role = "held out" if run.validates else "fitted"
-    said = [f"{each.quality.channel}: {run_words(each.quality)}" for each in run.channels]
+    words = (f"{each.quality.channel}: {run_words(each.quality)}" for each in run.channels)
+    said = [line for each in words for line in wrap(each, LETTERS)]
     title = f"{run.name} ({what}{role})"
     figure, axes = sheet([HEIGHTS[kind] for kind in kinds], title, lines=len(said) + 1)
     drive = run.experiment.input

@@ -109,7 +109,7 @@ def _html_row(table: Table, row: Row) -> list[Markup]:
         if column.name == "role":
             shown = Markup('<span class="badge {0}">{0}</span>').format(cell)
         if first:
-            below = Markup('<span class="meaning">{}</span>').format(meaning) if meaning else ""
+            below = Markup(' <span class="meaning">{}</span>').format(meaning) if meaning else ""
             look = Markup(' class="n"') if column.spec else ""
             parts.append(Markup('<th scope="row"{}>{}{}</th>').format(look, shown, below))
         elif column.shade:
@@ -119,7 +119,8 @@ def _html_row(table: Table, row: Row) -> list[Markup]:
         else:
             missed = " miss" if column.name == "holds" and cell == "no" else ""
             look = "unit" if column is UNIT else f"n{missed}" if column.spec else missed.strip()
-            parts.append(Markup('<td class="{}">{}</td>').format(look, shown))
+            inner = Markup('<td class="{}">{}</td>' if look else "<td{}>{}</td>")
+            parts.append(inner.format(look, shown))
         first = False
     return [*parts, Markup("</tr>\n")]
 

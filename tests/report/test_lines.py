@@ -1,15 +1,23 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
-from swashplate.report.broken_lines import (
+
+from swashplate import InputError, Limit, Simulation
+from swashplate.report.lines import (
+    active_spans,
     alone,
     broken,
     draw_broken,
+    envelope,
     gap_rows,
+    merged,
+    rows_within,
     thinned,
 )
 
+WINDOWED = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
 NONE = np.empty(0, dtype=np.intp)
 
 
@@ -113,3 +121,41 @@ def test_nothing_to_show_draws_nothing() -> None:
     ax = Figure().subplots()
     draw_broken(ax, np.arange(3.0), np.ones(3), "k", shown=np.zeros(3, dtype=bool))
     assert not ax.lines
+
+
+@pytest.mark.parametrize("size", [16, 17, 100, 999, 1000])
+def test_an_envelope_keeps_the_extremes_of_every_stretch(size: int) -> None:
+    time = np.arange(size) / 10.0
+    values = np.random.default_rng(size).normal(size=size)
+    stamps, heights = envelope(time, values, most=16)
+    assert stamps.size <= 16 + 4
+    assert (np.diff(stamps) > 0.0).all()
+    np.testing.assert_array_equal(values[np.searchsorted(time, stamps)], heights)
+    assert stamps[0] == time[0]
+    assert stamps[-1] == time[-1]
+    stretch = -(-size // 8)
+    for start in range(0, size, stretch):
+        assert values[start : start + stretch].max() in heights
+        assert values[start : start + stretch].min() in heights
+
+
+def test_spans_are_merged_only_when_there_are_too_many() -> None:
+    spans = np.array([[0.0, 1.0], [1.1, 2.0], [3.0, 4.0], [4.05, 5.0]])
+    np.testing.assert_array_equal(merged(spans, 0.5, most=4), spans)
+    np.testing.assert_array_equal(merged(spans, 0.5, most=3), [[0.0, 2.0], [3.0, 5.0]])
+
+
+def test_a_limit_that_never_acts_has_no_spans(step: Simulation) -> None:
+    assert active_spans(step, Limit.RELIEF).shape == (0, 2)
+
+
+def test_a_window_holds_its_ends() -> None:
+    assert rows_within(WINDOWED, (1.0, 3.0), "x") == slice(1, 4)
+    assert rows_within(WINDOWED, (0.5, 9.0), "x") == slice(1, 5)
+    assert rows_within(WINDOWED, None, "x") == slice(0, 5)
+
+
+@pytest.mark.parametrize("window", [(1.5, 2.5), (8.0, 9.0), (3.0, 1.0)])
+def test_a_window_without_a_line_is_refused(window: tuple[float, float]) -> None:
+    with pytest.raises(InputError, match=r"samples of boom.csv, which goes from 0 s to 4 s"):
+        rows_within(WINDOWED, window, "boom.csv")

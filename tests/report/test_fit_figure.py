@@ -47,10 +47,10 @@ def test_measured_and_simulated_in_degrees(assessed: Assessment, tmp_path: Path)
     figure = plot_fit(assessed.runs[0], [assessed])
     speed, command, _ = figure.axes
     measured, simulated = speed.lines
-    assert speed.get_ylabel() == "speed [deg/s]"
+    assert speed.get_ylabel() == "speed (deg/s)"
     assert measured.get_ydata()[-1] == pytest.approx(np.degrees(9.0), abs=np.degrees(0.4))
     assert simulated.get_ydata()[-1] == pytest.approx(np.degrees(9.0), abs=np.degrees(0.1))
-    assert command.get_ylabel() == "voltage [V]"
+    assert command.get_ylabel() == "voltage (V)"
     save_figure(figure, tmp_path / "result.png")
     assert (tmp_path / "result.png").stat().st_size > 10_000
 

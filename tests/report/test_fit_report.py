@@ -11,17 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from swashplate.report.fit_page import (
-    save_fit_figures,
-    save_run_figures,
-    write_fit_report,
-    write_validation_report,
-)
-from swashplate.report.fit_page.files import plot_overlay
-from swashplate.report.fit_page.numbers import percent, plain, spread, unit_text
-from swashplate.report.fit_page.page import StageProfile
-from swashplate.report.fit_page.runs import Shown, ignored_words, off_scale, shown_runs
-from swashplate.report.fit_page.truth import in_the_fits_scales
 
 from swashplate import Campaign, Channel, Drive, FileError, InputError, maneuvers
 from swashplate.campaign import Source, rig
@@ -32,8 +21,17 @@ from swashplate.identification.profile import Point, Profile, Threshold
 from swashplate.identification.setup import Setup
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.starts import StartResult
+from swashplate.identification.storing import StageProfile
+from swashplate.identification.tables import ignored_words
+from swashplate.identification.truth import in_the_fits_scales
 from swashplate.identification.validation import predict
 from swashplate.identification.verdict import verdict
+from swashplate.report.figures import plot_overlay, save_fit_figures, save_run_figures
+from swashplate.report.fit_report import (
+    write_fit_report,
+    write_validation_report,
+)
+from swashplate.report.fit_report.runs import Shown, off_scale, shown_runs
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
 SETUP = Setup.model_validate(
@@ -165,6 +163,16 @@ class Page(HTMLParser):
         if self._cell is not None:
             self._cell.append(data)
 
+    def rows(self, table: str) -> list[dict[str, str]]:
+        """Rows of all tables of a class by the heads of their columns; sums of others left out."""
+        found, head = [], []
+        for row in self.tables[table]:
+            if row[0] in ("unknown", "run", "parameter", "channel", "fold"):
+                head = row
+            elif row[0] != "all":
+                found.append({**dict(zip(head, row, strict=True)), "name": row[0].split(" ")[0]})
+        return found
+
 
 @pytest.fixture(scope="module")
 def read(page: Path) -> Page:
@@ -181,35 +189,33 @@ def number(text: str) -> float:
 
 
 def test_estimates_and_intervals_are_those_of_the_fit(read: Page, assessments) -> None:
-    rows = {row[0].split(" ")[0]: row for row in read.tables["parameters"]}
+    rows = {row["name"]: row for row in read.rows("parameters")}
     for assessment in assessments:
         for estimate in assessment.uncertainty.estimates:
             if estimate.name.startswith("offset"):
                 continue
-            row = next(row for name, row in rows.items() if name.startswith(estimate.name))
-            assert number(row[3]) == pytest.approx(estimate.value, rel=1e-3), row
+            row = rows[estimate.name]
+            assert number(row["estimate"]) == pytest.approx(estimate.value, rel=1e-3), row
             if estimate.lower is None:
-                assert (row[5], row[7]) == ("–", "–")
-                assert row[8] == estimate.status
-            else:
-                low, _, high = row[5].partition("…")
-                power = row[5].split("·10")[1:]
-                low = f"{low}·10{power[0]}" if power else low
-                half = 0.5 * (estimate.upper - estimate.lower)
-                assert number(low.strip()) == pytest.approx(estimate.lower, abs=0.06 * half)
-                assert number(high.strip()) == pytest.approx(estimate.upper, abs=0.06 * half)
+                assert row["lower 95 %"] == row["status"] == estimate.status
+                continue
+            half = 0.5 * (estimate.upper - estimate.lower)
+            for head, end in (("lower 95 %", estimate.lower), ("upper 95 %", estimate.upper)):
+                assert number(row[head]) == pytest.approx(end, abs=0.06 * half)
 
 
 def test_no_interval_at_an_active_bound(read: Page) -> None:
-    row = next(row for row in read.tables["parameters"] if row[0].startswith("omega"))
-    assert row[5:] == ["–", "–", "–", "at its upper bound"]
+    row = next(row for row in read.rows("parameters") if row["name"] == "omega")
+    assert (row["lower 95 %"], row["upper 95 %"]) == ("at its upper bound", "")
     assert re.search(r"omega = [\d.]+ stands at its upper bound: no interval is given", read.words)
 
 
-def test_held_parameters_are_listed_and_free_ones_are_not(read: Page) -> None:
-    held = {row[0] for row in read.tables["held"][1:]}
-    assert {"tau", "Z1", "Z18", "zeta_plus"} <= held
-    assert not held & {"G1_plus", "G1_minus", "omega_plus", "omega_minus", "Z10"}
+def test_fixed_parameters_are_listed_and_free_ones_are_not(read: Page) -> None:
+    fixed = {row["name"]: row for row in read.rows("held")}
+    assert {"tau", "Z1", "Z18", "zeta_plus"} <= set(fixed)
+    assert not set(fixed) & {"G1_plus", "G1_minus", "omega_plus", "omega_minus", "Z10"}
+    assert fixed["Z12"]["why, as far as can be told"] == "0: this effect is left out"
+    assert fixed["Z14"]["why, as far as can be told"] == "inactive: no test reaches it"
 
 
 def test_rmse_and_fit_of_a_run_are_recomputed(read: Page, fitted: Fit) -> None:
@@ -221,34 +227,32 @@ def test_rmse_and_fit_of_a_run_are_recomputed(read: Page, fitted: Fit) -> None:
     difference = problem.outputs(vector, 0)["current"][counted] - measured
     rmse = float(np.sqrt(np.mean(difference**2)))
     fit_percent = 100.0 * (1.0 - rmse / float(np.std(measured)))
-    row = next(
-        row for row in read.tables["agreement"] if row[0] == experiment.name and row[2] == "current"
-    )
-    assert float(row[3]) == pytest.approx(fit_percent, abs=0.006)
-    assert row[4].endswith(" mA")
-    assert number(row[4]) == pytest.approx(1e3 * rmse, rel=6e-3)
+    keys = {"run": experiment.name, "channel": "current"}
+    (row,) = (each for each in read.rows("agreement") if keys.items() <= each.items())
+    assert float(row["fit %"]) == pytest.approx(fit_percent, abs=0.006)
+    assert row["unit"] == "mA"
+    assert number(row["RMSE"]) == pytest.approx(1e3 * rmse, rel=6e-3)
 
 
 def test_initial_state_and_ignored_windows_stand_beside_every_fit_percent(
     read: Page, page: Path
 ) -> None:
-    head, *rows = read.tables["agreement"]
-    assert head[-2:] == ["initial state", "ignored"]
-    assert all(row[-2] == "at rest" for row in rows)
-    assert any("the dither starts" in row[-1] for row in rows)
+    rows = read.rows("agreement")
+    assert all(row["initial state"] == "rest" for row in rows)
+    assert any("the dither starts" in row["ignored"] for row in rows)
     beside = re.findall(r'<p class="measures">.*?</p>', page.read_text("utf-8"), re.DOTALL)
     assert len(beside) == len(rows)
-    assert all("initial state at rest" in each and "ignored:" in each for each in beside)
+    assert all("initial state rest" in each and "ignored:" in each for each in beside)
 
 
 def test_a_run_that_was_held_out_is_marked(read: Page, campaign: Campaign) -> None:
     (held,) = campaign.select(role="validate")
-    roles = {row[0]: row[1] for row in read.tables["agreement"][1:]}
+    roles = {row["run"]: row["role"] for row in read.rows("agreement")}
     assert [name for name, role in roles.items() if role == "validate"] == [held.name]
 
 
 def test_a_position_is_judged_by_its_speed_too(read: Page) -> None:
-    channels = {row[2] for row in read.tables["agreement"][1:]}
+    channels = {row["channel"] for row in read.rows("agreement")}
     assert channels == {"current", "counts", "speed from counts"}
     assert "speed from counts" in read.words
     # of the source's rules those that left out something
@@ -333,16 +337,13 @@ def test_truth_stands_beside_the_estimates(
     path = tmp_path / "fit.html"
     write_fit_report(fitted, campaign, path, assessments=assessments, truth=truth)
     page = Page(path.read_text("utf-8"))
-    head = page.tables["parameters"][0]
-    assert head[5:7] == ["truth", "holds it"]
-    assert "truth" not in read.tables["parameters"][0]
-    rows = {row[0].split(" ")[0]: row for row in page.tables["parameters"]}
-    name, row = next((name, row) for name, row in rows.items() if name.startswith("G1_plus"))
-    assert number(row[5]) == pytest.approx(0.051, rel=1e-4), name
+    assert "truth" not in read.rows("parameters")[0]
+    row = next(row for row in page.rows("parameters") if row["name"] == "G1_plus")
+    assert number(row["truth"]) == pytest.approx(0.051, rel=1e-4)
     estimate = next(each for each in assessments[0].uncertainty.estimates if each.name == "G1_plus")
-    assert row[6] == ("yes" if estimate.lower <= 0.051 <= estimate.upper else "no")
-    held = {row[0]: row for row in page.tables["held"][1:]}
-    assert number(held["Z4"][4]) == pytest.approx(truth.numbers["Z4"], rel=1e-4)
+    assert row["holds"] == ("yes" if estimate.lower <= 0.051 <= estimate.upper else "no")
+    fixed = {row["name"]: row for row in page.rows("held")}
+    assert number(fixed["Z4"]["truth"]) == pytest.approx(truth.numbers["Z4"], rel=1e-4)
 
 
 def test_truth_is_moved_to_the_scales_that_the_fit_held(campaign: Campaign) -> None:
@@ -361,12 +362,6 @@ def test_truth_is_moved_to_the_scales_that_the_fit_held(campaign: Campaign) -> N
     for name in ("Z9", "Z15", "Z1", "Z8"):
         assert moved[name] == pytest.approx(nominal.parameters.numbers[name], rel=1e-9)
     assert moved["Z10"] == pytest.approx(1.03 * nominal.parameters.numbers["Z10"])
-
-
-def test_held_scales_say_why(read: Page) -> None:
-    held = {row[0]: row for row in read.tables["held"][1:]}
-    assert held["Z12"][4] == "0: this effect is left out"
-    assert held["Z14"][4] == "inactive: no test reaches it"
 
 
 def test_shares_of_the_runs_add_up(read: Page) -> None:
@@ -397,13 +392,13 @@ def test_cross_validation_has_a_section(tmp_path: Path, campaign, fitted, assess
     found = CrossValidation(0, 2, folds)
     write_fit_report(fitted, campaign, path, assessments=assessments, folds=found)
     page = Page(path.read_text("utf-8"))
-    (row,) = page.tables["held-out"][1:]
-    assert row[:3] == ["current", "90.00", "50.0 mA"]
+    (row,) = page.rows("held-out")
+    assert (row["fit %"], row["RMSE held out"], row["unit"]) == ("90.00", "50", "mA")
     assert [each[0] for each in page.tables["folds"][1:]] == ["1", "2"]
-    (spread,) = page.tables["spreads"][1:]
+    (spread,) = page.rows("spreads")
     # sqrt(1/2 · 2 · 0.005²) of the estimate of the fit to all runs
     expected = 100.0 * 0.005 / fitted.stages[0].values["G1_plus"]
-    assert float(spread[3].strip("±%")) == pytest.approx(expected, abs=0.06)
+    assert float(spread["jackknife"].strip("±%")) == pytest.approx(expected, abs=0.06)
     assert "Cross-validation" in page.words
 
 
@@ -432,7 +427,7 @@ def test_a_validation_has_no_fit(validated: Path, campaign: Campaign, fitted: Fi
     page = Page(validated.read_text("utf-8"))
     assert HOSTILE not in validated.read_text("utf-8")
     assert set(page.tables) == {"agreement", "errors", "residuals", "data", "notes"}
-    roles = {row[0]: row[1] for row in page.tables["agreement"][1:]}
+    roles = {row["run"]: row["role"] for row in page.rows("agreement")}
     assert roles == {each.name: each.role for each in campaign}
     predicted = predict(fitted.parameters, campaign.experiments)
     assert verdict((), predicted).headline in page.words
@@ -510,85 +505,52 @@ setTimeout(() => {
 </script></body>"""
 
 
-def test_the_page_renders_and_zooms_in_a_browser_without_errors(
-    page: Path, tmp_path: Path, fitted: Fit
-) -> None:
+@pytest.fixture
+def browsed(tmp_path: Path):
+    """Show a page in a browser, which must not complain; what it made of the page."""
     browser = shutil.which("chromium") or shutil.which("chromium-browser")
     if browser is None:
         pytest.skip("there is no Chromium here; `make browser` installs it where it can")
+
+    def show(page: Path) -> str:
+        options = ("--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr")
+        more = ("--virtual-time-budget=20000", f"--user-data-dir={tmp_path / 'profile'}")
+        words = [browser, *options, *more, "--window-size=1280,1000", "--dump-dom"]
+        done = subprocess.run(
+            [*words, f"{page.as_uri()}#all"],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        said = [line for line in done.stderr.splitlines() if ":CONSOLE" in line]
+        assert [line for line in said if "setting log level" not in line] == []
+        return done.stdout
+
+    return show
+
+
+def test_the_page_renders_and_zooms_in_a_browser_without_errors(
+    page: Path, tmp_path: Path, fitted: Fit, browsed
+) -> None:
     zoomed = tmp_path / "zoomed.html"
     zoomed.write_text(page.read_text("utf-8").replace("</body>", ZOOM), "utf-8")
-    done = subprocess.run(
-        [
-            browser,
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--enable-logging=stderr",
-            "--virtual-time-budget=20000",
-            f"--user-data-dir={tmp_path / 'profile'}",
-            "--window-size=1280,1000",
-            "--dump-dom",
-            f"{zoomed.as_uri()}#all",
-        ],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    said = [line for line in done.stderr.splitlines() if ":CONSOLE" in line]
-    assert [line for line in said if "setting log level" not in line] == []
+    made = browsed(zoomed)
     figures = len(re.findall(r'class="figure[ "]', page.read_text("utf-8")))
     # 3 runs, 3 for each of two stages less the pump's correlations, starts, a profile
-    assert figures == 3 + 2 + 2 + 1 + 1 + done.stdout.count('data-item="correlation-')
-    assert done.stdout.count('data-drawn="yes"') == figures
+    assert figures == 3 + 2 + 2 + 1 + 1 + made.count('data-item="correlation-')
+    assert made.count('data-drawn="yes"') == figures
     # a second in view: every sample of it
     time = fitted.stages[0].problem.experiments[0]["current"].time
     expected = int(np.count_nonzero((time >= 2.0) & (time <= 3.0)))
-    rows = re.search(r'data-rows="(\d+)"', done.stdout)
+    rows = re.search(r'data-rows="(\d+)"', made)
     assert rows is not None
     assert expected > 500
     assert abs(int(rows[1]) - expected) <= 1  # stamps in single precision
 
 
-def test_a_validation_renders_in_a_browser_without_errors(validated: Path, tmp_path: Path) -> None:
-    browser = shutil.which("chromium") or shutil.which("chromium-browser")
-    if browser is None:
-        pytest.skip("there is no Chromium here; `make browser` installs it where it can")
-    done = subprocess.run(
-        [
-            browser,
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--enable-logging=stderr",
-            "--virtual-time-budget=10000",
-            f"--user-data-dir={tmp_path / 'profile'}",
-            "--dump-dom",
-            f"{validated.as_uri()}#all",
-        ],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    said = [line for line in done.stderr.splitlines() if ":CONSOLE" in line]
-    assert [line for line in said if "setting log level" not in line] == []
-    assert done.stdout.count('data-drawn="yes"') == 3
-
-
-def test_numbers_show_what_is_known() -> None:
-    assert plain(0.0) == "0"
-    assert plain(123.456) == "123.46"
-    assert plain(-4.5e-7, 2) == "−4.5 ·10⁻⁷"
-    assert plain(1.23456e9) == "1.2346 ·10⁹"
-    assert spread(0.1272955, 0.126961, 0.127630) == ("0.12730", "0.12696 … 0.12763")
-    assert spread(2e6, 1.9e6, 2.1e6) == ("2.00 ·10⁶", "1.90 … 2.10 ·10⁶")
-    assert percent(-0.0053, 1.0, sign=True) == "−0.53 %"
-    assert percent(1.0, 0.0) == "–"
-    assert unit_text("A/V^2") == "A/V²"
-    assert unit_text("sqrt(Pa)/(m s)") == "√Pa/(m s)"
-    assert unit_text("N^2 m^2") == "N² m²"
+def test_a_validation_renders_in_a_browser_without_errors(validated: Path, browsed) -> None:
+    assert browsed(validated).count('data-drawn="yes"') == 3
 
 
 def test_ignored_windows_in_words(fitted: Fit) -> None:

@@ -1,0 +1,292 @@
+"""Figures of simulations and analyses: what they show, in which units, and that it can be read."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from swashplate import Drive, FullOrderDrive, InputError, Limit, Simulation, maneuvers
+from swashplate.analysis.compensation import inverse_map
+from swashplate.analysis.envelope import envelope
+from swashplate.analysis.monte_carlo import bands, independent_drives
+from swashplate.analysis.outcomes import Trial, trial
+from swashplate.analysis.sensitivity import one_at_a_time, ranges_of, sobol
+from swashplate.analysis.tracking import improvement
+from swashplate.analysis.whatif import what_if
+from swashplate.full_order.comparison import compare
+from swashplate.report import figures
+from swashplate.report.lines import MOST_POINTS, MOST_RUNS, SHADES
+from swashplate.units import shown_in
+
+LEVERS = ("orifice", "pump", "relief")
+DEGREE = 180.0 / np.pi
+
+
+@pytest.fixture(scope="module")
+def task(hoist: Drive) -> Trial:
+    return trial(hoist, maneuvers.step(9.0, stop=4.0, length=5.0).sample())
+
+
+@pytest.fixture(scope="module")
+def made(hoist: Drive, step: Simulation, all_limits: Simulation, task: Trial) -> dict[str, Figure]:
+    """Every figure of a simulation or an analysis, by its name."""
+    luff, neutral = Drive.preset("luff"), Drive.preset("neutral")
+    drawn = independent_drives(hoist, {"Z10": 0.2}, 30)
+    band = bands(drawn, task.voltage)
+    changed = what_if(hoist, {"orifice": 1.5, "pump": 1.5}, task)
+    outcomes = ("final_speed", "rise_time", "overshoot")
+    one = one_at_a_time(hoist, ranges_of(LEVERS), task, outcomes=outcomes)
+    shares = sobol(hoist, ranges_of(LEVERS), task, outcomes=("final_speed",), samples=32)
+    inverse = inverse_map(luff)
+    wanted = 0.5 * np.sin(task.time)
+    current = hoist.simulate_current(0.5 * np.sin(np.arange(2000) / 300.0))
+    loaded = FullOrderDrive.preset("hoist").replace(load_torque=2e3)
+    both = compare(loaded, loaded.drive.simulate(maneuvers.step(9.0, length=8.0).sample()))
+    response = hoist.frequency_response(np.geomspace(0.05, 5.0, 12), [1.0, 9.0])
+    runs = {"hoist": {"step +9 V": step, "sine 9 V": all_limits}, "luff": {"step": step}}
+    axes = {name: Drive.preset(name) for name in ("hoist", "slew", "luff")}
+    return {
+        "simulation": figures.plot_simulation(step),
+        "all limits": figures.plot_simulation(all_limits),
+        "by current": figures.plot_simulation(current),
+        "neutral": figures.plot_simulation(neutral.simulate(maneuvers.step(0.8).sample())),
+        "full order": figures.plot_full_order(both),
+        "comparison": figures.plot_comparison({"hoist": step, "by current": current}),
+        "overview": figures.plot_maneuvers_overview(runs),
+        "steady": figures.plot_steady_map(axes),
+        "envelope": figures.plot_envelope(envelope(hoist)),
+        "timeline": figures.plot_limit_timeline(all_limits),
+        "whatif": figures.plot_whatif(changed, bands={"as it is": band}),
+        "bands": figures.plot_bands(band),
+        "tornado": figures.plot_tornado(one),
+        "sobol": figures.plot_sobol(shares),
+        "map": figures.plot_compensation(inverse),
+        "improvement": figures.plot_compensation(inverse, improvement(luff, wanted)),
+        "bode": figures.plot_bode(response, linear=hoist.linearize(4.0)),
+    }
+
+
+NAMES = (
+    *("simulation", "all limits", "by current", "neutral", "full order", "comparison"),
+    *("overview", "steady", "envelope", "timeline", "whatif", "bands", "tornado", "sobol"),
+    *("map", "improvement", "bode"),
+)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_everything_can_be_read(
+    made: dict[str, Figure], assert_legible: Callable[[Figure], None], name: str
+) -> None:
+    assert_legible(made[name])
+
+
+def labels(figure: Figure) -> list[str]:
+    return [ax.get_ylabel().replace("\n", " ") for ax in figure.axes]
+
+
+def lines(figure: Figure, panel: int) -> list[np.ndarray]:
+    """Curves of a panel, without the levels that it marks."""
+    return [
+        np.asarray(line.get_ydata())
+        for line in figure.axes[panel].lines
+        if len(line.get_xdata()) > 2
+    ]
+
+
+def legend(figure: Figure) -> list[str]:
+    found = figure.axes[0].get_legend()
+    return [] if found is None else [text.get_text() for text in found.get_texts()]
+
+
+def shades(figure: Figure, panel: int) -> dict[str, np.ndarray]:
+    """Beginning and end of each shaded stretch, by its name."""
+    return {
+        each.get_label(): np.array([path.vertices[[0, 1], 0] for path in each.get_paths()])
+        for each in figure.axes[panel].collections
+        if not each.get_label().startswith("_")
+    }
+
+
+def test_the_chain_from_command_to_speed(made: dict[str, Figure], step: Simulation) -> None:
+    figure = made["simulation"]
+    assert labels(figure) == [
+        "voltage (V)",
+        "current (A)",
+        "spool (mm)",
+        "stroker pressure (bar)",
+        "swash angle (deg)",
+        "shaft speed (deg/s)",
+    ]
+    expected = [
+        [step.voltage],
+        [step.current_positive, step.current_negative],
+        [1e3 * step.spool_position, 1e3 * step.orifice_opening],
+        [1e-5 * step.stroker_pressure],
+        [DEGREE * step.swash_angle],
+        [DEGREE * step.shaft_speed],
+    ]
+    for panel, signals in enumerate(expected):
+        for drawn, signal in zip(lines(figure, panel), signals, strict=True):
+            np.testing.assert_allclose(drawn, signal, rtol=1e-12)
+    assert labels(made["by current"])[0] == "current (A)"
+
+
+def test_units_of_choice_hold_for_figures(step: Simulation) -> None:
+    with shown_in(["rpm", "kPa"]):
+        figure = figures.plot_simulation(step)
+    assert labels(figure)[3::2] == ["stroker pressure (kPa)", "shaft speed (rpm)"]
+    np.testing.assert_allclose(lines(figure, 5)[0], 30.0 / np.pi * step.shaft_speed, rtol=1e-12)
+    assert labels(figures.plot_simulation(step))[5] == "shaft speed (deg/s)"
+
+
+def test_every_limit_is_shaded_where_it_acts(
+    made: dict[str, Figure], all_limits: Simulation
+) -> None:
+    figure = made["all limits"]
+    panels = {
+        Limit.DEAD_ZONE: [1],
+        Limit.CURRENT_RATE: [1],
+        Limit.ORIFICE: [2],
+        Limit.SPOOL: [2],
+        Limit.RELIEF: [3],
+        Limit.SWASH_STOP: [4, 5],
+    }
+    time = all_limits.time
+    for limit, at in panels.items():
+        name = SHADES[limit].name
+        assert [panel for panel in range(6) if name in shades(figure, panel)] == at
+        spans = shades(figure, at[0])[name]
+        inside = ((time[:, None] >= spans[:, 0]) & (time[:, None] <= spans[:, 1])).any(axis=1)
+        np.testing.assert_array_equal(inside, all_limits.active(limit))
+    assert legend(figure) == [shade.name for shade in SHADES.values()]
+
+
+def test_orifices_and_stops_are_marked_where_the_signal_comes_near(hoist: Drive) -> None:
+    figure = figures.plot_simulation(hoist.simulate(maneuvers.sine(9.0, 0.1).sample()))
+
+    def levels(panel: int, of: Figure) -> list[float]:
+        return [
+            float(line.get_ydata()[0])
+            for line in of.axes[panel].lines
+            if len(line.get_xdata()) == 2 and line.get_linestyle() == "--"
+        ]
+
+    assert levels(2, figure) == pytest.approx([0.11634, -0.15126])
+    assert levels(4, figure) == pytest.approx(np.degrees([0.27596, -0.26047]))
+    low = figures.plot_simulation(hoist.simulate(maneuvers.step(0.8).sample()))
+    assert levels(4, low) == []
+
+
+def test_an_hour_is_drawn_by_few_points_and_few_spans(hoist: Drive) -> None:
+    time = np.arange(3600 * 512) / 512.0
+    run = hoist.simulate(8.0 * np.sin(0.2 * time) + 1.5 * np.sin(20.0 * time))
+    figure = figures.plot_simulation(run)
+    for panel, ax in enumerate(figure.axes):
+        assert max(len(line.get_xdata()) for line in ax.lines) <= MOST_POINTS + 4
+        assert all(len(spans) <= MOST_RUNS for spans in shades(figure, panel).values())
+    assert lines(figure, 5)[0].max() == pytest.approx(DEGREE * run.shaft_speed.max())
+
+
+def test_a_single_sample_can_be_shown(hoist: Drive) -> None:
+    figures.plot_simulation(hoist.simulate([0.0])).draw_without_rendering()
+
+
+def test_both_models_and_what_lies_between(made: dict[str, Figure]) -> None:
+    assert labels(made["full order"]) == [
+        "voltage (V)",
+        "shaft speed (deg/s)",
+        "difference (% of top)",
+        "spool (mm)",
+        "swash angle (deg)",
+        "stroker pressure (bar)",
+        "motor pressure drop (bar)",
+    ]
+
+
+def test_a_comparison_shows_what_differs(step: Simulation, hoist: Drive) -> None:
+    faster = hoist.scale(Z10=1.5).simulate(step.voltage)
+    figure = figures.plot_comparison({"hoist": step, "faster": faster}, title="both")
+    assert legend(figure) == ["hoist", "faster"]
+    (difference,) = lines(figure, 2)
+    expected = DEGREE * (faster.shaft_speed - step.shaft_speed)
+    np.testing.assert_allclose(difference, expected, atol=1e-9)
+    with pytest.raises(InputError, match="at least one simulation"):
+        figures.plot_comparison({})
+
+
+def test_the_steady_map_groups_axes_of_like_speed(made: dict[str, Figure]) -> None:
+    figure = made["steady"]
+    words = [text.get_text() for ax in figure.axes for text in ax.texts]
+    assert {"−185.0 and +196.0", "−7.41 and +7.87", "creep +3.1 deg/s"} <= set(words)
+    # hoist and luff share a panel, slew has one of its own
+    assert labels(figure).count("steady speed (deg/s)") == 2
+    with pytest.raises(InputError, match="at least one drive"):
+        figures.plot_steady_map({})
+
+
+def test_an_overview_has_a_row_an_axis_and_a_column_a_kind(made: dict[str, Figure]) -> None:
+    figure = made["overview"]
+    assert [ax.get_title() for ax in figure.axes[:2]] == ["step", "sine"]
+    assert labels(figure)[::2][:2] == ["hoist speed (deg/s)", "luff speed (deg/s)"]
+    with pytest.raises(InputError, match="at least one run"):
+        figures.plot_maneuvers_overview({})
+
+
+def test_the_envelope_ends_at_the_swash_stop(made: dict[str, Figure]) -> None:
+    words = [text.get_text() for text in made["envelope"].axes[0].texts]
+    assert "swash stop\n+196.0 deg/s" in words
+    assert "orifice, at rest\n+136.8 deg/s²" in words
+
+
+def test_the_timeline_has_a_row_for_each_limit(
+    made: dict[str, Figure], all_limits: Simulation
+) -> None:
+    rows = made["timeline"].axes[2]
+    names = [label.get_text() for label in rows.get_yticklabels()]
+    assert names == [shade.name for shade in SHADES.values()]
+    share = 100.0 * np.mean(all_limits.active(Limit.ORIFICE))
+    assert f"{share:.1f} %" in [text.get_text() for text in rows.texts]
+    with pytest.raises(InputError, match="the run has"):
+        figures.plot_limit_timeline(all_limits, wanted=[0.0])
+
+
+def test_speeds_before_and_after(made: dict[str, Figure]) -> None:
+    figure = made["whatif"]
+    tops = sorted(float(each.max()) for each in lines(figure, 1))
+    assert tops[-1] == pytest.approx(294.0, abs=0.05)
+    names = ["as it is", "orifice x 1.5", "pump x 1.5", "changed", "wanted"]
+    assert legend(figure) == names
+    assert labels(figure)[3] == "about the median (deg/s)"
+
+
+def test_the_strongest_lever_is_at_the_top(made: dict[str, Figure]) -> None:
+    speed, rise, still = made["tornado"].axes[:3]
+    assert speed.get_yticklabels()[-1].get_text() == "pump"
+    assert rise.get_yticklabels()[-1].get_text() == "orifice"
+    ends = sorted(bar.get_x() + bar.get_width() for bar in speed.patches)
+    assert (ends[0], ends[-1]) == pytest.approx((176.4, 215.6), abs=0.05)
+    assert speed.get_xlabel() == "final speed (deg/s)"
+    assert "no lever moves it" in [text.get_text() for text in still.texts]
+    bars = [bar.get_width() for bar in made["sobol"].axes[0].patches]
+    assert max(bars) == pytest.approx(1.0, abs=0.3)
+
+
+def test_the_inverse_map_and_its_gap(made: dict[str, Figure]) -> None:
+    words = [text.get_text() for ax in made["map"].axes for text in ax.texts]
+    assert {"148.6 deg/s, 10 V", "cannot be held", "close-up around standstill"} <= set(words)
+    assert labels(made["improvement"])[2:] == ["speed (deg/s)", "error (deg/s)"]
+
+
+def test_lines_of_a_sweep_are_the_response(made: dict[str, Figure], hoist: Drive) -> None:
+    figure = made["bode"]
+    assert labels(figure) == ["gain ((deg/s)/V)", "phase (deg)", "distortion (%)"]
+    swept = hoist.frequency_response(np.geomspace(0.05, 5.0, 12), [1.0, 9.0])
+    for row in range(2):
+        there = swept.moves[row]
+        expected = DEGREE * swept.gain[row]
+        np.testing.assert_allclose(lines(figure, 0)[row][there], expected[there])
+    assert legend(figure) == ["1 V", "9 V", "small motions about 4 V"]
+    by_current = hoist.linearize(current=0.5)
+    with pytest.raises(InputError, match="leads from voltage to shaft_speed"):
+        figures.plot_bode(swept, linear=by_current)
