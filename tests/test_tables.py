@@ -1,58 +1,150 @@
-"""Tables out, whole or not at all."""
+"""Tables: numbers for people in units of choice, and for files in SI."""
+
+from pathlib import Path
 
 import polars as pl
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from swashplate import FileError
-from swashplate.tables import FIGURE, check_place, ending, write_table, write_text
-from swashplate.tables import TABLE as TABLES
-
-TABLE = pl.DataFrame({"time": [0.0, 0.5], "voltage": [1.25, -2.0]})
-
-
-def test_csv(tmp_path):
-    write_table(TABLE, tmp_path / "run.csv")
-    assert (tmp_path / "run.csv").read_text("utf-8") == "time,voltage\n0.0,1.25\n0.5,-2.0\n"
-
-
-@pytest.mark.parametrize("name", ["run.parquet", "run.PQ"])
-def test_parquet(tmp_path, name):
-    write_table(TABLE, tmp_path / name)
-    assert pl.read_parquet(tmp_path / name).equals(TABLE)
-
-
-def test_another_ending_is_refused(tmp_path):
-    with pytest.raises(
-        FileError, match=r"ends in '\.xlsx'; a table is written as \.csv or \.parquet"
-    ):
-        write_table(TABLE, tmp_path / "run.xlsx")
-    assert list(tmp_path.iterdir()) == []
+from swashplate import InputError
+from swashplate.tables import (
+    UNIT,
+    Cell,
+    Column,
+    Table,
+    count,
+    joined,
+    listed,
+    percent,
+    plain,
+    quantity,
+    spread,
+)
+from swashplate.units import chosen_unit, display_unit, shown_in, unit_text, units_of_choice
 
 
-def test_what_cannot_be_written_leaves_nothing(tmp_path):
-    (tmp_path / "run.csv").mkdir()
-    with pytest.raises(FileError, match="run.csv cannot be written"):
-        write_table(TABLE, tmp_path / "run.csv")
-    with pytest.raises(FileError, match="cannot be written: folder .*none does not exist"):
-        write_text("text", tmp_path / "none" / "run.toml")
-    with pytest.raises(FileError, match="cannot be written"):
-        write_text("text", tmp_path / f"{'x' * 300}.toml")
-    assert [path.name for path in tmp_path.rglob("*")] == ["run.csv"]
+@pytest.fixture
+def table() -> Table:
+    made = Table(
+        "Runs",
+        (
+            Column("run"),
+            Column("speed", ".2f", "rad/s", none="never"),
+            Column("error", ".3g"),
+            UNIT,
+            Column("share", ".1%"),
+            Column("samples", ",d", "1", key="n", of="pf"),
+        ),
+    )
+    made.add("a", 1.0, 0.005, 0.25, 5000, unit="A")
+    made.add("b", float("nan"), Cell(2.0, "two"), None, 10, unit="A", look=True)
+    made.add("all", 2.0, 1.5, 1.0, 5010, unit="A", total=True)
+    return made
 
 
-def test_endings():
-    assert [ending(name, TABLES) for name in ("a.csv", "a.PARQUET", "a.pq")] == [
-        ".csv",
-        ".parquet",
-        ".pq",
+def test_people_get_their_units_and_words(table: Table) -> None:
+    assert table.heads() == ["run", "speed deg/s", "error", "unit", "share", "samples"]
+    assert [table.texts(row) for row in table.rows] == [
+        ["a", "57.30", "5", "mA", "25.0 %", "5,000"],
+        ["b", "never", "two", "A", "", "10"],
+        ["all", "114.59", "1.5", "A", "100.0 %", "5,010"],
     ]
-    assert ending("a.b.SVG", FIGURE) == ".svg"
-    with pytest.raises(FileError, match=r"a figure is written as \.png, \.svg or \.pdf"):
-        ending("a.csv", FIGURE)
+    with shown_in(["rpm"]):
+        assert table.heads()[1] == "speed rpm"
+        assert table.texts(table.rows[0])[1] == "9.55"
+    assert table.of("t").heads()[-1] == "share"
 
 
-def test_a_folder_that_may_not_be_written_to(tmp_path, monkeypatch):
-    check_place(tmp_path / "run.csv")
-    monkeypatch.setattr("os.access", lambda *_: False)  # whoever runs this may be allowed all
-    with pytest.raises(FileError, match="folder .* may not be written to"):
-        check_place(tmp_path / "run.csv")
+def test_files_get_all_digits_in_si(table: Table, tmp_path: Path) -> None:
+    table.write(tmp_path / "runs.csv")
+    read = pl.read_csv(tmp_path / "runs.csv")
+    assert read.columns == ["run", "speed", "error", "unit", "share", "n"]
+    assert read.rows() == [("a", 1.0, 0.005, "A", 0.25, 5000), ("b", None, 2.0, "A", None, 10)]
+    assert joined([table, table]).to_polars().height == 4
+
+
+def test_a_row_has_a_cell_for_each_column(table: Table) -> None:
+    with pytest.raises(AssertionError, match="2 cells for 5 columns"):
+        table.add("a", 1.0)
+
+
+def test_fixed_decimals_keep_the_large_unit() -> None:
+    made = Table("", (Column("what"), Column("", ".4f"), UNIT))
+    made.add("current", 0.0123, unit="A")
+    assert made.texts(made.rows[0]) == ["current", "0.0123", "A"]
+
+
+def test_parameters_are_in_si_unless_a_unit_is_chosen() -> None:
+    made = Table("", (Column("what"), Column("", ".4g"), UNIT), si=True)
+    made.add("opening", 1.2e-4, unit="m")
+    made.add("gain", 0.05, unit="A/V^2")
+    assert [made.texts(row)[1:] for row in made.rows] == [["0.00012", "m"], ["0.05", "A/V²"]]
+    with shown_in(["mm"]):
+        assert made.texts(made.rows[0])[1:] == ["0.12", "mm"]
+
+
+@pytest.mark.parametrize(
+    ("words", "drum", "si", "name", "factor"),
+    [
+        (["rpm"], None, "rad/s", "rpm", 9.5492966),
+        (["1/min"], None, "rad/s^2", "rpm/s", 9.5492966),
+        (["rpm"], None, "rad/s/V", "(rpm)/V", 9.5492966),
+        (["rpm"], None, "rad", "turns", 0.15915494),
+        (["m/min"], 0.4, "rad/s", "m/min", 12.0),
+        (["m/min"], 0.4, "rad", "m", 0.2),
+        (["bar", "mm"], None, "Pa", "bar", 1e-5),
+        (["rad/s"], None, "V/(rad/s)", "V/(rad/s)", 1.0),
+    ],
+)
+def test_units_of_choice(words, drum, si, name, factor) -> None:
+    with shown_in(words, drum):
+        shown = display_unit(si)
+    assert shown.name == name
+    assert shown.factor == pytest.approx(factor)
+    assert display_unit("rad/s").name == "deg/s"
+
+
+def test_units_that_no_table_shows() -> None:
+    with pytest.raises(InputError, match="needs the drum's diameter"):
+        units_of_choice(["m/min"])
+    with pytest.raises(InputError, match="No table shows a quantity in 'kelvin'"):
+        units_of_choice(["kelvin"])
+    assert chosen_unit("Pa") == ("Pa", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("unit", "largest", "name"),
+    [
+        ("A", 0.05, "mA"),
+        ("A", 0.5, "A"),
+        ("m", 2.0, "mm"),
+        ("m", 20.0, "m"),
+        ("Pa", 500.0, "kPa"),
+        ("Pa", 1e6, "bar"),
+        ("1", 3.0, ""),
+        ("kg m^2", 3.0, "kg m²"),
+    ],
+)
+def test_usual_units_go_by_the_size(unit: str, largest: float, name: str) -> None:
+    assert display_unit(unit, largest).name == name
+
+
+def test_numbers_show_what_is_known() -> None:
+    assert [plain(each) for each in (0.0, 123.456, float("inf"))] == ["0", "123.46", "none"]
+    assert plain(-4.5e-7, 2) == "-4.5e-07"
+    assert spread(0.1272955, 0.126961, 0.127630) == ("0.12730", "0.12696", "0.12763")
+    assert spread(2e6, 1.9e6, 2.1e6) == ("2.00e+06", "1.90e+06", "2.10e+06")
+    assert (percent(-0.0053, 1.0, sign=True), percent(1.0, 0.0)) == ("-0.53 %", "–")
+    assert (quantity(0.0076, "A"), quantity(1.0, "rad/s", spec=".1f")) == ("7.60 mA", "57.3 deg/s")
+    assert unit_text("sqrt(Pa)/(m s)") == "√Pa/(m s)"
+    assert listed(["a", "b", "c"]) == "a, b and c"
+    assert [count(n, "entry is", "entries are") for n in (1, 2)] == ["1 entry is", "2 entries are"]
+
+
+@given(st.floats(1e-9, 1e9), st.floats(1e-6, 1.0))
+def test_an_interval_is_shown_to_two_digits_of_its_half_width(value: float, share: float) -> None:
+    half = share * value
+    shown = spread(value, value - half, value + half)
+    for text, exact in zip(shown, (value, value - half, value + half), strict=True):
+        assert float(text) == pytest.approx(exact, abs=0.06 * half)

@@ -48,8 +48,8 @@ class Column:
     spec: str = ""
     """Of numbers, as of `format`: ``".2f"``, ``".3g"``, ``".1%"``. Empty: words."""
     unit: str = ""
-    """SI unit of its numbers, which people get converted and named behind the column's name; ``"1"``
-    for pure numbers in rows that have a unit of their own."""
+    """SI unit of its numbers, which people get converted and named behind the name; ``"1"`` for
+    pure numbers in rows that have a unit of their own."""
     none: str = ""
     """What stands for no number."""
     wrap: bool = False
@@ -126,7 +126,11 @@ class Table:
     def texts(self, row: Row) -> list[str]:
         """A row's cells as words for people."""
         own = [each for each in self.columns if each is not UNIT]
-        pairs = [(c, v) for c, v in zip(own, row.cells, strict=True) if not c.unit]
+        pairs = [
+            (column, value)
+            for column, value in zip(own, row.cells, strict=True)
+            if not column.unit and not column.spec.endswith("%")
+        ]
         # numbers of fixed decimals keep the large unit: 0.0450 A, but 45 mA
         fixed = any((row.spec or each.spec).endswith("f") for each, _ in pairs if each.spec)
         size = float("inf") if fixed else largest([value for _, value in pairs])

@@ -66,8 +66,3 @@ def test_a_changed_drive_and_another_frequency(done):
 )
 def test_refusals(refused, words, said):
     assert said in refused("bode", "hoist", *words)
-
-
-def test_the_example_in_its_help(run):
-    text = run("bode", "--help").stdout
-    assert "swashplate bode" in text.partition("Example")[2]

@@ -57,8 +57,3 @@ def test_files(done, tmp_path):
 )
 def test_refusals(refused, words, said):
     assert said in refused("compensate", *words)
-
-
-def test_the_examples_in_its_help(run):
-    text = run("compensate", "--help").stdout
-    assert "swashplate compensate hoist" in text.partition("Example")[2]

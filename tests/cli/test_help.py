@@ -1,15 +1,92 @@
-"""Help texts fit a terminal of 80 columns."""
+"""Help texts fit a terminal of 80 columns, and what they show as examples can be run."""
 
 import inspect
+import re
+import shlex
+import shutil
+from pathlib import Path
 
 import pytest
+import scipy.io
+from typer.testing import CliRunner
 
-from swashplate.cli import app, campaign
+from swashplate import Drive, maneuvers
+from swashplate.campaign import rig
+from swashplate.cli import EPILOG, app, campaign
+from swashplate.identification.setup import load_setup, setup_text
 
 COMMANDS = [*app.registered_commands, *campaign.app.registered_commands]
+QUICK = {"1000": "40", "1024": "16", "--starts 50": "--starts 1", "--folds 5": "--folds 2"}
+"""Draws, starts and folds, as many as a test has time for."""
+ELSEWHERE = ("demo", "tour", "valve", "campaign init")
+"""Run by tests of their own."""
+
+
+def examples() -> list[str]:
+    """Commands of all examples, without what is said beside them."""
+    texts = [EPILOG, *(str(each.epilog) for each in COMMANDS)]
+    found = re.findall(r"^  (swashplate .*?)(?:   .*|\s*>.*)?$", "\n".join(texts), re.MULTILINE)
+    return list(dict.fromkeys(found))
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda each: str(each.name))
 def test_no_line_is_broken_in_mid_sentence(command):
     """Lines are kept as they are written, and a line has 78 characters between its margins."""
     assert max(map(len, inspect.getdoc(command.callback).splitlines())) <= 78
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda each: str(each.name))
+def test_each_command_has_an_example(command):
+    assert re.search(rf"swashplate (campaign )?{command.name}\b", command.epilog)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with all that the examples name: campaigns, a fit, logs, drives."""
+    folder = tmp_path_factory.mktemp("examples")
+    tests = (maneuvers.step(4.0, stop=3.0, length=4.0), maneuvers.step(-5.0, stop=3.0, length=4.0))
+    for name in ("virtual", "harbour", "logs"):
+        path = rig.write(rig.run("hoist", [*tests, maneuvers.step(9.0)], seed=1), folder / name)
+        if name != "logs":
+            text = path.read_text("utf-8")
+            before, _, after = text.rpartition('role = "fit"')
+            path.write_text(f'{before}role = "validate"{after}', "utf-8")
+    few = load_setup("hoist").model_copy(deep=True)
+    for stage in few.stages:
+        kept = ("G1", "J", "Z10", "Z8")
+        stage.free = {key: free for key, free in stage.free.items() if key in kept}
+        stage.forces = None
+    for name in ("mine.toml", "fewer.toml"):
+        (folder / "harbour" / name).write_text(setup_text(few), "utf-8")
+    hoist = Drive.preset("hoist")
+    for name in ("mine.toml", "worn.toml"):
+        hoist.scale(Z10=0.9).to_toml(folder / name)
+    run = hoist.simulate(maneuvers.step(4.0, length=8.0).sample())
+    run.write(folder / "log.csv")
+    scipy.io.savemat(folder / "trial1.mat", {"time": run.time, "voltage": run.voltage})
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("example", [e for e in examples() if not any(w in e for w in ELSEWHERE)])
+def test_the_examples_can_be_run(
+    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, example: str
+) -> None:
+    folder = tmp_path / "examples"
+    shutil.copytree(place, folder)
+    monkeypatch.chdir(folder)
+    setups = "harbour" in example and ("--setup" in example or "--write" in example)
+    for name in ("mine.toml", "fewer.toml") if setups else ():
+        shutil.copy(folder / "harbour" / name, folder / name)
+    if re.search(r"\bfitted\b", example) and " fit " not in example:
+        words = ["fit", "virtual/campaign.toml", "--setup", "harbour/fewer.toml", "--no-report"]
+        CliRunner().invoke(app, words)
+    if example.startswith("swashplate fit logs"):
+        assert CliRunner().invoke(app, ["guess", "logs/campaign.toml"]).exit_code == 0
+    for usual, quick in QUICK.items():
+        example = example.replace(usual, quick)
+    words = shlex.split(example.replace("logs/*.csv", "logs/hoist_step_4_V.csv"))[1:]
+    result = CliRunner().invoke(app, words, prog_name="swashplate")
+    # a fit to a few short runs need not be usable: that is exit code 1
+    assert result.exit_code in (0, 1), result.output
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+
 from swashplate.cli.words import drive_file
 
 NUMBER = re.compile(r"(?<!\S)[-+]?\d[\d.e+-]*(?!\S)")

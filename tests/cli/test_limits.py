@@ -114,8 +114,3 @@ def test_the_units_of_the_errors(done):
 )
 def test_refusals(refused, words, said):
     assert said in refused("limits", *words)
-
-
-def test_the_examples_in_its_help(run):
-    text = run("limits", "--help").stdout
-    assert "swashplate limits hoist" in text.partition("Example")[2]

@@ -90,8 +90,3 @@ def test_files(done, tmp_path):
 )
 def test_refusals(refused, words, said):
     assert said in refused("linearize", *words)
-
-
-def test_the_example_in_its_help(run):
-    text = run("linearize", "--help").stdout
-    assert "swashplate linearize" in text.partition("Example")[2]

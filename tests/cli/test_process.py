@@ -38,12 +38,6 @@ def test_help_is_a_page_with_examples(tmp_path, word):
     assert "\x1b" not in done.stdout
 
 
-@pytest.mark.parametrize("command", ["simulate", "compare", "axes", "show", "tour"])
-def test_each_command_has_an_example(run, command):
-    text = run(command, "--help").stdout
-    assert f"swashplate {command}" in text.partition("Example")[2]
-
-
 def test_version(tmp_path):
     assert swashplate("--version", cwd=tmp_path).stdout == f"swashplate {__version__}\n"
 

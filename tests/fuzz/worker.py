@@ -125,7 +125,7 @@ def check(path: Path, error: SwashplateError, limited: bool) -> None:
 def main(kind: str, number: int, seconds: float, folder: Path) -> None:
     """Damage and read files of a kind for so many seconds."""
     # the others are read in a process that has a limit of its own
-    limited = kind in ("text", "matlab4", "matlab5", "tdms")
+    limited = kind == "text"
     sources = list(valid(kind, folder / "valid"))
     for path in sources:
         assert open_log(path).columns, path  # warms up, too: what is imported needs memory as well

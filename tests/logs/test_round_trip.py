@@ -230,7 +230,7 @@ def test_matlab_73(tmp_path):
     file.write_bytes(content)
     log = open_log(file)
     assert log.format == "MATLAB 7.3"
-    assert log.left_out == {"n": "it is a MATLAB char", "e": "it is empty"}
+    assert log.left_out == {"n": "it is a MATLAB text", "e": "it is empty"}
     expected = {
         "t": TIME,
         "s.u": TIME,

@@ -79,11 +79,11 @@ def test_files_that_matlab_wrote():
     for path in sorted(MATLAB.glob("test*.mat")):
         try:
             log = open_log(path)
+            names = [column.name for column in log.columns]
+            read = log.read(names)
         except FileError as error:
             refused.append(str(error))
             continue
-        names = [column.name for column in log.columns]
-        read = log.read(names)
         if log.format == "MATLAB 7.3":
             continue
         expected = scipy.io.loadmat(path)
@@ -98,4 +98,5 @@ def test_files_that_matlab_wrote():
             np.testing.assert_array_equal(read[name], np.ravel(array))
             compared += 1
     assert compared > 30
-    assert all("has no vectors of numbers" in sentence for sentence in refused)
+    said = ("has no vectors of numbers", "it holds complex numbers")
+    assert all(any(words in sentence for words in said) for sentence in refused)

@@ -1,4 +1,7 @@
-"""Damaged and hostile files: whatever a library meets in one becomes one sentence."""
+"""Damaged and hostile files: whatever a library meets in one becomes one sentence.
+
+A file is known by its first bytes, whatever it is called.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import re
 import struct
 import warnings
 import zlib
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from types import TracebackType
 
@@ -117,21 +121,18 @@ def check_file(path: Path) -> int:
     return size
 
 
-def check_claim(path: Path, what: str, claimed: int, stored: int) -> None:
-    """Refuse what claims to hold more than its stored bytes can be unpacked to.
+def left_out_notes(left_out: Mapping[str, str]) -> tuple[str, ...]:
+    """What is left out of a file and why, one sentence each."""
+    return tuple(f"'{each}' is left out: {reason}." for each, reason in left_out.items())
 
-    Parameters
-    ----------
-    what : str
-        What makes the claim, for the sentence.
-    claimed, stored : int
-        Bytes that it would take in memory, and that the file has for it.
-    """
-    if claimed > INFLATION * stored + 4096:
-        raise FileError(
-            f"{path}: {what} claims {claimed} bytes, more than the {stored} bytes stored for it "
-            "can hold; the file is damaged."
-        )
+
+def check_any(
+    path: Path, columns: Collection[object], what: str, left_out: Mapping[str, str]
+) -> None:
+    """Refuse a file without columns of numbers, and say what it has instead."""
+    if not columns:
+        why = "".join(f"; '{each}': {reason}" for each, reason in left_out.items())[:300]
+        raise FileError(f"{path} has no {what} of numbers{why}.")
 
 
 def missing_extra(path: Path, library: str, extra: str) -> FileError:
@@ -140,3 +141,52 @@ def missing_extra(path: Path, library: str, extra: str) -> FileError:
         f"{path} needs the library {library}, which is not installed: "
         f"pip install 'swashplate[{extra}]'."
     )
+
+
+# --- kinds by their first bytes -------------------------------------------------------------------
+
+HDF5 = b"\x89HDF\r\n\x1a\n"
+PARQUET = b"PAR1"
+TDMS = b"TDSm"
+MDF = b"MDF     "
+UNFINISHED_MDF = b"UnFinMF "
+MATLAB = b"MATLAB 5.0 MAT-file"
+MATLAB_73 = b"MATLAB 7.3 MAT-file"
+
+_KINDS = {
+    HDF5: "HDF5",
+    PARQUET: "Parquet",
+    TDMS: "TDMS",
+    MDF: "MDF",
+    UNFINISHED_MDF: "MDF",
+    MATLAB: "MATLAB",
+    MATLAB_73: "MATLAB",
+    b"PK\x03\x04": "Excel or zip",
+    b"\xd0\xcf\x11\xe0": "Excel",
+    b"\x1f\x8b": "gzip",
+    b"\x28\xb5\x2f\xfd": "zstd",
+    b"\xfd7zXZ": "xz",
+    b"\x80\x02": "Python pickle",
+    b"\x80\x03": "Python pickle",
+    b"\x80\x04": "Python pickle",
+    b"\x80\x05": "Python pickle",
+    b"\x93NUMPY": "NumPy",
+    b"%PDF-": "PDF",
+}
+
+
+def check_kind(path: Path, *expected: str) -> None:
+    """Refuse a file whose first bytes are those of another kind, and say of which.
+
+    Parameters
+    ----------
+    expected : str
+        Kinds that are right, by name; a file of no known kind passes.
+    """
+    with path.open("rb") as file:
+        first = file.read(32)
+    for magic, kind in _KINDS.items():
+        if first.startswith(magic) and kind not in expected:
+            raise FileError(
+                f"{path} ends in '{path.suffix}' but holds {kind}; rename or convert it."
+            )

@@ -10,12 +10,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swashplate.errors import FileError
-from swashplate.logs.damage import Reading, check_claim, said
-from swashplate.logs.log import Array, Column, Log
-from swashplate.logs.lookup import split_unit
-from swashplate.logs.magic import HDF5, check_kind
-from swashplate.logs.signals import signals
-from swashplate.logs.text.options import TextOptions
+from swashplate.logs.damage import (
+    HDF5,
+    Reading,
+    check_any,
+    check_kind,
+    left_out_notes,
+    said,
+)
+from swashplate.logs.log import Array, Column, Log, signals, split_unit
+from swashplate.logs.text import TextOptions
 
 name = "HDF5"
 suffixes = (".h5", ".hdf5", ".hdf", ".he5")
@@ -102,10 +106,8 @@ def log_of(path: Path, form: str, found: Found) -> Log:
     FileError
         If nothing was found.
     """
-    if not found.columns:
-        why = "".join(f"; '{each}': {reason}" for each, reason in found.left_out.items())[:300]
-        raise FileError(f"{path} has no columns of numbers{why}.")
-    notes = tuple(f"'{each}' is left out: {reason}." for each, reason in found.left_out.items())
+    check_any(path, found.columns, "columns", found.left_out)
+    notes = left_out_notes(found.left_out)
 
     def load(positions: Sequence[int]) -> list[Array]:
         import h5py
@@ -205,11 +207,7 @@ def _check_stored(path: Path, dataset: Any) -> None:
     what = f"'{dataset.name}'"
     if stored == 0:
         raise FileError(f"{path}: {what} claims {prod(dataset.shape)} numbers, but none is stored.")
-    check_claim(path, what, prod(dataset.shape) * dataset.dtype.itemsize, stored)
-    check_claim(path, what, stored, path.stat().st_size)
     if dataset.chunks is not None:
-        block = prod(dataset.chunks) * dataset.dtype.itemsize
-        check_claim(path, f"a block of {what}", block, stored)
         expected = prod(
             ceil(length / chunk)
             for length, chunk in zip(dataset.shape, dataset.chunks, strict=True)

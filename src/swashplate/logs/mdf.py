@@ -10,11 +10,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swashplate.errors import FileError
-from swashplate.logs.damage import Reading, check_claim, missing_extra
-from swashplate.logs.log import Array, Column, Log
-from swashplate.logs.lookup import split_unit
-from swashplate.logs.magic import MDF, UNFINISHED_MDF, check_kind
-from swashplate.logs.text.options import TextOptions
+from swashplate.logs.damage import (
+    MDF,
+    UNFINISHED_MDF,
+    Reading,
+    check_any,
+    check_kind,
+    left_out_notes,
+    missing_extra,
+)
+from swashplate.logs.log import Array, Column, Log, split_unit
+from swashplate.logs.text import TextOptions
 
 name = "MDF"
 suffixes = (".mf4", ".mdf")
@@ -54,8 +60,6 @@ def open(path: Path, options: TextOptions) -> Log:
         for number, (prefix, group) in enumerate(zip(_prefixes(file), file.groups, strict=True)):
             block = group.channel_group
             rows = block.cycles_nr
-            width = block.samples_byte_nr + block.invalidation_bytes_nr
-            check_claim(path, f"group {number}", rows * width, path.stat().st_size)
             for place, channel in enumerate(group.channels):
                 called = prefix + channel.name
                 reason = _why_not(channel, rows)
@@ -66,10 +70,8 @@ def open(path: Path, options: TextOptions) -> Log:
                 columns.append(Column(called, unit or split_unit(channel.name)[1]))
                 sources.append(_Source(number, place, rows))
         comments = (f"start: {file.header.start_time.isoformat()}",)
-    if not columns:
-        why = "".join(f"; '{each}': {reason}" for each, reason in left_out.items())[:300]
-        raise FileError(f"{path} has no channels of numbers{why}.")
-    notes = tuple(f"'{each}' is left out: {reason}." for each, reason in left_out.items())
+    check_any(path, columns, "channels", left_out)
+    notes = left_out_notes(left_out)
 
     def load(positions: Sequence[int]) -> list[Array]:
         with _reading(path), _opened(path) as file:

@@ -1,15 +1,17 @@
-"""A log from its file: which reader takes it."""
+"""A log from its file: which reader takes it; and one signal of it in SI."""
 
 from __future__ import annotations
 
 from importlib import import_module, metadata
 from pathlib import Path
+from typing import NamedTuple
 
 from swashplate.errors import FileError
 from swashplate.logs.apart import open_apart
 from swashplate.logs.damage import check_file
-from swashplate.logs.log import Log, Reader
-from swashplate.logs.text.options import TextOptions
+from swashplate.logs.log import Array, Log, Reader, check_finite, check_stamps, unit_of
+from swashplate.logs.text import TextOptions
+from swashplate.units import speed_unit, to_si
 
 _READERS = {
     "text": (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".log"),
@@ -21,7 +23,7 @@ _READERS = {
 }
 """Module of each format and the endings of its files: they are imported when one is opened."""
 
-_APART = ("parquet", "hdf5", "mdf")
+_APART = ("parquet", "matlab", "hdf5", "tdms", "mdf")
 """Modules whose libraries cannot be trusted with a damaged file: see `apart`."""
 
 SUFFIXES = tuple(suffix for suffixes in _READERS.values() for suffix in suffixes)
@@ -95,3 +97,67 @@ def _others() -> list[Reader]:
             )
         readers.append(reader)
     return readers
+
+
+class Series(NamedTuple):
+    """A time series read from a file, SI."""
+
+    time: Array
+    values: Array
+
+
+def read_series(
+    path: str | Path,
+    column: str,
+    unit: str,
+    *,
+    time_column: str = "time",
+    options: TextOptions | None = None,
+) -> Series:
+    """Read time stamps and one column of a log, in SI.
+
+    Parameters
+    ----------
+    path : path
+        A log as `open_log` reads it. A column may carry its unit: ``time [ms]``, ``voltage_mV``,
+        in a row of units or in an attribute.
+    column, unit : str
+        Column wanted, with or without its unit, and the SI unit wanted.
+    time_column : str
+        Column of the time stamps.
+    options : TextOptions, optional
+        As in `open_log`.
+
+    Returns
+    -------
+    Series
+        Time [s], increasing, and values, all finite, each of shape (n,).
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read, a cell is no number, a number is missing or not finite, or time
+        stamps do not increase; the sentence names file, column and row.
+    InputError
+        If a column is missing or its unit wrong; the sentence lists what there is.
+    """
+    log = open_log(path, options=options)
+    read = log.read([time_column, column])
+    time, values = read[time_column], read[column]
+    if time.size != values.size:
+        raise FileError(
+            f"{log.path}: '{time_column}' has {time.size} rows and '{column}' has {values.size}; "
+            "they must have as many."
+        )
+    check_stamps(log, time_column, time)
+    check_finite(log, column, values)
+    return Series(_si(log, time_column, "s", time), _si(log, column, unit, values))
+
+
+def _si(log: Log, wanted: str, si: str, values: Array) -> Array:
+    found = log.find(wanted)
+    unit = unit_of(found, wanted, si)
+    unit = speed_unit(unit) if si == "rad/s" else unit
+    what = f"{log.path}: column '{found.name}'"
+    zero, one = (to_si(value, unit, si, what) for value in (0.0, 1.0))
+    return values * one if zero == 0.0 else values * (one - zero) + zero

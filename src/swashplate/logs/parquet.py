@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from swashplate.errors import FileError
-from swashplate.logs.damage import Reading
-from swashplate.logs.log import Array, Column, Log
-from swashplate.logs.lookup import split_unit
-from swashplate.logs.magic import PARQUET, check_kind
-from swashplate.logs.text.numbers import NoNumber, numbers_of, shown
-from swashplate.logs.text.options import TextOptions
+from swashplate.logs.damage import PARQUET, Reading, check_kind, left_out_notes
+from swashplate.logs.log import Array, Column, Log, split_unit
+from swashplate.logs.text import TextOptions
+from swashplate.logs.text.cells import NoNumber, numbers_of, shown
 
 if TYPE_CHECKING:
     import polars
@@ -53,7 +51,7 @@ def open(path: Path, options: TextOptions) -> Log:
         raise FileError(f"{path} has no columns of numbers.")
     dated = [each for each, kind in schema.items() if kind in (pl.Date, pl.Datetime)]
     notes = [f"'{each}' holds dates, read as seconds since the first." for each in dated]
-    notes += [f"'{each}' is left out: {reason}." for each, reason in left_out.items()]
+    notes += left_out_notes(left_out)
     comments = tuple(
         f"{key}: {value}"
         for key, value in metadata.items()

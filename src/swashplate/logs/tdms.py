@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import logging
 import struct
 from collections.abc import Iterator, Sequence
@@ -13,11 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swashplate.errors import FileError
-from swashplate.logs.damage import Reading, missing_extra
-from swashplate.logs.log import Array, Column, Log
-from swashplate.logs.lookup import split_unit
-from swashplate.logs.magic import TDMS, check_kind
-from swashplate.logs.text.options import TextOptions
+from swashplate.logs.damage import (
+    TDMS,
+    Reading,
+    check_any,
+    check_kind,
+    left_out_notes,
+    missing_extra,
+)
+from swashplate.logs.log import Array, Column, Log, split_unit
+from swashplate.logs.text import TextOptions
 
 name = "TDMS"
 suffixes = (".tdms",)
@@ -77,16 +81,14 @@ def open(path: Path, options: TextOptions) -> Log:
         comments = tuple(
             f"{key}: {value}" for key, value in file.properties.items() if len(str(value)) <= _KEPT
         )
-    if not columns:
-        why = "".join(f"; '{each}': {reason}" for each, reason in left_out.items())[:300]
-        raise FileError(f"{path} has no channels of numbers{why}.")
+    check_any(path, columns, "channels", left_out)
     sources = [source for _, source in columns.values()]
     notes = [
         f"'{column.name}' is computed from the increment of a waveform."
         for column, source in columns.values()
         if source.clock
     ]
-    notes += [f"'{each}' is left out: {reason}." for each, reason in left_out.items()]
+    notes += left_out_notes(left_out)
 
     def load(positions: Sequence[int]) -> list[Array]:
         with Reading(path, "TDMS"), _opened(path) as file:
@@ -108,7 +110,7 @@ def _opened(path: Path) -> Iterator[Any]:
     logger, refusal = logging.getLogger("nptdms"), _Refusal()
     logger.addHandler(refusal)
     try:
-        with _Bounded(io.FileIO(path)) as file, nptdms.TdmsFile.open(file) as opened:
+        with path.open("rb") as file, nptdms.TdmsFile.open(file) as opened:
             yield opened
     finally:
         logger.removeHandler(refusal)
@@ -119,20 +121,6 @@ class _Refusal(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         raise ValueError(record.getMessage())
-
-
-class _Bounded(io.BufferedReader):
-    """A file that does not make room for more bytes than it has, however many are claimed."""
-
-    def read(self, size: int | None = -1, /) -> bytes:
-        """So many bytes; fewer only at the end, where a segment might begin."""
-        if size is not None and size > _LEAD_IN:
-            place = self.tell()
-            left = self.seek(0, 2) - place
-            self.seek(place)
-            if size > left:
-                raise ValueError(f"a text claims {size} bytes where {left} are left")
-        return super().read(size)
 
 
 def _check_segments(path: Path) -> int:

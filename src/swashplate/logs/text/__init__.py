@@ -9,8 +9,8 @@ from swashplate.errors import FileError
 from swashplate.logs.log import Log
 from swashplate.logs.text.encoding import text_source
 from swashplate.logs.text.header import MARKER, Line, comment_marks, read_heading
+from swashplate.logs.text.layout import TextOptions as TextOptions
 from swashplate.logs.text.layout import find_layout
-from swashplate.logs.text.options import TextOptions
 from swashplate.logs.text.rows import RowReader
 
 name = "CSV"

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 
 from swashplate.errors import FileError
-from swashplate.logs.magic import check_kind
+from swashplate.logs.damage import check_kind
 
 PIECE = 1 << 22
 """Bytes that are read at a time: large enough for every core, small beside a column."""

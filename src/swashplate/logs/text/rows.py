@@ -13,11 +13,17 @@ from numpy.typing import NDArray
 
 from swashplate.errors import FileError
 from swashplate.logs.damage import printable
-from swashplate.logs.text.dates import DAY, microseconds_of
+from swashplate.logs.text.cells import (
+    DAY,
+    NoNumber,
+    is_number,
+    microseconds_of,
+    numbers_of,
+    shown,
+)
 from swashplate.logs.text.encoding import TextSource
 from swashplate.logs.text.header import Heading
 from swashplate.logs.text.layout import Layout
-from swashplate.logs.text.numbers import NoNumber, is_number, numbers_of, shown
 
 if TYPE_CHECKING:
     import polars
