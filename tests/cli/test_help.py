@@ -51,11 +51,15 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
             text = path.read_text("utf-8")
             before, _, after = text.rpartition('role = "fit"')
             path.write_text(f'{before}role = "validate"{after}', "utf-8")
-    few = load_setup("hoist").model_copy(deep=True)
-    for stage in few.stages:
-        kept = ("G1", "J", "Z10", "Z8")
-        stage.free = {key: free for key, free in stage.free.items() if key in kept}
-        stage.forces = None
+    usual = load_setup("hoist")
+    kept = ("G1", "J", "Z10", "Z8")
+    stages = [
+        stage.model_copy(
+            update={"free": {k: v for k, v in stage.free.items() if k in kept}, "forces": None}
+        )
+        for stage in usual.stages
+    ]
+    few = usual.model_copy(update={"stages": stages})
     for name in ("mine.toml", "fewer.toml"):
         (folder / "harbour" / name).write_text(setup_text(few), "utf-8")
     hoist = Drive.preset("hoist")

@@ -238,7 +238,7 @@ def test_initial_state_and_ignored_windows_stand_beside_every_fit_percent(
     read: Page, page: Path
 ) -> None:
     rows = read.rows("agreement")
-    assert all(row["initial state"] == "rest" for row in rows)
+    assert all(row["start"] == "rest" for row in rows)
     assert any("the dither starts" in row["ignored"] for row in rows)
     beside = re.findall(r'<p class="measures">.*?</p>', page.read_text("utf-8"), re.DOTALL)
     assert len(beside) == len(rows)

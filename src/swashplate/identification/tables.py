@@ -330,7 +330,7 @@ def runs_tables(
                 Column("manoeuvre", of="pf"),
                 Column("role", of="pf"),
                 Column("channel", of="pf"),
-                Column("initial state", key="initial_state"),
+                Column("start", key="initial_state"),
                 Column("ignored"),
                 Column("samples", ",d", "1", of="pf"),
                 Column("RMSE", ".3g", key="rmse"),
