@@ -67,7 +67,7 @@ RIG_EXAMPLES = """\
 Examples:
   swashplate rig hoist --out virtual-hoist
   swashplate rig slew --out worn --seed 7 --severity harsh --backlash-deg 0.1
-  swashplate rig hoist --out loaded --set load_torque=30kNm --set motor_leakage=1e-6
+  swashplate rig hoist --out loaded --set load_torque=30kN*m --set motor_leakage=1e-6
   swashplate rig hoist --out short --maneuver step:4 --maneuver sine:6,0.2 --perturb 0.1
   swashplate campaign check virtual-hoist/campaign.toml
 """
