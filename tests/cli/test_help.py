@@ -25,6 +25,7 @@ INSTEAD = {
     "--out virtual": "--out new",
     "virtual-hoist/": "virtual/",
     "--run hoistr6": "--run hoist_step_4_V",
+    "--from 5.8 --to 6.6": "--from 2.8 --to 3.6",
     "logs/*.csv": "logs/hoist_step_4_V.csv",
 }
 """Draws, starts and folds, as many as a test has time for, and names that there are."""
