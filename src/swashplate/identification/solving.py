@@ -23,6 +23,20 @@ LEG = 30
 as a step that just reaches the swash plate's stop, it shrinks to nothing."""
 GAINED = 1e-6
 """Relative gain of a leg from which another one is worth it."""
+WAKINGS = 3
+"""How often a search is taken back from where it lost an unknown."""
+NO_EFFECT = 1e-12
+"""Share of its nominal effect that rounding may leave of none."""
+AWAKE = 0.05
+"""Share of its nominal effect at which an unknown counts as awake again."""
+VALUES = 25
+"""Within its bounds that are tried for one."""
+SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03, 0.015)
+"""Of the Gauss-Newton step past an edge."""
+SINGULAR = 1e-10
+"""Singular values below this share of the largest make no step."""
+NOTHING = 1e-20
+"""Share of the cost at the start that is left of it by rounding alone."""
 UNCHANGED = 2
 _ENDINGS = {
     0: "stopped at the largest number of evaluations; give it more",
@@ -202,13 +216,16 @@ def solve(
         how = memory.evaluations, ending > 0, ending < 0, message, perf_counter() - begun
         return Solution(np.asarray(vector, dtype=np.float64), float(cost), start_cost, *how)
 
-    before, spent = np.inf, 0
+    best = begin = vector
+    lowest, spent, unwoken, wakings = np.inf, 0, np.inf, 0
+    # what was woken is held for a leg, in which the others learn to live with it
+    held = np.zeros(vector.size, dtype=bool)
     try:
         while True:
             found = least_squares(
                 lambda vector: memory(vector).residuals,
-                vector,
-                jac=lambda vector: memory(vector).jacobian,
+                begin,
+                jac=lambda vector, held=held: np.where(held, 0.0, memory(vector).jacobian),
                 bounds=objective.bounds,
                 x_scale="jac",
                 loss=loss,
@@ -218,18 +235,90 @@ def solve(
                 max_nfev=min(LEG, max_evaluations - spent),
                 callback=told,
             )
-            first, gained = spent == 0, before - found.cost > GAINED * found.cost
+            gained = lowest - found.cost > GAINED * found.cost
             # steps that round to nothing are counted by SciPy alone
             spent += int(found.nfev)
-            vector, before, ending = found.x, float(found.cost), int(found.status)
-            if not first and not gained:
-                ending = ending or UNCHANGED
+            ending = int(found.status)
+            if found.cost < lowest:
+                best, lowest, message = found.x, float(found.cost), str(found.message)
+            spent = max(spent, memory.evaluations)
+            if spent >= max_evaluations:
                 break
-            if (first and ending > 0) or spent >= max_evaluations:
+            if held.any() or (ending == 0 and gained):
+                begin, held = found.x, np.zeros_like(held)
+                continue
+            ending, point = ending or UNCHANGED, None
+            if wakings < WAKINGS and lowest < unwoken * (1.0 - GAINED):
+                point, held = _woken(memory, best)
+                unwoken, wakings = lowest, wakings + 1
+            if point is None and loss == "linear":
+                point = _past_edge(memory, best, start_cost)
+            spent = max(spent, memory.evaluations)
+            if point is None or spent >= max_evaluations:
                 break
+            begin = point
     except KeyboardInterrupt:
         if memory.best is None:
             raise
-        cost, vector = memory.best
-        return ended(vector, cost, "interrupted: the best so far", -1)
-    return ended(found.x, found.cost, _ENDINGS.get(ending, str(found.message)), ending)
+        cost, best = memory.best
+        return ended(best, cost, "interrupted: the best so far", -1)
+    return ended(best, lowest, _ENDINGS.get(ending, message), ending)
+
+
+def _woken(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.bool_]]:
+    """A point where unknowns that had lost their effect have one, and (K,) which those are.
+
+    A stop that the swash plate no longer reaches has no derivative, and no descent finds back to
+    it. Such an unknown goes to the nearest value within its bounds that has an effect.
+    """
+    low, high = memory.objective.bounds
+
+    def effects(vector: Array) -> Array:
+        memory.evaluations += 1
+        try:
+            jacobian = memory.objective.evaluate(vector).jacobian
+        except DomainError:
+            return np.zeros(vector.size)
+        return np.asarray(np.linalg.norm(jacobian, axis=0))
+
+    present = np.linalg.norm(memory(vector).jacobian, axis=0)
+    asleep, point = np.zeros(present.size, dtype=bool), vector.copy()
+    if present.min(initial=np.inf) > NO_EFFECT * present.max(initial=0.0):
+        return None, asleep
+    nominal = effects(memory.objective.start)
+    for k in np.flatnonzero(present < NO_EFFECT * nominal):
+        values = np.linspace(low[k], high[k], VALUES)
+        for value in values[np.argsort(np.abs(values - vector[k]))]:
+            trial = point.copy()
+            trial[k] = value
+            if effects(trial)[k] > AWAKE * nominal[k]:
+                point, asleep[k] = trial, True
+                break
+    return (point if asleep.any() else None), asleep
+
+
+def _past_edge(memory: _Memory, vector: Array, start_cost: float) -> Array | None:
+    """The lowest of some shares of the Gauss-Newton step; None if none gains.
+
+    Where a step just reaches the swash plate's stop, the derivatives of both sides differ: a region
+    that looks no further than this edge of the cost shrinks to nothing, a longer step passes it.
+    """
+    residuals, jacobian = memory(vector)
+    lowest = 0.5 * float(residuals @ residuals)
+    if lowest <= NOTHING * start_cost:
+        return None
+    step = np.linalg.lstsq(jacobian, -residuals, rcond=SINGULAR)[0]
+    left = residuals + jacobian @ step
+    if 0.5 * float(residuals @ residuals - left @ left) <= GAINED * lowest:
+        return None  # an optimum as it should be
+    point, enough = None, lowest * (1.0 - GAINED)
+    for share in SHARES:
+        trial = np.clip(vector + share * step, *memory.objective.bounds)
+        memory.evaluations += 1
+        try:
+            cost = memory.objective.cost(trial)
+        except DomainError:
+            continue
+        if cost < enough:
+            point, enough = trial, cost
+    return point
