@@ -244,13 +244,15 @@ def solve(
             spent = max(spent, memory.evaluations)
             if spent >= max_evaluations:
                 break
-            if held.any() or (ending == 0 and gained):
-                begin, held = found.x, np.zeros_like(held)
-                continue
-            ending, point = ending or UNCHANGED, None
-            if wakings < WAKINGS and lowest < unwoken * (1.0 - GAINED):
+            point, released = None, held.any()
+            held = np.zeros_like(held)
+            if not released and wakings < WAKINGS and lowest < unwoken * (1.0 - GAINED):
                 point, held = _woken(memory, best)
-                unwoken, wakings = lowest, wakings + 1
+                unwoken, wakings = lowest, wakings + held.any()
+            if point is None and (released or (ending == 0 and gained)):
+                begin = found.x
+                continue
+            ending = ending or UNCHANGED
             if point is None and loss == "linear":
                 point = _past_edge(memory, best, start_cost)
             spent = max(spent, memory.evaluations)
@@ -288,7 +290,9 @@ def _woken(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.boo
     nominal = effects(memory.objective.start)
     for k in np.flatnonzero(present < NO_EFFECT * nominal):
         values = np.linspace(low[k], high[k], VALUES)
-        for value in values[np.argsort(np.abs(values - vector[k]))]:
+        away = np.abs(values - vector[k])
+        far = (values - vector[k]) * (memory.objective.start[k] - vector[k]) < 0.0
+        for value in values[np.lexsort((away, far))]:
             trial = point.copy()
             trial[k] = value
             if effects(trial)[k] > AWAKE * nominal[k]:
