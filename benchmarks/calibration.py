@@ -5,9 +5,9 @@
 
 Each campaign draws a drive about the published one, logs the source's tests of it through imperfect
 instruments, is written to files, read, fitted from the published values, and judged, all by the
-same calls as `swashplate rig` and `swashplate fit` make. The axis "own" is a valve and a rod, fitted
-as a model of one's own. `--cells` are campaigns in each of the eight noises and of the wrong
-models, where nothing is promised; "own" has the realistic noise alone. With `--methods` the candidates for
+same calls as `swashplate rig` and `swashplate fit` make. The axis "own" is a valve and a rod,
+fitted as a model of one's own, under realistic noise alone. `--cells` are campaigns in each of the
+eight noises and of the wrong models, where nothing is promised. With `--methods` the candidates for
 the noise model are compared on the same fits.
 
 The rule, written down before the comparison: of the methods whose pooled coverage over the noises
@@ -123,10 +123,11 @@ VALVE = {"dead_zone": 0.6, "gain": 0.02, "lag": 0.15}
 
 
 def own_campaign(seed):
-    """Rows of a campaign of a valve and a rod, in Python's own arithmetic, as a page of the docs."""
+    """Rows of a campaign of a valve and a rod, in plain Python, as in the docs."""
+    from valve import model
+
     from swashplate import Campaign
     from swashplate.identification import assess, fit, predict, verdict
-    from valve import model
 
     random, h = np.random.default_rng([seed, 0x0BEEF]), 0.02
     truth = {name: v * np.exp(0.1 * random.standard_normal()) for name, v in VALVE.items()}

@@ -31,12 +31,6 @@ AWAKE = 0.05
 """Share of its nominal effect at which an unknown counts as awake again."""
 VALUES = 25
 """Within its bounds that are tried for one."""
-SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03, 0.015)
-"""Of the Gauss-Newton step past an edge."""
-SINGULAR = 1e-10
-"""Singular values below this share of the largest make no step."""
-NOTHING = 1e-20
-"""Share of the cost at the start that is left of it by rounding alone."""
 UNCHANGED = 2
 _ENDINGS = {
     0: "stopped at the largest number of evaluations; give it more",
@@ -248,13 +242,11 @@ def solve(
             held = np.zeros_like(held)
             if not released and wakings < WAKINGS and lowest < unwoken * (1.0 - GAINED):
                 point, held = _woken(memory, best)
-                unwoken, wakings = lowest, wakings + held.any()
+                unwoken, wakings = lowest, wakings + int(held.any())
             if point is None and (released or (ending == 0 and gained)):
                 begin = found.x
                 continue
             ending = ending or UNCHANGED
-            if point is None and loss == "linear":
-                point = _past_edge(memory, best, start_cost)
             spent = max(spent, memory.evaluations)
             if point is None or spent >= max_evaluations:
                 break
@@ -299,30 +291,3 @@ def _woken(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.boo
                 point, asleep[k] = trial, True
                 break
     return (point if asleep.any() else None), asleep
-
-
-def _past_edge(memory: _Memory, vector: Array, start_cost: float) -> Array | None:
-    """The lowest of some shares of the Gauss-Newton step; None if none gains.
-
-    Where a step just reaches the swash plate's stop, the derivatives of both sides differ: a region
-    that looks no further than this edge of the cost shrinks to nothing, a longer step passes it.
-    """
-    residuals, jacobian = memory(vector)
-    lowest = 0.5 * float(residuals @ residuals)
-    if lowest <= NOTHING * start_cost:
-        return None
-    step = np.linalg.lstsq(jacobian, -residuals, rcond=SINGULAR)[0]
-    left = residuals + jacobian @ step
-    if 0.5 * float(residuals @ residuals - left @ left) <= GAINED * lowest:
-        return None  # an optimum as it should be
-    point, enough = None, lowest * (1.0 - GAINED)
-    for share in SHARES:
-        trial = np.clip(vector + share * step, *memory.objective.bounds)
-        memory.evaluations += 1
-        try:
-            cost = memory.objective.cost(trial)
-        except DomainError:
-            continue
-        if cost < enough:
-            point, enough = trial, cost
-    return point
