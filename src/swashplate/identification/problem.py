@@ -46,6 +46,9 @@ class Problem:
     """What one unit of residual is, by channel: its noise, in its unit."""
     fixed: Mapping[str, float] = field(default_factory=dict)
     """Values of the model's names that are not unknown but differ from the model's own."""
+    doubts: tuple[Mapping[str, float], ...] = ()
+    """Standard uncertainties of fixed numbers, by the model's names; those of one mapping are off
+    together. [unit]"""
     threads: int = 1
     """Threads over experiments, for a model that releases the interpreter's lock."""
     compare: Callable[[Channel, Array], Array] | None = None
