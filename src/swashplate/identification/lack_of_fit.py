@@ -14,7 +14,7 @@ from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.errors import DomainError
 from swashplate.identification.drive_model import CURRENTS, DriveModel
 from swashplate.identification.linearised import TOLERANCE, triangular_factor
-from swashplate.identification.model import simulated
+from swashplate.identification.model import linearised, simulated
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
 
 if TYPE_CHECKING:
@@ -333,6 +333,7 @@ class _StageBlocks:
         self.earlier: list[Assessment] = []
         self.fixed: list[str] = []
         if not isinstance(model, DriveModel):
+            self.fixed = [name for doubt in self.problem.doubts for name in doubt]
             return
         part = model.part
         simulated_currents = self.stage.stage.current == "simulated"
@@ -422,12 +423,10 @@ class _StageBlocks:
             names += _machine(each.stage.problem)
         if not names:
             return {}
-        assert isinstance(self.model, DriveModel)
-        experiment = self.problem.experiments[number]
-        values = self.problem.unknowns.targets(self.vector, experiment.name)
-        numbers = self.stage.parameters.numbers
+        experiment, numbers = self.problem.experiments[number], self.numbers
+        values = self.problem.model_values(self.vector, number)
         made: dict[str, dict[str, Array]] = {}
-        for channel, part in self.model.linearise(values, experiment, names).items():
+        for channel, part in linearised(self.model, values, experiment, names).items():
             columns = {name: part.by[:, k] * numbers[name] for k, name in enumerate(self.fixed)}
             first = len(self.fixed)
             for each in self.earlier:

@@ -159,7 +159,9 @@ class ModelSetup:
         of_runs = {each.name for unknowns in own.values() for each in unknowns}
         channels = self.channels or self._given(experiments)
         runs = tuple(
-            each for each in experiments if any(name in each.channels for name in channels)
+            self._with_noise(each)
+            for each in experiments
+            if any(name in each.channels for name in channels)
         )
         if not runs:
             had = ", ".join(dict.fromkeys(name for each in experiments for name in each.channels))
@@ -169,13 +171,12 @@ class ModelSetup:
             )
         machine = [each for each in self._free.values() if each.name not in of_runs]
         unknowns = (*machine, *(unknown for each in runs for unknown in own[each.name]))
-        stated = [name for name in channels if name not in self.noise]
         return Problem(
             self.model,  # type: ignore[arg-type]  # made one that simulates at the beginning
             runs,
             Unknowns(unknowns),
             channels,
-            {**noise_scales(runs, stated), **self.noise},
+            noise_scales(runs, channels),
             dict(self.fixed),
             tuple(
                 {name: deviation(doubt, self.fixed[name])}
@@ -193,6 +194,15 @@ class ModelSetup:
             for each in self._free.values()
             if each.run is None and (each.name in zeros or (states and each.name.startswith(START)))
         )
+
+    def _with_noise(self, experiment: Experiment) -> Experiment:
+        """The run with the noise of channels that the campaign does not state."""
+        stated = {
+            name: replace(channel, noise=self.noise[name])
+            for name, channel in experiment.channels.items()
+            if channel.noise is None and name in self.noise
+        }
+        return replace(experiment, channels={**experiment.channels, **stated})
 
     @property
     def _free(self) -> dict[str, Unknown]:

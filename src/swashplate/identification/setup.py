@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
 Pair = tuple[Finite, Finite]
-Doubt = Positive | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")]
+Doubt = (
+    Annotated[PositiveFloat, Field(strict=True, allow_inf_nan=False)]
+    | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")]
+)
 """A standard uncertainty: in SI units, or as "5 %" of the value."""
 COEFFICIENTS = ("Z19", "Z20", "Z21", "Z22")
 """Of the solenoids: what `GivenForces` stand for."""

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.linearised import LinearisedFit, linearised_fit
-from swashplate.identification.model import OFFSET
 from swashplate.identification.model import linearised as linearised_model
 from swashplate.identification.noise import (
     Covariance,
@@ -267,13 +266,11 @@ def _slopes(stage: StageFit, linearised: LinearisedFit, names: Sequence[str], by
     products = np.zeros((linearised.rank, by.shape[1]))
     rows = {(run.name, run.channel): run for run in linearised.runs}
     for number, experiment in enumerate(problem.experiments):
-        values = problem.unknowns.targets(vector, experiment.name)
         if chain is model or number not in driven:
-            zeros = {f"{OFFSET}{name}" for name in problem.channels}
-            values = {**stage.parameters.numbers, **problem.fixed, **values}
-            values = {name: value for name, value in values.items() if name not in zeros}
+            values = problem.model_values(vector, number)
             moved = linearised_model(model, values, experiment, names)
         else:
+            values = problem.unknowns.targets(vector, experiment.name)
             own = {name: value for name, value in values.items() if name not in machine}
             moved = linearised_model(chain, own, experiment, names)
         for name, weight in problem.weights[number].items():
