@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.identification.test_own_model_fit import FREE, NOISE, RUNS, servo
 
 from swashplate import Campaign, Drive, ParameterError
 from swashplate.campaign import rig
@@ -11,7 +12,6 @@ from swashplate.identification import ModelSetup, assess, fit
 from swashplate.identification.lack_of_fit import lack_of_fit
 from swashplate.identification.setup import Setup, load_setup, setup_text
 from swashplate.maneuvers import source_tests
-from tests.identification.test_own_model_fit import FREE, NOISE, RUNS, servo
 
 DOUBTS = {"Z9": "3 %", "tau": 1e-3}
 ONE = {"lag": FREE["lag"], "start.place": FREE["start.place"]}

@@ -343,7 +343,7 @@ class Assessment:
     @cached_property
     def linearised(self) -> LinearisedFit:
         """Residuals and derivatives at the optimum."""
-        return linearised_fit(self.stage.problem, self._vector)
+        return linearised_fit(self.stage.problem, self._vector, self.stage.solution.loss)
 
     @cached_property
     def identifiability(self) -> Identifiability:

@@ -41,6 +41,23 @@ _ENDINGS = {
 }
 
 
+def influence(residuals: Array, loss: Loss) -> tuple[Array, Array]:
+    """ψ of each residual, half the derivative of its loss, and the derivative of that.
+
+    The losses are SciPy's, of residuals in units of their noise (Huber 1981, chapter 4).
+    """
+    z = residuals**2
+    if loss == "soft_l1":
+        return residuals / np.sqrt(1.0 + z), (1.0 + z) ** -1.5
+    if loss == "huber":
+        return np.clip(residuals, -1.0, 1.0), np.where(z <= 1.0, 1.0, 0.0)
+    if loss == "cauchy":
+        return residuals / (1.0 + z), (1.0 - z) / (1.0 + z) ** 2
+    if loss == "arctan":
+        return residuals / (1.0 + z**2), (1.0 - 3.0 * z**2) / (1.0 + z**2) ** 2
+    return residuals, np.ones_like(residuals)
+
+
 class Evaluation(NamedTuple):
     """Residuals and their derivatives by the solver's vector at one point."""
 
@@ -122,6 +139,8 @@ class Solution:
     message: str
     """Why it stopped, in words."""
     seconds: float
+    loss: Loss = "linear"
+    """What of each residual was summed."""
 
 
 class _Memory:
@@ -207,7 +226,7 @@ def solve(
             watch(Progress(iteration, float(now.cost), now.x.copy(), seconds, *spent))
 
     def ended(vector: Array, cost: float, message: str, ending: int) -> Solution:
-        how = memory.evaluations, ending > 0, ending < 0, message, perf_counter() - begun
+        how = memory.evaluations, ending > 0, ending < 0, message, perf_counter() - begun, loss
         return Solution(np.asarray(vector, dtype=np.float64), float(cost), start_cost, *how)
 
     best = begin = vector
