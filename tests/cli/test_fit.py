@@ -145,7 +145,7 @@ def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path
     assert "Cross-validation" in said
     assert "Fixed at their nominal values: V_dz, G1" in said
     header, *rows = (tmp_path / "fitted" / "estimates.csv").read_text("utf-8").splitlines()
-        assert "bootstrap lower 95 %,bootstrap upper 95 %" in header
+    assert "bootstrap lower 95 %,bootstrap upper 95 %" in header
     # by other noise of the same kind the estimates move about as far as the errors say
     columns = header.split(",")
     for row in rows:
