@@ -150,11 +150,11 @@ def _judged(test: ResidualTest, residual: Array, command: Array) -> ResidualTest
     )
     if not np.any(command != command[0]):
         return replace(test, verdict=f"{colour}; the input is constant and explains nothing.")
-    from scipy.stats import norm
+    from scipy.special import ndtri
 
     # neighbouring lags say the same: as many looks as correlation lengths fit
     looks = max(test.cross_lags.size / max(test.duration / test.lags[1], 1.0), 1.0)
-    limit = float(norm.isf(0.5 * CHANCE / looks)) / DEVIATIONS * test.cross_band
+    limit = -float(ndtri(0.5 * CHANCE / looks)) / DEVIATIONS * test.cross_band
     lag, value = test.peak
     if abs(value) <= limit:
         return replace(test, verdict=f"{colour} and have no relation to the input.")

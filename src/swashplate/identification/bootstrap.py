@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.signal import lfilter
 
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
@@ -59,6 +58,8 @@ class Autoregression(NamedTuple):
         (m,) array
             In order; gaps leave no trace, m may be 0.
         """
+        from scipy.signal import lfilter
+
         order = self.coefficients.size
         taps = np.concatenate([[1.0], -self.coefficients])
         present = np.convolve(grid.spread(np.ones(noise.size)), np.ones(order + 1))[: grid.size]
@@ -72,6 +73,8 @@ class Autoregression(NamedTuple):
 
     def coloured(self, innovations: Array) -> Array:
         """(m - settling,) noise of variance 1 from m innovations."""
+        from scipy.signal import lfilter
+
         taps = np.concatenate([[1.0], -self.coefficients])
         noise: Array = lfilter([self.deviation], taps, innovations)
         return noise[self.settling :]

@@ -304,9 +304,9 @@ def threshold(
             f"{samples} samples are worth {samples / inflation:.1f} independent ones, no more than "
             f"the {unknowns} unknowns: no interval follows from them."
         )
-    from scipy.stats import t as student
+    from scipy.special import stdtrit
 
-    quantile = float(student.ppf(0.5 + 0.5 * level, freedom))
+    quantile = float(stdtrit(freedom, 0.5 + 0.5 * level))
     rise = quantile**2 * inflation * cost / (samples - unknowns)
     return Threshold(rise, level, inflation)
 
