@@ -1,4 +1,4 @@
-"""What to hold, or to ask for instead, so that all that is free is determined."""
+"""What to fix, or to ask for instead, so that all that is free is determined."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -47,18 +47,18 @@ def complete(proposal: Proposal, *runs: Experiment) -> bool:
 def test_away_from_the_stops_only_a_ratio_matters() -> None:
     runs = (run("a", 3.0), run("b", -3.0))
     found = proposed({"Z6": FACTOR, "Z8": FACTOR}, *runs)
-    assert found.held == {"Z6": "only Z8/(1+Z6) is determined"}
-    assert found.sentences() == ("Hold Z6: only Z8/(1+Z6) is determined.",)
+    assert found.fixed == {"Z6": "only Z8/(1+Z6) is determined"}
+    assert found.sentences() == ("Fix Z6: only Z8/(1+Z6) is determined.",)
     assert found.proposed is not None
     assert list(found.proposed.free) == ["Z8"]
     assert complete(found, *runs)
 
 
-def test_a_direction_that_no_run_takes_is_held_alone() -> None:
+def test_a_direction_that_no_run_takes_is_fixed_alone() -> None:
     runs = (run("a", 9.0), run("b", 4.0))
     found = proposed({"Z13": FACTOR, "Z10": FACTOR, "Z14": FACTOR}, *runs)
-    assert set(found.held) == {"Z13_minus", "Z14"}
-    assert found.sentences() == ("Hold Z13_minus, Z14: no run exercises them.",)
+    assert set(found.fixed) == {"Z13_minus", "Z14"}
+    assert found.sentences() == ("Fix Z13_minus, Z14: no run exercises them.",)
     assert found.proposed is not None
     assert list(found.proposed.free) == ["Z13_plus", "Z10"]
     assert complete(found, *runs)
@@ -86,7 +86,7 @@ def test_forces_are_asked_for_where_there_is_a_current() -> None:
     asked, minus = found.sentences()
     assert "no run goes further" in asked
     assert "force_minus_4 cannot be left out of [stages.forces]" in minus
-    assert found.held == {}
+    assert found.fixed == {}
 
 
 def test_a_set_up_is_written_as_it_will_be_read(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from swashplate.identification.excitation import Outlook
-    from swashplate.identification.identifiability import Identifiability
 
 EXAMPLES = """\
 Examples:
@@ -59,10 +59,12 @@ def excitation(
             show_default=False,
         ),
     ] = None,
-    faint: Annotated[
+    weak: Annotated[
         bool,
         typer.Option(
-            "--faint", help="Propose to hold what is hardly told as well: only for values you know."
+            "--weak",
+            help="Propose to fix what would be known to ±10 % or worse as well: only for values "
+            "you know.",
         ),
     ] = False,
     write: Annotated[
@@ -80,7 +82,7 @@ def excitation(
         ),
     ] = None,
 ) -> None:
-    """Say before a fit what the runs can tell of each unknown, and what to hold.
+    """Say before a fit what the runs can tell of each unknown, and what to fix.
 
     Simulates the runs with the drive as it is: which thresholds and limits they
     reach, how much each unknown changes what was measured, and which unknowns
@@ -106,8 +108,7 @@ def excitation(
     with working("Simulating"):
         doubts = refuse_unsound(check_sound(runs, smooth(drive), plan, rank=False))
         looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
-        proposals = [propose(each, faint=faint) for each in looks]
-        verdicts = [each.identifiability for each in looks]
+        proposals = [propose(each, weak=weak) for each in looks]
     comments = {each.stage.name: each.comments() for each in proposals}
     if write is not None:
         write_text(setup_text(proposed_setup(plan, proposals), comments), write)
@@ -116,10 +117,11 @@ def excitation(
     for sentence in doubts:
         say(f"! {sentence}")
     names = [each.name for each in runs]
-    for look, verdict, proposal in zip(looks, verdicts, proposals, strict=True):
+    for look, proposal in zip(looks, proposals, strict=True):
         show(_table(look, names))
-        say(_singular_values(verdict))
-        for sentence in (*_said(verdict), *look.sentences()):
+        # what no run exercises is said with its reason
+        verdict = replace(look.identifiability, unexcited=())
+        for sentence in (*verdict.sentences(), *look.sentences()):
             say(f"- {sentence}")
         for sentence in proposal.sentences():
             say(f"* {sentence}")
@@ -154,23 +156,6 @@ def _table(look: Outlook, runs: Sequence[str]) -> Table:
             "".join(letters.get(run, "-") for run in runs),
         )
     return made
-
-
-def _singular_values(verdict: Identifiability) -> str:
-    sizes = verdict.singular_values
-    if not sizes.size:
-        return "No unknown changes anything: there is no singular value."
-    said = ", ".join(f"{each:.2g}" for each in sizes[: verdict.rank] / sizes[0])
-    none = sizes.size - verdict.rank
-    more = f", and {none} of nothing" if none else ""
-    return f"Singular values of the scaled derivatives, over the largest: {said}{more}."
-
-
-def _said(verdict: Identifiability) -> tuple[str, ...]:
-    """The verdict without what no run exercises, which is said with its reason."""
-    from dataclasses import replace
-
-    return replace(verdict, unexcited=()).sentences()
 
 
 def _written(looks: Sequence[Outlook], out: Path) -> None:

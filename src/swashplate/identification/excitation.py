@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,8 +15,12 @@ from numpy.typing import NDArray
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel, Forces, current_record, voltage_record
-from swashplate.identification.identifiability import NAMED as NAMED_OTHERS
-from swashplate.identification.identifiability import Identifiability, identifiability
+from swashplate.identification.identifiability import (
+    NAMED,
+    Identifiability,
+    identifiability,
+    listed,
+)
 from swashplate.identification.linearised import LinearisedFit, linearised_fit
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Free, GivenForces, Setup, Stage
@@ -181,13 +184,12 @@ def activation(
     rows = []
     for simulation in simulations.values():
         found = acting(simulation, parameters)
-        row = []
-        for each in ours:
-            if forces is not None and each.name in forces.names:
-                row.append(_near(simulation, each.name, forces, parameters.numbers["Z17"]))
-            else:
-                row.append(max(found[target] for target in each.targets))
-        rows.append(row)
+        for name in forces.names if forces is not None else ():
+            # from half way to the force's effective current on
+            beyond = (1.0 if "_plus_" in name else -1.0) * simulation.current - simulation.pump.Z17
+            reached = beyond >= _current_of(name, forces)[1]
+            found[name] = float(np.count_nonzero(reached)) / simulation.record.rate
+        rows.append([max(found[target] for target in each.targets) for each in ours])
     return Activation(
         tuple(simulations),
         tuple(each.name for each in ours),
@@ -206,18 +208,10 @@ def need_of(name: str, forces: Forces | None = None) -> str:
 
 def _current_of(name: str, forces: Forces) -> tuple[float, float]:
     """Effective current of a force, and where its neighbourhood begins. [A]"""
-    match = re.fullmatch(r"force_(plus|minus)_(\d)", name)
-    assert match is not None
-    currents = forces.plus if match[1] == "plus" else forces.minus
-    k = int(match[2]) - 1
-    return currents[k], 0.5 * (currents[k] + (currents[k - 1] if k else 0.0))
-
-
-def _near(simulation: Simulation, name: str, forces: Forces, Z17: float) -> float:
-    """How long the effective current is at that of a force or beyond, from half way to it. [s]"""
-    sign = 1.0 if "_plus_" in name else -1.0
-    reached = sign * simulation.current - Z17 >= _current_of(name, forces)[1]
-    return float(np.count_nonzero(reached)) / simulation.record.rate
+    _, side, number = name.split("_")
+    currents = (0.0, *getattr(forces, side))
+    k = int(number)
+    return currents[k], 0.5 * (currents[k] + currents[k - 1])
 
 
 Mark = Literal["most", "some", "unseen", "none"]
@@ -226,8 +220,14 @@ ALONE = 0.9
 """Share of a single run from which an unknown is said to rest on it."""
 MOST = 0.2
 """Share of a run's information from which it is one of those that tell most."""
-NAMED = 8
-"""Unknowns that a sentence names."""
+
+
+def _alone(name: str, share: Array, runs: Sequence[str], what: str) -> list[str]:
+    """A sentence on an unknown that rests on one run."""
+    most = int(np.argmax(share))
+    if len(runs) < 2 or share[most] < ALONE:
+        return []
+    return [f"{name}: {100.0 * share[most]:.0f} % of {what} of it comes from {runs[most]} alone."]
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,16 +247,10 @@ class Excitation:
     def sentences(self) -> tuple[str, ...]:
         """What rests on nothing, and what on one run alone."""
         said = []
-        for column, name in enumerate(self.names):
-            share = self.share[:, column]
-            most = int(np.argmax(share))
+        for name, share in zip(self.names, self.share.T, strict=True):
+            said += _alone(name, share, self.runs, "what is known")
             if not share.any():
                 said.append(f"{name}: no run depends on it.")
-            elif len(self.runs) > 1 and share[most] >= ALONE:
-                said.append(
-                    f"{name}: {100.0 * share[most]:.0f} % of what is known of it comes from "
-                    f"{self.runs[most]} alone."
-                )
         return tuple(said)
 
 
@@ -298,15 +292,11 @@ class Outlook:
         )
 
     @cached_property
-    def excitation(self) -> Excitation:
-        """Shares of the runs and channels."""
-        return excitation(self.linearised)
-
-    @cached_property
     def shares(self) -> Array:
         """(runs, K) part of what is known of an unknown from each run, its channels together."""
         shares = np.zeros((len(self.activation.runs), len(self.linearised.variables.names)))
-        for run, share in zip(self.linearised.runs, self.excitation.share, strict=True):
+        found = excitation(self.linearised).share
+        for run, share in zip(self.linearised.runs, found, strict=True):
             shares[self.activation.runs.index(run.name)] += share
         return shares
 
@@ -339,18 +329,12 @@ class Outlook:
             if name in self.activation.names:
                 groups.setdefault(self._missing(name), []).append(name)
         said = [
-            f"{_listed(names)} need{'s' if len(names) == 1 else ''} {why}."
+            f"{listed(names)} need{'s' if len(names) == 1 else ''} {why}."
             for why, names in groups.items()
         ]
-        several = len(self.activation.runs) > 1
         for name in self.activation.names:
             share = self.shares[:, self.linearised.variables.index(name)]
-            most = int(np.argmax(share))
-            if several and share[most] >= ALONE:
-                said.append(
-                    f"{name}: {100.0 * share[most]:.0f} % of what the runs tell of it comes from "
-                    f"{self.activation.runs[most]} alone."
-                )
+            said += _alone(name, share, self.activation.runs, "what the runs tell")
         return tuple(said)
 
     def _missing(self, name: str) -> str:
@@ -400,14 +384,6 @@ def outlook(stage: Stage, parameters: ParameterSet, experiments: Sequence[Experi
     )
 
 
-def _listed(names: Sequence[str]) -> str:
-    named = list(names[:NAMED])
-    more = len(names) - len(named)
-    if more:
-        return f"{', '.join(named)} and {more} more"
-    return named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
-
-
 ROOM = 0.98
 """Part of the largest tested current at which the outermost force is asked for."""
 IDLE = "no run exercises it"
@@ -423,8 +399,8 @@ class Proposal:
     """As it was."""
     proposed: Stage | None
     """As it could be; None if nothing of it can be determined."""
-    held: Mapping[str, str]
-    """Unknowns to hold, each with the reason."""
+    fixed: Mapping[str, str]
+    """Unknowns to fix, each with the reason."""
     notes: tuple[str, ...] = ()
     """What else is changed, or cannot be."""
 
@@ -435,22 +411,24 @@ class Proposal:
 
     def sentences(self) -> tuple[str, ...]:
         """The offer in words."""
-        said = [f"Hold {', '.join(names)}: {reason}." for names, reason in self._by_reason()]
+        said = [f"Fix {', '.join(names)}: {reason}." for names, reason in self._by_reason()]
         if self.proposed is None:
             said.append(f"Nothing is then left of the stage '{self.stage.name}'.")
         return (*said, *self.notes)
 
     def comments(self) -> tuple[str, ...]:
-        """What is held, as lines for the file."""
-        lines = []
-        for names, reason in self._by_reason():
-            are = "is" if len(names) == 1 else "are"
-            lines += wrap(f"{', '.join(names)} {are} held: {reason}", COMMENT)
-        return tuple(lines)
+        """What is fixed, as lines for the file."""
+        return tuple(
+            line
+            for names, reason in self._by_reason()
+            for line in wrap(
+                f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} fixed: {reason}", COMMENT
+            )
+        )
 
     def _by_reason(self) -> list[tuple[list[str], str]]:
         reasons: dict[str, list[str]] = {}
-        for name, reason in self.held.items():
+        for name, reason in self.fixed.items():
             reasons.setdefault(reason, []).append(name)
         return [
             (names, "no run exercises them" if reason == IDLE and len(names) > 1 else reason)
@@ -458,53 +436,51 @@ class Proposal:
         ]
 
 
-def propose(outlook: Outlook, *, faint: bool = False) -> Proposal:
-    """What to hold, or to ask for instead, from what the runs cannot tell.
+def propose(outlook: Outlook, *, weak: bool = False) -> Proposal:
+    """What to fix, or to ask for instead, from what the runs cannot tell.
 
     Parameters
     ----------
     outlook : Outlook
         Of one stage.
-    faint : bool
-        Hold as well what the runs hardly tell: for values that are known, as they are then taken
+    weak : bool
+        Fix as well what the runs hardly tell: for values that are known, as they are then taken
         for exact.
     """
     verdict = outlook.identifiability
     reasons = dict.fromkeys(verdict.unexcited, IDLE)
-    for direction in (*verdict.null, *(verdict.faint if faint else ())):
-        others = [name for name in direction.changes if name != direction.hold]
+    for direction in (*verdict.null, *(verdict.weak if weak else ())):
+        others = [name for name in direction.changes if name != direction.fix]
+        more = f" and {len(others) - NAMED} others" if len(others) > NAMED else ""
+        told = f"{', '.join(others[:NAMED])}{more}"
         if direction.gauge is not None:
-            reason = direction.gauge.determined
-        elif direction.sharpness > 0.0:
-            more = len(others) - NAMED_OTHERS
-            told = f"{', '.join(others[:NAMED_OTHERS])}{f' and {more} others' if more > 0 else ''}"
-            reason = f"the runs hardly tell it from {told}, but a wrong value shows in them"
+            reasons[direction.fix] = direction.gauge.determined
+        elif direction.weak:
+            reasons[direction.fix] = (
+                f"the runs hardly tell it{f' from {told}' if told else ''}, but a wrong value "
+                "shows in them"
+            )
         else:
-            reason = f"the runs cannot tell it from {', '.join(others)}"
-        reasons[direction.hold] = reason
-    own = [each for each in reasons if "(" in each]
-    notes = [f"{name} belongs to one run and stays free." for name in own]
-    reasons = {name: why for name, why in reasons.items() if name not in own}
+            reasons[direction.fix] = f"the runs cannot tell it from {told}"
+    notes = [f"{name} belongs to one run and stays free." for name in reasons if "(" in name]
+    reasons = {name: why for name, why in reasons.items() if "(" not in name}
     stage = outlook.stage
     forces, of_forces, said = _forces(outlook, reasons)
     for name in of_forces:
         del reasons[name]
-    notes += said
     free = _without(stage.free, tuple(reasons))
-    proposed = None
-    if free:
-        proposed = stage.model_copy(update={"free": free, "forces": forces})
-    return Proposal(stage, proposed, reasons, tuple(notes))
+    changed = stage.model_copy(update={"free": free, "forces": forces}) if free else None
+    return Proposal(stage, changed, reasons, (*notes, *said))
 
 
-def _without(free: Mapping[str, Free], held: Sequence[str]) -> dict[str, Free]:
-    """Entries of a stage without some unknowns; a direction alone where the other one is held."""
+def _without(free: Mapping[str, Free], fixed: Sequence[str]) -> dict[str, Free]:
+    """Entries of a stage without some unknowns; a direction alone where the other one is fixed."""
     kept: dict[str, Free] = {}
     for name, entry in free.items():
-        if name in held:
+        if name in fixed:
             continue
         columns = CATALOGUE[name].columns if name in CATALOGUE else (name,)
-        left = [column for column in columns if column not in held]
+        left = [column for column in columns if column not in fixed]
         if entry.tied or len(left) == len(columns):
             kept[name] = entry
         else:
@@ -526,7 +502,10 @@ def _forces(
     for side, sign in (("plus", 1.0), ("minus", -1.0)):
         names = [name for name in concerned if f"_{side}_" in name]
         currents = getattr(given, side)
-        largest = _largest_current(outlook, sign)
+        largest = max(
+            float(np.max(sign * each.current, initial=0.0)) - each.pump.Z17
+            for each in outlook.simulations.values()
+        )
         outermost = outlook.activation[f"force_{side}_{len(currents)}"]
         if largest <= 0.0 and names:
             notes.append(
@@ -543,18 +522,10 @@ def _forces(
             )
         elif names:
             notes.append(
-                f"{', '.join(names)} cannot be held alone in [stages.forces]: add a run that "
+                f"{', '.join(names)} cannot be fixed alone in [stages.forces]: add a run that "
                 f"dwells at more levels between {currents[0]:g} and {currents[-1]:g} A ({side})."
             )
     return given.model_copy(update=changes), concerned, notes
-
-
-def _largest_current(outlook: Outlook, sign: float) -> float:
-    """Largest current beyond the solenoids' dead zone in any run, one way. [A]"""
-    return max(
-        float(np.max(sign * each.current, initial=0.0)) - each.pump.Z17
-        for each in outlook.simulations.values()
-    )
 
 
 def proposed_setup(setup: Setup, proposals: Sequence[Proposal]) -> Setup:
