@@ -1,16 +1,23 @@
 """The source's largest per cent errors, with its exclusions."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from swashplate import Channel, Experiment
+from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.errors import InputError
+from swashplate.identification.assessment import compared
 from swashplate.identification.error_tables import (
     SOURCE_RULES,
     ComparedRun,
     ErrorTable,
-    WholeKind,
+    edges,
     error_table,
-    sine_error,
+    error_tables,
+    source_rules,
 )
 
 TIME = np.arange(0.0, 10.0, 0.1)
@@ -44,7 +51,7 @@ def percent(table: ErrorTable) -> dict[str, float | None]:
 
 
 def test_the_settled_error_of_a_step() -> None:
-    table = error_table([step()])
+    table = error_table("speed", [step()])
     assert percent(table) == {"step": pytest.approx(2.0)}
     (row,) = table.rows
     assert row.run == "hoistr6"
@@ -54,61 +61,42 @@ def test_the_settled_error_of_a_step() -> None:
 
 def test_the_overshoot_counts_if_its_rule_is_off() -> None:
     rules = [rule for rule in SOURCE_RULES if rule.name != "overshoot"]
-    assert percent(error_table([step()], rules=rules))["step"] == pytest.approx(30.0)
+    assert percent(error_table("speed", [step()], rules=rules))["step"] == pytest.approx(30.0)
 
 
-def test_rules_that_left_out_something_are_printed() -> None:
+def test_rules_that_left_out_something_are_named() -> None:
     """A step's speed has no zero crossings of a current, and there is no fast sine."""
-    table = error_table([step()])
-    said = table.sentences()
-    assert [rule.name for rule in table.rules] == [rule.name for rule in SOURCE_RULES]
+    table = error_table("speed", [step()])
+    assert table.rules == SOURCE_RULES
     assert [rule.name for rule in table.acted] == ["start transient", "overshoot", "small values"]
-    assert sum(each.startswith("Left out (") for each in said) == 3
-    assert any("plussing" in each for each in said)
-    assert any("Per cent of what is measured then." in each for each in said)
-    assert "step: 2.00 % in hoistr6 at" in said[0]
-
-
-def test_per_cent_of_the_largest_value() -> None:
-    run = sine(simulated=sine().measured + 5.0)
-    rules = [rule for rule in SOURCE_RULES if rule.name != "small values"]
-    # 5 of the largest measured value, 50 sin(0.2π·2.5) = 50
-    assert percent(error_table([run], rules=rules, reference="largest"))["sine"] == pytest.approx(
-        10.0
-    )
-    # of what is measured it is largest where that is smallest: 20 % of 50
-    found = percent(error_table([run]))["sine"]
-    assert found == pytest.approx(100.0 * 5.0 / (50.0 * np.sin(0.2 * np.pi * 0.4)), rel=1e-6)
 
 
 def test_fast_sines_are_left_out_as_a_whole() -> None:
-    table = error_table([sine(0.1), sine(0.3, simulated=np.zeros(TIME.size))])
+    table = error_table("speed", [sine(0.1), sine(0.3, simulated=np.zeros(TIME.size))])
     assert percent(table)["sine"] == pytest.approx(10.0)
     assert table.left_out == (("sine 0.3 Hz", "fast sines"),)
-    alone = error_table([sine(0.3)])
+    alone = error_table("speed", [sine(0.3)])
     assert [rule.name for rule in alone.acted] == ["fast sines"]
 
 
 def test_nothing_left_is_a_verdict() -> None:
-    table = error_table([sine(0.3)])
+    table = error_table("speed", [sine(0.3)])
     assert percent(table) == {"sine": None}
-    assert table.sentences()[0] == "sine: no sample is left to judge."
+    assert table.rows[0].samples == 0
 
 
 def test_slew_leaves_out_its_steps() -> None:
-    table = error_table([step()], rules=[*SOURCE_RULES, WholeKind("step")])
-    assert percent(table) == {"step": None}
-    assert any("backlash" in each for each in table.sentences())
+    assert percent(error_table("speed", [step()], source_rules("slew"))) == {"step": None}
 
 
 def test_a_run_at_rest_has_no_per_cent() -> None:
     still = step(measured=np.zeros(TIME.size))
-    assert percent(error_table([still], rules=[])) == {"step": None}
+    assert percent(error_table("speed", [still], rules=[])) == {"step": None}
 
 
 def test_rows_come_in_the_sources_order() -> None:
     ramp = step(kind="ramp", name="ramp")
-    assert [row.kind for row in error_table([sine(), step(), ramp]).rows] == [
+    assert [row.kind for row in error_table("speed", [sine(), step(), ramp]).rows] == [
         "ramp",
         "step",
         "sine",
@@ -118,41 +106,96 @@ def test_rows_come_in_the_sources_order() -> None:
 def test_dither_is_averaged_over() -> None:
     dither = 20.0 * np.where(np.arange(TIME.size) % 2, 1.0, -1.0)
     run = step(simulated=1.02 * step().measured + dither)
-    assert percent(error_table([run]))["step"] > 20.0
-    assert percent(error_table([run], average=0.2))["step"] == pytest.approx(2.0, abs=0.01)
-
-
-def test_a_sine_by_amplitude_and_phase() -> None:
-    """The 2.90 % of the source: what the shape at the peaks does not enter."""
-    late = sine(simulated=51.45 * np.sin(0.2 * np.pi * TIME - 0.05))
-    found = sine_error(late, rules=[])
-    assert found.amplitude_percent == pytest.approx(2.9)
-    assert found.phase == pytest.approx(-0.05)
+    assert percent(error_table("speed", [run]))["step"] > 20.0
+    assert percent(error_table("speed", [run], average=0.2))["step"] == pytest.approx(2.0, abs=0.01)
 
 
 @pytest.mark.parametrize(
     ("run", "said"),
     [
-        (step(), "no sine of known frequency"),
-        (sine(quantity="rectified_current"), "rectified current is no sine"),
-        (sine(0.01), "less than one period"),
-        (sine(measured=np.zeros(TIME.size)), "nothing was measured"),
+        (step(measured=np.zeros(3)), "differ in length"),
+        (step(simulated=np.full(TIME.size, np.nan)), "not finite"),
     ],
 )
-def test_what_is_no_sine_is_refused(run: ComparedRun, said: str) -> None:
+def test_wrong_runs_are_refused(run: ComparedRun, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        sine_error(run, rules=[])
+        error_table("speed", [run])
 
 
-@pytest.mark.parametrize(
-    ("runs", "more", "said"),
-    [
-        ([], {}, "at least one run"),
-        ([step(measured=np.zeros(3))], {}, "differ in length"),
-        ([step(simulated=np.full(TIME.size, np.nan))], {}, "not finite"),
-        ([step()], {"average": -1.0}, "must not be negative"),
-    ],
-)
-def test_wrong_runs_are_refused(runs: list, more: dict, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        error_table(runs, **more)
+PULSE = np.where((TIME >= 1.0) & (TIME < 6.0), 1.0, 0.0)
+
+
+def excluded(name: str, run: ComparedRun) -> np.ndarray:
+    """Samples that one of the source's rules leaves out."""
+    (rule,) = (each for each in SOURCE_RULES if each.name == name)
+    return np.broadcast_to(rule.excluded(run), run.time.shape)
+
+
+def test_the_start_transient_is_the_speeds() -> None:
+    early = TIME < 400.0 / 512.0
+    np.testing.assert_array_equal(excluded("start transient", step()), early)
+    assert not excluded("start transient", step(quantity="rectified_current")).any()
+
+
+def test_edges_of_a_step_and_of_a_ramp() -> None:
+    np.testing.assert_allclose(edges(step()), [1.0, 6.0])
+    ramp = step(kind="ramp", command=np.clip(TIME - 1.0, 0.0, None))
+    np.testing.assert_allclose(edges(ramp), [1.1])
+    assert edges(step(command=np.zeros(TIME.size))).size == 0
+
+
+def test_overshoot_windows() -> None:
+    expected = ((TIME > 0.95) & (TIME < 2.95)) | ((TIME > 5.95) & (TIME < 7.95))
+    np.testing.assert_array_equal(excluded("overshoot", step()), expected)
+    assert not excluded("overshoot", step(kind="ramp")).any()
+
+
+def test_zero_crossings_are_the_rectified_currents() -> None:
+    out = excluded("zero crossings", sine(quantity="rectified_current"))
+    np.testing.assert_array_equal(out, np.abs(np.sin(0.2 * np.pi * TIME)) < 0.1)
+    assert not excluded("zero crossings", sine()).any()
+    assert not excluded("zero crossings", step(quantity="rectified_current")).any()
+
+
+def test_fast_and_small() -> None:
+    assert excluded("fast sines", sine(0.3)).all()
+    assert not excluded("fast sines", sine(0.1)).any()
+    assert not excluded("fast sines", replace(sine(), frequency=None)).any()
+    found = excluded("small values", step(measured=30.0 * PULSE + 70.0 * PULSE * (TIME > 3.0)))
+    np.testing.assert_array_equal(found, PULSE == 0.0)
+
+
+def measured_step(name: str, maneuver: str, current: np.ndarray) -> Experiment:
+    """A command of 4 V from 1 s to 6 s, and a current."""
+    time = np.arange(0.0, 10.0, 0.01)
+    voltage = np.where((time >= 1.0) & (time < 6.0), 4.0, 0.0)
+    source = Source(Path("log.csv"), "column")
+    drive = InputSignal("voltage", "V", time, voltage, "previous", source)
+    channel = Channel(
+        "current", "rectified_current", "A", time, current, np.ones(time.size), source
+    )
+    return Experiment(
+        name, "hoist", name, "validate", "rest", None, drive, {"current": channel}, maneuver
+    )
+
+
+def test_the_table_of_a_channel() -> None:
+    time = np.arange(0.0, 10.0, 0.01)
+    current = np.where((time >= 1.0) & (time < 6.0), 0.5, 0.0)
+    # 5 % too large throughout, 40 % within the overshoot's window that is left out
+    simulated = current * np.where((time >= 1.0) & (time < 2.0), 1.4, 1.05)
+    step = measured_step("a", "step +4 V", current)
+    free = measured_step("b", "free", current)
+    (found,) = error_tables(
+        [compared(step, "current", simulated), compared(free, "current", current)]
+    )
+    assert (found.channel, found.unjudged, found.average) == ("current", ("b",), 0.1)
+    (row,) = found.rows
+    assert (row.kind, row.run) == ("step", "a")
+    assert row.percent == pytest.approx(5.0, rel=1e-6)
+    assert [each.name for each in source_rules("slew")] == [
+        *(each.name for each in source_rules("hoist")),
+        "steps",
+    ]
+    (slew,) = error_tables([compared(step, "current", simulated)], source_rules("slew"))
+    assert slew.rows[0].percent is None

@@ -11,12 +11,11 @@ from swashplate import Campaign, Channel, Drive, Experiment, InputError, maneuve
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.identification.assessment import compared
+from swashplate.identification.error_tables import error_tables
 from swashplate.identification.validation import (
-    channel_errors,
     ignored_windows,
     pooled,
     predict,
-    source_rules,
     with_speeds,
 )
 
@@ -101,37 +100,10 @@ def test_windows_that_do_not_count() -> None:
     assert ignored_windows(run["current"]) == ()
 
 
-def test_the_sources_table_of_a_channel() -> None:
-    current = np.where((TIME >= 1.0) & (TIME < 6.0), 0.5, 0.0)
-    # 5 % too large throughout, 40 % within the overshoot's window that is left out
-    simulated = current * np.where((TIME >= 1.0) & (TIME < 2.0), 1.4, 1.05)
-    step = step_of("a", "step +4 V", current)
-    free = step_of("b", "free", current)
-    found = channel_errors(
-        [compared(step, "current", simulated), compared(free, "current", current)]
-    )
-    assert [each.channel for each in found] == ["current"]
-    (row,) = found[0].table.rows
-    assert (row.kind, row.run) == ("step", "a")
-    assert row.percent == pytest.approx(5.0, rel=1e-6)
-    assert found[0].unjudged == ("b",)
-    assert found[0].average == 0.1
-
-
-def test_slew_leaves_out_all_steps(experiment: Callable[..., Experiment]) -> None:
-    assert [each.name for each in source_rules("slew")][-1] == "steps"
-    assert "steps" not in [each.name for each in source_rules("hoist")]
-    current = np.where(TIME >= 1.0, 0.5, 0.0)
-    found = channel_errors(
-        [compared(step_of("a", "step +4 V", current), "current", current)], source_rules("slew")
-    )
-    assert found[0].table.rows[0].percent is None
-
-
 def test_positions_have_no_per_cent(campaign: Campaign) -> None:
     (run,) = campaign
     qualities = with_speeds(predict(Drive.preset("hoist").parameters, [run]))
-    assert [each.channel for each in channel_errors(qualities)] == [
+    assert [each.channel for each in error_tables(qualities)] == [
         "current",
         "speed from counts",
     ]

@@ -74,12 +74,8 @@ def validate(
     is not usable for these runs.
     """
     from swashplate.campaign import Campaign
-    from swashplate.identification.validation import (
-        channel_errors,
-        predict,
-        source_rules,
-        with_speeds,
-    )
+    from swashplate.identification.error_tables import error_tables, source_rules
+    from swashplate.identification.validation import predict, with_speeds
     from swashplate.identification.verdict import verdict
 
     if figures is not None and out is None:
@@ -104,7 +100,7 @@ def validate(
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
         judged = verdict((), predicted, required=require / 100.0)
         qualities = with_speeds(predicted)
-        errors = channel_errors(qualities, source_rules(parameters.name))
+        errors = error_tables(qualities, source_rules(parameters.name))
     lines = []
     if out is not None:
         with working("Writing the report"):

@@ -189,9 +189,9 @@ def bootstraps_of(
         raise InputError(f"{len(ended)} of {draws} refits ended; there is nothing to compare.")
     made = {}
     for place, (stage, noise) in enumerate(shared):
-        vectors = np.array([each[place] for each in ended])
+        of_stage = np.array([each[place] for each in ended])
         fit, failed = noise.fit, draws - len(ended)
-        made[stage.stage.name] = Bootstrap(fit.variables, vectors, fit.determined, failed, seed)
+        made[stage.stage.name] = Bootstrap(fit.variables, of_stage, fit.determined, failed, seed)
     return made
 
 

@@ -13,7 +13,7 @@ from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment, Measures, RunQuality
 from swashplate.identification.data_checks import contradicting_runs
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.identifiability import WIDE, listed
+from swashplate.identification.identifiability import listed
 from swashplate.identification.lack_of_fit import (
     EXPLAINS,
     LackOfFit,

@@ -2,214 +2,129 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign.experiment import Experiment
 from swashplate.errors import InputError
+from swashplate.identification.assessment import RunQuality
 
 Array = NDArray[np.float64]
-
 Mask = NDArray[np.bool_]
 Kind = Literal["ramp", "step", "sine"]
-Quantity = Literal["rectified_current", "shaft_speed", "other"]
 
+START = 400.0 / 512.0
+"""Begin of speed records that is left out. [s]"""
+OVERSHOOT = 2.0
+"""What is left out behind an edge of a step, its rise taken in. [s]"""
+CROSSING = 0.1
+"""Of a sine's largest command, below which one ammeter around both leads misreads. [1]"""
+FAST = 0.3
+"""Frequency from which sines are left out. [Hz]"""
+SMALL = 0.2
+"""Of the largest measured size, below which a per cent means nothing. [1]"""
 EDGE = 0.25
 """A jump between two samples by this part of the largest command is an edge."""
-
 OFF_ZERO = 0.01
 """Part of the largest command beyond which it has left zero."""
+DITHER_MEAN = 0.1
+"""Width of the moving mean over a current's differences, against the dither. [s]"""
 
 
 @dataclass(frozen=True, eq=False)
 class ComparedRun:
-    """One run of one kind of test, measured and simulated."""
+    """One run of one kind of test, measured and simulated, where it counts."""
 
     name: str
     kind: Kind
-    quantity: Quantity
+    quantity: str
+    """Kind of the channel, such as ``"shaft_speed"``."""
     time: Array
     """(n,) stamps. [s]"""
     command: Array
     """(n,) voltage. [V]"""
     measured: Array
-    """(n,) in the quantity's unit."""
+    """(n,) in the channel's unit."""
     simulated: Array
     """(n,) the same."""
     frequency: float | None = None
     """Of a sine. [Hz]"""
 
 
-class Rule(Protocol):
-    """Leaves out samples."""
+class Rule(NamedTuple):
+    """What leaves out samples."""
 
-    @property
-    def name(self) -> str:
-        """In a few words."""
-        ...
-
-    @property
-    def why(self) -> str:
-        """What is left out and for what reason, as a sentence."""
-        ...
-
-    def excluded(self, run: ComparedRun) -> Mask:
-        """(n,) samples that are left out."""
-        ...
+    name: str
+    """In a few words."""
+    why: str
+    """What is left out and for what reason, as a sentence."""
+    excluded: Callable[[ComparedRun], Mask | bool]
+    """From a run the (n,) samples that are left out, or one answer for all."""
 
 
-@dataclass(frozen=True)
-class StartTransient:
-    """Leaves out the begin of speed records."""
-
-    duration: float = 400.0 / 512.0
-    """[s]"""
-    name: str = "start transient"
-
-    @property
-    def why(self) -> str:
-        """See `Rule`."""
-        return (
-            f"The first {self.duration:.3g} s of the speed: the plussing acts as a step when the "
-            "simulation begins."
-        )
-
-    def excluded(self, run: ComparedRun) -> Mask:
-        """See `Rule`."""
-        concerned = run.quantity == "shaft_speed"
-        early: Mask = (run.time < run.time[0] + self.duration) & concerned
-        return early
+def _after_edges(run: ComparedRun) -> Mask | bool:
+    if run.kind != "step":
+        return False
+    since = run.time[:, None] - edges(run)
+    return np.any((since >= 0.0) & (since < OVERSHOOT), axis=1)
 
 
-@dataclass(frozen=True)
-class Overshoot:
-    """Leaves out what follows an edge of the command."""
-
-    duration: float = 2.0
-    """How long, which for steps must take in the rise. [s]"""
-    kinds: tuple[Kind, ...] = ("step",)
-    name: str = "overshoot"
-
-    @property
-    def why(self) -> str:
-        """See `Rule`."""
-        return (
-            f"{self.duration:.3g} s after each edge of the command in {' and '.join(self.kinds)} "
-            "tests: the solenoids' overshoot is not modelled."
-        )
-
-    def excluded(self, run: ComparedRun) -> Mask:
-        """See `Rule`."""
-        out = np.zeros(run.time.shape, dtype=np.bool_)
-        if run.kind not in self.kinds:
-            return out
-        for begin in edges(run):
-            out |= (run.time >= begin) & (run.time < begin + self.duration)
-        return out
+def _small(values: Array, share: float) -> Mask:
+    size = np.abs(values)
+    small: Mask = size < share * size.max(initial=0.0)
+    return small
 
 
-@dataclass(frozen=True)
-class ZeroCrossings:
-    """Leaves out the middle of sines of the rectified current."""
-
-    share: float = 0.1
-    """Of the largest command."""
-    name: str = "zero crossings"
-
-    @property
-    def why(self) -> str:
-        """See `Rule`."""
-        return (
-            f"Sines of the rectified current below {100.0 * self.share:.3g} % of the largest "
-            "command: one ammeter around both leads misreads where the solenoids change over."
-        )
-
-    def excluded(self, run: ComparedRun) -> Mask:
-        """See `Rule`."""
-        concerned = run.kind == "sine" and run.quantity == "rectified_current"
-        size = np.abs(run.command)
-        small: Mask = (size < self.share * size.max(initial=0.0)) & concerned
-        return small
-
-
-@dataclass(frozen=True)
-class FastSines:
-    """Leaves out whole runs of fast sines."""
-
-    frequency: float = 0.3
-    """[Hz]"""
-    name: str = "fast sines"
-
-    @property
-    def why(self) -> str:
-        """See `Rule`."""
-        return (
-            f"Sines of {self.frequency:g} Hz and above: faster than any swell that a crane is "
-            "to follow."
-        )
-
-    def excluded(self, run: ComparedRun) -> Mask:
-        """See `Rule`."""
-        fast = run.kind == "sine" and (run.frequency or 0.0) >= (1.0 - 1e-6) * self.frequency
-        return np.full(run.time.shape, fast)
-
-
-@dataclass(frozen=True)
-class WholeKind:
-    """Leaves out all tests of a kind."""
-
-    kind: Kind = "step"
-    reason: str = "the turret swings in its backlash, so that no steady value can be told"
-
-    @property
-    def name(self) -> str:
-        """See `Rule`."""
-        return f"{self.kind}s"
-
-    @property
-    def why(self) -> str:
-        """See `Rule`."""
-        return f"All {self.kind} tests: {self.reason}."
-
-    def excluded(self, run: ComparedRun) -> Mask:
-        """See `Rule`."""
-        return np.full(run.time.shape, run.kind == self.kind)
-
-
-@dataclass(frozen=True)
-class SmallValues:
-    """Leaves out where a relative error has no meaning."""
-
-    share: float = 0.2
-    """Of the largest measured size in the run."""
-    name: str = "small values"
-
-    @property
-    def why(self) -> str:
-        """See `Rule`."""
-        return (
-            f"Measured values below {100.0 * self.share:.3g} % of the run's largest: a per cent "
-            "of next to nothing means nothing. The source does not state how it did this."
-        )
-
-    def excluded(self, run: ComparedRun) -> Mask:
-        """See `Rule`."""
-        size = np.abs(run.measured)
-        small: Mask = size < self.share * size.max(initial=0.0)
-        return small
-
-
-SOURCE_RULES: Sequence[Rule] = (
-    StartTransient(),
-    Overshoot(),
-    ZeroCrossings(),
-    FastSines(),
-    SmallValues(),
+SOURCE_RULES: tuple[Rule, ...] = (
+    Rule(
+        "start transient",
+        f"The first {START:.3g} s of the speed: the plussing acts as a step when the simulation "
+        "begins.",
+        lambda run: (run.time < run.time[0] + START) & (run.quantity == "shaft_speed"),
+    ),
+    Rule(
+        "overshoot",
+        f"{OVERSHOOT:.3g} s after each edge of the command in step tests: the solenoids' overshoot "
+        "is not modelled.",
+        _after_edges,
+    ),
+    Rule(
+        "zero crossings",
+        f"Sines of the rectified current below {100.0 * CROSSING:.3g} % of the largest command: "
+        "one ammeter around both leads misreads where the solenoids change over.",
+        lambda run: (
+            (run.kind == "sine" and run.quantity == "rectified_current")
+            & _small(run.command, CROSSING)
+        ),
+    ),
+    Rule(
+        "fast sines",
+        f"Sines of {FAST:g} Hz and above: faster than any swell that a crane is to follow.",
+        lambda run: run.kind == "sine" and (run.frequency or 0.0) >= (1.0 - 1e-6) * FAST,
+    ),
+    Rule(
+        "small values",
+        f"Measured values below {100.0 * SMALL:.3g} % of the run's largest: a per cent of next to "
+        "nothing means nothing. The source does not state how it did this.",
+        lambda run: _small(run.measured, SMALL),
+    ),
 )
-"""The source's exclusions on hoist; slew leaves out `WholeKind("step")` as well."""
+"""The source's exclusions on hoist."""
+
+STEPS = Rule(
+    "steps",
+    "All step tests: the turret swings in its backlash, so that no steady value can be told.",
+    lambda run: run.kind == "step",
+)
+
+
+def source_rules(drive: str) -> tuple[Rule, ...]:
+    """What the source leaves out of its tables for a drive of that name: of slew all steps."""
+    return (*SOURCE_RULES, STEPS) if drive == "slew" else SOURCE_RULES
 
 
 def edges(run: ComparedRun) -> Array:
@@ -222,10 +137,6 @@ def edges(run: ComparedRun) -> Array:
     leaving = np.flatnonzero(size > OFF_ZERO * largest)[:1]
     found: Array = run.time[np.unique(np.concatenate([jumps + 1, leaving]))]
     return found
-
-
-Reference = Literal["measured", "largest"]
-"""What 100 % is: what is measured at that instant, or the largest size measured in the run."""
 
 
 class LargestError(NamedTuple):
@@ -246,183 +157,162 @@ class LargestError(NamedTuple):
 
 @dataclass(frozen=True)
 class ErrorTable:
-    """Largest per cent errors, as in the source's tables 4.5, 4.6, 7.5 and 7.6."""
+    """Largest per cent errors of one channel, as in the source's tables 4.5, 4.6, 7.5 and 7.6."""
 
+    channel: str
     rows: tuple[LargestError, ...]
     """Of the kinds of test that there are: ramp, step, sine."""
     rules: tuple[Rule, ...]
     """That were applied."""
     acted: tuple[Rule, ...]
     """Those of them that left out a sample."""
-    reference: Reference
     left_out: tuple[tuple[str, str], ...]
     """Runs that were left out as a whole, and the rule."""
-
-    def sentences(self) -> tuple[str, ...]:
-        """The table in words, and every rule that left out anything."""
-        said = []
-        for row in self.rows:
-            if row.percent is None:
-                said.append(f"{row.kind}: no sample is left to judge.")
-            else:
-                said.append(
-                    f"{row.kind}: {row.percent:.2f} % in {row.run} at {row.time:.2f} s, of "
-                    f"{row.samples} samples in {row.runs} run{'s' if row.runs > 1 else ''}."
-                )
-        of = "what is measured then" if self.reference == "measured" else "the run's largest value"
-        said.append(f"Per cent of {of}.")
-        said += [f"Left out ({rule.name}): {rule.why}" for rule in self.acted]
-        return tuple(said)
+    average: float
+    """Width of the moving mean over the differences. [s]"""
+    unjudged: tuple[str, ...] = ()
+    """Runs that are neither ramp, step nor sine, or too short."""
 
 
-def error_table(
-    runs: Sequence[ComparedRun],
-    *,
-    rules: Sequence[Rule] = SOURCE_RULES,
-    reference: Reference = "measured",
-    average: float = 0.0,
-) -> ErrorTable:
-    """Largest per cent error by kind of test.
+def error_tables(
+    qualities: Sequence[RunQuality], rules: Sequence[Rule] = SOURCE_RULES
+) -> tuple[ErrorTable, ...]:
+    """The source's error table of each channel: the largest per cent error by kind of test.
 
     Parameters
     ----------
-    runs : sequence of ComparedRun
-        Runs of one axis and quantity.
+    qualities : sequence of RunQuality
+        Runs of one axis. Positions are passed over: their zero is free, so that a per cent of one
+        means nothing; take `with_speeds`.
     rules : sequence of Rule
-        What is left out; fewer rules switch the others off.
-    reference : {"measured", "largest"}
-        What 100 % is.
-    average : float
-        Width of a moving mean over the differences, for currents with dither: the source read its
-        errors off figures. 0 is none. [s]
-
-    Raises
-    ------
-    InputError
-        If there is no run, lengths differ, a number is not finite, or the width is negative.
+        What is left out.
 
     Notes
     -----
     The source speaks of the region with the largest per cent error and gives neither formula nor
     limits of the regions; they are stated here as rules and printed with the table.
     """
-    if not runs:
-        raise InputError("An error table needs at least one run.")
-    if not average >= 0.0:
-        raise InputError(f"The width {average:g} s of a moving mean must not be negative.")
-    rows, left_out = [], list[tuple[str, str]]()
-    acted = set[str]()
+    made = []
+    for name in dict.fromkeys(each.channel for each in qualities):
+        alike = [each for each in qualities if each.channel == name]
+        channel = alike[0].experiment[name]
+        found = {each.experiment.name: compared_run(each) for each in alike}
+        judged = [run for run in found.values() if run is not None]
+        if judged and not channel.is_position:
+            unjudged = tuple(run for run, each in found.items() if each is None)
+            average = DITHER_MEAN if channel.unit == "A" else 0.0
+            made.append(error_table(name, judged, rules, average, unjudged))
+    return tuple(made)
+
+
+def compared_run(quality: RunQuality) -> ComparedRun | None:
+    """A channel of a run as the source's error tables take it, None if it is of no kind there."""
+    experiment, channel = quality.experiment, quality.experiment[quality.channel]
+    kind, used = kind_of(experiment), channel.used
+    if kind is None or np.count_nonzero(used) < 8:
+        return None
+    time, recognised = channel.time[used], experiment.recognised
+    return ComparedRun(
+        experiment.name,
+        kind,
+        channel.kind,
+        time,
+        experiment.input.at(time),
+        channel.values[used],
+        quality.simulated[used],
+        recognised.frequency if recognised is not None else None,
+    )
+
+
+def kind_of(experiment: Experiment) -> Kind | None:
+    """Kind of a test in the source's tables, by the first word of its manoeuvre."""
+    word = experiment.maneuver.split(" ")[0]
+    return next((each for each in get_args(Kind) if each == word), None)
+
+
+def error_table(
+    channel: str,
+    runs: Sequence[ComparedRun],
+    rules: Sequence[Rule] = SOURCE_RULES,
+    average: float = 0.0,
+    unjudged: tuple[str, ...] = (),
+) -> ErrorTable:
+    """Largest per cent error of what is measured, by kind of test.
+
+    Parameters
+    ----------
+    channel : str
+        Its name.
+    runs : sequence of ComparedRun
+        Runs of one axis and channel.
+    rules : sequence of Rule
+        What is left out.
+    average : float
+        Width of a moving mean over the differences, for currents with dither: the source read its
+        errors off figures. 0 is none. [s]
+    unjudged : tuple of str
+        Runs that are none of these.
+
+    Raises
+    ------
+    InputError
+        If lengths differ or a number is not finite.
+    """
+    rows, acted, left_out = [], set[str](), list[tuple[str, str]]()
     for kind in get_args(Kind):
         alike = [run for run in runs if run.kind == kind]
-        if not alike:
-            continue
         best: tuple[float, str, float] | None = None
-        samples, judged = 0, 0
+        samples = judged = 0
         for run in alike:
-            _check(run)
-            kept, whole, by = _kept(run, rules)
+            kept, by, whole = kept_by(run, rules)
             acted.update(by)
-            if whole is not None:
-                left_out.append((run.name, whole))
-            percent, defined = _percent(run, reference, average)
-            places = np.flatnonzero(kept & defined)
+            left_out += [(run.name, by[0])] if whole else []
+            percent = _percent(run, average)
+            places = np.flatnonzero(kept & np.isfinite(percent))
             samples += places.size
             judged += bool(places.size)
             if places.size and (best is None or percent[places].max() > best[0]):
                 worst = int(places[np.argmax(percent[places])])
                 best = float(percent[worst]), run.name, float(run.time[worst])
-        percent_of, where, when = best if best is not None else (None, None, None)
-        rows.append(LargestError(kind, percent_of, where, when, samples, judged))
+        if alike:
+            rows.append(LargestError(kind, *(best or (None, None, None)), samples, judged))
     of_use = tuple(rule for rule in rules if rule.name in acted)
-    return ErrorTable(tuple(rows), tuple(rules), of_use, reference, tuple(left_out))
+    return ErrorTable(
+        channel, tuple(rows), tuple(rules), of_use, tuple(left_out), average, unjudged
+    )
 
 
-class SineError(NamedTuple):
-    """Error of a sine by its first harmonic."""
-
-    amplitude_percent: float
-    """Simulated amplitude less measured, of the measured. [%]"""
-    phase: float
-    """Simulated phase less measured; positive leads. [rad]"""
-
-
-def sine_error(run: ComparedRun, *, rules: Sequence[Rule] = SOURCE_RULES) -> SineError:
-    """Amplitude and phase error of a sine, which its shape's errors do not enter.
-
-    Parameters
-    ----------
-    run : ComparedRun
-        With a frequency.
-    rules : sequence of Rule
-        What is left out.
+def kept_by(run: ComparedRun, rules: Sequence[Rule]) -> tuple[Mask, list[str], bool]:
+    """(n,) samples that rules leave in, names of those that act, and whether one leaves out all.
 
     Raises
     ------
     InputError
-        If it is no sine of known frequency, or rectified, less than a period is left, or nothing
-        was measured.
+        If lengths differ or a number is not finite.
     """
-    _check(run)
-    if run.kind != "sine" or not run.frequency:
-        raise InputError(f"{run.name} is no sine of known frequency; it has no amplitude error.")
-    if run.quantity == "rectified_current":
-        raise InputError(f"{run.name}: a rectified current is no sine any more.")
-    kept, _, _ = _kept(run, rules)
-    time = run.time[kept]
-    if time.size < 8 or _length(time) < (1.0 - 1e-6) / run.frequency:
-        raise InputError(f"Of {run.name} less than one period is left to judge.")
-    turn = 2.0 * np.pi * run.frequency * time
-    columns = np.column_stack([np.cos(turn), np.sin(turn), np.ones(time.size)])
-    measured, simulated = (
-        complex(*np.linalg.lstsq(columns, samples[kept], rcond=None)[0][:2]).conjugate()
-        for samples in (run.measured, run.simulated)
-    )
-    if abs(measured) == 0.0:
-        raise InputError(f"Of {run.name} nothing was measured at {run.frequency:g} Hz.")
-    ratio = simulated / measured
-    return SineError(100.0 * (abs(ratio) - 1.0), float(np.angle(ratio)))
+    arrays = (run.time, run.command, run.measured, run.simulated)
+    if len({each.shape for each in arrays}) != 1 or not run.time.size:
+        raise InputError(f"{run.name}: time, command, measured and simulated differ in length.")
+    if not all(np.isfinite(each).all() for each in arrays):
+        raise InputError(f"{run.name}: a sample is not finite; leave it out.")
+    kept, acted = np.ones(run.time.shape, dtype=np.bool_), list[str]()
+    for rule in rules:
+        out = np.broadcast_to(rule.excluded(run), kept.shape)
+        if out.all():
+            # of what is not there at all no other rule can take anything
+            return ~out, [rule.name], True
+        acted += [rule.name] if out.any() else []
+        kept &= ~out
+    return kept, acted, False
 
 
-def _length(time: Array) -> float:
-    """Time that samples stand for. [s]"""
-    return float(np.ptp(time) + np.median(np.diff(time)))
-
-
-def _percent(
-    run: ComparedRun, reference: Reference, average: float
-) -> tuple[Array, NDArray[np.bool_]]:
-    """(n,) errors, and where there is something that they can be a part of. [%]"""
+def _percent(run: ComparedRun, average: float) -> Array:
+    """(n,) errors of what is measured; nan where that is nothing. [%]"""
     difference = run.simulated - run.measured
     if average > 0.0 and run.time.size > 1:
         width = max(round(average / float(np.median(np.diff(run.time)))), 1)
         inside = np.convolve(np.ones(difference.size), np.ones(width), "same")
         difference = np.convolve(difference, np.ones(width), "same") / inside
     size = np.abs(run.measured)
-    full = size if reference == "measured" else np.full(size.shape, size.max())
-    percent = 100.0 * np.abs(difference)
-    return np.divide(percent, full, out=np.zeros_like(full), where=full > 0.0), full > 0.0
-
-
-def _kept(
-    run: ComparedRun, rules: Sequence[Rule]
-) -> tuple[NDArray[np.bool_], str | None, list[str]]:
-    """(n,) samples that no rule leaves out, the rule that leaves out all, and those that act."""
-    kept = np.ones(run.time.shape, dtype=np.bool_)
-    acted = []
-    for rule in rules:
-        out = rule.excluded(run)
-        if out.all():
-            # of what is not there at all no other rule can take anything
-            return ~out, rule.name, [rule.name]
-        if out.any():
-            acted.append(rule.name)
-        kept &= ~out
-    return kept, None, acted
-
-
-def _check(run: ComparedRun) -> None:
-    arrays = (run.time, run.command, run.measured, run.simulated)
-    if len({each.shape for each in arrays}) != 1 or not run.time.size:
-        raise InputError(f"{run.name}: time, command, measured and simulated differ in length.")
-    if not all(np.isfinite(each).all() for each in arrays):
-        raise InputError(f"{run.name}: a sample is not finite; leave it out.")
+    nothing = np.full_like(size, np.nan)
+    return np.divide(100.0 * np.abs(difference), size, out=nothing, where=size > 0.0)

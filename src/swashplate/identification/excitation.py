@@ -184,11 +184,12 @@ def activation(
     rows = []
     for simulation in simulations.values():
         found = acting(simulation, parameters)
-        for name in forces.names if forces is not None else ():
-            # from half way to the force's effective current on
-            beyond = (1.0 if "_plus_" in name else -1.0) * simulation.current - simulation.pump.Z17
-            reached = beyond >= _current_of(name, forces)[1]
-            found[name] = float(np.count_nonzero(reached)) / simulation.record.rate
+        if forces is not None:
+            for name in forces.names:
+                # from half way to the force's effective current on
+                signed = (1.0 if "_plus_" in name else -1.0) * simulation.current
+                reached = signed - simulation.pump.Z17 >= _current_of(name, forces)[1]
+                found[name] = float(np.count_nonzero(reached)) / simulation.record.rate
         rows.append([max(found[target] for target in each.targets) for each in ours])
     return Activation(
         tuple(simulations),

@@ -429,7 +429,7 @@ class _Space:
                 continue
             vector = tangent / tangent[place]
             told = vector @ np.linalg.lstsq(covariance, vector, rcond=1e-14)[0]
-            if HALF > WIDE * sqrt(max(told, 0.0)):
+            if WIDE * sqrt(max(told, 0.0)) < HALF:
                 return gauge, vector
         return None, covariance[place] / covariance[place, place]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,22 +19,10 @@ from swashplate.identification.assessment import (
     pooled_measures,
 )
 from swashplate.identification.drive_model import SIGNALS, DriveModel, current_record
-from swashplate.identification.error_tables import (
-    SOURCE_RULES,
-    ComparedRun,
-    ErrorTable,
-    Kind,
-    Quantity,
-    Rule,
-    WholeKind,
-    error_table,
-)
 from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.staging import Parameters
 
 Array = NDArray[np.float64]
-DITHER_MEAN = 0.1
-"""Width of the moving mean over a current's differences, against the dither. [s]"""
 
 
 def predict(parameters: Parameters, experiments: Sequence[Experiment]) -> tuple[RunQuality, ...]:
@@ -123,84 +110,6 @@ def ignored_windows(channel: Channel) -> tuple[tuple[float, float], ...]:
         (float(channel.time[first]), float(channel.time[after - 1]))
         for first, after in zip(edges[::2], edges[1::2], strict=True)
     )
-
-
-class ChannelErrors(NamedTuple):
-    """The source's error table of one channel."""
-
-    channel: str
-    table: ErrorTable
-    average: float
-    """Width of the moving mean over the differences. [s]"""
-    unjudged: tuple[str, ...]
-    """Runs that are neither ramp, step nor sine, or too short."""
-
-
-def source_rules(drive: str) -> tuple[Rule, ...]:
-    """What the source leaves out of its tables for a drive of that name: of slew all steps."""
-    return (*SOURCE_RULES, WholeKind("step")) if drive == "slew" else tuple(SOURCE_RULES)
-
-
-def channel_errors(
-    qualities: Sequence[RunQuality], rules: Sequence[Rule] = SOURCE_RULES
-) -> tuple[ChannelErrors, ...]:
-    """The source's error table of each channel: the largest per cent error by kind of test.
-
-    Parameters
-    ----------
-    qualities : sequence of RunQuality
-        Runs of one axis. Positions are passed over: their zero is free, so that a per cent of one
-        means nothing; take `with_speeds`.
-    rules : sequence of Rule
-        What is left out.
-    """
-    made = []
-    for name in dict.fromkeys(each.channel for each in qualities):
-        alike = [each for each in qualities if each.channel == name]
-        channel = alike[0].experiment[name]
-        if channel.is_position:
-            continue
-        found = [compared_run(each) for each in alike]
-        judged = [each for each in found if each is not None]
-        if not judged:
-            continue
-        average = DITHER_MEAN if channel.unit == "A" else 0.0
-        unjudged = tuple(
-            each.experiment.name for each, run in zip(alike, found, strict=True) if run is None
-        )
-        table = error_table(judged, rules=rules, average=average)
-        made.append(ChannelErrors(name, table, average, unjudged))
-    return tuple(made)
-
-
-def compared_run(quality: RunQuality) -> ComparedRun | None:
-    """A channel of a run as the source's error tables take it, None if it is of no kind there."""
-    experiment, channel = quality.experiment, quality.experiment[quality.channel]
-    kind = kind_of(experiment)
-    used = channel.used
-    if kind is None or np.count_nonzero(used) < 8:
-        return None
-    quantity: Quantity = "other"
-    if channel.kind in ("rectified_current", "shaft_speed"):
-        quantity = "rectified_current" if channel.kind == "rectified_current" else "shaft_speed"
-    recognised = experiment.recognised
-    time = channel.time[used]
-    return ComparedRun(
-        experiment.name,
-        kind,
-        quantity,
-        time,
-        experiment.input.at(time),
-        channel.values[used],
-        quality.simulated[used],
-        recognised.frequency if recognised is not None else None,
-    )
-
-
-def kind_of(experiment: Experiment) -> Kind | None:
-    """Kind of a test in the source's tables, by the first word of its manoeuvre."""
-    word = experiment.maneuver.split(" ")[0]
-    return next((each for each in get_args(Kind) if each == word), None)
 
 
 def _speed_quality(quality: RunQuality) -> RunQuality | None:

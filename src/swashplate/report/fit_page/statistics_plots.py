@@ -17,7 +17,7 @@ from swashplate.identification.profile import Profile
 from swashplate.identification.starts import StartResult
 from swashplate.identification.unknowns import Unknown
 from swashplate.report.fit_page.bokeh_style import dress
-from swashplate.report.style import BLUE, FAINT, GREY, VERMILION
+from swashplate.report.style import BLUE, GREY, VERMILION
 
 ROW = 15
 """Height of a bar with its name. [px]"""
