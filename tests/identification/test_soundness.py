@@ -13,6 +13,7 @@ from swashplate.campaign import Campaign, InputSignal, Source, rig
 from swashplate.cli import app
 from swashplate.identification.data_checks import (
     Finding,
+    Motion,
     check_runs,
     check_sound,
     contradictions,
@@ -20,7 +21,6 @@ from swashplate.identification.data_checks import (
     time_constant,
 )
 from swashplate.identification.fitting import smooth
-from swashplate.identification.motion import Motion
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
 
 NOMINAL = smooth(Drive.preset("hoist").parameters)

@@ -539,8 +539,8 @@ def test_the_page_renders_and_zooms_in_a_browser_without_errors(
     said = [line for line in done.stderr.splitlines() if ":CONSOLE" in line]
     assert [line for line in said if "setting log level" not in line] == []
     figures = len(re.findall(r'class="figure[ "]', page.read_text("utf-8")))
-    # 3 runs, 3 for each of two stages less the pump's correlations, starts, a profile
-    assert figures == 3 + 2 + 2 + 1 + 1 + done.stdout.count('data-item="correlation-')
+    # 3 runs, sensitivities of each of two stages, starts, a profile, and correlations
+    assert figures == 3 + 2 + 1 + 1 + done.stdout.count('data-item="correlation-')
     assert done.stdout.count('data-drawn="yes"') == figures
     # a second in view: every sample of it
     time = fitted.stages[0].problem.experiments[0]["current"].time

@@ -70,7 +70,8 @@ def _after_edges(run: ComparedRun) -> Mask | bool:
     if run.kind != "step":
         return False
     since = run.time[:, None] - edges(run)
-    return np.any((since >= 0.0) & (since < OVERSHOOT), axis=1)
+    after: Mask = np.any((since >= 0.0) & (since < OVERSHOOT), axis=1)
+    return after
 
 
 def _small(values: Array, share: float) -> Mask:
@@ -275,7 +276,8 @@ def error_table(
                 worst = int(places[np.argmax(percent[places])])
                 best = float(percent[worst]), run.name, float(run.time[worst])
         if alike:
-            rows.append(LargestError(kind, *(best or (None, None, None)), samples, judged))
+            percent_of, where, when = best or (None, None, None)
+            rows.append(LargestError(kind, percent_of, where, when, samples, judged))
     of_use = tuple(rule for rule in rules if rule.name in acted)
     return ErrorTable(
         channel, tuple(rows), tuple(rules), of_use, tuple(left_out), average, unjudged

@@ -165,7 +165,7 @@ NAMED = 6
 """Changes that a sentence names, the largest first."""
 
 WIDE = 0.1
-"""Half width of a 95 % interval, of the value or of the scale, from which an unknown is weak. [1]"""
+"""Half width of a 95 % interval, of the value or the scale, from which an unknown is weak. [1]"""
 
 HALF = 1.96
 """Half width of a 95 % interval, in standard errors."""

@@ -152,8 +152,8 @@ def _aside(power: Array, place: int) -> float:
 def _tapers(size: int, count: int) -> Array:
     """(count, size) Slepian sequences of unit energy, each of either sign.
 
-    Eigenvectors of Slepian's (1978) tridiagonal matrix, as SciPy's ``dpss`` has them; that one comes
-    with all of `scipy.signal`, which takes half a second to load.
+    Eigenvectors of Slepian's (1978) tridiagonal matrix, as in SciPy's ``dpss``, which comes with
+    all of `scipy.signal` and half a second to load it.
     """
     n = np.arange(size)
     middle = (0.5 * (size - 1) - n) ** 2 * np.cos(2.0 * np.pi * HALF_BANDWIDTH / size)
