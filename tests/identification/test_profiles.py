@@ -6,7 +6,7 @@ from scipy.optimize import brentq, least_squares, minimize_scalar
 from scipy.stats import t as student
 
 from swashplate.errors import DomainError, InputError
-from swashplate.identification.profile import Profile, Threshold, profile, threshold
+from swashplate.identification.profile import Profile, profile, threshold
 
 RNG = np.random.default_rng(6)
 J = RNG.normal(size=(60, 3)) @ np.array([[1.0, 0.0, 0.0], [0.9, 0.3, 0.0], [0.0, 0.2, 2.0]])
@@ -74,7 +74,7 @@ def test_a_nonlinear_model_agrees_with_a_root_search() -> None:
     def over(rate: float) -> float:
         shape = np.exp(-rate * time)
         gain = shape @ measured / (shape @ shape)
-        return 0.5 * float(np.sum((gain * shape - measured) ** 2)) - best.cost - limit.rise
+        return 0.5 * float(np.sum((gain * shape - measured) ** 2)) - best.cost - limit
 
     assert found.lower == pytest.approx(brentq(over, 0.5, best.x[1]), rel=1e-3)
     assert found.upper == pytest.approx(brentq(over, best.x[1], 4.0), rel=1e-3)
@@ -101,7 +101,7 @@ def bowl(height: float = 1.0) -> tuple:
     return lambda index, value, start: (1.0 + 0.5 * height * value**2, np.array([value]))
 
 
-LIMIT = Threshold(0.5, 0.95, 1.0)
+LIMIT = 0.5
 ZERO = np.zeros(1)
 
 
@@ -164,9 +164,9 @@ def test_the_root_of_a_kinked_cost_is_found() -> None:
 
 def test_thresholds_by_hand() -> None:
     # s² = 2·28.5/57 = 1, q = 2.0025 for 57 degrees of freedom
-    assert threshold(28.5, 60, 3).rise == pytest.approx(0.5 * 2.002465**2, rel=1e-5)
+    assert threshold(28.5, 60, 3) == pytest.approx(0.5 * 2.002465**2, rel=1e-5)
     given = threshold(28.5, 60, 3, inflation=4.0, freedom=1e9)
-    assert given.rise == pytest.approx(4.0 * 0.5 * 1.959964**2, rel=1e-5)
+    assert given == pytest.approx(4.0 * 0.5 * 1.959964**2, rel=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -187,11 +187,11 @@ def test_thresholds_that_mean_nothing_are_refused(change: dict, said: str) -> No
     ("change", "said"),
     [
         ({"step": 0.0}, "must be positive"),
-        ({"threshold": Threshold(0.0, 0.95, 1.0)}, "exactly zero"),
+        ({"rise": 0.0}, "exactly zero"),
         ({"bounds": (1.0, 2.0)}, "outside the bounds"),
     ],
 )
 def test_profiles_that_cannot_begin_are_refused(change: dict, said: str) -> None:
-    arguments = {"threshold": LIMIT, "step": 1.0, "bounds": (-9.0, 9.0), **change}
+    arguments = {"rise": LIMIT, "step": 1.0, "bounds": (-9.0, 9.0), **change}
     with pytest.raises(InputError, match=said):
         _: Profile = profile(bowl(), ZERO, 1.0, 0, **arguments)

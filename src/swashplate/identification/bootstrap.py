@@ -19,7 +19,7 @@ from swashplate.identification.fitting import StageFit
 from swashplate.identification.linearised import LinearisedFit
 from swashplate.identification.noise import grid_of, noise_colours, unweighted
 from swashplate.identification.problem import Problem
-from swashplate.identification.profile import Profile, Threshold, minimiser, profile, threshold
+from swashplate.identification.profile import Profile, minimiser, profile, threshold
 from swashplate.identification.solving import solve
 from swashplate.identification.spectral_lines import without_lines
 from swashplate.identification.unknowns import Unknowns
@@ -249,7 +249,7 @@ class _Sideways(NamedTuple):
     problem: Problem
     vector: Array
     cost: float
-    thresholds: dict[int, Threshold]
+    rises: dict[int, float]
     steps: Array
 
 
@@ -289,7 +289,7 @@ def profiles_of(
     else:
         chosen = sorted({variables.index(name) for name in names})
     cost = problem.cost(vector)
-    thresholds = {
+    rises = {
         k: threshold(
             cost,
             fit.samples,
@@ -301,7 +301,7 @@ def profiles_of(
         for k in chosen
     }
     steps = found.own.standard_errors
-    shared = _Sideways(replace(problem, threads=1), vector, cost, thresholds, steps)
+    shared = _Sideways(replace(problem, threads=1), vector, cost, rises, steps)
     made: dict[str, Profile] = {}
     for position, each in (executor or Serial()).run(_profiled, shared, chosen):
         made[variables.names[chosen[position]]] = each
@@ -315,5 +315,5 @@ def _profiled(shared: _Sideways, index: int) -> Profile:
     step = float(shared.steps[index])
     if not (np.isfinite(step) and step > 0.0):
         step = 0.01 * (high - low)
-    limit, least = shared.thresholds[index], minimiser(shared.problem)
-    return profile(least, shared.vector, shared.cost, index, limit, step, (low, high))
+    least, rise = minimiser(shared.problem), shared.rises[index]
+    return profile(least, shared.vector, shared.cost, index, rise, step, (low, high))

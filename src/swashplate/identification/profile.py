@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -19,41 +19,36 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """The other unknowns of a problem, for `solving.solve`."""
+class _Beside:
+    """A problem with one of its unknowns fixed, as `solving.Objective` has it."""
 
     problem: Problem
     index: int
-    """Of the unknown that is held."""
     number: float
-    """Where, in the solver's vector."""
+    """Of the fixed unknown, in the solver's vector."""
     start: Array
-    """(K - 1,) where the others begin."""
+    """(K - 1,)"""
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """(K - 1,) bounds of the others."""
         low, high = self.problem.bounds
         return np.delete(low, self.index), np.delete(high, self.index)
 
     def evaluate(self, vector: Array, *, compressed: bool = True) -> Evaluation:
-        """As of the problem, without the held unknown's column."""
         whole = self.problem.evaluate(self.whole(vector), compressed=compressed)
         return Evaluation(whole.residuals, np.delete(whole.jacobian, self.index, axis=1))
 
     def cost(self, vector: Array) -> float:
-        """As of the problem."""
         return self.problem.cost(self.whole(vector))
 
     def whole(self, vector: Array) -> Array:
-        """(K,) vector with the held unknown put in."""
         return np.insert(vector, self.index, self.number)
 
 
 def minimiser(
     problem: Problem, *, tolerance: float = 1e-8, max_evaluations: int = 60
 ) -> Callable[[int, float, Array], tuple[float, Array]]:
-    """What `profiles.profile` asks for: the least cost with one unknown held."""
+    """What `profile` asks for: the least cost with one unknown fixed."""
 
     def minimise(index: int, number: float, start: Array) -> tuple[float, Array]:
         low, high = problem.bounds
@@ -61,16 +56,16 @@ def minimiser(
         if not others.size:
             vector = np.array([number])
             return problem.cost(vector), vector
-        held = Held(problem, index, number, others)
-        found = solve(held, others, tolerance=tolerance, max_evaluations=max_evaluations)
-        return found.cost, held.whole(found.vector)
+        beside = _Beside(problem, index, number, others)
+        found = solve(beside, tolerance=tolerance, max_evaluations=max_evaluations)
+        return found.cost, beside.whole(found.vector)
 
     return minimise
 
 
 Minimise = Callable[[int, float, Array], tuple[float, Array]]
-"""Number of the unknown held, its number in the vector, and a (K,) start to the least cost of all
-vectors that have it there, and the vector; cost is half the sum of squares."""
+"""Number of the unknown that is fixed, its number in the vector, and a (K,) start to the least cost
+of all vectors that have it there, and the vector; cost is half the sum of squares."""
 
 Ending = Literal["crossed", "bound", "open", "domain", "better optimum"]
 """How a side ended: beyond the threshold, at the bound below it, below it as far as was looked,
@@ -102,37 +97,36 @@ class Point(NamedTuple):
     vector: Vector
 
 
+@dataclass(eq=False)
 class ProfileSide:
     """One side of a profile, outwards."""
 
-    def __init__(
-        self,
-        minimise: Minimise,
-        optimum: Point,
-        index: int,
-        rise: float,
-        direction: float,
-        step: float,
-        bound: float,
-        most: int,
-    ) -> None:
-        self._minimise, self._optimum, self._index = minimise, optimum, index
-        self._rise, self._direction, self._step, self._most = rise, direction, step, most
-        self._room = abs(bound - optimum.number)
-        self.points: list[Point] = []
-        self.end: float | None = None
-        self.better: Point | None = None
+    minimise: Minimise
+    optimum: Point
+    index: int
+    rise: float
+    """Of the cost, at which the side ends."""
+    direction: float
+    """1 upwards, -1 downwards."""
+    step: float
+    """Of about one standard error."""
+    bound: float
+    most: int
+    """Largest number of points."""
+    points: list[Point] = field(default_factory=list)
+    end: float | None = None
+    better: Point | None = None
 
     def march(self) -> Ending:
         """Outwards until the cost has risen enough, or something else ends the side."""
         # roots of the rise over the threshold's, by distance: nearly a straight line
         path = [(0.0, 0.0)]
-        stride, halvings = STRIDE * self._step, 0
-        while len(self.points) < self._most:
-            distance = min(path[-1][0] + stride, self._room)
+        stride, halvings = STRIDE * self.step, 0
+        while len(self.points) < self.most:
+            distance = min(path[-1][0] + stride, abs(self.bound - self.optimum.number))
             if distance <= path[-1][0]:
                 return "bound"
-            if distance > FURTHEST * self._step:
+            if distance > FURTHEST * self.step:
                 return "open"
             point = self._at(distance)
             if point is None:
@@ -167,7 +161,8 @@ class ProfileSide:
                 break
             if self._improves(point):
                 return "better optimum"
-            self._insert(point)
+            self.points.append(point)
+            self.points.sort(key=lambda each: abs(each.number - self.optimum.number))
             value = self._height(point) - 1.0
             if abs(value) <= CLOSE:
                 break
@@ -176,45 +171,29 @@ class ProfileSide:
             else:
                 low *= 0.5
             far, high = distance, value
-        self.end = self._optimum.number + self._direction * distance
+        self.end = self.optimum.number + self.direction * distance
         return "crossed"
 
     def _at(self, distance: float) -> Point | None:
         """The least cost at a distance from the optimum; None outside the model's domain."""
-        number = self._optimum.number + self._direction * distance
-        start = self._nearest(number).vector.copy()
-        start[self._index] = number
+        number = self.optimum.number + self.direction * distance
+        known = (self.optimum, *self.points)
+        start = min(known, key=lambda point: abs(point.number - number)).vector.copy()
+        start[self.index] = number
         try:
-            cost, vector = self._minimise(self._index, number, start)
+            cost, vector = self.minimise(self.index, number, start)
         except DomainError:
             return None
         return Point(number, float(cost), vector) if np.isfinite(cost) else None
 
-    def _nearest(self, number: float) -> Point:
-        return min((self._optimum, *self.points), key=lambda point: abs(point.number - number))
-
-    def _insert(self, point: Point) -> None:
-        self.points.append(point)
-        self.points.sort(key=lambda each: abs(each.number - self._optimum.number))
-
     def _improves(self, point: Point) -> bool:
-        better = point.cost < self._optimum.cost - BETTER * self._rise
+        better = point.cost < self.optimum.cost - BETTER * self.rise
         if better:
             self.better = point
         return better
 
     def _height(self, point: Point) -> float:
-        return float(np.sqrt(max(point.cost - self._optimum.cost, 0.0) / self._rise))
-
-
-class Threshold(NamedTuple):
-    """Rise of the cost up to which a value is within the interval."""
-
-    rise: float
-    """Of half the sum of squares."""
-    level: float
-    inflation: float
-    """Samples that stand for one independent one."""
+        return float(np.sqrt(max(point.cost - self.optimum.cost, 0.0) / self.rise))
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +205,8 @@ class Profile:
     """Of the optimum that it starts from."""
     points: tuple[Point, ...]
     """In order of the unknown, the optimum among them."""
-    threshold: Threshold
+    rise: float
+    """Of the cost, up to which a value is within the interval."""
     lower: float | None
     """End of the interval, in the solver's vector; None where there is none on that side."""
     upper: float | None
@@ -262,7 +242,7 @@ def threshold(
     inflation: float = 1.0,
     freedom: float | None = None,
     level: float = 0.95,
-) -> Threshold:
+) -> float:
     """Rise of the cost that ends an interval, for coloured residuals.
 
     Parameters
@@ -307,8 +287,7 @@ def threshold(
     from scipy.special import stdtrit
 
     quantile = float(stdtrit(freedom, 0.5 + 0.5 * level))
-    rise = quantile**2 * inflation * cost / (samples - unknowns)
-    return Threshold(rise, level, inflation)
+    return quantile**2 * inflation * cost / (samples - unknowns)
 
 
 def profile(
@@ -316,7 +295,7 @@ def profile(
     vector: Array,
     cost: float,
     index: int,
-    threshold: Threshold,
+    rise: float,
     step: float,
     bounds: tuple[float, float] = (-np.inf, np.inf),
     *,
@@ -334,8 +313,8 @@ def profile(
         Its half sum of squares.
     index : int
         Number of the unknown.
-    threshold : Threshold
-        Where the interval ends.
+    rise : float
+        Of the cost at which the interval ends, see `threshold`.
     step : float
         About one standard error of the unknown's number, positive: how far the first step goes.
     bounds : (float, float)
@@ -346,11 +325,11 @@ def profile(
     Raises
     ------
     InputError
-        If the step or the threshold is not positive, or the optimum lies outside the bounds.
+        If the step or the rise is not positive, or the optimum lies outside the bounds.
     """
     if not (step > 0.0 and np.isfinite(step)):
         raise InputError(f"The first step of a profile, {step:g}, must be positive and finite.")
-    if not threshold.rise > 0.0:
+    if not rise > 0.0:
         raise InputError(
             "The residuals are exactly zero: there is no noise that a profile could weigh against."
         )
@@ -358,7 +337,7 @@ def profile(
         raise InputError("The optimum of a profile lies outside the bounds of its unknown.")
     optimum = Point(float(vector[index]), cost, vector)
     sides = [
-        ProfileSide(minimise, optimum, index, threshold.rise, direction, step, bound, most)
+        ProfileSide(minimise, optimum, index, rise, direction, step, bound, most)
         for direction, bound in ((-1.0, bounds[0]), (1.0, bounds[1]))
     ]
     endings: list[Ending] = []
@@ -373,7 +352,7 @@ def profile(
         index,
         cost,
         points,
-        threshold,
+        rise,
         sides[0].end if better is None else None,
         sides[1].end if better is None else None,
         (endings[0], endings[1]),

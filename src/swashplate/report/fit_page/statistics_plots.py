@@ -156,7 +156,7 @@ def profile_item(profile: Profile, unknown: Unknown, name: str) -> Any:
     panel.add_layout(
         Span(
             dimension="width",
-            location=profile.threshold.rise,
+            location=profile.rise,
             line_color=VERMILION,
             line_dash="dashed",
         )
