@@ -26,14 +26,6 @@ def test_ignored_samples_do_not_count() -> None:
     assert found.rmse == pytest.approx(np.sqrt(2.0 / 3.0))
 
 
-def test_weights_weigh_if_asked_to() -> None:
-    weight = np.array([1.0, 3.0, 0.0, 1.0])
-    found = measures(MEASURED, SIMULATED, weight, weighted=True)
-    # mean (0 + 6 + 6)/5 = 2.4; spread (5.76 + 3·0.16 + 12.96)/5
-    assert found.rmse == pytest.approx(np.sqrt(0.4))
-    assert found.spread == pytest.approx(np.sqrt(3.84))
-
-
 def test_runs_are_pooled_about_one_mean() -> None:
     found = pooled_measures(
         [(MEASURED[:2], SIMULATED[:2], None), (MEASURED[2:], SIMULATED[2:], np.ones(2))]
