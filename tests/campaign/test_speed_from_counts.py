@@ -8,6 +8,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from swashplate.campaign import savitzky_golay_speed
+from swashplate.errors import InputError
+
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "speed-from-counts.md").read_text("utf-8")
 ROWS = [[cell.strip() for cell in row.strip("|").split("|")] for row in PAGE.splitlines()]
@@ -68,3 +71,19 @@ def test_delays_hold(benchmark: ModuleType) -> None:
     assert 1e3 * benchmark.rise_time("source") == pytest.approx(
         float(row[4].removesuffix(" ms")), abs=1.0
     )
+
+
+def test_the_moving_parabola_by_hand() -> None:
+    # five samples, order 2: (-2 u₋₂ - u₋₁ + u₁ + 2 u₂)/10 per sample
+    time, angle = np.arange(7.0) * 0.02, np.array([0.0, 1.0, 0.0, 4.0, 2.0, 1.0, 0.0])
+    speed = savitzky_golay_speed(time, angle)
+    assert speed[3] == pytest.approx((-2.0 * 1.0 - 0.0 + 2.0 + 2.0 * 1.0) / 10.0 / 0.02)
+    # a parabola is differentiated exactly, also at the ends
+    np.testing.assert_allclose(savitzky_golay_speed(time, 3.0 * time**2), 6.0 * time, atol=1e-12)
+
+
+def test_a_moving_parabola_that_cannot_be() -> None:
+    with pytest.raises(InputError, match="evenly spaced .* resample"):
+        savitzky_golay_speed(np.arange(9.0) ** 1.5, np.zeros(9))
+    with pytest.raises(InputError, match="from 3 samples to the record's 9, but at 1 Hz it holds"):
+        savitzky_golay_speed(np.arange(9.0), np.zeros(9))

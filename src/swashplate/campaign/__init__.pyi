@@ -1,5 +1,4 @@
 from . import rig as rig
-from .ammeter import SignedCurrent as SignedCurrent
 from .ammeter import ZeroCrossings as ZeroCrossings
 from .ammeter import signed_by_command as signed_by_command
 from .ammeter import zero_crossings as zero_crossings

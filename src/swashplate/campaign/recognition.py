@@ -52,8 +52,7 @@ COARSEST = 6.0
 class Recognised:
     """The manoeuvre of a record. Numbers are rounded to what the data support.
 
-    Levels and amplitudes are relative to `rest`, in `unit`; positive and negative as in the record.
-    A number that does not belong to the kind is None.
+    Levels and amplitudes in the name are relative to `rest`, with their sign in the record.
     """
 
     kind: Kind
@@ -62,14 +61,6 @@ class Recognised:
     unit: str
     rest: float
     """The input at rest, not rounded. [unit]"""
-    levels: tuple[float, ...] = ()
-    """Levels of a step or of stairs in their order, without the rest at the end. [unit]"""
-    slope: float | None = None
-    """Slope of a ramp. [unit/s]"""
-    limit: float | None = None
-    """Level at which a ramp ends and is held, None for one that is cut short. [unit]"""
-    amplitude: float | None = None
-    """Amplitude of a sine, negative for one that begins downwards. [unit]"""
     frequency: float | None = None
     """Frequency of a sine. [Hz]"""
 
@@ -346,13 +337,7 @@ def _stairs(trace: _Trace, unit: str) -> Recognised | None:
     else:
         shown = [*heights, 0.0] if ending.kind == "fall" else heights
         name = f"stairs {'/'.join(f'{height:g}' for height in shown)} {unit}"
-    return Recognised(
-        "step" if len(levels) == 1 else "stairs",
-        name,
-        unit,
-        trace.rest,
-        levels=heights,
-    )
+    return Recognised("step" if len(levels) == 1 else "stairs", name, unit, trace.rest)
 
 
 def _held_levels(trace: _Trace) -> tuple[list[_Level], _Ending] | None:
@@ -428,7 +413,7 @@ def _ramp(trace: _Trace, unit: str) -> Recognised | None:
         leaves = trace.first(np.abs(trace.values[low:] - line[low:]) > trace.tolerance, low)
         if leaves < high:
             return None
-    ending, limit = _ending(trace, leaves, start), None
+    ending = _ending(trace, leaves, start)
     near = trace.values[leaves + 2 : leaves + 2 + HELD]
     if (ending is None or ending.kind == "return") and near.size == HELD:
         away = np.abs(trace.values[leaves + 2 :] - np.median(near)) > trace.tolerance
@@ -443,14 +428,7 @@ def _ramp(trace: _Trace, unit: str) -> Recognised | None:
     if rms is None:
         return rms
     shown = roundest(slope, max(3.0 * error, 0.002 * abs(slope)))
-    return Recognised(
-        "ramp",
-        f"ramp {shown:+g} {unit}/s",
-        unit,
-        trace.rest,
-        slope=shown,
-        limit=None if limit is None else roundest(limit, 0.002 * trace.peak),
-    )
+    return Recognised("ramp", f"ramp {shown:+g} {unit}/s", unit, trace.rest)
 
 
 def _line(trace: _Trace, first: int, last: int) -> tuple[float, float, float]:
@@ -525,15 +503,10 @@ def _sine(trace: _Trace, unit: str) -> Recognised | None:
     frequency = roundest(hertz, max(3.0 * tone.error / (2.0 * np.pi), 0.001 * hertz))
     down = float(np.cos(tone.omega * (start - tone.crossing))) < -1e-9
     amplitude = roundest(-tone.amplitude if down else tone.amplitude, 0.002 * tone.amplitude)
-    return Recognised(
-        "sine",
-        f"sine {amplitude:g} {unit} {frequency:g} Hz",
-        unit,
-        # where it begins within the sine there is no rest to see
-        trace.rest if first else trace.rest + tone.mean,
-        amplitude=amplitude,
-        frequency=frequency,
-    )
+    # where it begins within the sine there is no rest to see
+    rest = trace.rest if first else trace.rest + tone.mean
+    name = f"sine {amplitude:g} {unit} {frequency:g} Hz"
+    return Recognised("sine", name, unit, rest, frequency)
 
 
 def _guessed(trace: _Trace) -> tuple[_Tone, float] | None:

@@ -571,9 +571,9 @@ def _of_one_command(ours: Sequence[Motion]) -> list[list[Motion]]:
         near = np.arange(len(groups))
         for step, allowed in ((COARSE, 2.0 * SAME_COMMAND), (1, SAME_COMMAND)):
             near = near[_same(heads[near, ::step], command[::step], allowed)]
-        near = [k for k in near if groups[k][0].experiment.input.kind == drive.kind]
-        if near:
-            groups[near[0]].append(each)
+        alike = [k for k in near if groups[k][0].experiment.input.kind == drive.kind]
+        if alike:
+            groups[alike[0]].append(each)
         else:
             heads[len(groups)] = command
             groups.append([each])

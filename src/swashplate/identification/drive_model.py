@@ -168,8 +168,6 @@ class Forces:
         }
 
 
-SIGN_WIDTH = 0.05
-"""Width that `signed_by_command` masks; the mask is not used to drive a pump. [s]"""
 REST = 0.01
 """Share of the largest command below which it has no sign of its own. [1]"""
 
@@ -216,14 +214,9 @@ def _signed_channel(experiment: Experiment) -> tuple[Channel, Array]:
     for channel in experiment.of_kind("rectified_current"):
         command = experiment.input.at(channel.time)
         # noise about zero leaves readings just below it, and a command at rest without a sign
-        signed = signed_by_command(
-            channel.time,
-            np.maximum(channel.values, 0.0),
-            command,
-            width=SIGN_WIDTH,
-            level=REST * float(np.abs(command).max()),
-        )
-        return channel, signed.current
+        readings = np.maximum(channel.values, 0.0)
+        level = REST * float(np.abs(command).max())
+        return channel, signed_by_command(readings, command, level=level)
     raise InputError(
         f"{experiment.name} has no measured current to drive the pump: it needs a channel of the "
         "kind signed_current, current_plus and current_minus, or rectified_current."
