@@ -268,7 +268,7 @@ def test_forces_are_asked_for_where_there_is_a_current() -> None:
     assert found.proposed.forces.plus[0] == pytest.approx(0.06 / 0.40 * top, rel=0.01)
     assert found.proposed.forces.minus == given.minus
     asked, minus = found.sentences()
-    assert "no held_run goes further" in asked
+    assert "no run goes further" in asked
     assert "force_minus_4 cannot be left out of [stages.forces]" in minus
     assert found.fixed == {}
 
