@@ -283,10 +283,10 @@ def test_the_roundest_is_near(value: float, uncertainty: float) -> None:
 @pytest.mark.parametrize(
     ("time", "voltage", "sentence"),
     [
-        ([0.0, 1.0], [0.0], "There are 2 time stamps for 1 input samples."),
-        ([0.0, 1.0, 1.0], [0.0] * 3, "row 2 (the first is 0) has 1 s after 1 s"),
-        ([0.0, 1.0], [0.0, np.nan], "The input is nan in row 1 (the first is 0)"),
-        ([], [], "The time must be one row of numbers"),
+        ([0.0, 1.0], [0.0], "input must be one signal with one row for each of the 2 stamps"),
+        ([0.0, 1.0, 1.0], [0.0] * 3, "row 2 (the first is 0) has 1.0 s after 1.0 s"),
+        ([0.0, 1.0], [0.0, np.nan], "input must be finite, but row 1 (the first is 0) is nan"),
+        ([], [], "time must be one row of numbers"),
     ],
 )
 def test_bad_records_are_refused(time: list, voltage: list, sentence: str) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.campaign import read_run
 from swashplate.campaign.encoder import rolls_over_at
-from swashplate.campaign.quality import signed
+from swashplate.campaign.quality import has_sign
 from swashplate.campaign.recognition import recognise
 from swashplate.campaign.schema import KINDS, CampaignFile, ChannelKind, InputKind, conversion
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
@@ -275,7 +275,7 @@ def _refined(
             if size is not None:
                 met[name] = each._replace(role="channel", kind="encoder_counts", rolls_over_at=size)
         known = name in given
-        if each.kind == "rectified_current" and values and not known and signed(values):
+        if each.kind == "rectified_current" and values and not known and has_sign(values):
             met[name] = each._replace(kind="signed_current")
     for one, other in (("A", "B"), ("a", "b"), ("1", "2")):
         for name, each in met.items():

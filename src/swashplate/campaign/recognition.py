@@ -15,7 +15,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.errors import InputError
+from swashplate.campaign.stamps import increasing, signal
+from swashplate.maneuvers.pieces import row
 
 Array = NDArray[np.float64]
 Kind = Literal["rest", "step", "stairs", "ramp", "sine", "free"]
@@ -28,8 +29,6 @@ LARGEST_ZERO = 0.5
 """Reading at rest beyond which it is no zero error of an instrument. [V]"""
 SHORTEST = 16
 """Samples below which nothing is told apart."""
-ENOUGH = 20_000
-"""Samples that a curve is fitted to; more do not make it better where noise is small."""
 JUMP_SAMPLES, JUMP_SECONDS = 3, 0.03
 """A jump takes so many samples or seconds at most, whichever is more."""
 SMALLEST_JUMP = 0.05
@@ -162,30 +161,11 @@ class _Trace:
         """Index of the first true element of a mask that begins at `start`, or the length."""
         return start + int(mask.argmax()) if mask.any() else self.time.size
 
-    def picked(self, start: int, stop: int) -> NDArray[np.intp]:
-        """Indices from `start` to before `stop`: all, or `ENOUGH` spread unevenly over them.
-
-        Evenly picked ones would hide what happens between two, at their own rhythm.
-        """
-        if stop - start <= ENOUGH:
-            return np.arange(start, stop)
-        steps = np.arange(ENOUGH)
-        share = (steps + np.mod(steps * 0.6180339887498949, 1.0)) / ENOUGH
-        chosen: NDArray[np.intp] = start + (share * (stop - start)).astype(np.intp)
-        return chosen
-
 
 def _trace(time: ArrayLike, voltage: ArrayLike, unit: str) -> _Trace:
-    stamps, values = _row(time, "time"), _row(voltage, "input")
-    if stamps.size != values.size:
-        raise InputError(f"There are {stamps.size} time stamps for {values.size} input samples.")
+    stamps = increasing(time) if np.size(time) > 1 else row("time", time)
+    values = signal("input", voltage, stamps.size)
     steps = np.diff(stamps)
-    if steps.size and steps.min() <= 0.0:
-        late = int(np.argmax(steps <= 0.0)) + 1
-        raise InputError(
-            f"The time must increase, but row {late} (the first is 0) has {stamps[late]:g} s "
-            f"after {stamps[late - 1]:g} s."
-        )
     noise = _noise(stamps, values)
     zero, error = _rest(values, noise)
     values = values - zero
@@ -195,19 +175,6 @@ def _trace(time: ArrayLike, voltage: ArrayLike, unit: str) -> _Trace:
     least = max(smallest, min(SURE * noise, SURE * smallest), 1e-12 * abs(zero))
     spacing = float(np.median(steps)) if steps.size else 0.0
     return _Trace(stamps, values, zero, error, min(noise, 0.05 * peak), least, peak, spacing)
-
-
-def _row(values: ArrayLike, what: str) -> Array:
-    data = np.asarray(values, dtype=np.float64)
-    if data.ndim != 1 or data.size == 0:
-        raise InputError(f"The {what} must be one row of numbers, not of shape {data.shape}.")
-    wrong = np.flatnonzero(~np.isfinite(data))
-    if wrong.size:
-        raise InputError(
-            f"The {what} is {data[wrong[0]]} in row {wrong[0]} (the first is 0); leave out the "
-            "rows without a number."
-        )
-    return data
 
 
 def _noise(time: Array, values: Array) -> float:
@@ -433,8 +400,7 @@ def _ramp(trace: _Trace, unit: str) -> Recognised | None:
 
 def _line(trace: _Trace, first: int, last: int) -> tuple[float, float, float]:
     """Slope [unit/s], instant of zero [s] and the slope's standard error, by least squares."""
-    chosen = trace.picked(first, last)
-    time, values = trace.time[chosen], trace.values[chosen]
+    time, values = trace.time[first:last], trace.values[first:last]
     middle = time.mean()
     spread = float(((time - middle) ** 2).sum())
     slope = float(((time - middle) @ values) / spread)
@@ -482,7 +448,8 @@ def _sine(trace: _Trace, unit: str) -> Recognised | None:
     tone = _fitted(trace, guess[0], departs, certain)
     start = _start(trace, tone, departs)
     first = int(np.searchsorted(trace.time, start - 1e-9))
-    leaves = _leaves(trace, tone, first)
+    away = np.abs(trace.values[first:] - tone(trace.time[first:])) > trace.tolerance
+    leaves = trace.first(away, first)
     if leaves < certain:
         return None
     tone = _fitted(trace, tone, first, leaves)
@@ -539,8 +506,7 @@ def _fitted(trace: _Trace, guess: _Tone, first: int, last: int) -> _Tone:
     Gauss-Newton from a guess whose phase is right to a small part of a turn over the whole record,
     as IEEE Std 1057 does it.
     """
-    chosen = trace.picked(first, last)
-    time, values = trace.time[chosen], trace.values[chosen]
+    time, values = trace.time[first:last], trace.values[first:last]
     origin = float(0.5 * (time[0] + time[-1]))
     omega = guess.omega
     # carried along to where it hardly correlates with the frequency
@@ -574,15 +540,3 @@ def _start(trace: _Trace, tone: _Tone, departs: int) -> float:
     if abs(crossing - (seen - hidden)) > 0.1 * half + trace.spacing or crossing > seen:
         return seen
     return max(float(crossing), float(trace.time[0]))
-
-
-def _leaves(trace: _Trace, tone: _Tone, first: int) -> int:
-    """First sample that is not on the tone, or the record's length; long records are leapt over."""
-    chosen = trace.picked(first, trace.time.size)
-    away = np.abs(trace.values[chosen] - tone(trace.time[chosen])) > trace.tolerance
-    if not away.any():
-        return trace.time.size
-    late = int(away.argmax())
-    begin, end = int(chosen[max(late - 1, 0)]), int(chosen[late]) + 1
-    near = slice(begin, end)
-    return trace.first(np.abs(trace.values[near] - tone(trace.time[near])) > trace.tolerance, begin)
