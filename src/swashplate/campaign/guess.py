@@ -94,18 +94,10 @@ def march_guess(
 ) -> None:
     """March speed and position behind dead zone, gain, limits and lag.
 
-    Parameters
-    ----------
-    command : (n,) array
-        Delayed command. [V]
-    h : float
-        Step. [s]
-    dead, gain, top, pull : (2,) arrays
-        Dead zones, gains, top speeds and accelerations, plus and minus.
-    began : (float, float)
-        Share of the way to its target that the speed takes in a step [1], and speed at first.
-    position : (n,) array
-        Output, 0 at the first sample.
+    From a delayed command (n,) [V] with a step [s]; dead zones, gains, top speeds and accelerations
+    (2,) are those of plus and minus; `began` is the share of the way to its target that the speed
+    takes in a step [1], and the speed at first. `position` (n,) is the output, 0 at the first
+    sample.
     """
     share, speed = began
     position[0] = 0.0

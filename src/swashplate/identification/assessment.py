@@ -229,18 +229,7 @@ def measures(measured: Array, simulated: Array, weight: Array | None = None) -> 
 
 
 def pooled_measures(runs: list[tuple[Array, Array, Array | None]]) -> Measures:
-    """Measures of one channel over several runs, each about the mean of all.
-
-    Parameters
-    ----------
-    runs : list of (measured, simulated, weight)
-        As of `measures`.
-
-    Raises
-    ------
-    InputError
-        As `measures`.
-    """
+    """Measures of one channel over several runs, each about the mean of all; else as `measures`."""
     parts = [_counting(*run) for run in runs]
     measured, simulated = (np.concatenate(column) for column in zip(*parts, strict=True))
     if not measured.size:

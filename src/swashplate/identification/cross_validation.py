@@ -243,19 +243,8 @@ def cross_validate(
 def deal(experiments: Sequence[Experiment], folds: int, seed: int) -> tuple[tuple[int, ...], ...]:
     """Deal runs into folds, those of a kind and direction apart as far as there are folds.
 
-    Parameters
-    ----------
-    experiments : sequence of Experiment
-        The runs.
-    folds : int
-        How many parts.
-    seed : int
-        Of the order within each kind.
-
-    Returns
-    -------
-    tuple of tuple of int
-        Places of each fold's runs, increasing. Folds differ by at most one run.
+    Places of each fold's runs, increasing; folds differ by at most one run. The seed is that of the
+    order within each kind.
 
     Raises
     ------

@@ -310,12 +310,7 @@ def short_runs(
 def time_constant(nominal: ParameterSet, *, of_current: bool = False) -> float | None:
     """Time for 63 % of a 5 V step, delay and rate limits included; None if there is no answer. [s]
 
-    Parameters
-    ----------
-    nominal : ParameterSet
-        The drive.
-    of_current : bool
-        Of the card's current instead of the shaft's speed.
+    Of the shaft's speed, or of the card's current.
     """
     drive = Drive(nominal)
     steady = drive.steady_current if of_current else drive.steady_speed
@@ -354,15 +349,7 @@ class Motion(NamedTuple):
 
 
 def motions(experiments: Sequence[Experiment], parameters: ParameterSet) -> dict[str, list[Motion]]:
-    """What each channel did in each run, by the channel's name; runs that hardly move left out.
-
-    Parameters
-    ----------
-    experiments : sequence of Experiment
-        The runs.
-    parameters : ParameterSet
-        The drive that stands beside them.
-    """
+    """What each channel did in each run, by the channel's name; runs that hardly move left out."""
     found: dict[str, list[Motion]] = {}
     for experiment in experiments:
         simulation = simulated_run(experiment, parameters)

@@ -180,18 +180,9 @@ def error_tables(
 ) -> tuple[ErrorTable, ...]:
     """The source's error table of each channel: the largest per cent error by kind of test.
 
-    Parameters
-    ----------
-    qualities : sequence of RunQuality
-        Runs of one axis. Positions are passed over: their zero is free, so that a per cent of one
-        means nothing; take `with_speeds`.
-    rules : sequence of Rule
-        What is left out.
-
-    Notes
-    -----
-    The source speaks of the region with the largest per cent error and gives neither formula nor
-    limits of the regions; they are stated here as rules and printed with the table.
+    Positions are passed over: their zero is free, so that a per cent of one means nothing; take
+    `with_speeds`. The source speaks of the region with the largest per cent error and gives neither
+    formula nor limits of the regions; they are stated here as rules and printed with the table.
     """
     made = []
     for name in dict.fromkeys(each.channel for each in qualities):
@@ -238,21 +229,10 @@ def error_table(
     average: float = 0.0,
     unjudged: tuple[str, ...] = (),
 ) -> ErrorTable:
-    """Largest per cent error of what is measured, by kind of test.
+    """Largest per cent error of what is measured in runs of one axis and channel, by kind of test.
 
-    Parameters
-    ----------
-    channel : str
-        Its name.
-    runs : sequence of ComparedRun
-        Runs of one axis and channel.
-    rules : sequence of Rule
-        What is left out.
-    average : float
-        Width of a moving mean over the differences, for currents with dither: the source read its
-        errors off figures. 0 is none. [s]
-    unjudged : tuple of str
-        Runs that are none of these.
+    `average` is the width of a moving mean over the differences, for currents with dither: the
+    source read its errors off figures. 0 is none. [s]
 
     Raises
     ------

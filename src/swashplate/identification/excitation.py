@@ -70,19 +70,9 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
 
 
 def acting(simulation: Simulation, parameters: ParameterSet) -> dict[str, float]:
-    """How long what a parameter needs happens in a run, for every column such as ``"Z16_plus"``.
+    """How long what a parameter needs happens in a run [s], for every column (``"Z16_plus"``).
 
-    Parameters
-    ----------
-    simulation : Simulation
-        Of the run.
-    parameters : ParameterSet
-        What was simulated.
-
-    Returns
-    -------
-    dict of str to float
-        Durations, 0 where it never happens. Without a card its parameters have 0. [s]
+    0 where it never happens; without a card its parameters have 0.
     """
     numbers, found = parameters.numbers, dict.fromkeys(COLUMNS, 0.0)
     for side, sign in (("plus", 1.0), ("minus", -1.0)):
@@ -167,18 +157,10 @@ def activation(
     unknowns: Sequence[Unknown],
     forces: Forces | None = None,
 ) -> Activation:
-    """The table of runs and unknowns.
+    """The table of runs, by their names, and of the machine's unknowns.
 
-    Parameters
-    ----------
-    simulations : mapping of str to Simulation
-        Of each run by its name, see `simulated_run`.
-    parameters : ParameterSet
-        What was simulated.
-    unknowns : sequence of Unknown
-        Of a fit; those of single runs are left out.
-    forces : Forces, optional
-        Where forces stand for the solenoids' coefficients.
+    `parameters` are those that were simulated, `forces` what stands for the solenoids'
+    coefficients.
     """
     ours = [each for each in unknowns if each.run is None]
     rows = []
@@ -438,15 +420,10 @@ class Proposal:
 
 
 def propose(outlook: Outlook, *, weak: bool = False) -> Proposal:
-    """What to fix, or to ask for instead, from what the runs cannot tell.
+    """What to fix in one stage, or to ask for instead, from what the runs cannot tell.
 
-    Parameters
-    ----------
-    outlook : Outlook
-        Of one stage.
-    weak : bool
-        Fix as well what the runs hardly tell: for values that are known, as they are then taken
-        for exact.
+    With `weak` what they hardly tell as well: for values that are known, as they are then taken for
+    exact.
     """
     verdict = outlook.identifiability
     reasons = dict.fromkeys(verdict.unexcited, IDLE)

@@ -117,14 +117,8 @@ def measured_sensors(
 ) -> dict[str, Sensor]:
     """The campaign's own sensors, by channel.
 
-    Parameters
-    ----------
-    problem : Problem
-        The tests, begun at the drive's values.
-    machine : sequence of int
-        Places of the unknowns that belong to no single run.
-    fitted : bool
-        Whether the residuals of that drive are noise; else it is as the campaign states.
+    `machine` are the places of the unknowns that belong to no single run. If the drive at which the
+    problem begins is `fitted`, its residuals are the noise; else that is as the campaign states.
 
     Raises
     ------
@@ -531,18 +525,9 @@ def judge_sensors(
     *,
     beside: Sequence[str] = (),
 ) -> tuple[SensorAdvice, ...]:
-    """For each sensor the test in which it tells most, and what it adds there.
+    """For each sensor, one by one, the test in which it tells most, and what it adds there.
 
-    Parameters
-    ----------
-    bench : Bench
-        What is known so far.
-    maneuvers : sequence of Maneuver
-        Tests in which it could be read.
-    added : sequence of Sensor
-        To be judged, one by one.
-    beside : sequence of str
-        Names of manoeuvres that count as made where the bench has no tests yet.
+    `beside` are names of manoeuvres that count as made where the bench has no tests yet.
     """
     known = [bench.present]
     if not len(bench.present):
@@ -570,12 +555,7 @@ def in_turn(
 ) -> tuple[Advice, ...]:
     """A plan of tests: the best one, then the best beside it, and so on, each at most once.
 
-    Parameters
-    ----------
-    present, candidates, variables, tolerance :
-        As of `advise`.
-    count : int
-        Tests to choose; fewer if none of the others tells anything new.
+    As many as `count`, fewer if none of the others tells anything new; otherwise as `advise`.
     """
     left, chosen = list(candidates), list[Advice]()
     while left and len(chosen) < count:

@@ -48,19 +48,10 @@ class Gauge:
     """Symbols whose values the moves depend on."""
 
     def tangent(self, variables: Unknowns, fixed: Known | None = None) -> Array:
-        """Derivative of the solver's vector along the gauge.
+        """Derivative (K,) of the solver's vector along the gauge.
 
-        Parameters
-        ----------
-        variables : Unknowns
-            The unknowns.
-        fixed : mapping of str to float, optional
-            Values of parameters that are no unknowns, by symbol.
-
-        Returns
-        -------
-        (K,) array
-            0 for what does not move, and throughout if a value that the gauge needs is not known.
+        0 for what does not move, and throughout if a value that the gauge needs is neither among
+        the unknowns nor among the `fixed` ones, by symbol.
         """
         symbols = [symbol_of(name) for name in variables.names]
         estimates = map(float, variables.estimates)

@@ -243,18 +243,17 @@ def threshold(
     freedom: float | None = None,
     level: float = 0.95,
 ) -> float:
-    """Rise of the cost that ends an interval, for coloured residuals.
+    """Rise of the cost (half the sum of squares) that ends an interval, for coloured residuals.
 
     Parameters
     ----------
     cost : float
-        Half the sum of squares at the optimum.
+        At the optimum.
     samples, unknowns : int
         Numbers of samples and of combinations determined.
     inflation : float
         Samples that stand for one independent one, at least 1: the ratio of the unknown's variance
-        under coloured noise to that under white noise, or a channel's samples over its effective
-        ones.
+        under coloured noise to that under white noise.
     freedom : float, optional
         Degrees of freedom of Student's quantile; by default samples/inflation - unknowns.
     level : float
@@ -263,8 +262,7 @@ def threshold(
     Raises
     ------
     InputError
-        If there are no more samples than unknowns, the residuals are worth no more independent
-        samples than there are unknowns, or inflation or level are out of range.
+        If nothing is left to tell the noise from, or inflation or level are out of range.
 
     Notes
     -----
