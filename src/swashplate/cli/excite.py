@@ -59,14 +59,6 @@ def excitation(
             show_default=False,
         ),
     ] = None,
-    weak: Annotated[
-        bool,
-        typer.Option(
-            "--weak",
-            help="Propose to fix what would be known to ±10 % or worse as well: only for values "
-            "you know.",
-        ),
-    ] = False,
     write: Annotated[
         Path | None,
         typer.Option(
@@ -108,7 +100,7 @@ def excitation(
     with working("Simulating"):
         doubts = refuse_unsound(check_sound(runs, smooth(drive), plan, rank=False))
         looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
-        proposals = [propose(each, weak=weak) for each in looks]
+        proposals = [propose(each) for each in looks]
     comments = {each.stage.name: each.comments() for each in proposals}
     if write is not None:
         write_text(setup_text(proposed_setup(plan, proposals), comments), write)

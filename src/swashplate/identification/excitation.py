@@ -419,27 +419,15 @@ class Proposal:
         ]
 
 
-def propose(outlook: Outlook, *, weak: bool = False) -> Proposal:
-    """What to fix in one stage, or to ask for instead, from what the runs cannot tell.
-
-    With `weak` what they hardly tell as well: for values that are known, as they are then taken for
-    exact.
-    """
+def propose(outlook: Outlook) -> Proposal:
+    """What to fix in one stage, or to ask for instead, from what the runs cannot tell."""
     verdict = outlook.identifiability
     reasons = dict.fromkeys(verdict.unexcited, IDLE)
-    for direction in (*verdict.null, *(verdict.weak if weak else ())):
+    for direction in verdict.null:
         others = [name for name in direction.changes if name != direction.fix]
         more = f" and {len(others) - NAMED} others" if len(others) > NAMED else ""
-        told = f"{', '.join(others[:NAMED])}{more}"
-        if direction.gauge is not None:
-            reasons[direction.fix] = direction.gauge.determined
-        elif direction.weak:
-            reasons[direction.fix] = (
-                f"the runs hardly tell it{f' from {told}' if told else ''}, but a wrong value "
-                "shows in them"
-            )
-        else:
-            reasons[direction.fix] = f"the runs cannot tell it from {told}"
+        told = f"the runs cannot tell it from {', '.join(others[:NAMED])}{more}"
+        reasons[direction.fix] = told if direction.gauge is None else direction.gauge.determined
     notes = [f"{name} belongs to one run and stays free." for name in reasons if "(" in name]
     reasons = {name: why for name, why in reasons.items() if "(" not in name}
     stage = outlook.stage
