@@ -268,14 +268,6 @@ def test_a_set_up_that_nothing_depends_on() -> None:
     assert said.startswith("Stage pump: no run depends on any of Z14, Z15")
 
 
-def test_a_set_up_of_deficient_rank() -> None:
-    free = {"Z1": FACTOR, "Z8": FACTOR, "Z9": FACTOR, "Z14": FACTOR}
-    setup = Setup(stages=(Stage(name="pump", part="pump", free=free),))
-    first, second = warned(*GOOD, setup=setup)
-    assert "no run exercises Z14, which stays where the fit begins" in first
-    assert "Z1, Z8 and Z9 can move together unseen (scale of pressure)" in second
-
-
 # --- through the command line ---------------------------------------------------------------------
 
 CAMPAIGN = """

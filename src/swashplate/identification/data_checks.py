@@ -15,11 +15,8 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import SIGNALS
 from swashplate.identification.excitation import simulated_run
-from swashplate.identification.identifiability import identifiability
-from swashplate.identification.linearised import triangular_factor
 from swashplate.identification.setup import Setup
 from swashplate.identification.staging import stage_problem
-from swashplate.identification.unknowns import Unknowns
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.result import Simulation
 
@@ -99,8 +96,8 @@ def check_sound(
     setup : Setup
         What is free.
     rank : bool
-        Also look at what the runs can determine, which needs derivatives; `excitation.outlook`
-        tells it in full.
+        Also see whether anything depends on the unknowns, which needs derivatives;
+        `excitation.outlook` tells it in full.
 
     Returns
     -------
@@ -614,7 +611,7 @@ def _scales(name: str, ours: Sequence[Motion]) -> list[Finding]:
 
 
 def _rank(experiments: Sequence[Experiment], nominal: ParameterSet, setup: Setup) -> list[Finding]:
-    """Stages with fewer samples than unknowns, or unknowns that the runs cannot determine."""
+    """Stages with fewer samples than unknowns, or on whose unknowns nothing depends."""
     found: list[Finding] = []
     for stage in setup.stages:
         problem = stage_problem(stage, nominal, experiments)
@@ -625,34 +622,10 @@ def _rank(experiments: Sequence[Experiment], nominal: ParameterSet, setup: Setup
                 "record longer runs, or free less."
             )
             found.append(refusal(None, None, said))
-            continue
-        taken = {target for each in unknowns for target in each.targets}
-        # as the statistics see them, none at a bound
-        variables = Unknowns.of(
-            unknowns.names,
-            [each.start for each in unknowns],
-            scales=unknowns.scales,
-            logarithmic=unknowns.logarithmic,
-        )
-        verdict = identifiability(
-            triangular_factor(problem.evaluate(problem.start).jacobian),
-            variables,
-            fixed={name: value for name, value in nominal.numbers.items() if name not in taken},
-        )
-        if verdict.rank == 0:
+        elif not problem.evaluate(problem.start).jacobian.any():
             said = (
                 f"{where}: no run depends on any of {', '.join(unknowns.names[:NAMED])}; free what "
                 "the runs exercise, or test what exercises these."
             )
             found.append(refusal(None, None, said))
-            continue
-        if verdict.unexcited:
-            several = len(verdict.unexcited) > 1
-            said = (
-                f"{where}: no run exercises {', '.join(verdict.unexcited)}, which "
-                f"{'stay' if several else 'stays'} where the fit begins: fix "
-                f"{'them' if several else 'it'}, or add a test that does."
-            )
-            found.append(warning(None, None, said))
-        found += [warning(None, None, f"{where}: {each.sentence}") for each in verdict.null]
     return found
