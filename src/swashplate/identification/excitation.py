@@ -263,7 +263,7 @@ class Outlook:
 
     @cached_property
     def identifiability(self) -> Identifiability:
-        """Singular values, and directions that change nothing."""
+        """Which unknowns the runs determine, and directions that change nothing."""
         model = self.problem.model
         assert isinstance(model, DriveModel)
         taken = {target for each in self.problem.unknowns for target in each.targets}
