@@ -113,11 +113,6 @@ def speed_from_counts(
     -------
     array, shape (n,)
         Speed, delayed by `path_delay`. [rad/s]
-
-    Raises
-    ------
-    InputError
-        As `encoder.interpolate_counts`, `encoder.radians_per_count` and `speed_from_angle`.
     """
     stamps = stamps_of(time)
     position = interpolated(stamps.time, signal("counts", counts, stamps.time.size))
@@ -177,18 +172,7 @@ def matched_speed(
     form :
         As of the measured path.
     aligned : bool
-        Without it, the source's own filters, whose output comes half a sample later than the
-        measured path's.
-
-    Returns
-    -------
-    array, shape (n,)
-        Speed, delayed by `path_delay`, and by half a sample more if not aligned. [rad/s]
-
-    Raises
-    ------
-    InputError
-        As `speed_from_angle`.
+        Without it, the source's own filters, whose output is half a sample later.
 
     Notes
     -----
@@ -204,20 +188,10 @@ def matched_speed(
 
 
 def path_delay(period: float, *, form: Form = "source") -> float:
-    """Delay of a slow change of speed on its way through the measured path [s].
+    """Delay of a slow change of speed on its way through the measured path. [s]
 
-    Parameters
-    ----------
-    period : float
-        Sample period h. [s]
-    form :
-        As in `speed_from_angle`.
-
-    Returns
-    -------
-    float
-        1/a + 1/b - h/2 in the explicit form, 20.2 ms at 512 Hz, and 1/a + 1/b but for terms in h²
-        in the exact one, 21.2 ms. [s]
+    Of a sample period h [s], 1/a + 1/b - h/2 in the explicit form, 20.2 ms at 512 Hz, and 1/a + 1/b
+    but for terms in h² in the exact one, 21.2 ms.
 
     Raises
     ------

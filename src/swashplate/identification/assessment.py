@@ -85,10 +85,8 @@ def residual_test(
     ----------
     time : (n,) array
         Stamps of the samples that count; gaps are respected. [s]
-    residual : (n,) array
-        Simulated less measured, weights left out.
-    command : (n,) array
-        The input at the same stamps, in its unit.
+    residual, command : (n,) arrays
+        Simulated less measured, weights left out, and the input at the same stamps.
     longest : float
         Largest lag of the curves; at most a quarter of the run is shown. [s]
 

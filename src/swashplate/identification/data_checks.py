@@ -122,15 +122,7 @@ def check_sound(
 
 
 def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list[Finding]:
-    """What is wrong with runs beside each other and beside the nominal drive.
-
-    Raises
-    ------
-    InputError
-        If an input is neither a voltage nor a current, or cannot be simulated.
-    DomainError
-        If the model does not hold at the nominal values.
-    """
+    """What is wrong with runs beside each other and beside the nominal drive."""
     unsigned = unsigned_currents(experiments).items()
     found = [refusal(None, name, f"{said}.") for (_, name), said in unsigned]
     found += [finding for each in experiments for finding in _samples(each)]
@@ -156,13 +148,7 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
 def contradicting_runs(
     experiments: Sequence[Experiment], parameters: ParameterSet
 ) -> list[Finding]:
-    """Runs whose sign or scale contradicts the others, beside a drive that was fitted to all.
-
-    Raises
-    ------
-    InputError, DomainError
-        As `check_runs`.
-    """
+    """Runs whose sign or scale contradicts the others, beside a drive that was fitted to all."""
     found = contradictions(motions(experiments, parameters))
     return [each for each in found if each.run is not None]
 

@@ -63,15 +63,10 @@ def simulated_current(experiment: Experiment, parameters: ParameterSet) -> Recor
 def at_rate_of(
     experiments: Sequence[Experiment], parameters: ParameterSet
 ) -> tuple[ParameterSet, tuple[str, ...]]:
-    """A set whose card's filter holds at the rate of the runs, and what was changed for that.
+    """A set whose card's filter holds at the rate of the runs, and a sentence if it was changed.
 
-    Returns
-    -------
-    parameters : ParameterSet
-        With the filter's differential equation, if a run is marched at another rate than the one
-        that its recursion belongs to; otherwise as they are.
-    said : tuple of str
-        A sentence, if they were changed.
+    It then has the filter's differential equation, if a run is marched at another rate than the one
+    that its recursion belongs to.
     """
     if parameters.rate is None:
         return parameters, ()
@@ -173,20 +168,11 @@ REST = 0.01
 
 
 def measured_current(experiment: Experiment, scale: float = 1.0) -> Record:
-    """The signed current that was measured, on the march's grid.
+    """The signed current that was measured, times a factor, on the march's grid. [A]
 
-    Parameters
-    ----------
-    experiment : Experiment
-        Driven by a current, or with a channel of it: signed, of both solenoids, or of one ammeter
-        around both leads, which is given the command's sign.
-    scale : float
-        Factor on it. [1]
-
-    Returns
-    -------
-    Record
-        Positive towards positive speed. [A]
+    Of an experiment driven by a current, or with a channel of it: signed, of both solenoids, or of
+    one ammeter around both leads, which is given the command's sign. Positive towards positive
+    speed.
 
     Raises
     ------

@@ -265,13 +265,7 @@ def error_table(
 
 
 def kept_by(run: ComparedRun, rules: Sequence[Rule]) -> tuple[Mask, list[str], bool]:
-    """(n,) samples that rules leave in, names of those that act, and whether one leaves out all.
-
-    Raises
-    ------
-    InputError
-        If lengths differ or a number is not finite.
-    """
+    """(n,) samples that rules leave in, names of those that act, and whether one leaves out all."""
     arrays = (run.time, run.command, run.measured, run.simulated)
     if len({each.shape for each in arrays}) != 1 or not run.time.size:
         raise InputError(f"{run.name}: time, command, measured and simulated differ in length.")

@@ -226,14 +226,9 @@ def bench(
         Whether the drive is fitted to them: noise and its colour are then those of the residuals.
         Else noise is as the campaign states it, correlated over `MEMORY`.
     free : sequence of str
-        Symbols or columns that are held in the set-up and count as unknown here.
+        Symbols or columns that are fixed in the set-up and count as unknown here.
     sensors : sequence of Sensor
         Of a fresh plan; beside experiments they replace those of the same kind.
-
-    Raises
-    ------
-    InputError, ParameterError
-        If set-up, runs and parameters do not fit each other.
     """
     stage = _together(setup, free, parameters)
     if not experiments:

@@ -224,10 +224,7 @@ class EquationModel(ABC):
     ) -> Ready:
         """The model with numbers, and columns as the engine names them.
 
-        Parameters
-        ----------
-        shifts : (sequence, sequence)
-            Offsets and clock offsets of the observations.
+        `shifts` are offsets and clock offsets of the observations.
         """
 
     def moves(self, name: str) -> Mapping[str, float]:
@@ -264,18 +261,9 @@ class EquationModel(ABC):
         names: Sequence[str],
         weights: Mapping[str, Array],
     ) -> Array:
-        """Triangular factor of [J r] by some of the unknowns, without ever holding J.
+        """Triangular factor (k+1, k+1) of [J r] by some of the unknowns, without ever holding J.
 
-        Parameters
-        ----------
-        values, experiment, names :
-            As in `Differentiable.linearise`.
-        weights : mapping of str to (m,) array
-            Channels that count, and the factors on their residuals.
-
-        Returns
-        -------
-        (k+1, k+1) array
+        `weights` are the channels that count, and the factors (m,) on their residuals.
         """
         known = self.signals_of(experiment)
         channels = [name for name in weights if name in known]
@@ -340,7 +328,7 @@ class EquationModel(ABC):
                     unknown=tuple(unknown),
                 )
             )
-            by, record, others = self.driven(experiment)
+        by, record, others = self.driven(experiment)
         return ObservedRecord(record, observations, by, experiment.begins, others)
 
 

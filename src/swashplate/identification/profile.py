@@ -305,10 +305,8 @@ def profile(
     ----------
     minimise : callable
         See `Minimise`. It may raise DomainError where the model does not hold.
-    vector : (K,) array
-        The optimum.
-    cost : float
-        Its half sum of squares.
+    vector, cost :
+        The optimum (K,), and its half sum of squares.
     index : int
         Number of the unknown.
     rise : float
@@ -390,19 +388,8 @@ def checked_ends(
     """Sides on which the cost does not rise as the linearised fit says, and how it does.
 
     Unknowns of single runs, such as a free zero, are passed over: residuals are linear in them.
-
-    Parameters
-    ----------
-    problem : Problem
-        What was fitted.
-    vector : (K,) array
-        The optimum.
-    linearised : LinearisedFit
-        The fit there.
-    reach : (K,) array
-        Half width of each interval in the solver's vector; 0 for unknowns without one.
-    limits : collection of int
-        Numbers of the unknowns that limit something, such as a stop.
+    `reach` (K,) is the half width of each interval in the solver's vector, 0 for unknowns without
+    one; `limits` are the numbers of the unknowns that limit something, such as a stop.
 
     Notes
     -----
