@@ -26,14 +26,6 @@ NEAR = 1.05
 """The counts of a turn are the size where they are at most this much more than the range."""
 
 
-class CounterRangeError(InputError):
-    """A reading outside its counter; `said` leaves out what would be right."""
-
-    def __init__(self, said: str) -> None:
-        super().__init__(f"{said}; give the right modulus.")
-        self.said = said
-
-
 class Unwrapped(NamedTuple):
     """A counter's position without its roll-overs."""
 
@@ -73,9 +65,10 @@ def unwrap_counts(counts: ArrayLike, modulus: int) -> Unwrapped:
     low, high = (-(size // 2), (size - 1) // 2) if signed else (0, size - 1)
     outside = np.flatnonzero((readings < low) | (readings > high))
     if outside.size:
-        raise CounterRangeError(
+        raise InputError(
             f"counts hold {readings[outside[0]]:.0f} in row {outside[0]} (the first is 0), outside "
-            f"the {low} to {high} of a {'signed ' if signed else ''}counter of {size} readings"
+            f"the {low} to {high} of a {'signed ' if signed else ''}counter of {size} readings: "
+            "give its own size, in a campaign file rolls_over_at."
         )
     steps = np.diff(readings)
     short = steps - size * np.floor(steps / size + 0.5)

@@ -195,15 +195,11 @@ def _of_channel(run: str, channel: Channel) -> list[Finding]:
         return []
     bad = used & ~(np.isfinite(channel.values) & np.isfinite(channel.time))
     samples = int(np.count_nonzero(used))
-    if bad.any() and bad[used].all():
-        said = (
-            "has no finite value at all; ignore the channel in this run, or leave the run out with "
-            'role = "ignore".'
-        )
-    elif bad.any():
+    if bad.any():
         said = (
             f"is not finite in {_count(int(np.count_nonzero(bad)))}, the first at "
-            f'{channel.time[np.argmax(bad)]:.6g} s; say missing = "drop", or ignore a window.'
+            f'{channel.time[np.argmax(bad)]:.6g} s; say missing = "drop", or ignore a window, the '
+            "channel or the run."
         )
     elif samples < 2:
         said = (
