@@ -16,7 +16,10 @@ from swashplate.campaign import Experiment
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.assessment import RunQuality
-from swashplate.identification.error_tables import (
+from swashplate.identification.fitting import fit
+from swashplate.identification.setup import load_setup
+from swashplate.identification.staging import drawn
+from swashplate.identification.validation import (
     SOURCE_RULES,
     ComparedRun,
     LargestError,
@@ -24,12 +27,10 @@ from swashplate.identification.error_tables import (
     error_tables,
     kept_by,
     kind_of,
+    predict,
     source_rules,
+    with_speeds,
 )
-from swashplate.identification.fitting import fit
-from swashplate.identification.setup import load_setup
-from swashplate.identification.staging import drawn
-from swashplate.identification.validation import predict, with_speeds
 from swashplate.parameters.parameter_set import ParameterSet
 
 SPREAD = 0.02

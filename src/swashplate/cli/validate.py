@@ -74,8 +74,12 @@ def validate(
     is not usable for these runs.
     """
     from swashplate.campaign import Campaign
-    from swashplate.identification.error_tables import error_tables, source_rules
-    from swashplate.identification.validation import predict, with_speeds
+    from swashplate.identification.validation import (
+        error_tables,
+        predict,
+        source_rules,
+        with_speeds,
+    )
     from swashplate.identification.verdict import verdict
 
     if figures is not None and out is None:

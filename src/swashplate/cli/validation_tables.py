@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from swashplate.identification.assessment import Measures, RunQuality
-    from swashplate.identification.error_tables import ErrorTable
+    from swashplate.identification.validation import ErrorTable
     from swashplate.identification.verdict import Verdict
 
 

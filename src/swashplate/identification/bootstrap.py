@@ -1,11 +1,10 @@
-"""Bootstrap and profiles: what is found by fitting again, to other noise or beside the optimum."""
+"""Bootstrap: estimates from other noise of the same kind, by fitting again."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,6 @@ from swashplate.identification.fitting import StageFit
 from swashplate.identification.linearised import LinearisedFit
 from swashplate.identification.noise import grid_of, noise_colours, unweighted
 from swashplate.identification.problem import Problem
-from swashplate.identification.profile import Profile, minimiser, profile, threshold
 from swashplate.identification.solving import solve
 from swashplate.identification.spectral_lines import without_lines
 from swashplate.identification.unknowns import Unknowns
@@ -241,79 +239,3 @@ def _redrawn(stage: StageFit, noise: NoiseDraws, number: int) -> Problem:
         experiments.append(replace(experiment, channels=channels))
     # a copy of the model, which would keep every draw's records otherwise
     return replace(problem, model=copy(problem.model), experiments=tuple(experiments))
-
-
-class _Sideways(NamedTuple):
-    """What a worker needs to follow a profile."""
-
-    problem: Problem
-    vector: Array
-    cost: float
-    rises: dict[int, float]
-    steps: Array
-
-
-def profiles_of(
-    assessment: Assessment,
-    names: Sequence[str] | None = None,
-    *,
-    executor: Executor | None = None,
-    watch: Callable[[int], None] | None = None,
-) -> dict[str, Profile]:
-    """Profile likelihoods of a stage's unknowns.
-
-    Parameters
-    ----------
-    assessment : Assessment
-        Of the stage.
-    names : sequence of str, optional
-        Which unknowns; by default all of the machine that have an interval.
-    executor, watch :
-        As of `bootstraps_of`.
-
-    Returns
-    -------
-    dict of str to Profile
-        In the order of the unknowns. What earlier stages do not know is not in them.
-
-    Raises
-    ------
-    InputError
-        For a name that is none of the stage's unknowns.
-    """
-    problem, found, fit = assessment.stage.problem, assessment.uncertainty, assessment.linearised
-    variables, vector = found.own.variables, assessment.stage.solution.vector
-    if names is None:
-        known = zip(problem.unknowns, found.own.determined, strict=True)
-        chosen = [k for k, (each, told) in enumerate(known) if each.run is None and told]
-    else:
-        chosen = sorted({variables.index(name) for name in names})
-    cost = problem.cost(vector)
-    rises = {
-        k: threshold(
-            cost,
-            fit.samples,
-            fit.rank,
-            inflation=float(found.inflation[k]),
-            freedom=float(found.own.degrees_of_freedom[k]),
-            level=found.level,
-        )
-        for k in chosen
-    }
-    steps = found.own.standard_errors
-    shared = _Sideways(replace(problem, threads=1), vector, cost, rises, steps)
-    made: dict[str, Profile] = {}
-    for position, each in (executor or Serial()).run(_profiled, shared, chosen):
-        made[variables.names[chosen[position]]] = each
-        if watch is not None:
-            watch(len(made))
-    return {variables.names[k]: made[variables.names[k]] for k in chosen}
-
-
-def _profiled(shared: _Sideways, index: int) -> Profile:
-    low, high = (float(each[index]) for each in shared.problem.bounds)
-    step = float(shared.steps[index])
-    if not (np.isfinite(step) and step > 0.0):
-        step = 0.01 * (high - low)
-    least, rise = minimiser(shared.problem), shared.rises[index]
-    return profile(least, shared.vector, shared.cost, index, rise, step, (low, high))

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import DomainError, InputError
+from swashplate.executors import Executor, Serial
 from swashplate.identification.linearised import LinearisedFit
 from swashplate.identification.problem import Problem
 from swashplate.identification.solving import Evaluation, solve
 from swashplate.identification.unknowns import Vector
+
+if TYPE_CHECKING:
+    from swashplate.identification.assessment import Assessment
 
 Array = NDArray[np.float64]
 
@@ -464,3 +468,79 @@ def _unneeded(problem: Problem, vector: Array, index: int, allowed: float) -> bo
             return False
         before = cost
     return False
+
+
+class _Sideways(NamedTuple):
+    """What a worker needs to follow a profile."""
+
+    problem: Problem
+    vector: Array
+    cost: float
+    rises: dict[int, float]
+    steps: Array
+
+
+def profiles_of(
+    assessment: Assessment,
+    names: Sequence[str] | None = None,
+    *,
+    executor: Executor | None = None,
+    watch: Callable[[int], None] | None = None,
+) -> dict[str, Profile]:
+    """Profile likelihoods of a stage's unknowns.
+
+    Parameters
+    ----------
+    assessment : Assessment
+        Of the stage.
+    names : sequence of str, optional
+        Which unknowns; by default all of the machine that have an interval.
+    executor, watch :
+        Where they are followed, here by default; told how many are done.
+
+    Returns
+    -------
+    dict of str to Profile
+        In the order of the unknowns. What earlier stages do not know is not in them.
+
+    Raises
+    ------
+    InputError
+        For a name that is none of the stage's unknowns.
+    """
+    problem, found, fit = assessment.stage.problem, assessment.uncertainty, assessment.linearised
+    variables, vector = found.own.variables, assessment.stage.solution.vector
+    if names is None:
+        known = zip(problem.unknowns, found.own.determined, strict=True)
+        chosen = [k for k, (each, told) in enumerate(known) if each.run is None and told]
+    else:
+        chosen = sorted({variables.index(name) for name in names})
+    cost = problem.cost(vector)
+    rises = {
+        k: threshold(
+            cost,
+            fit.samples,
+            fit.rank,
+            inflation=float(found.inflation[k]),
+            freedom=float(found.own.degrees_of_freedom[k]),
+            level=found.level,
+        )
+        for k in chosen
+    }
+    steps = found.own.standard_errors
+    shared = _Sideways(replace(problem, threads=1), vector, cost, rises, steps)
+    made: dict[str, Profile] = {}
+    for position, each in (executor or Serial()).run(_profiled, shared, chosen):
+        made[variables.names[chosen[position]]] = each
+        if watch is not None:
+            watch(len(made))
+    return {variables.names[k]: made[variables.names[k]] for k in chosen}
+
+
+def _profiled(shared: _Sideways, index: int) -> Profile:
+    low, high = (float(each[index]) for each in shared.problem.bounds)
+    step = float(shared.steps[index])
+    if not (np.isfinite(step) and step > 0.0):
+        step = 0.01 * (high - low)
+    least, rise = minimiser(shared.problem), shared.rises[index]
+    return profile(least, shared.vector, shared.cost, index, rise, step, (low, high))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from swashplate.identification.error_tables import ErrorTable, Rule, error_tables
+from swashplate.identification.validation import ErrorTable, Rule, error_tables
 from swashplate.report.fit_page.numbers import listed
 from swashplate.report.fit_page.runs import ShownRun
 

@@ -13,9 +13,9 @@ from markupsafe import Markup
 
 from swashplate.campaign import Campaign
 from swashplate.identification.assessment import ResidualTest
-from swashplate.identification.error_tables import source_rules
 from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.staging import Parameters
+from swashplate.identification.validation import source_rules
 from swashplate.report.fit_page.error_sections import error_sections
 from swashplate.report.fit_page.numbers import count, fixed, plain
 from swashplate.report.fit_page.run_data import run_data
