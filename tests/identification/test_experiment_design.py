@@ -48,8 +48,6 @@ def test_gains_by_hand() -> None:
     assert found.d_gain == pytest.approx(2.0**0.25)
     assert found.best is not None
     assert found.best.name == "a"
-    assert "tell most of a: its standard error would shrink to 71 %" in found.sentence
-    assert "1.19 times better" in found.sentence
 
 
 def test_what_was_unknown_comes_first() -> None:
@@ -67,14 +65,12 @@ def test_what_was_unknown_comes_first() -> None:
     assert found[0].ranks == 1
     assert found[0].gains[1].before == np.inf
     assert found[0].gains[1].after == pytest.approx(0.5)
-    assert "first to determine b" in found[0].sentence
 
 
 def test_an_error_above_100_per_cent_is_not_determined() -> None:
     (found,) = advise(diagonal(0.1, np.inf), [Candidate("weak", diagonal(np.inf, 3.0))], AB)
     assert found.ranks == 1
     assert found.newly_determined == ()
-    assert found.sentence == "weak would tell next to nothing new."
 
 
 def test_a_candidate_that_mixes_known_and_unknown_tells_of_the_unknown_alone() -> None:
@@ -106,7 +102,6 @@ def test_the_order_is_that_of_determinants_computed_apart() -> None:
 def test_from_nothing() -> None:
     (found,) = advise(np.zeros((0, 2)), [Candidate("first", diagonal(0.1, 0.2))], AB)
     assert found.newly_determined == ("a", "b")
-    assert found.sentence == "first would be the first to determine a, b."
 
 
 def test_an_unknown_at_its_bound_counts_as_known() -> None:
@@ -118,7 +113,6 @@ def test_an_unknown_at_its_bound_counts_as_known() -> None:
 
 def test_a_candidate_that_moves_nothing() -> None:
     (found,) = advise(diagonal(0.1, 0.1), [Candidate("rest", np.zeros((5, 2)))], AB)
-    assert found.sentence == "rest would tell next to nothing new."
     assert found.d_gain == 1.0
 
 

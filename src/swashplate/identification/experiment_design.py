@@ -321,9 +321,6 @@ KNOWN = 1.0
 WORTH = 1e-3
 """Relative gain below which nothing is said of it."""
 
-NAMED = 6
-"""Unknowns that a sentence names."""
-
 
 class Candidate(NamedTuple):
     """A test that could be made."""
@@ -385,32 +382,9 @@ class Advice:
         known = [gain for gain in self.gains if gain.after <= KNOWN]
         return min(known, key=lambda gain: gain.ratio) if known else None
 
-    @property
-    def sentence(self) -> str:
-        """What an engineer would say."""
-        if self.newly_determined:
-            named = ", ".join(self.newly_determined[:NAMED])
-            more = len(self.newly_determined) - NAMED
-            first = f"{self.candidate} would be the first to determine {named}"
-            first += f" and {more} more" if more > 0 else ""
-        elif self.best is not None and self.best.ratio < 1.0 - WORTH:
-            first = (
-                f"{self.candidate} would tell most of {self.best.name}: its standard error would "
-                f"shrink to {100.0 * self.best.ratio:.0f} %"
-            )
-        else:
-            return f"{self.candidate} would tell next to nothing new."
-        if self.d_gain < 1.0 + WORTH:
-            return f"{first}."
-        return f"{first}; what is known already would be known {self.d_gain:.3g} times better."
-
 
 def advise(
-    present: Array,
-    candidates: Sequence[Candidate],
-    variables: Unknowns,
-    *,
-    tolerance: float = TOLERANCE,
+    present: Array, candidates: Sequence[Candidate], variables: Unknowns
 ) -> tuple[Advice, ...]:
     """Rank candidate tests by what they would add.
 
@@ -423,8 +397,6 @@ def advise(
         Tests to choose from.
     variables : Unknowns
         The unknowns; those at a bound count as known.
-    tolerance : float
-        As of `whitening`.
 
     Returns
     -------
@@ -441,14 +413,14 @@ def advise(
     _check("what is known at present", present, variables.count)
     for each in candidates:
         _check(each.name, each.derivatives, variables.count)
-    judged = [_judge(present, each, variables, tolerance) for each in candidates]
+    judged = [_judge(present, each, variables) for each in candidates]
     return tuple(sorted(judged, key=lambda each: each.rank))
 
 
-def _judge(present: Array, candidate: Candidate, variables: Unknowns, tolerance: float) -> Advice:
+def _judge(present: Array, candidate: Candidate, variables: Unknowns) -> Advice:
     free = variables.free
-    now, known_now = whitening(present, free, tolerance)
-    then, known_then = whitening(np.vstack([present, candidate.rows]), free, tolerance)
+    now, known_now = whitening(present, free, TOLERANCE)
+    then, known_then = whitening(np.vstack([present, candidate.rows]), free, TOLERANCE)
     before = np.where(known_now, np.sqrt(np.sum(now**2, axis=1)), inf)
     after = np.where(known_then, np.sqrt(np.sum(then**2, axis=1)), inf)
     names = variables.names
@@ -545,8 +517,6 @@ def in_turn(
     candidates: Sequence[Candidate],
     variables: Unknowns,
     count: int,
-    *,
-    tolerance: float = TOLERANCE,
 ) -> tuple[Advice, ...]:
     """A plan of tests: the best one, then the best beside it, and so on, each at most once.
 
@@ -554,7 +524,7 @@ def in_turn(
     """
     left, chosen = list(candidates), list[Advice]()
     while left and len(chosen) < count:
-        best = advise(present, left, variables, tolerance=tolerance)[0]
+        best = advise(present, left, variables)[0]
         if not best.newly_determined and not best.ranks and best.d_gain < 1.0 + WORTH:
             break
         taken = next(each for each in left if each.name == best.candidate)
