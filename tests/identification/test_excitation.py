@@ -78,7 +78,7 @@ def test_shares_by_hand() -> None:
 
 def test_before_a_fit_each_run_is_marked() -> None:
     found = looked({"Z13": FACTOR, "Z10": FACTOR}, run("low", 3.0), run("high", 9.0))
-    assert found.activation.runs == ("low", "high")
+    assert tuple(found.simulations) == ("low", "high")
     assert found.marks("Z13_plus") == ("none", "most")
     assert found.marks("Z13_minus") == ("none", "none")
     assert found.effect("Z13_minus") == 0.0
@@ -196,14 +196,13 @@ def test_the_table_of_runs() -> None:
         Unknown("offset counts", 0.0, -1.0, 1.0, run="low"),
     ]
     table = activation(runs, HOIST.parameters, unknowns, FORCES)
-    assert table.runs == ("low", "high")
-    assert table.names == ("Z13", "force_plus_4", "Z14")
-    assert table["Z13"][0] == 0.0
-    assert table["Z13"][1] > 3.0
+    stops, forces, spool = table.T
+    assert stops[0] == 0.0
+    assert stops[1] > 3.0
     # 2 V leave less than 0.34 A beyond Z17, half way from the third current to the fourth
-    assert table["force_plus_4"][0] == 0.0
-    assert table["force_plus_4"][1] > 4.0
-    assert not table["Z14"].any()
+    assert forces[0] == 0.0
+    assert forces[1] > 4.0
+    assert not spool.any()
 
 
 def test_needs_in_words() -> None:

@@ -137,13 +137,12 @@ def _table(look: Outlook, runs: Sequence[str]) -> Table:
     made = table(
         f"Stage {look.stage.name}", "unknown", "needs", ">s", ">effect", "runs", wrap="needs"
     )
-    own = look.activation
-    for k, name in enumerate(own.names):
-        letters = dict(zip(own.runs, (_LETTERS[each] for each in look.marks(name)), strict=True))
+    for k, name in enumerate(look.names):
+        letters = {r: _LETTERS[m] for r, m in zip(look.simulations, look.marks(name), strict=True)}
         made.add_row(
             name,
-            own.needs[k],
-            f"{own.seconds[:, k].sum():.3g}",
+            look.need(name),
+            f"{look.seconds[:, k].sum():.3g}",
             f"{look.effect(name):.3g}",
             "".join(letters.get(run, "-") for run in runs),
         )
@@ -157,19 +156,18 @@ def _written(looks: Sequence[Outlook], out: Path) -> None:
 
     rows = []
     for look in looks:
-        own = look.activation
-        for k, name in enumerate(own.names):
+        for k, name in enumerate(look.names):
             share = look.shares[:, look.linearised.variables.index(name)]
             rows += [
                 {
                     "stage": look.stage.name,
                     "unknown": name,
-                    "needs": own.needs[k],
+                    "needs": look.need(name),
                     "run": run,
-                    "seconds": float(own.seconds[r, k]),
+                    "seconds": float(look.seconds[r, k]),
                     "share": float(share[r]),
                     "effect of 1 %": look.effect(name) * float(share[r]) ** 0.5,
                 }
-                for r, run in enumerate(own.runs)
+                for r, run in enumerate(look.simulations)
             ]
     write_table(pl.DataFrame(rows), out)

@@ -134,35 +134,16 @@ def _of_channel(simulation: Simulation, side: str, numbers: Mapping[str, float])
     }
 
 
-@dataclass(frozen=True, eq=False)
-class Activation:
-    """How long each run makes happen what each unknown needs."""
-
-    runs: tuple[str, ...]
-    names: tuple[str, ...]
-    """The unknowns, those of single runs left out."""
-    needs: tuple[str, ...]
-    """What each needs, in words."""
-    seconds: Array
-    """(runs, K) how long it happens. [s]"""
-
-    def __getitem__(self, name: str) -> Array:
-        """(runs,) durations for one unknown. [s]"""
-        return self.seconds[:, self.names.index(name)]
-
-
 def activation(
     simulations: Mapping[str, Simulation],
     parameters: ParameterSet,
     unknowns: Sequence[Unknown],
     forces: Forces | None = None,
-) -> Activation:
-    """The table of runs, by their names, and of the machine's unknowns.
+) -> Array:
+    """How long each run makes happen what each unknown of the machine needs: (runs, K). [s]
 
-    `parameters` are those that were simulated, `forces` what stands for the solenoids'
-    coefficients.
+    `parameters` are those that were simulated, `forces` stand for the solenoids' coefficients.
     """
-    ours = [each for each in unknowns if each.run is None]
     rows = []
     for simulation in simulations.values():
         found = acting(simulation, parameters)
@@ -172,13 +153,8 @@ def activation(
                 signed = (1.0 if "_plus_" in name else -1.0) * simulation.current
                 reached = signed - simulation.pump.Z17 >= _current_of(name, forces)[1]
                 found[name] = float(np.count_nonzero(reached)) / simulation.record.rate
-        rows.append([max(found[target] for target in each.targets) for each in ours])
-    return Activation(
-        tuple(simulations),
-        tuple(each.name for each in ours),
-        tuple(need_of(each.name, forces) for each in ours),
-        np.array(rows).reshape(len(rows), len(ours)),
-    )
+        rows.append([max(found[t] for t in each.targets) for each in unknowns if each.run is None])
+    return np.array(rows)
 
 
 def need_of(name: str, forces: Forces | None = None) -> str:
@@ -258,29 +234,43 @@ class Outlook:
     problem: Problem
     simulations: Mapping[str, Simulation]
     """The nominal drive in each run that the stage fits, by the run's name."""
-    activation: Activation
     linearised: LinearisedFit
+    seconds: Array
+    """(runs, K) how long what each unknown of `names` needs happens. [s]"""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The unknowns, those of single runs left out."""
+        return tuple(each.name for each in self.problem.unknowns if each.run is None)
+
+    @property
+    def _model(self) -> DriveModel:
+        assert isinstance(self.problem.model, DriveModel)
+        return self.problem.model
+
+    def need(self, name: str) -> str:
+        """What an unknown needs, in words."""
+        return need_of(name, self._model.forces)
 
     @cached_property
     def identifiability(self) -> Identifiability:
         """Which unknowns the runs determine, and directions that change nothing."""
-        model = self.problem.model
-        assert isinstance(model, DriveModel)
         taken = {target for each in self.problem.unknowns for target in each.targets}
         return identifiability(
             self.linearised.triangle,
             self.linearised.variables,
             tolerance=self.linearised.tolerance,
-            fixed={k: v for k, v in model.parameters.numbers.items() if k not in taken},
+            fixed={k: v for k, v in self._model.parameters.numbers.items() if k not in taken},
         )
 
     @cached_property
     def shares(self) -> Array:
         """(runs, K) part of what is known of an unknown from each run, its channels together."""
-        shares = np.zeros((len(self.activation.runs), len(self.linearised.variables.names)))
+        runs = list(self.simulations)
+        shares = np.zeros((len(runs), len(self.linearised.variables.names)))
         found = excitation(self.linearised).share
         for run, share in zip(self.linearised.runs, found, strict=True):
-            shares[self.activation.runs.index(run.name)] += share
+            shares[runs.index(run.name)] += share
         return shares
 
     def effect(self, name: str) -> float:
@@ -302,37 +292,39 @@ class Outlook:
             else "unseen"
             if seconds > 0.0
             else "none"
-            for part, seconds in zip(share, self.activation[name], strict=True)
+            for part, seconds in zip(share, self._seconds(name), strict=True)
         )
 
     def sentences(self) -> tuple[str, ...]:
         """What no run tells of, why, and what rests on one run alone."""
         groups: dict[str, list[str]] = {}
         for name in self.identifiability.unexcited:
-            if name in self.activation.names:
+            if name in self.names:
                 groups.setdefault(self._missing(name), []).append(name)
         said = [
             f"{listed(names)} need{'s' if len(names) == 1 else ''} {why}."
             for why, names in groups.items()
         ]
-        for name in self.activation.names:
+        for name in self.names:
             share = self.shares[:, self.linearised.variables.index(name)]
-            said += _alone(name, share, self.activation.runs, "what the runs tell")
+            said += _alone(name, share, list(self.simulations), "what the runs tell")
         return tuple(said)
 
     def _missing(self, name: str) -> str:
         """What an unknown that no sample depends on needs, and whether a run has it."""
-        need = self.activation.needs[self.activation.names.index(name)]
+        need = self.need(name)
         if name.startswith("force_"):
             need = "currents of their size beyond Z17"
         side = next((each for each in ("plus", "minus") if f"_{each}" in name), None)
         need = need if side is None else f"{need} ({side})"
-        having = np.flatnonzero(self.activation[name] > 0.0)
-        if not having.size:
+        having = [run for run, s in zip(self.simulations, self._seconds(name), strict=True) if s]
+        if not having:
             return f"{need}, which no run has"
-        return (
-            f"{need}: {self.activation.runs[having[0]]} has it, but no sample that counts shows it"
-        )
+        return f"{need}: {having[0]} has it, but no sample that counts shows it"
+
+    def _seconds(self, name: str) -> Array:
+        seconds: Array = self.seconds[:, self.names.index(name)]
+        return seconds
 
 
 def outlook(stage: Stage, parameters: ParameterSet, experiments: Sequence[Experiment]) -> Outlook:
@@ -358,13 +350,9 @@ def outlook(stage: Stage, parameters: ParameterSet, experiments: Sequence[Experi
     model = problem.model
     assert isinstance(model, DriveModel)
     simulations = {each.name: simulated_run(each, parameters) for each in problem.experiments}
-    return Outlook(
-        stage,
-        problem,
-        simulations,
-        activation(simulations, parameters, problem.unknowns.items, model.forces),
-        linearised_fit(problem, problem.start),
-    )
+    seconds = activation(simulations, parameters, problem.unknowns.items, model.forces)
+    fit = linearised_fit(problem, problem.start)
+    return Outlook(stage, problem, simulations, fit, seconds)
 
 
 ROOM = 0.98
@@ -472,7 +460,7 @@ def _forces(
             float(np.max(sign * each.current, initial=0.0)) - each.pump.Z17
             for each in outlook.simulations.values()
         )
-        outermost = outlook.activation[f"force_{side}_{len(currents)}"]
+        outermost = outlook.seconds[:, outlook.names.index(f"force_{side}_{len(currents)}")]
         if largest <= 0.0 and names:
             notes.append(
                 f"{', '.join(names)} cannot be left out of [stages.forces]: without a current "
