@@ -8,6 +8,7 @@ errors puts together; the numbers beside it are what the name is made of.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import floor, log10
 from typing import Literal, NamedTuple
@@ -239,27 +240,23 @@ def _ending(trace: _Trace, first: int, earliest: float) -> _Ending | None:
     return _Ending("return", first, last)
 
 
-def _judged(
-    trace: _Trace, model: Array, ending: _Ending, jumps: list[tuple[int, int]] | None = None
-) -> float | None:
-    """RMS of record less model, None where the whole or any part of it is too large."""
+def _fits(
+    trace: _Trace, model: Array, ending: _Ending, jumps: Sequence[tuple[int, int]] = ()
+) -> bool:
+    """Whether the RMS of record less model is small, as a whole and in every part."""
     kept = np.ones(model.size, dtype=np.bool_)
     if ending.kind != "none":
         model[ending.last :] = 0.0
         kept[max(ending.first - 1, 0) : ending.last] = False
-    for before, after in jumps or ():
+    for before, after in jumps:
         kept[before:after] = False
     squares = (trace.values - model)[kept] ** 2
     # one percent of the peak, and noise with a margin for its estimate
     quality = float(np.hypot(0.01 * trace.peak, 1.5 * trace.noise))
-    rms = float(np.sqrt(squares.mean()))
-    if not rms <= quality:
-        return None
     parts = max(min(50, squares.size // 8), 1)
     edges = np.linspace(0, squares.size, parts, endpoint=False).astype(np.intp)
     means = np.add.reduceat(squares, edges) / np.diff(edges, append=squares.size)
-    worst = float(np.sqrt(means.max()))
-    return rms if worst <= 3.0 * quality else None
+    return bool(squares.mean() <= quality**2 and means.max() <= (3.0 * quality) ** 2)
 
 
 # --- steps and stairs -----------------------------------------------------------------------------
@@ -278,7 +275,7 @@ def _stairs(trace: _Trace, unit: str) -> Recognised | None:
     """Levels that are held, with jumps between them, None of other records."""
     held = _held_levels(trace)
     if held is None:
-        return held
+        return None
     levels, ending = held
     model = np.zeros_like(trace.values)
     # of the jump to the first level it is known when it is complete
@@ -289,9 +286,8 @@ def _stairs(trace: _Trace, unit: str) -> Recognised | None:
             jumps.append((before.last, level.first))
     if ending.kind == "fall":
         jumps.append((levels[-1].last, ending.first))
-    rms = _judged(trace, model, ending, jumps)
-    if rms is None:
-        return rms
+    if not _fits(trace, model, ending, jumps):
+        return None
     errors = [
         np.hypot(trace.noise / (each.last - each.first) ** 0.5, trace.rest_error) for each in levels
     ]
@@ -391,9 +387,8 @@ def _ramp(trace: _Trace, unit: str) -> Recognised | None:
             line = np.minimum(line, limit) if limit > 0.0 else np.maximum(line, limit)
     if ending is None:
         return ending
-    rms = _judged(trace, line, ending)
-    if rms is None:
-        return rms
+    if not _fits(trace, line, ending):
+        return None
     shown = roundest(slope, max(3.0 * error, 0.002 * abs(slope)))
     return Recognised("ramp", f"ramp {shown:+g} {unit}/s", unit, trace.rest)
 
@@ -440,7 +435,7 @@ def _sine(trace: _Trace, unit: str) -> Recognised | None:
     """One frequency, at least a whole period of it, None of other records."""
     guess = _guessed(trace)
     if guess is None:
-        return guess
+        return None
     departs = trace.first(np.abs(trace.values) > trace.tolerance, 0)
     certain = int(np.searchsorted(trace.time, guess[1]))
     if certain - departs < COARSEST:
@@ -463,9 +458,8 @@ def _sine(trace: _Trace, unit: str) -> Recognised | None:
         return None
     model = tone(trace.time)
     model[:first] = 0.0
-    rms = _judged(trace, model, ending)
-    if rms is None:
-        return rms
+    if not _fits(trace, model, ending):
+        return None
     hertz = tone.omega / (2.0 * np.pi)
     frequency = roundest(hertz, max(3.0 * tone.error / (2.0 * np.pi), 0.001 * hertz))
     down = float(np.cos(tone.omega * (start - tone.crossing))) < -1e-9
