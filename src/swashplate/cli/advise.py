@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,7 +25,6 @@ from swashplate.tables import TABLE, write_text
 if TYPE_CHECKING:
     from swashplate.campaign import ChannelKind
     from swashplate.identification.experiment_design import Bench, Sensor
-    from swashplate.identification.identifiability import Identifiability
     from swashplate.parameters.parameter_set import ParameterSet
 
 EXCITATION_EXAMPLES = """\
@@ -54,12 +54,6 @@ def excitation(
     axis: AxisName = None,
     setup: SetupWord = None,
     begin: StartWord = None,
-    faint: Annotated[
-        bool,
-        option(
-            "Propose to fix what is hardly determined as well: only for values you know.", "--faint"
-        ),
-    ] = False,
     write: Annotated[
         Path | None,
         option("Write a fit configuration with the proposal taken.", metavar="FILE"),
@@ -88,7 +82,7 @@ def excitation(
     with working("Simulating"):
         doubts = refuse_unsound(check_sound(runs, smooth(drive), plan, rank=False))
         looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
-        proposals = [propose(each, faint=faint) for each in looks]
+        proposals = [propose(each) for each in looks]
     comments = {each.stage.name: each.comments() for each in proposals}
     proposed = setup_text(proposed_setup(plan, proposals), comments)
     changed = any(each.changes for each in proposals)
@@ -99,8 +93,9 @@ def excitation(
     names = [each.name for each in runs]
     for look, proposal in zip(looks, proposals, strict=True):
         show(outlook_table(look, names))
-        say(_singular_values(look.identifiability))
-        for sentence in (*_said(look.identifiability), *look.sentences()):
+        # what no run exercises is said with its reason
+        verdict = replace(look.identifiability, unexcited=())
+        for sentence in (*verdict.sentences(), *look.sentences()):
             say(f"- {sentence}")
         for sentence in proposal.sentences():
             say(f"* {sentence}")
@@ -115,23 +110,6 @@ def excitation(
         note("")
         note(proposed.rstrip())
     files.say()
-
-
-def _singular_values(verdict: Identifiability) -> str:
-    sizes = verdict.singular_values
-    if not sizes.size:
-        return "No unknown changes anything: there is no singular value."
-    said = ", ".join(f"{each:.2g}" for each in sizes[: verdict.rank] / sizes[0])
-    none = sizes.size - verdict.rank
-    more = f", and {none} of nothing" if none else ""
-    return f"Singular values of the scaled derivatives, over the largest: {said}{more}."
-
-
-def _said(verdict: Identifiability) -> tuple[str, ...]:
-    """The verdict without what no run exercises, which is said with its reason."""
-    from dataclasses import replace
-
-    return replace(verdict, unexcited=()).sentences()
 
 
 def advise(
@@ -209,8 +187,6 @@ def advise(
         sensors = judge_sensors(bench, trials, added, beside=[each.candidate for each in plan])
     files.write(out, "Table", tables.advice_rows(ranked, sensors).write)
     show(tables.advice_table("Tests, with the sensors at hand", ranked[:top]))
-    for each in ranked[: min(top, 3)]:
-        say(f"- {each.sentence}")
     if plan:
         show(tables.advice_table("A plan, each test chosen beside those before it", plan))
         undetermined = [gain.name for gain in plan[-1].gains if not gain.after <= 1.0]

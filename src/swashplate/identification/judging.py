@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 from swashplate.__about__ import __version__
 from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment, RunQuality, assess
-from swashplate.identification.bootstrap import Bootstrap, bootstraps_of, profiles_of
+from swashplate.identification.bootstrap import Bootstrap, bootstraps_of
 from swashplate.identification.cross_validation import CrossValidation, cross_validate
+from swashplate.identification.profile import profiles_of
 from swashplate.identification.storing import StageProfile, StoredFit, save_fit
 from swashplate.identification.validation import predict
 from swashplate.identification.verdict import Verdict, verdict

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from swashplate.identification.excitation import Outlook
     from swashplate.identification.fitting import Fit, StageFit
     from swashplate.identification.unknowns import Unknown
-    from swashplate.identification.validation import ChannelErrors
+    from swashplate.identification.validation import ErrorTable
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -257,7 +257,7 @@ def fixed_table(fit: Fit, truth: ParameterSet | None = None) -> Table:
 def _why_fixed(parameters: ParameterSet, column: str, symbol: str, moved: set[str]) -> str:
     """Why nothing was to be found out about a parameter, as far as that can be told."""
     for gauge in GAUGES:
-        fixed = next((each for each in gauge.hold if not _is_moved(each, moved)), None)
+        fixed = next((each for each in gauge.fix if not _is_moved(each, moved)), None)
         others = [each for each in gauge.moves if each != symbol and _is_moved(each, moved)]
         if gauge.name in SCALES and fixed == symbol and others:
             return f"fixes the {gauge.name}: {gauge.determined}"
@@ -431,7 +431,7 @@ def residual_table(qualities: Sequence[RunQuality]) -> Table:
     return made
 
 
-def errors_table(found: ChannelErrors) -> Table:
+def errors_table(found: ErrorTable) -> Table:
     """The thesis's error table of one channel: the largest error of each kind of test."""
     made = Table(
         f"Largest per cent error of {found.channel}, by kind of test",
@@ -445,23 +445,21 @@ def errors_table(found: ChannelErrors) -> Table:
             Column("runs", "d"),
         ),
     )
-    for row in found.table.rows:
+    for row in found.rows:
         where = row.run or "no sample is left"
         sign = "" if row.percent is None else "%"
         made.add(row.kind, row.percent, sign, where, row.time, row.samples, row.runs)
     return made
 
 
-def left_out(errors: Sequence[ChannelErrors]) -> list[str]:
+def left_out(errors: Sequence[ErrorTable]) -> list[str]:
     """What error tables leave out, each rule that acted once, and what else belongs to them."""
     said = ["Per cent of what is measured at that instant."] if errors else []
-    acted = {rule for each in errors for rule in each.table.acted}
-    for rule in dict.fromkeys(rule for each in errors for rule in each.table.rules):
+    acted = {rule for each in errors for rule in each.acted}
+    for rule in dict.fromkeys(rule for each in errors for rule in each.rules):
         if rule not in acted:
             continue
-        runs = dict.fromkeys(
-            run for each in errors for run, by in each.table.left_out if by == rule.name
-        )
+        runs = dict.fromkeys(run for each in errors for run, by in each.left_out if by == rule.name)
         whole = f" All of: {', '.join(runs)}." if runs else ""
         said.append(f"Left out ({rule.name}): {rule.why}{whole}")
     averages = {each.average for each in errors if each.average}
@@ -577,11 +575,11 @@ def outlook_table(look: Outlook, runs: Sequence[str]) -> Table:
             Column("runs"),
         ),
     )
-    own = look.activation
-    for k, name in enumerate(own.names):
-        letters = dict(zip(own.runs, (_LETTERS[each] for each in look.marks(name)), strict=True))
+    for k, name in enumerate(look.names):
+        letters = {r: _LETTERS[m] for r, m in zip(look.simulations, look.marks(name), strict=True)}
         marks = "".join(letters.get(run, "-") for run in runs)
-        made.add(name, own.needs[k], float(own.seconds[:, k].sum()), look.effect(name), marks)
+        seconds = float(look.seconds[:, k].sum())
+        made.add(name, look.need(name), seconds, look.effect(name), marks)
     return made
 
 
@@ -591,13 +589,12 @@ def outlook_rows(looks: Sequence[Outlook]) -> Table:
     words = ("stage", "unknown", "needs", "run")
     made = Table("", (*map(Column, words), *(Column(each, ".6g") for each in columns)))
     for look in looks:
-        own = look.activation
-        for k, name in enumerate(own.names):
+        for k, name in enumerate(look.names):
             share = look.shares[:, look.linearised.variables.index(name)]
-            for r, run in enumerate(own.runs):
+            for r, run in enumerate(look.simulations):
                 effect = look.effect(name) * float(share[r]) ** 0.5
-                start = (look.stage.name, name, own.needs[k], run)
-                made.add(*start, float(own.seconds[r, k]), float(share[r]), effect)
+                start = (look.stage.name, name, look.need(name), run)
+                made.add(*start, float(look.seconds[r, k]), float(share[r]), effect)
     return made
 
 

@@ -19,7 +19,7 @@ from swashplate.identification.staging import Parameters
 from swashplate.identification.starts import StartResult
 from swashplate.identification.storing import StageProfile
 from swashplate.identification.truth import in_the_fits_scales
-from swashplate.identification.validation import channel_errors, pooled, source_rules
+from swashplate.identification.validation import error_tables, pooled, source_rules
 from swashplate.identification.verdict import Statement, Verdict, Weight, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import plots
@@ -281,12 +281,12 @@ def _errors_section(runs: Sequence[ShownRun], drive: str) -> Section:
             each.quality for run in runs if run.role == role for each in run.channels
             if each.stage == stage
         ]  # fmt: skip
-        for found in channel_errors(alike, source_rules(drive)):
+        for found in error_tables(alike, source_rules(drive)):
             blocks.append(Block("heading", f"{found.channel} ({role})", "h3"))
             blocks.append(Block("table", tables.errors_table(found), "errors"))
             said = tables.left_out([found])[1:]
             if said:
-                rules = ", ".join(rule.name for rule in found.table.acted) or "remarks"
+                rules = ", ".join(rule.name for rule in found.acted) or "remarks"
                 blocks.append(Block("details", listed_block(said), f"Left out: {rules}"))
     return Section("errors", "Errors by kind of test", blocks)
 
@@ -510,33 +510,21 @@ def _identifiability_section(assessments: Sequence[Assessment], items: dict[str,
         found = each.identifiability
         general = [unknown.run is None for unknown in each.stage.problem.unknowns]
         items[f"sensitivity-{number}"] = plots.sensitivity_item(found, general)
-        items[f"singular-{number}"] = plots.singular_value_item(found)
         blocks.append(Block("heading", f"Stage {each.stage.stage.name}", "h3"))
         blocks += listed_block(found.sentences())
-        columns = (Column("direction"), Column("effect", ".2g"), Column("moves together"))
+        width = Column("half width", ".3g", "%", none="none")
+        columns = (Column("direction"), width, Column("moves together"))
         directions = Table("", (*columns, Column("fix")))
-        for way in found.null + found.faint:
-            kind = way.gauge.name if way.gauge else "faint" if way.sharpness else "null"
+        for way in found.null + found.weak:
+            kind = way.gauge.name if way.gauge else "weak" if way.weak else "null"
             moves = ", ".join(f"{name} {change:+.2g} %" for name, change in way.changes.items())
-            known = f"{way.hold} if known" if way.sharpness else way.hold
-            directions.add(kind, way.sharpness, moves, known)
+            known = f"{way.fix} if known" if way.weak else way.fix
+            directions.add(kind, 100.0 * way.half_width if way.weak else None, moves, known)
         if directions.rows:
             blocks.append(Block("table", directions, "directions"))
         without = f"; none: {', '.join(found.unexcited)}" if found.unexcited else ""
-        pair = [
-            Block(
-                "figure",
-                f"sensitivity-{number}",
-                f"Sensitivity of each unknown that all runs share{without}",
-            ),
-            Block(
-                "figure",
-                f"singular-{number}",
-                "Singular values; below the solid line counts as none, below the dashed one as "
-                "faint",
-            ),
-        ]
-        blocks.append(Block("pair", pair))
+        words = f"Sensitivity of each unknown that all runs share{without}"
+        blocks.append(Block("figure", f"sensitivity-{number}", words))
         blocks += _errors_rest_on(each, number, general, items)
     return Section("identifiability", "Identifiability", blocks)
 
