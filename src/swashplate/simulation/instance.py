@@ -112,6 +112,7 @@ def step_limit(zeta: ArrayLike, exact: bool) -> NDArray[np.float64]:
     return limit
 
 
+@lru_cache(maxsize=256)
 def check_filter_stability(parameters: ParameterSet, step: float) -> None:
     """Refuse a step at which the filter would settle on wrong values without a word.
 

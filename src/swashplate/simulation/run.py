@@ -148,7 +148,6 @@ def measured_records(
         "supply_pressure": supply_pressure,
     }
     found: dict[str, Array] = {}
-    grid = np.arange(record.values.size)
     size = (record.values.size - 1) // record.substeps + 1
     for name, values in given.items():
         if values is None:
@@ -161,6 +160,7 @@ def measured_records(
         if not np.isfinite(samples).all():
             bad = int(np.argmax(~np.isfinite(samples)))
             raise InputError(f"{name} is {samples[bad]} at sample {bad}; it must be finite.")
+        grid = np.arange(record.values.size)
         found[name] = np.interp(grid, grid[:: record.substeps], samples)
     return found
 
