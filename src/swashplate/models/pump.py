@@ -42,6 +42,7 @@ from swashplate.models.refinements import (
     rippled_angle,
     static_leakage,
     stiff_line_torque,
+    unloaded_leakage,
 )
 
 WELL_CONDITIONED = 0.25
@@ -554,6 +555,8 @@ def flow_speed(
         lost = load_leakage(tangent, rate, k.Z12 * inputs.pump_speed)
     elif options.loaded is not None:
         lost = load_leakage(tangent, rate, k.Z12 * inputs.pump_speed)
+    else:
+        lost = unloaded_leakage(tangent, rate * inputs.pump_speed, k.Z12)
     return shaft_speed(angle, lost, p.Z10 * inputs.pump_speed, Z11)
 
 

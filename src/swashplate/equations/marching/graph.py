@@ -78,7 +78,7 @@ class Component:
     piece: int
     groups: list[Group]
     signals: bool = False
-    """Whether the piece fills in the derivatives of signals as well."""
+    """Whether the piece fills in signals and their derivatives as well."""
 
 
 @dataclass
@@ -394,28 +394,35 @@ class _Builder:
         own = part.own.name
         derivatives, partials = self.found[self.graphs.index(graph)]
 
-        def fill(name: str, outs: Iterable[str]) -> int:
+        def fill(name: str, outs: Iterable[str], values: Mapping[int, Node]) -> int:
             wanted = {*outs}
             some = {key: node for key, node in partials.items() if key[0] in wanted}
-            return self._fill(graph, part, name, derivatives, some)
+            return self._fill(graph, part, name, derivatives, some, values)
 
         signals = [
             each
             for each in self._results(part)
             if each.startswith("signals.") and each.removeprefix("signals.") not in graph.aliases
         ]
-        # derivatives are carried through sub-steps once, for states and signals
-        together = part.code.repeats
-        if signals and not together:
-            graph.signal_piece = fill(f"{own}_signals", signals)
         states = list(dict.fromkeys(out for out, _ in partials if out.startswith("state.")))
         flows = {
             out: {f"state.{by.path}" for each, by in partials if each == out and by.kind == "state"}
             & {*states}
             for out in states
         }
+        components = _weakly_connected(states, flows)
+        # what leads to states leads to signals, sub-steps above all: once for both
+        together = part.code.repeats or (bool(signals) and len(components) == 1)
         if together:
-            filled = fill(own, [*states, *signals])
+            components = [states]
+            values = {
+                row: part.signal(path)
+                for (number, path), row in self.values.items()
+                if number == part.part
+            }
+            filled = fill(own, [*states, *signals], values)
+        elif signals:
+            graph.signal_piece = fill(f"{own}_signals", signals, {})
         at_sample = {
             by.path
             for out, by in graph.entries
@@ -423,10 +430,10 @@ class _Builder:
         } | {place.path for place, _ in self.observed if place.kind == "state"}
         at_sample |= {s.signal for s in self.sampler.sources if s.part == part.part}
         graph.aliases = {s: path for s, path in graph.aliases.items() if path not in at_sample}
-        for c, outs in enumerate([states] if together else _weakly_connected(states, flows)):
+        for c, outs in enumerate(components):
             name = f"{own}_{c}" if len(outs) < len(states) else own
             if not together:
-                filled = fill(name, outs)
+                filled = fill(name, outs, {})
             groups = []
             for members in _strongly_connected(outs, flows):
                 bare = tuple(each.removeprefix("state.") for each in members)
@@ -514,8 +521,9 @@ class _Builder:
         name: str,
         derivatives: Derivatives,
         partials: Mapping[tuple[str, By], Node],
+        values: Mapping[int, Node],
     ) -> int:
-        """Piece that writes partial derivatives at known states into rows of the block."""
+        """Piece that writes partial derivatives, and values, at known states into rows."""
         rows = {}
         for key, partial in partials.items():
             if partial.op == "number":
@@ -523,9 +531,9 @@ class _Builder:
             else:
                 rows[key] = self._new_row()
                 graph.entries[key] = Entry(rows[key])
-        if not rows:
+        if not rows and not values:
             return -1
-        taken, wanted = {*part.code.taken}, [partials[key] for key in rows]
+        taken, wanted = {*part.code.taken}, [*(partials[key] for key in rows), *values.values()]
         writer = Writer(taken, derivatives.items, wanted, derivatives.hints)
         ahead, loads = self._arguments(part, writer.needed)
         # what only one side of a choice makes would carry its value from one sample to the next, as
@@ -533,7 +541,7 @@ class _Builder:
         begun = [f"{name} = {value}" for name, value in writer.inner.items()]
         stores = [
             f"{_place(row, 'm')} = {made}"
-            for row, made in zip(rows.values(), writer.texts, strict=True)
+            for row, made in zip([*rows.values(), *values], writer.texts, strict=True)
         ]
         return self._piece(
             f"fill_{name}",

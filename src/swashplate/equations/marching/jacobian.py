@@ -16,13 +16,19 @@ from swashplate.equations.marching.observation import ObservedRecord, Own
 from swashplate.equations.marching.pieces import addresses
 from swashplate.equations.marching.rows import (
     ABREAST,
+    ADD,
     BLOCK,
     CALL,
     CARRIED,
     COMBINE,
+    DONE,
+    FOLLOW,
+    OUTWARDS,
     RECUR,
+    SET,
     STRIDE,
     Indices,
+    Plan,
     Program,
     Sink,
     Terms,
@@ -78,13 +84,19 @@ class Layout:
     """Most states of a recurrence."""
     tangents: int
     """Numbers in the vector of tangents."""
-    places: Mapping[tuple[int, str, int], int]
-    """Place of a tangent by part, state and column."""
+    columns: Mapping[str, int]
+    """Number of each column by its path."""
+    places: Mapping[tuple[int, str], Mapping[int, int]]
+    """Place of a tangent by part and state, and by the number of the column."""
 
 
 @generating
 def layout_of(
-    graph: Any, model: Model, columns: tuple[str, ...], observed: tuple[int, ...]
+    graph: Any,
+    model: Model,
+    columns: tuple[str, ...],
+    observed: tuple[int, ...],
+    whole: tuple[bool, ...],
 ) -> Layout:
     """What to do in every block for some columns.
 
@@ -98,8 +110,20 @@ def layout_of(
         Paths of parameters, and ``start.`` with the path of a state.
     observed : tuple of int
         For each observation, which of the graph's observed signals it is.
+    whole : tuple of bool
+        Whether it sees every sample of the record, and all of its rows are kept.
     """
-    return _Planner(graph, model, columns).layout(observed)
+    return _Planner(graph, model, columns).layout(observed, whole)
+
+
+class _Chain(NamedTuple):
+    """A recurrence of one state."""
+
+    todo: tuple[int, int, int, int]
+    factor: int
+    """Place of what a step leaves of it."""
+    columns: list[tuple[int, int, int, int]]
+    """Of each column its number, the rows of input and result, and its place among the tangents."""
 
 
 class _Planner:
@@ -109,32 +133,41 @@ class _Planner:
         self.constant: dict[float, int] = {}
         self.idle = self._row()
         self.tangents = 1  # the first belongs to idle columns
-        self.places: dict[tuple[int, str, int], int] = {}
+        self.places: dict[tuple[int, str], dict[int, int]] = {}
         self.references: dict[tuple[str, int, str], dict[int, Reference]] = {}
         self.made: list[tuple[int, list[Term]]] = []
         """Rows that are sums of terms."""
         self.todo: list[tuple[int, int, int, int]] = []
+        self.chains: list[_Chain] = []
         self.columns_of: list[Indices] = [np.zeros(0, dtype=np.int64)]
         self.states = 1
         self.linked = set(graph.sources)
 
-    def layout(self, observed: tuple[int, ...]) -> Layout:
-        pieces = [0, *(part.value_piece for part in self.graph.parts)]
+    def layout(self, observed: tuple[int, ...], whole: tuple[bool, ...]) -> Layout:
+        pieces = [0]
+        for part in self.graph.parts:
+            filled = self.columns and any(each.signals for each in part.components)
+            pieces += [] if filled else [part.value_piece]
         self.todo += [(CALL, each, 0, 0) for each in pieces if each >= 0]
         for part in self.graph.parts if self.columns else ():
             by_result = _by_result(part)
             for component in part.components:
                 at = len(self.todo)
-                some = [self._group(part, group, by_result) for group in component.groups]
+                early = component.signals
+                some = [self._group(part, group, by_result, early) for group in component.groups]
                 if (any(some) or component.signals) and component.piece >= 0:
                     self.todo.insert(at, (CALL, component.piece, 0, 0))
             if part.signal_piece >= 0:
                 self.todo.append((CALL, part.signal_piece, 0, 0))
             self._signals(part, by_result)
+        shown = {
+            (r, c): self._observed(number, c)
+            for r, number in enumerate(observed)
+            for c in range(len(self.columns))
+        }
+        way = self._outwards(shown, whole)
         seen, width = len(self.made), len(self.columns) + 2
-        for r, number in enumerate(observed):
-            for c in range(len(self.columns)):
-                self.made.append((r * width + c, self._observed(number, c)))
+        self.made += [(r * width + c, terms) for (r, c), terms in shown.items()]
         terms = [term for _, made in self.made for term in made]
         program = Program(
             len(self.columns),
@@ -149,6 +182,7 @@ class _Planner:
             ),
             seen,
             np.concatenate(self.columns_of),
+            way,
             np.array([self._value_row(number) for number in observed], dtype=np.int64),
             np.array([self.graph.observed[number][1] for number in observed], dtype=np.bool_),
         )
@@ -160,6 +194,7 @@ class _Planner:
             {row: value for value, row in self.constant.items()},
             self.states,
             self.tangents,
+            {column: c for c, column in enumerate(self.columns)},
             self.places,
         )
 
@@ -230,10 +265,17 @@ class _Planner:
         return Reference(row, 1.0)
 
     def _group(
-        self, part: PartGraph, group: Group, by_result: Mapping[str, Mapping[By, Entry]]
+        self,
+        part: PartGraph,
+        group: Group,
+        by_result: Mapping[str, Mapping[By, Entry]],
+        early: bool,
     ) -> bool:
-        """Columns of a recurrence, and rows that they need."""
-        since = len(self.made)
+        """Columns of a recurrence, and rows that they need.
+
+        `early` says whether the derivatives of signals are there before it.
+        """
+        since, whose = len(self.made), list[int]()
         found: list[list[tuple[int, int, int]]] = []
         prefix = self._prefix(part.part)
         for c, column in enumerate(self.columns):
@@ -254,12 +296,13 @@ class _Planner:
                 made = self._made(terms[i], whole=True)
                 place = self.tangents
                 self.tangents += 1
-                self.places[part.part, path, c] = place
+                self.places.setdefault((part.part, path), {})[c] = place
                 each.append((made.row if made else self._constant(0.0), result, place))
                 if group.stored[i]:
                     rows = self.references.setdefault(("state", part.part, path), {})
                     rows[c] = Reference(result, 1.0)
             found.append(each)
+            whose.append(c)
         if not found:
             return False
         k = len(group.states)
@@ -278,7 +321,65 @@ class _Planner:
         self.states = max(self.states, k)
         self._combine(since)
         self.todo.append((RECUR, k, begin, begin + len(numbers)))
+        if k == 1 and early and not group.after[0]:
+            columns = [(c, *each[0]) for c, each in zip(whose, found, strict=False)]
+            self.chains.append(_Chain(self.todo[-1], numbers[0], columns))
         return True
+
+    def _outwards(
+        self, shown: dict[tuple[int, int], list[Term]], whole: Sequence[bool]
+    ) -> Indices:
+        """Let recurrences whose results one observation alone needs go there at once."""
+        way = np.full((len(whole), len(self.columns)), SET)
+        uses: dict[int, list[tuple[int, int, Term | None]]] = {}
+        for terms in (terms for _, terms in self.made):
+            for row in (row for term in terms for row in (term.a, term.b)):
+                uses.setdefault(row, []).append((-1, -1, None))
+        for (r, c), terms in shown.items():
+            for term in terms:
+                for row in {term.a, term.b}:
+                    uses.setdefault(row, []).append((r, c, term))
+        for chain in self.chains:
+            found = [uses.get(result, [])[:2] for _, _, result, _ in chain.columns]
+            if any(len(each) != 1 for each in found):
+                continue
+            users = [each[0] for each in found]
+            r, _, first = users[0]
+            if first is None or not whole[r] or any(
+                user != r or term is None or term[:1] + term[2:] != (first.a, 1.0, None)
+                for user, _, term in users
+            ):
+                continue
+            self._follow(chain, r, first.a)
+            for user, c, term in users:
+                assert term is not None
+                shown[user, c].remove(term)
+                way[user, c] = ADD if shown[user, c] else DONE
+                if not shown[user, c]:
+                    del shown[user, c]
+        return way
+
+    def _follow(self, chain: _Chain, r: int, through: int) -> None:
+        """Put a recurrence that ends in an observation in the place of one that ends in rows."""
+        columns, since = sorted(chain.columns, key=lambda each: each[1]), len(self.made)
+        numbers = [through * STRIDE, chain.factor]
+        for k in range(0, len(columns), OUTWARDS):
+            some = columns[k : k + OUTWARDS]
+            rows, idle = [row for _, row, _, _ in some], OUTWARDS - len(some)
+            if idle or rows != list(range(rows[0], rows[0] + OUTWARDS)):
+                fresh = [self._row() for _ in range(OUTWARDS)]
+                self.made += [(to, [Term(row, -1, 1.0)]) for to, row in zip(fresh, rows)]
+                self.made += [(to, []) for to in fresh[len(some) :]]
+                rows = fresh
+            numbers += [rows[0] * STRIDE, *(at for *_, at in some), *(0,) * idle]
+            numbers += [*(c for c, *_ in some), *(-1,) * idle]
+        begin = sum(each.size for each in self.columns_of)
+        self.columns_of.append(np.array(numbers, dtype=np.int64))
+        at = self.todo.index(chain.todo)
+        self.todo[at : at + 1] = [
+            (COMBINE, since, len(self.made), 0),
+            (FOLLOW, r, begin, begin + len(numbers)),
+        ]
 
     def _factor(self, by_result: Mapping[str, Mapping[By, Entry]], path: str, other: str) -> int:
         """Row of the derivative of a state behind the sample by another one at it."""
@@ -424,12 +525,16 @@ def tangents_of(
     tangent = np.zeros(layout.tangents)
     several = len(model.parts) > 1
     free = set(own)
-    for (part, path, c), at in layout.places.items():
+    for (part, path), found in layout.places.items():
         full = f"{model.parts[part].name}.{path}" if several else path
         if full in free:
-            tangent[at] = 1.0 if path in started_by(model, part, columns[c]) else 0.0
+            for c, at in found.items():
+                tangent[at] = 1.0 if path in started_by(model, part, columns[c]) else 0.0
         else:
-            tangent[at] = slopes.states.get((part, path), {}).get(columns[c], 0.0)
+            known = slopes.states.get((part, path), {})
+            for column in known.keys() & layout.columns.keys():
+                at = found.get(layout.columns[column], 0)
+                tangent[at] = known[column] if at else 0.0
     return tangent
 
 
@@ -623,12 +728,10 @@ def _march(
     records, h = observed.records, observed.record.step
     signals, seen = tuple(records), tuple(dict.fromkeys(o.signal for o in observed.observations))
     graph = graph_of(instance.model, signals, instance.options, seen)
-    layout = layout_of(
-        graph,
-        instance.model,
-        columns,
-        tuple(seen.index(each.signal) for each in observed.observations),
-    )
+    plan = observed.plan(own, len(columns) if first_own is None else first_own)
+    numbers = tuple(seen.index(each.signal) for each in observed.observations)
+    whole = _whole(graph, plan, numbers, observed, sink)
+    layout = layout_of(graph, instance.model, columns, numbers, whole)
     first = {name: float(values[0]) for name, values in records.items()}
     started = instance.start(first, h, observed.start)
     missing = [c for c in columns if c.startswith("start.") and c[6:] not in own.start]
@@ -646,7 +749,6 @@ def _march(
         slopes = start_slopes(graph, instance, first, h, observed.start)
     tangent = tangents_of(layout, slopes, instance.model, columns, own.start)
     places = instance.places(signals, h)
-    plan = observed.plan(own, len(columns) if first_own is None else first_own)
     program = _with_numbers(layout, slopes.constants, places)
     marched = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
     met = np.array([np.inf])
@@ -655,6 +757,21 @@ def _march(
     pieces, grid = addresses(graph.pieces, layout.pieces), (marched[0].size, block, h)
     march_observed(pieces, arrays, grid, tangent, program, plan, sink, room)
     check_domain(instance, states, float(met[0]), observed.driven_by)
+
+
+def _whole(
+    graph: Graph, plan: Plan, numbers: Sequence[int], observed: ObservedRecord, sink: Sink
+) -> tuple[bool, ...]:
+    """Which observations see every sample of the record as it is, if all rows are kept."""
+    return tuple(
+        not sink.factor.size
+        and bool(plan.regular[r])
+        and plan.clock_column[r] < 0
+        and not plan.kept[r].any()
+        and not graph.observed[number][1]
+        and plan.first[r + 1] - plan.first[r] == observed.record.values.size
+        for r, number in enumerate(numbers)
+    )
 
 
 def _with_numbers(layout: Layout, constants: Mapping[Slot, float], places: Places) -> Program:

@@ -26,6 +26,8 @@ CARRIED = 8
 others only keep the block's first sample at the beginning of a cache line."""
 ABREAST = 4
 """Columns of a recurrence side by side: they fill the time that each waits for its last number."""
+OUTWARDS = 8
+"""The same, where results go out at once."""
 
 
 class Terms(NamedTuple):
@@ -53,21 +55,27 @@ class Program(NamedTuple):
 
     - CALL, number of a piece: call it;
     - COMBINE, first and end of the terms' targets: make rows of the block;
-    - RECUR, number k of states, first place and end in `columns`: run a recurrence.
+    - RECUR, number k of states, first place and end in `columns`: run a recurrence;
+    - FOLLOW, an observation, first place and end in `columns`: run a recurrence of one state whose
+      weighted results are that observation's derivatives.
     """
     terms: Terms
     """Of all rows that are made, those of the observations behind the others."""
     seen: int
     """First target that is a row of the observations."""
     columns: Indices
-    """For each recurrence what `follow_each_other` takes: its `places`, then its `columns`."""
+    """For each recurrence what `follow_each_other` takes: its `places`, then its `columns`; or what
+    `follow_out` takes."""
+    way: Indices
+    """(r, d) how the derivatives of an observation get to the sink, one of SET, ADD and DONE."""
     value: Indices
     """(r,) row of each observation's signal."""
     integral: NDArray[np.bool_]
     """(r,) whether an observation is its signal's integral."""
 
 
-CALL, COMBINE, RECUR = 0, 1, 2
+CALL, COMBINE, RECUR, FOLLOW = 0, 1, 2, 3
+SET, ADD, DONE = 0, 1, 2
 
 
 class Plan(NamedTuple):
@@ -238,6 +246,50 @@ def follow(a: Array, columns: Indices, flat: Array, count: int, tangent: Array) 
 
 
 @subroutine
+def follow_out(
+    columns: Indices, flat: Array, tangent: Array, sink: Sink, span: tuple[int, int], room: Room
+) -> None:
+    """Run y[n+1] = a[n] y[n] + g[n] as `follow`, and put q[n] y[n] into the sink.
+
+    Parameters
+    ----------
+    columns : array
+        Place of a in `flat`, then for each OUTWARDS columns the place of the first g, the others
+        in the rows behind it; their places in `tangent`; and their numbers in the sink, -1 for none.
+    span : (int, int)
+        First place in the sink, and how many.
+    room : Room
+        With q in `aside`.
+    """
+    at, count = span
+    a, q = flat[columns[0] :], room.aside
+    idle = room.seen[0, room.seen.shape[1] - 1]
+    for c in range(1, columns.size, 1 + 2 * OUTWARDS):
+        g, p, to = flat[columns[c] :], columns[c + 1 :], columns[c + 1 + OUTWARDS :]
+        d0 = sink.rows[sink.to[to[0]], at:] if to[0] >= 0 else idle
+        d1 = sink.rows[sink.to[to[1]], at:] if to[1] >= 0 else idle
+        d2 = sink.rows[sink.to[to[2]], at:] if to[2] >= 0 else idle
+        d3 = sink.rows[sink.to[to[3]], at:] if to[3] >= 0 else idle
+        d4 = sink.rows[sink.to[to[4]], at:] if to[4] >= 0 else idle
+        d5 = sink.rows[sink.to[to[5]], at:] if to[5] >= 0 else idle
+        d6 = sink.rows[sink.to[to[6]], at:] if to[6] >= 0 else idle
+        d7 = sink.rows[sink.to[to[7]], at:] if to[7] >= 0 else idle
+        y0, y1, y2, y3 = tangent[p[0]], tangent[p[1]], tangent[p[2]], tangent[p[3]]
+        y4, y5, y6, y7 = tangent[p[4]], tangent[p[5]], tangent[p[6]], tangent[p[7]]
+        for m in range(count):
+            f, s = a[m], q[m]
+            n0, n1 = f * y0 + g[m], f * y1 + g[STRIDE + m]
+            n2, n3 = f * y2 + g[2 * STRIDE + m], f * y3 + g[3 * STRIDE + m]
+            n4, n5 = f * y4 + g[4 * STRIDE + m], f * y5 + g[5 * STRIDE + m]
+            n6, n7 = f * y6 + g[6 * STRIDE + m], f * y7 + g[7 * STRIDE + m]
+            d0[m], d1[m], d2[m], d3[m] = s * y0, s * y1, s * y2, s * y3
+            d4[m], d5[m], d6[m], d7[m] = s * y4, s * y5, s * y6, s * y7
+            y0, y1, y2, y3, y4, y5, y6, y7 = n0, n1, n2, n3, n4, n5, n6, n7
+        tangent[p[0]], tangent[p[1]], tangent[p[2]], tangent[p[3]] = y0, y1, y2, y3
+        tangent[p[4]], tangent[p[5]], tangent[p[6]], tangent[p[7]] = y4, y5, y6, y7
+
+
+@subroutine
 def follow_pair(places: Indices, columns: Indices, flat: Array, count: int, tangent: Array) -> None:
     """`follow_each_other` for two states, which most filters have."""
     a00, a01 = flat[places[0] :], flat[places[1] :]
@@ -370,7 +422,15 @@ def low_pass(
 
 @subroutine
 def place(
-    seen: Array, base: int, plan: Plan, r: int, at: int, count: int, sink: Sink, to: int
+    seen: Array,
+    base: int,
+    way: Indices,
+    plan: Plan,
+    r: int,
+    at: int,
+    count: int,
+    sink: Sink,
+    to: int,
 ) -> None:
     """Weighted rows of the problem at some stamps of an observation, from its rows on the grid.
 
@@ -380,6 +440,8 @@ def place(
         On the grid: derivatives by the d columns that the drive's march gives, and the signal.
     base : int
         Point of the grid at place 0 of `seen`.
+    way : (d,) array
+        What of the derivatives is still to be done, see `Program.way`.
     r, at, count : int
         The observation, the first of its stamps and how many.
     sink, to :
@@ -391,10 +453,16 @@ def place(
     begin = cell[0] - base
     for c in range(derived):
         column = sink.rows[sink.to[c], to : to + count]
+        if way[c] == DONE:
+            continue
         if plan.regular[r]:
             row = seen[c, begin : begin + count]
-            for i in range(count):
-                column[i] = weight[i] * row[i]
+            if way[c] == ADD:
+                for i in range(count):
+                    column[i] += weight[i] * row[i]
+            else:
+                for i in range(count):
+                    column[i] = weight[i] * row[i]
         else:
             row = seen[c]
             for i in range(count):
@@ -426,6 +494,7 @@ def place(
 def rotate(
     seen: Array,
     base: int,
+    way: Indices,
     plan: Plan,
     r: int,
     stamps: tuple[int, int],
@@ -437,7 +506,7 @@ def rotate(
 
     Parameters
     ----------
-    seen, base, plan, r, sink :
+    seen, base, way, plan, r, sink :
         As in `place`.
     stamps : (int, int)
         The first stamp of the observation, and the one behind the last.
@@ -463,7 +532,7 @@ def rotate(
             and plan.weight[at + count] != 0.0
         ):
             count += 1
-        place(seen, base, plan, r, at, count, sink, used)
+        place(seen, base, way, plan, r, at, count, sink, used)
         at, used = at + count, used + count
         if used == sink.rows.shape[1]:
             absorb(sink.rows, sink.factor, products)
@@ -513,7 +582,7 @@ def deliver(
     combine(room.flat, program.terms, program.seen, targets, count, room.flat_seen)
     base, last = first - CARRIED, first + count == size
     for r in range(plan.first.size - 1):
-        rows = room.seen[r]
+        rows, way = room.seen[r], program.way[r]
         signal, value = rows[derived, CARRIED:], room.table[program.value[r]]
         for m in range(count):
             signal[m] = value[m]
@@ -535,9 +604,9 @@ def deliver(
             end += 1
         room.progress[r] = end
         if sink.factor.size > 0:
-            used = rotate(rows, base, plan, r, (at, end), sink, used, room.products)
+            used = rotate(rows, base, way, plan, r, (at, end), sink, used, room.products)
         elif end > at:
-            place(rows, base, plan, r, at, end - at, sink, at)
+            place(rows, base, way, plan, r, at, end - at, sink, at)
     return used
 
 
@@ -588,7 +657,12 @@ def march_observed(
                 call(pieces[a], count, first, h, arrays)
             elif what == COMBINE:
                 combine(flat, program.terms, a, b, count, flat)
-            else:
+            elif what == RECUR:
                 recur(a, program.columns[b:c], flat, count, tangent, room.waiting)
+            else:
+                at, through = plan.first[a] + first, flat[program.columns[b] :]
+                for m in range(count):
+                    room.aside[m] = plan.weight[at + m] * through[m]
+                follow_out(program.columns[b + 1 : c], flat, tangent, sink, (at, count), room)
         used = deliver(program, plan, sink, room, used, (first, count, size), h)
     finish(sink, room, used)
