@@ -270,9 +270,7 @@ class Sensitivities:
         """
         rows = getattr(self, output)
         stamps = np.asarray(time, dtype=np.float64)
-        return np.column_stack(
-            [np.interp(stamps, self.record.time, column) for column in rows.T]
-        )
+        return np.column_stack([np.interp(stamps, self.record.time, column) for column in rows.T])
 
 
 def sensitivities(

@@ -39,6 +39,8 @@ from swashplate.equations.reading import read
 from swashplate.equations.writing import Writer, lines_of
 from swashplate.errors import InputError
 
+PAIR = 2
+"""Columns of a generated recurrence side by side."""
 WORD = re.compile(r"\b[A-Za-z_]\w*")
 
 
@@ -69,6 +71,8 @@ class Group:
     """Whether a state's row holds the derivative behind the sample, as its signal needs it."""
     stored: tuple[bool, ...]
     """Whether anyone reads a state's row."""
+    piece: int = -1
+    """Piece that runs the recurrence; -1 where kernels of the library do, for one state or two."""
 
 
 @dataclass
@@ -229,9 +233,16 @@ class _Builder:
         file = f"{self.model.name}_{name}"
         return Planned(lambda: module(file, text, {"piece": piece, **names})[name])
 
-    def _piece(self, name: str, says: str, lines: Sequence[str], names: Mapping[str, Any]) -> int:
+    def _piece(
+        self,
+        name: str,
+        says: str,
+        lines: Sequence[str],
+        names: Mapping[str, Any],
+        arguments: str = PIECE,
+    ) -> int:
         """Number of a new piece."""
-        text = function_source(f"{name}({PIECE})", says, lines, "@piece")
+        text = function_source(f"{name}({arguments})", says, lines, "@piece")
         self.pieces.append(self._planned(name, text, {**self.sampler.names, **names}))
         return len(self.pieces)
 
@@ -450,6 +461,8 @@ class _Builder:
                     for path, behind in zip(bare, after, strict=True)
                 )
                 groups.append(Group(bare, after, stored))
+                if len(bare) > 2:
+                    groups[-1].piece = self._recurrence(graph, f"{own}_{bare[0]}", groups[-1])
             graph.components.append(Component(filled, groups, together))
         starts = {"rest": self._starting(part, rest_of(part))}
         settled = settled_of(part)
@@ -514,6 +527,50 @@ class _Builder:
 
     # -- pieces --------------------------------------------------------------------------------
 
+    def _recurrence(self, graph: PartGraph, name: str, group: Group) -> int:
+        """Piece that runs y[n+1] = A[n] y[n] + g[n] for some columns, PAIR of them side by side.
+
+        Its second argument is the number of columns; in place of ``whole`` it takes, for each state,
+        the places of its inputs g and results in ``flat`` and of y in ``tangent``, of all columns;
+        and that vector in place of ``params``.
+        """
+        states, abreast = range(len(group.states)), range(PAIR)
+        ahead, inner, behind, loads = [], [], [], {}
+        for i in states:
+            for j in abreast:
+                for k, what in enumerate(("g", "d", "p")):
+                    if what != "d" or group.stored[i]:
+                        ahead.append(f"{what}{i}_{j} = columns[{3 * i + k} * width + c + {j}]")
+                ahead.append(f"y{i}_{j} = tangent[p{i}_{j}]")
+                behind.append(f"tangent[p{i}_{j}] = y{i}_{j}")
+                terms = [f"flat[g{i}_{j} + m]"]
+                for l in states:
+                    by = By("state", group.states[l])
+                    entry = graph.entries.get((f"state.{group.states[i]}", by))
+                    if entry is not None and entry.row >= 0:
+                        loads[f"a{i}_{l}"] = f"a{i}_{l} = {_place(entry.row, 'm')}"
+                        terms.append(f"a{i}_{l} * y{l}_{j}")
+                    elif entry is not None:
+                        terms.append(f"{entry.value!r} * y{l}_{j}")
+                inner.append(f"n{i}_{j} = {_sum(terms)}")
+        for i in states:
+            for j in abreast:
+                if group.stored[i]:
+                    inner.append(f"flat[d{i}_{j} + m] = {'n' if group.after[i] else 'y'}{i}_{j}")
+        inner += [f"y{i}_{j} = n{i}_{j}" for i in states for j in abreast]
+        head = PIECE.replace("first", "width").replace("whole", "columns")
+        return self._piece(
+            f"recur_{name}",
+            f"Derivatives of {', '.join(group.states)}.",
+            [
+                f"for c in range(0, width, {PAIR}):",
+                *indented([*ahead, "for m in range(count):", *indented([*loads.values(), *inner])]),
+                *indented(behind),
+            ],
+            {},
+            head.replace("params", "tangent"),
+        )
+
     def _fill(
         self,
         graph: PartGraph,
@@ -558,6 +615,12 @@ class _Builder:
 def _place(row: int, at: str) -> str:
     """Text of a number in a row of the block."""
     return f"flat[{row * STRIDE} + {at}]"
+
+
+def _sum(terms: Sequence[str]) -> str:
+    """Text of a sum, its parts beside each other: none waits for all before it."""
+    half = len(terms) // 2
+    return terms[0] if not half else f"({_sum(terms[:half])} + {_sum(terms[half:])})"
 
 
 def _weakly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> list[list[str]]:

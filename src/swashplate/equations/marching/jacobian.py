@@ -11,7 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code import generating, leaves
 from swashplate.equations.fields import floats_of, value_at
-from swashplate.equations.marching.graph import By, Entry, Graph, Group, PartGraph, graph_of
+from swashplate.equations.marching.graph import (
+    PAIR,
+    By,
+    Entry,
+    Graph,
+    Group,
+    PartGraph,
+    graph_of,
+)
 from swashplate.equations.marching.observation import ObservedRecord, Own
 from swashplate.equations.marching.pieces import addresses
 from swashplate.equations.marching.rows import (
@@ -20,6 +28,7 @@ from swashplate.equations.marching.rows import (
     BLOCK,
     CALL,
     CARRIED,
+    CHAIN,
     COMBINE,
     DONE,
     FOLLOW,
@@ -80,8 +89,6 @@ class Layout:
     rows: int
     constant: Mapping[int, float]
     """Rows that hold just one value."""
-    states: int
-    """Most states of a recurrence."""
     tangents: int
     """Numbers in the vector of tangents."""
     columns: Mapping[str, int]
@@ -140,7 +147,6 @@ class _Planner:
         self.todo: list[tuple[int, int, int, int]] = []
         self.chains: list[_Chain] = []
         self.columns_of: list[Indices] = [np.zeros(0, dtype=np.int64)]
-        self.states = 1
         self.linked = set(graph.sources)
 
     def layout(self, observed: tuple[int, ...], whole: tuple[bool, ...]) -> Layout:
@@ -188,11 +194,10 @@ class _Planner:
         )
         return Layout(
             program,
-            frozenset(todo[1] for todo in self.todo if todo[0] == CALL),
+            frozenset(todo[1] for todo in self.todo if todo[0] in (CALL, CHAIN)),
             tuple((k, term.slot) for k, term in enumerate(terms) if term.slot is not None),
             self.rows,
             {row: value for value, row in self.constant.items()},
-            self.states,
             self.tangents,
             {column: c for c, column in enumerate(self.columns)},
             self.places,
@@ -305,30 +310,35 @@ class _Planner:
             whose.append(c)
         if not found:
             return False
-        k = len(group.states)
-        found += [[(self._constant(0.0), self.idle, 0)] * k] * (-len(found) % ABREAST)
+        k, own = len(group.states), group.piece >= 0
+        abreast = PAIR if own else ABREAST
+        found += [[(self._constant(0.0), self.idle, 0)] * k] * (-len(found) % abreast)
         states = group.states
-        numbers = [
-            self._factor(by_result, path, other) * STRIDE for path in states for other in states
-        ]
+        numbers = (
+            [len(found)]
+            if own
+            else [
+                self._factor(by_result, path, other) * STRIDE for path in states for other in states
+            ]
+        )
         for i, after in enumerate(group.after):
             numbers += [each[i][0] * STRIDE for each in found]
             numbers += [each[i][1] * STRIDE for each in found]
             numbers += [each[i][2] for each in found]
-            numbers += [int(after) for _ in found]
+            numbers += [] if own else [int(after) for _ in found]
         begin = sum(each.size for each in self.columns_of)
         self.columns_of.append(np.array(numbers, dtype=np.int64))
-        self.states = max(self.states, k)
         self._combine(since)
-        self.todo.append((RECUR, k, begin, begin + len(numbers)))
+        if own:
+            self.todo.append((CHAIN, group.piece, begin, begin + len(numbers)))
+        else:
+            self.todo.append((RECUR, k, begin, begin + len(numbers)))
         if k == 1 and early and not group.after[0]:
             columns = [(c, *each[0]) for c, each in zip(whose, found, strict=False)]
             self.chains.append(_Chain(self.todo[-1], numbers[0], columns))
         return True
 
-    def _outwards(
-        self, shown: dict[tuple[int, int], list[Term]], whole: Sequence[bool]
-    ) -> Indices:
+    def _outwards(self, shown: dict[tuple[int, int], list[Term]], whole: Sequence[bool]) -> Indices:
         """Let recurrences whose results one observation alone needs go there at once."""
         way = np.full((len(whole), len(self.columns)), SET)
         uses: dict[int, list[tuple[int, int, Term | None]]] = {}
@@ -345,9 +355,13 @@ class _Planner:
                 continue
             users = [each[0] for each in found]
             r, _, first = users[0]
-            if first is None or not whole[r] or any(
-                user != r or term is None or term[:1] + term[2:] != (first.a, 1.0, None)
-                for user, _, term in users
+            if (
+                first is None
+                or not whole[r]
+                or any(
+                    user != r or term is None or term[:1] + term[2:] != (first.a, 1.0, None)
+                    for user, _, term in users
+                )
             ):
                 continue
             self._follow(chain, r, first.a)
@@ -752,7 +766,7 @@ def _march(
     program = _with_numbers(layout, slopes.constants, places)
     marched = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
     met = np.array([np.inf])
-    room = room_for(layout.rows, layout.constant, layout.states, len(columns), plan)
+    room = room_for(layout.rows, layout.constant, len(columns), plan)
     arrays = arrays_of(instance, marched, started, places, states, met, room.flat)
     pieces, grid = addresses(graph.pieces, layout.pieces), (marched[0].size, block, h)
     march_observed(pieces, arrays, grid, tangent, program, plan, sink, room)

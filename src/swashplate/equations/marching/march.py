@@ -591,7 +591,9 @@ def march_source(
     samples: list[list[str]] = []
     for part in parts:
         code = part.code
-        if part is parts[-1]:  # the longest chain from sample to sample; others need not wait for it
+        if (
+            part is parts[-1]
+        ):  # the longest chain from sample to sample; others need not wait for it
             guessed = sampler.guessed(part)
             made = [ex.name(each.name) for each in guessed.ahead.items if isinstance(each, Let)]
             lines += lines_of(guessed.ahead, made)

@@ -242,9 +242,7 @@ class ObservedRecord:
         )
 
 
-def _cells(
-    record: Record, time: Array, moving: bool
-) -> tuple[NDArray[np.int64], Array, Array]:
+def _cells(record: Record, time: Array, moving: bool) -> tuple[NDArray[np.int64], Array, Array]:
     """Where stamps lie on the grid.
 
     Parameters

@@ -56,6 +56,7 @@ class Program(NamedTuple):
     - CALL, number of a piece: call it;
     - COMBINE, first and end of the terms' targets: make rows of the block;
     - RECUR, number k of states, first place and end in `columns`: run a recurrence;
+    - CHAIN, number of a piece, first place and end in `columns`: run one that was generated;
     - FOLLOW, an observation, first place and end in `columns`: run a recurrence of one state whose
       weighted results are that observation's derivatives.
     """
@@ -64,8 +65,8 @@ class Program(NamedTuple):
     seen: int
     """First target that is a row of the observations."""
     columns: Indices
-    """For each recurrence what `follow_each_other` takes: its `places`, then its `columns`; or what
-    `follow_out` takes."""
+    """For each recurrence what runs it takes: k² places of its factors, then the `columns` of
+    `follow`; the number of columns, then theirs; what `follow_out` takes."""
     way: Indices
     """(r, d) how the derivatives of an observation get to the sink, one of SET, ADD and DONE."""
     value: Indices
@@ -74,7 +75,7 @@ class Program(NamedTuple):
     """(r,) whether an observation is its signal's integral."""
 
 
-CALL, COMBINE, RECUR, FOLLOW = 0, 1, 2, 3
+CALL, COMBINE, RECUR, FOLLOW, CHAIN = 0, 1, 2, 3, 4
 SET, ADD, DONE = 0, 1, 2
 
 
@@ -141,16 +142,12 @@ class Room(NamedTuple):
     """(STRIDE,) room for a row that is needed for a moment."""
     products: Array
     """Room for `absorb`."""
-    waiting: Array
-    """(2, k, ABREAST) room for `follow_each_other`."""
     progress: Indices
     """(r,) first stamp of each observation that is not yet dealt with."""
 
 
-def room_for(
-    rows: int, constant: Mapping[int, float], states: int, derived: int, plan: Plan
-) -> Room:
-    """Memory for a march with so many rows, states in a recurrence, columns and observations.
+def room_for(rows: int, constant: Mapping[int, float], derived: int, plan: Plan) -> Room:
+    """Memory for a march with so many rows, columns and observations.
 
     `constant` are numbers of rows that hold just one value.
     """
@@ -170,7 +167,6 @@ def room_for(
         np.zeros((observations, derived + 1, 3)),
         np.empty(STRIDE),
         aligned(EIGHTH),
-        np.empty((2, states, ABREAST)),
         plan.first[:-1].copy(),
     )
 
@@ -291,7 +287,7 @@ def follow_out(
 
 @subroutine
 def follow_pair(places: Indices, columns: Indices, flat: Array, count: int, tangent: Array) -> None:
-    """`follow_each_other` for two states, which most filters have."""
+    """`follow` for two states that move each other, which most filters have: places of A first."""
     a00, a01 = flat[places[0] :], flat[places[1] :]
     a10, a11 = flat[places[2] :], flat[places[3] :]
     behind, other_behind = columns[3, 0] != 0, columns[7, 0] != 0
@@ -313,55 +309,14 @@ def follow_pair(places: Indices, columns: Indices, flat: Array, count: int, tang
 
 
 @subroutine
-def follow_each_other(
-    k: int, places: Indices, columns: Indices, flat: Array, count: int, tangent: Array, y: Array
-) -> None:
-    """Run y[n+1] = A[n] y[n] + g[n] of k states, several columns side by side.
-
-    Parameters
-    ----------
-    places : (k²,) array
-        Places of A in `flat`, state by state.
-    columns : (4 k, j) array
-        Of each state what `follow` takes.
-    y : (2, k, ABREAST) array
-        Room for the states and for those behind the sample.
-    """
-    for c in range(0, columns.shape[1], ABREAST):
-        for i in range(k):
-            for j in range(ABREAST):
-                y[0, i, j] = tangent[columns[4 * i + 2, c + j]]
-        for m in range(count):
-            for i in range(k):
-                for j in range(ABREAST):
-                    y[1, i, j] = flat[columns[4 * i, c + j] + m]
-                for l in range(k):
-                    a = flat[places[i * k + l] + m]
-                    for j in range(ABREAST):
-                        y[1, i, j] += a * y[0, l, j]
-            for i in range(k):
-                behind = columns[4 * i + 3, 0]
-                for j in range(ABREAST):
-                    flat[columns[4 * i + 1, c + j] + m] = y[behind, i, j]
-            for i in range(k):
-                for j in range(ABREAST):
-                    y[0, i, j] = y[1, i, j]
-        for i in range(k):
-            for j in range(ABREAST):
-                tangent[columns[4 * i + 2, c + j]] = y[0, i, j]
-
-
-@subroutine
-def recur(k: int, columns: Indices, flat: Array, count: int, tangent: Array, y: Array) -> None:
+def recur(k: int, columns: Indices, flat: Array, count: int, tangent: Array) -> None:
     """Run a recurrence of k states, as laid down in `Program.columns`."""
     places, rest = columns[: k * k], columns[k * k :]
     chosen = rest.reshape(4 * k, rest.size // (4 * k))
     if k == 1:
         follow(flat[places[0] :], chosen, flat, count, tangent)
-    elif k == 2:
-        follow_pair(places, chosen, flat, count, tangent)
     else:
-        follow_each_other(k, places, chosen, flat, count, tangent, y)
+        follow_pair(places, chosen, flat, count, tangent)
 
 
 @subroutine
@@ -658,7 +613,10 @@ def march_observed(
             elif what == COMBINE:
                 combine(flat, program.terms, a, b, count, flat)
             elif what == RECUR:
-                recur(a, program.columns[b:c], flat, count, tangent, room.waiting)
+                recur(a, program.columns[b:c], flat, count, tangent)
+            elif what == CHAIN:
+                taken = (program.columns[b + 1 : c], arrays[3], tangent, *arrays[5:])
+                call(pieces[a], count, program.columns[b], h, (arrays[0], arrays[1], *taken))
             else:
                 at, through = plan.first[a] + first, flat[program.columns[b] :]
                 for m in range(count):

@@ -251,6 +251,7 @@ class Guessed:
                 self.waits |= reads
         self.choices: dict[str, Node] = {}
         self.code, self.ahead = Code(code.taken), Code(code.taken)
+        self.code.names = self.ahead.names = code.names
         self.code.items = self._items(items)
 
     def _items(self, items: Iterable[Item]) -> list[Item]:
