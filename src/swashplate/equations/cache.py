@@ -126,17 +126,18 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
         If there is no place for the cache; the function works all the same.
     """
     known[plain(function)] = None
-    compiled: Any = njit(nogil=True, error_model="numpy")(function)
+    without: Any = {"no_cfunc_wrapper": True}
+    compiled: Any = njit(nogil=True, error_model="numpy", **without)(function)
     if not config.DISABLE_JIT:  # type: ignore[attr-defined]
         on_disk(compiled, function)
     return compiled  # type: ignore[no-any-return]
 
 
 def subroutine(function: Callable[P, R]) -> Callable[P, R]:
-    """A `kernel` that only kernels call: without the code that takes arguments from Python."""
+    """A `kernel` that only kernels call: no arguments from Python, no counting of references."""
     known[plain(function)] = None
-    inner: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    compiled: Any = njit(nogil=True, error_model="numpy", **inner)(function)
+    without: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
+    compiled: Any = njit(nogil=True, error_model="numpy", **without)(function)
     if not config.DISABLE_JIT:  # type: ignore[attr-defined]
         on_disk(compiled, function)
     return compiled  # type: ignore[no-any-return]

@@ -530,9 +530,9 @@ class _Builder:
     def _recurrence(self, graph: PartGraph, name: str, group: Group) -> int:
         """Piece that runs y[n+1] = A[n] y[n] + g[n] for some columns, PAIR of them side by side.
 
-        Its second argument is the number of columns; in place of ``whole`` it takes, for each state,
-        the places of its inputs g and results in ``flat`` and of y in ``tangent``, of all columns;
-        and that vector in place of ``params``.
+        Its second argument is the number of columns. In place of ``whole`` it takes, for each state
+        and all columns, the places of inputs g and results in ``flat`` and of y in ``tangent``; and
+        that vector in place of ``params``.
         """
         states, abreast = range(len(group.states)), range(PAIR)
         ahead, inner, behind, loads = [], [], [], {}
@@ -553,10 +553,9 @@ class _Builder:
                     elif entry is not None:
                         terms.append(f"{entry.value!r} * y{l}_{j}")
                 inner.append(f"n{i}_{j} = {_sum(terms)}")
-        for i in states:
-            for j in abreast:
-                if group.stored[i]:
-                    inner.append(f"flat[d{i}_{j} + m] = {'n' if group.after[i] else 'y'}{i}_{j}")
+        for i in (i for i in states if group.stored[i]):
+            shown = "n" if group.after[i] else "y"
+            inner += [f"flat[d{i}_{j} + m] = {shown}{i}_{j}" for j in abreast]
         inner += [f"y{i}_{j} = n{i}_{j}" for i in states for j in abreast]
         head = PIECE.replace("first", "width").replace("whole", "columns")
         return self._piece(

@@ -379,14 +379,13 @@ class _Planner:
         numbers = [through * STRIDE, chain.factor]
         for k in range(0, len(columns), OUTWARDS):
             some = columns[k : k + OUTWARDS]
-            rows, idle = [row for _, row, _, _ in some], OUTWARDS - len(some)
-            if idle or rows != list(range(rows[0], rows[0] + OUTWARDS)):
-                fresh = [self._row() for _ in range(OUTWARDS)]
-                self.made += [(to, [Term(row, -1, 1.0)]) for to, row in zip(fresh, rows)]
-                self.made += [(to, []) for to in fresh[len(some) :]]
-                rows = fresh
-            numbers += [rows[0] * STRIDE, *(at for *_, at in some), *(0,) * idle]
-            numbers += [*(c for c, *_ in some), *(-1,) * idle]
+            some += some[-1:] * (OUTWARDS - len(some))
+            rows = [row for _, row, _, _ in some]
+            if rows != list(range(rows[0], rows[0] + OUTWARDS)):
+                rows = [self._row() for _ in some]
+                pairs = zip(rows, some, strict=True)
+                self.made += [(to, [Term(row, -1, 1.0)]) for to, (_, row, _, _) in pairs]
+            numbers += [rows[0] * STRIDE, *(at for *_, at in some), *(c for c, *_ in some)]
         begin = sum(each.size for each in self.columns_of)
         self.columns_of.append(np.array(numbers, dtype=np.int64))
         at = self.todo.index(chain.todo)

@@ -243,7 +243,7 @@ def follow(a: Array, columns: Indices, flat: Array, count: int, tangent: Array) 
 
 @subroutine
 def follow_out(
-    columns: Indices, flat: Array, tangent: Array, sink: Sink, span: tuple[int, int], room: Room
+    columns: Indices, flat: Array, tangent: Array, q: Array, sink: Sink, at: int, count: int
 ) -> None:
     """Run y[n+1] = a[n] y[n] + g[n] as `follow`, and put q[n] y[n] into the sink.
 
@@ -251,25 +251,24 @@ def follow_out(
     ----------
     columns : array
         Place of a in `flat`, then for each OUTWARDS columns the place of the first g, the others
-        in the rows behind it; their places in `tangent`; and their numbers in the sink, -1 for none.
-    span : (int, int)
+        in the rows behind it; their places in `tangent`; and their numbers among the derivatives.
+        A column may stand there several times.
+    q : (m,) array
+        What the result is multiplied by.
+    at, count : int
         First place in the sink, and how many.
-    room : Room
-        With q in `aside`.
     """
-    at, count = span
-    a, q = flat[columns[0] :], room.aside
-    idle = room.seen[0, room.seen.shape[1] - 1]
+    a, out, size = flat[columns[0] :], sink.rows.reshape(-1), sink.rows.shape[1]
     for c in range(1, columns.size, 1 + 2 * OUTWARDS):
         g, p, to = flat[columns[c] :], columns[c + 1 :], columns[c + 1 + OUTWARDS :]
-        d0 = sink.rows[sink.to[to[0]], at:] if to[0] >= 0 else idle
-        d1 = sink.rows[sink.to[to[1]], at:] if to[1] >= 0 else idle
-        d2 = sink.rows[sink.to[to[2]], at:] if to[2] >= 0 else idle
-        d3 = sink.rows[sink.to[to[3]], at:] if to[3] >= 0 else idle
-        d4 = sink.rows[sink.to[to[4]], at:] if to[4] >= 0 else idle
-        d5 = sink.rows[sink.to[to[5]], at:] if to[5] >= 0 else idle
-        d6 = sink.rows[sink.to[to[6]], at:] if to[6] >= 0 else idle
-        d7 = sink.rows[sink.to[to[7]], at:] if to[7] >= 0 else idle
+        d0 = out[sink.to[to[0]] * size + at :]
+        d1 = out[sink.to[to[1]] * size + at :]
+        d2 = out[sink.to[to[2]] * size + at :]
+        d3 = out[sink.to[to[3]] * size + at :]
+        d4 = out[sink.to[to[4]] * size + at :]
+        d5 = out[sink.to[to[5]] * size + at :]
+        d6 = out[sink.to[to[6]] * size + at :]
+        d7 = out[sink.to[to[7]] * size + at :]
         y0, y1, y2, y3 = tangent[p[0]], tangent[p[1]], tangent[p[2]], tangent[p[3]]
         y4, y5, y6, y7 = tangent[p[4]], tangent[p[5]], tangent[p[6]], tangent[p[7]]
         for m in range(count):
@@ -306,17 +305,6 @@ def follow_pair(places: Indices, columns: Indices, flat: Array, count: int, tang
             e0[m], e1[m] = o0 if other_behind else z0, o1 if other_behind else z1
             y0, y1, z0, z1 = n0, n1, o0, o1
         tangent[p0], tangent[p1], tangent[q0], tangent[q1] = y0, y1, z0, z1
-
-
-@subroutine
-def recur(k: int, columns: Indices, flat: Array, count: int, tangent: Array) -> None:
-    """Run a recurrence of k states, as laid down in `Program.columns`."""
-    places, rest = columns[: k * k], columns[k * k :]
-    chosen = rest.reshape(4 * k, rest.size // (4 * k))
-    if k == 1:
-        follow(flat[places[0] :], chosen, flat, count, tangent)
-    else:
-        follow_pair(places, chosen, flat, count, tangent)
 
 
 @subroutine
@@ -613,7 +601,12 @@ def march_observed(
             elif what == COMBINE:
                 combine(flat, program.terms, a, b, count, flat)
             elif what == RECUR:
-                recur(a, program.columns[b:c], flat, count, tangent)
+                places = program.columns[b : b + a * a]
+                chosen = program.columns[b + a * a : c].reshape(4 * a, (c - b - a * a) // (4 * a))
+                if a == 1:
+                    follow(flat[places[0] :], chosen, flat, count, tangent)
+                else:
+                    follow_pair(places, chosen, flat, count, tangent)
             elif what == CHAIN:
                 taken = (program.columns[b + 1 : c], arrays[3], tangent, *arrays[5:])
                 call(pieces[a], count, program.columns[b], h, (arrays[0], arrays[1], *taken))
@@ -621,6 +614,6 @@ def march_observed(
                 at, through = plan.first[a] + first, flat[program.columns[b] :]
                 for m in range(count):
                     room.aside[m] = plan.weight[at + m] * through[m]
-                follow_out(program.columns[b + 1 : c], flat, tangent, sink, (at, count), room)
+                follow_out(program.columns[b + 1 : c], flat, tangent, room.aside, sink, at, count)
         used = deliver(program, plan, sink, room, used, (first, count, size), h)
     finish(sink, room, used)

@@ -1,7 +1,7 @@
 """Decisions as a processor likes them: without branches for many sets, well guessed for one.
 
-Many sets side by side: straight code, so that a loop becomes vector instructions. The compiler turns a loop into vector instructions if there is nothing in it but arithmetic on rows
-of neighbouring numbers. Hence
+Many sets side by side: straight code. The compiler turns a loop into vector instructions if there
+is nothing in it but arithmetic on rows of neighbouring numbers. Hence
 
 - a decision is not a branch: both ways are computed, and one result is taken;
 - what does not change over the march is computed once, ahead of it: the compiler moves it out of a
@@ -17,7 +17,7 @@ The operations and their order stay as they are, and so does the last bit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import reduce
 from typing import Any, NamedTuple
