@@ -8,7 +8,7 @@ A definition stands once, on the field of `swashplate.models.card.Card` or
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from typing import Literal
 
@@ -83,6 +83,41 @@ OPTIONS: tuple[str, ...] = tuple(dict.fromkeys(SWITCHES.values()))
 def options_of(numbers: Mapping[str, float]) -> frozenset[str]:
     """Options whose parameters are not all zero; what is not among the numbers is off."""
     return frozenset(each for name, each in SWITCHES.items() if numbers.get(name, 0.0) != 0.0)
+
+
+OWN: dict[str, type] = {}
+"""Parameters of users' own equations among the refinements, and the class that declares each."""
+
+
+def declare(kind: type) -> None:
+    """Make the parameters of one's own equation known by name, beside the refinements.
+
+    Parameters
+    ----------
+    kind : class of named tuples
+        Each field a float with its `Definition`, of one value, and a default.
+
+    Raises
+    ------
+    ParameterError
+        If one has no definition or is called like another one.
+    """
+    for each in declared_by(kind):
+        default = kind._field_defaults.get(each.symbol)  # type: ignore[attr-defined]
+        if len(each.fields) != 1 or default is None or not each.definition.unit:
+            raise ParameterError(
+                f"{kind.__name__}.{each.symbol} needs a Definition with a unit, one value and a "
+                "default."
+            )
+        made = replace(definition_of(each, "refinements"), default=default)
+        known = REFINEMENTS.get(each.symbol) or CATALOGUE.get(each.symbol)
+        if known is not None and (known != made or each.symbol not in OWN):
+            raise ParameterError(
+                f"{kind.__name__}.{each.symbol}: there is another parameter {each.symbol}, "
+                f"{known.name}; give yours a name of its own."
+            )
+        REFINEMENTS[each.symbol], DEFAULTS[each.symbol] = made, float(default)
+        OWN[each.symbol] = kind
 
 
 def find(name: str) -> Definition:

@@ -5,13 +5,16 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
+from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.definitions import (
     CATALOGUE,
     DEFAULTS,
+    OWN,
     REFINEMENTS,
     SWITCHES,
     Definition,
+    declare,
     find,
     options_of,
     unknown_parameter,
@@ -99,10 +102,21 @@ class ParameterSet(Mapping[str, Parameter]):
     filter's differential equation, whose ζ, ω and C mean the same at every rate. [Hz]"""
     options: frozenset[str] = frozenset()
     """Terms of the pump that count: of `swashplate.parameters.definitions.OPTIONS`."""
+    equations: tuple[Replacement, ...] = ()
+    """One's own equations in the place of the pump's, see `Drive.with_equation`."""
     numbers: Mapping[str, float] = field(init=False, repr=False, compare=False)
     """Every single value by column, e.g. ``Z16_plus``."""
 
     def __post_init__(self) -> None:
+        own = {each.parameters for each in self.equations if each.parameters is not None}
+        for kind in own:
+            declare(kind)
+        strange = [name for name in self.parameters if OWN.get(name, None) not in {None, *own}]
+        if strange:
+            raise ParameterError(
+                f"{self.name}: {strange[0]} belongs to an equation of your own, which this drive "
+                "does not have; see Drive.with_equation."
+            )
         missing = [symbol for symbol in CATALOGUE if symbol not in self.parameters]
         if missing:
             raise ParameterError(f"{self.name}: no value for {', '.join(missing)}.")
@@ -141,7 +155,7 @@ class ParameterSet(Mapping[str, Parameter]):
         return len(self.parameters)
 
     def __hash__(self) -> int:
-        return hash((self.name, self.options, *self.numbers.values()))
+        return hash((self.name, self.options, self.equations, *self.numbers.values()))
 
     def __reduce__(self) -> tuple[object, ...]:
         # read-only views cannot be pickled, so a copy in another process is built anew
@@ -155,6 +169,7 @@ class ParameterSet(Mapping[str, Parameter]):
             self.card_switch,
             self.rate,
             self.options,
+            self.equations,
         )
 
     @property
@@ -169,11 +184,11 @@ class ParameterSet(Mapping[str, Parameter]):
     @property
     def plain(self) -> "ParameterSet":
         """The set without refinements, itself if it has none."""
-        if REFINEMENTS.keys().isdisjoint(self.parameters):
+        if REFINEMENTS.keys().isdisjoint(self.parameters) and not self.equations:
             return self
         parameters = {symbol: self.parameters[symbol] for symbol in CATALOGUE}
         own = {SWITCHES[symbol] for symbol in CATALOGUE if symbol in SWITCHES}
-        return replace(self, parameters=parameters, options=self.options & own)
+        return replace(self, parameters=parameters, options=self.options & own, equations=())
 
     def refuse_refinements(self, what: str) -> None:
         """Refuse the set where a computation knows the source's equations alone.
