@@ -80,17 +80,22 @@ OPTIONS: tuple[str, ...] = tuple(dict.fromkeys(SWITCHES.values()))
 """Those options, along the chain."""
 
 
+def is_column(name: str) -> bool:
+    """Whether a set can have a value of this name, e.g. ``Z16_plus``."""
+    return name in COLUMNS or name in REFINEMENTS or name in OWN
+
+
 def options_of(numbers: Mapping[str, float]) -> frozenset[str]:
     """Options whose parameters are not all zero; what is not among the numbers is off."""
     return frozenset(each for name, each in SWITCHES.items() if numbers.get(name, 0.0) != 0.0)
 
 
-OWN: dict[str, type] = {}
-"""Parameters of users' own equations among the refinements, and the class that declares each."""
+OWN: dict[str, Definition] = {}
+"""Definitions of what users' own equations brought along, by symbol."""
 
 
 def declare(kind: type) -> None:
-    """Make the parameters of one's own equation known by name, beside the refinements.
+    """Make the parameters of one's own equation known by name.
 
     Parameters
     ----------
@@ -110,14 +115,13 @@ def declare(kind: type) -> None:
                 "default."
             )
         made = replace(definition_of(each, "refinements"), default=default)
-        known = REFINEMENTS.get(each.symbol) or CATALOGUE.get(each.symbol)
-        if known is not None and (known != made or each.symbol not in OWN):
+        known = (CATALOGUE | REFINEMENTS | OWN).get(each.symbol, made)
+        if known != made:
             raise ParameterError(
                 f"{kind.__name__}.{each.symbol}: there is another parameter {each.symbol}, "
                 f"{known.name}; give yours a name of its own."
             )
-        REFINEMENTS[each.symbol], DEFAULTS[each.symbol] = made, float(default)
-        OWN[each.symbol] = kind
+        OWN[each.symbol] = made
 
 
 def find(name: str) -> Definition:
@@ -134,6 +138,8 @@ def find(name: str) -> Definition:
         return CATALOGUE[COLUMNS[name]]
     if name in REFINEMENTS:
         return REFINEMENTS[name]
+    if name in OWN:
+        return OWN[name]
     raise unknown_parameter(name)
 
 

@@ -108,10 +108,11 @@ class ParameterSet(Mapping[str, Parameter]):
     """Every single value by column, e.g. ``Z16_plus``."""
 
     def __post_init__(self) -> None:
-        own = {each.parameters for each in self.equations if each.parameters is not None}
-        for kind in own:
+        kinds = [each.parameters for each in self.equations if each.parameters is not None]
+        for kind in kinds:
             declare(kind)
-        strange = [name for name in self.parameters if OWN.get(name, None) not in {None, *own}]
+        own = {name for kind in kinds for name in kind._fields}
+        strange = [name for name in self.parameters if name in OWN and name not in own]
         if strange:
             raise ParameterError(
                 f"{self.name}: {strange[0]} belongs to an equation of your own, which this drive "
@@ -121,7 +122,8 @@ class ParameterSet(Mapping[str, Parameter]):
         if missing:
             raise ParameterError(f"{self.name}: no value for {', '.join(missing)}.")
         ordered = {symbol: self.parameters[symbol] for symbol in CATALOGUE}
-        ordered |= {each: self.parameters[each] for each in REFINEMENTS if each in self.parameters}
+        more = [each for each in (*REFINEMENTS, *OWN) if each in self.parameters]
+        ordered |= {each: self.parameters[each] for each in more}
         numbers = {}
         for parameter in ordered.values():
             for column, value in zip(parameter.definition.columns, parameter.values, strict=True):
@@ -143,6 +145,10 @@ class ParameterSet(Mapping[str, Parameter]):
             return self.parameters[symbol]
         if symbol in REFINEMENTS:
             return Parameter(REFINEMENTS[symbol], DEFAULTS[symbol], status="inactive")
+        if symbol in OWN:
+            default = OWN[symbol].default
+            assert default is not None
+            return Parameter(OWN[symbol], default, status="inactive")
         raise unknown_parameter(symbol)
 
     def __contains__(self, symbol: object) -> bool:
