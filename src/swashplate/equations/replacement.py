@@ -40,9 +40,10 @@ def _place_of(thing: Any) -> tuple[str, str]:
 
 
 def _found(*places: tuple[str, str] | None) -> Replacement:
-    return Replacement(
-        *(None if each is None else getattr(import_module(each[0]), each[1]) for each in places)
-    )
+    found: list[Any] = [
+        None if each is None else getattr(import_module(each[0]), each[1]) for each in places
+    ]
+    return Replacement(*found)
 
 
 def uses(model: Model, equation: Equation) -> bool:
@@ -114,7 +115,8 @@ def _part(part: Model, old: Equation, new: Equation, parameters: type[Any] | Non
     leading = {name: each for name, each in equations.items() if _reaches(each, old)}
     if not leading:
         return part
-    kind = part.parameters if parameters is None else _extended(part.parameters, parameters)
+    own: Any = part.parameters
+    kind = own if parameters is None else _extended(own, parameters)
     names = {part.parameters.__name__: kind}
     made = {plain(old): _called_like(old, new, part.name, kind)}
     return replace(
@@ -130,7 +132,7 @@ def _reaches(function: Any, old: Equation) -> bool:
 
 
 @cache
-def _extended(kind: type[Any], more: type[Any]) -> type[Any]:
+def _extended(kind: Any, more: Any) -> type[Any]:
     """A class of named tuples with the fields of two."""
     hints: dict[str, Any] = {}
     defaults: dict[str, Any] = {}

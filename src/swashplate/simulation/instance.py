@@ -86,7 +86,7 @@ def with_equation(parameters: ParameterSet, made: Replacement) -> ParameterSet:
     found = replace(parameters, equations=own)
     if made.parameters is None:
         return found
-    defaults = made.parameters._field_defaults  # type: ignore[attr-defined]
+    defaults = made.parameters._field_defaults
     return found.replace(defaults, found.options)
 
 

@@ -310,13 +310,13 @@ class _Planner:
             whose.append(c)
         if not found:
             return False
-        k, own = len(group.states), group.piece >= 0
-        abreast = PAIR if own else ABREAST
+        k, generated = len(group.states), group.piece >= 0
+        abreast = PAIR if generated else ABREAST
         found += [[(self._constant(0.0), self.idle, 0)] * k] * (-len(found) % abreast)
         states = group.states
         numbers = (
             [len(found)]
-            if own
+            if generated
             else [
                 self._factor(by_result, path, other) * STRIDE for path in states for other in states
             ]
@@ -325,11 +325,11 @@ class _Planner:
             numbers += [each[i][0] * STRIDE for each in found]
             numbers += [each[i][1] * STRIDE for each in found]
             numbers += [each[i][2] for each in found]
-            numbers += [] if own else [int(after) for _ in found]
+            numbers += [] if generated else [int(after) for _ in found]
         begin = sum(each.size for each in self.columns_of)
         self.columns_of.append(np.array(numbers, dtype=np.int64))
         self._combine(since)
-        if own:
+        if generated:
             self.todo.append((CHAIN, group.piece, begin, begin + len(numbers)))
         else:
             self.todo.append((RECUR, k, begin, begin + len(numbers)))
@@ -355,22 +355,19 @@ class _Planner:
                 continue
             users = [each[0] for each in found]
             r, _, first = users[0]
-            if (
-                first is None
-                or not whole[r]
-                or any(
-                    user != r or term is None or term[:1] + term[2:] != (first.a, 1.0, None)
-                    for user, _, term in users
-                )
-            ):
+            # the same factor times the result, all of them in one observation
+            wanted = [
+                (r, None if first is None else Term(first.a, result, 1.0))
+                for _, _, result, _ in chain.columns
+            ]
+            if first is None or not whole[r] or [(user, t) for user, _, t in users] != wanted:
                 continue
             self._follow(chain, r, first.a)
-            for user, c, term in users:
-                assert term is not None
-                shown[user, c].remove(term)
-                way[user, c] = ADD if shown[user, c] else DONE
-                if not shown[user, c]:
-                    del shown[user, c]
+            for _, c, used in users:
+                shown[r, c] = [each for each in shown[r, c] if each is not used]
+                way[r, c] = ADD if shown[r, c] else DONE
+                if not shown[r, c]:
+                    del shown[r, c]
         return way
 
     def _follow(self, chain: _Chain, r: int, through: int) -> None:

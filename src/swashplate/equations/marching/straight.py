@@ -52,7 +52,8 @@ def _expected(typing: Any, test: Any) -> Any:
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         kind = ir.FunctionType(bit, [bit, bit])
-        expect = cgutils.get_or_insert_function(builder.module, kind, "llvm.expect.i1")
+        inserted: Any = cgutils.get_or_insert_function
+        expect = inserted(builder.module, kind, "llvm.expect.i1")
         return builder.call(expect, [values[0], ir.Constant(bit, 0)])
 
     return types.boolean(types.boolean), generate
