@@ -29,7 +29,7 @@ class Level:
         return {"y": np.full(experiment["y"].time.size, values["level"])}
 
 
-def problem(prior: Prior, *, memory: float, scale: float = 1.0) -> Problem:
+def problem(prior: Prior | None, *, memory: float, scale: float = 1.0) -> Problem:
     """A level of 2 under noise of variance 1 with this correlation from sample to sample."""
     drawn = np.random.default_rng(5).normal(size=COUNT)
     noise = lfilter([np.sqrt(1.0 - memory**2)], [1.0, -memory], drawn)

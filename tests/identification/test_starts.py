@@ -72,29 +72,6 @@ def test_time_left_by_hand() -> None:
     assert longest_left(Progress(0, 5.0, np.zeros(1), 0.0)) is None
 
 
-BOUNDS = (np.array([-20.0]), np.array([20.0]))
-
-
-@dataclass(frozen=True)
-class Ridge:
-    """x - 10, with a ridge over (0, 1) that a short step from 0 only climbs."""
-
-    height: float = 5.0
-    bounds: tuple[np.ndarray, np.ndarray] = BOUNDS
-    forbidden: float = np.inf
-    start = np.zeros(1)
-
-    def evaluate(self, vector: np.ndarray, *, compressed: bool = True) -> Evaluation:
-        x = float(vector[0])
-        if x > self.forbidden:
-            raise DomainError("too far")
-        ridge = self.height if 0.0 < x < 1.0 else 0.0
-        return Evaluation(np.array([x - 10.0 - ridge]), np.eye(1))
-
-    def cost(self, vector: np.ndarray) -> float:
-        return 0.5 * float(self.evaluate(vector).residuals[0] ** 2)
-
-
 @dataclass(frozen=True)
 class Stop:
     """A speed of 2 that a stop at x cuts off where x is below it; 1.5 was measured."""
@@ -108,19 +85,6 @@ class Stop:
 
     def cost(self, vector: np.ndarray) -> float:
         return 0.5 * float(self.evaluate(vector).residuals[0] ** 2)
-
-
-def test_the_step_past_an_edge_is_cut_at_the_bounds_and_stays_in_the_domain() -> None:
-    (cut,) = solve_from(Ridge(bounds=(np.zeros(1), np.full(1, 4.0))), [np.zeros(1)])
-    np.testing.assert_allclose(cut.vector, [4.0])
-    (kept,) = solve_from(Ridge(forbidden=4.9), [np.zeros(1)])
-    assert 2.5 <= kept.vector[0] <= 4.9
-
-
-def test_a_search_from_before_the_ridge_ends_behind_it() -> None:
-    (result,) = solve_from(Ridge(), [np.zeros(1)])
-    assert result.cost < 1e-20
-    np.testing.assert_allclose(result.vector, [10.0])
 
 
 def test_a_search_that_lost_the_stop_finds_it_again() -> None:

@@ -8,6 +8,7 @@ import pytest
 from swashplate import Drive
 from swashplate.campaign import rig
 from swashplate.campaign.campaign import Campaign
+from swashplate.identification import staging
 from swashplate.identification.assessment import Assessment, assess
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Setup, load_setup
@@ -85,3 +86,15 @@ def test_counts_and_noise_leave_small_errors(tmp_path: Path) -> None:
     fitted, true = Drive(result.parameters), truth
     for volts in (-9.0, -6.5, -2.0, 2.0, 4.0, 9.0):
         assert fitted.steady_speed(volts) == pytest.approx(true.steady_speed(volts), rel=2e-3)
+
+
+@pytest.mark.parametrize("seed", [1, 39])
+def test_a_stop_that_the_search_loses_is_found_again(seed: int, tmp_path: Path) -> None:
+    """From the published values a descent leaves these machines' stop, and finds none back."""
+    axis, setup = "slew", load_setup("slew")
+    truth = staging.drawn(Drive.preset(axis), setup, seed)
+    tests = rig.run(axis, severity="realistic", truth=truth, seed=seed)
+    campaign = Campaign.from_toml(rig.write(tests, tmp_path))
+    values = fit(Drive.preset(axis), campaign, setup, threads=1).stages[-1].values
+    for name in ("Z13_plus", "Z13_minus"):
+        assert values[name] == pytest.approx(truth.parameters.numbers[name], rel=2e-3)

@@ -26,6 +26,7 @@ from swashplate.identification.uncertainty import (
     reach,
     released,
     slopes_by_earlier,
+    slopes_by_fixed,
     uncertainty,
 )
 
@@ -342,7 +343,7 @@ class Assessment:
     @cached_property
     def linearised(self) -> LinearisedFit:
         """Residuals and derivatives at the optimum."""
-        return linearised_fit(self.stage.problem, self._vector)
+        return linearised_fit(self.stage.problem, self._vector, self.stage.solution.loss)
 
     @cached_property
     def identifiability(self) -> Identifiability:
@@ -369,11 +370,15 @@ class Assessment:
     def uncertainty(self) -> Uncertainty:
         """Errors of the estimates, for coloured residuals, those of earlier stages taken in."""
         handed = []
+        fixed = slopes_by_fixed(self.stage, self.linearised)
         for each in self.earlier:
             slopes = slopes_by_earlier(self.stage, each.stage, self.linearised)
             if slopes is not None:
-                handed.append(Handed(each.uncertainty.quoted, slopes))
-        found = uncertainty(self.linearised, handed=handed)
+                before = each.uncertainty
+                handed.append(Handed(before.sampled, slopes))
+                # a fixed number acts on this stage by itself, and through what it does to others
+                fixed = fixed + slopes @ before.fixed
+        found = uncertainty(self.linearised, handed=handed, fixed=fixed)
         said = prior_sentences(self.stage.problem.unknowns, self._vector, found.quoted)
         found = replace(found, priors=said)
         if not found.noisy:

@@ -188,7 +188,9 @@ def fit(
         setup = nominal.setup.setup
     parameters, stages = smooth(nominal), []
     for stage in setup.stages:
-        problem = stage_problem(stage, parameters, experiments, threads=threads)
+        problem = stage_problem(
+            stage, parameters, experiments, threads=threads, doubts=setup.standard_uncertainty
+        )
         begin: Array | None = None
         results: tuple[StartResult, ...] = ()
         if search is not None and search.starts > 0:

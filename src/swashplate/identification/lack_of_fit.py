@@ -14,7 +14,7 @@ from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.errors import DomainError
 from swashplate.identification.drive_model import CURRENTS, DriveModel
 from swashplate.identification.linearised import TOLERANCE, triangular_factor
-from swashplate.identification.model import simulated
+from swashplate.identification.model import linearised, simulated
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
 
 if TYPE_CHECKING:
@@ -47,6 +47,10 @@ FAR = 100.0
 
 UNTOLD = 1e-4
 """Part of a fixed parameter's effect outside the estimates' below which it is a unit of them."""
+
+DOUBTED = "fixed: "
+"""What the name of a fixed parameter with a standard uncertainty begins with: an estimate that its
+value, as a measurement, is part of."""
 
 DWELLS = 0.1
 """Time for which a noisy channel stands at its very largest value only if it is clipped. [s]"""
@@ -173,7 +177,8 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
     Notes
     -----
     χ² against the known measurement error (Draper and Smith 1998, section 1.5, with the pure error
-    known beforehand). Causes by Rao's score test (Rao 1948): each fault is a further unknown; its
+    known beforehand). A fixed parameter with a standard uncertainty may differ by about that much.
+    Causes by Rao's score test (Rao 1948): each fault is a further unknown; its
     derivatives, freed of what the estimates can make up for, are projected on the residuals, which
     gives its size after one Gauss-Newton step and the part of their squares that it explains. All
     stages are taken together, each in units of its own noise, so that a later stage's residuals
@@ -190,7 +195,8 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
             count = len(places)
         elif group == "fixed":
             constants = list(places)[count:]
-    triangle = np.zeros((0, len(places) + 1))
+    doubted = [place for name, place in places.items() if name.startswith(DOUBTED)]
+    triangle = np.eye(len(places) + 1)[doubted]
     for block in blocks:
         triangle = triangular_factor(np.vstack([triangle, block.placed(places)]))
     basis, inverse = _span(triangle[:, :count])
@@ -323,10 +329,11 @@ class _StageBlocks:
         self.problem, self.vector = self.stage.problem, self.stage.solution.vector
         self.noise = _noise_units(assessment)
         model = self.problem.model
-        self.model = model
+        self.model, self.numbers = model, self.stage.parameters.numbers
         self.earlier: list[Assessment] = []
         self.fixed: list[str] = []
         if not isinstance(model, DriveModel):
+            self.fixed = [name for doubt in self.problem.doubts for name in doubt]
             return
         part = model.part
         simulated_currents = self.stage.stage.current == "simulated"
@@ -380,6 +387,13 @@ class _StageBlocks:
                 for label, column in by_others.get(name, {}).items():
                     target = held if label in self.fixed else estimates
                     target[label] = weight * column[used]
+                for doubt in self.problem.doubts:
+                    known = [column for column in doubt if column in held]
+                    if known:
+                        estimates[f"{DOUBTED}{', '.join(known)}"] = sum(
+                            (held.pop(c) * (doubt[c] / abs(self.numbers[c])) for c in known),
+                            np.zeros(run.residual.size),
+                        )
                 place = number / max(len(self.problem.experiments) - 1, 1) - 0.5
                 faults = {
                     **_instrument_faults(experiment, experiment[name], outputs[name], place),
@@ -409,12 +423,10 @@ class _StageBlocks:
             names += _machine(each.stage.problem)
         if not names:
             return {}
-        assert isinstance(self.model, DriveModel)
-        experiment = self.problem.experiments[number]
-        values = self.problem.unknowns.targets(self.vector, experiment.name)
-        numbers = self.stage.parameters.numbers
+        experiment, numbers = self.problem.experiments[number], self.numbers
+        values = self.problem.model_values(self.vector, number)
         made: dict[str, dict[str, Array]] = {}
-        for channel, part in self.model.linearise(values, experiment, names).items():
+        for channel, part in linearised(self.model, values, experiment, names).items():
             columns = {name: part.by[:, k] * numbers[name] for k, name in enumerate(self.fixed)}
             first = len(self.fixed)
             for each in self.earlier:

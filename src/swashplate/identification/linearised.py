@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from swashplate.errors import InputError
 from swashplate.identification.model import Differentiable
 from swashplate.identification.problem import Problem
+from swashplate.identification.solving import Loss, influence
 from swashplate.identification.unknowns import Unknowns
 
 Array = NDArray[np.float64]
@@ -235,7 +236,7 @@ BY_DIFFERENCES = 1e-6
 """Singular values of difference derivatives below this part of the largest count as zero."""
 
 
-def linearised_fit(problem: Problem, vector: Array) -> LinearisedFit:
+def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> LinearisedFit:
     """Residuals and derivatives of every run at a point, ignored samples left out.
 
     Parameters
@@ -244,6 +245,18 @@ def linearised_fit(problem: Problem, vector: Array) -> LinearisedFit:
         What was fitted.
     vector : (K,) array
         The solver's vector at the optimum.
+    loss : Loss
+        What of each residual the fit summed.
+
+    Raises
+    ------
+    InputError
+        If so many residuals lie in the tails of a robust loss that it has no optimum there.
+
+    Notes
+    -----
+    With a robust loss each residual stands as ψ over the mean of ψ', by channel: the covariance of
+    these is that of the estimates (Huber 1981, equation 6.5), whatever their spectrum.
     """
     runs = []
     for number, experiment in enumerate(problem.experiments):
@@ -260,6 +273,18 @@ def linearised_fit(problem: Problem, vector: Array) -> LinearisedFit:
                     weights[name][used],
                 )
             )
+    if loss != "linear":
+        for name in problem.channels:
+            mine = [k for k, run in enumerate(runs) if run.channel == name]
+            parts = [influence(runs[k].residual, loss) for k in mine]
+            slope = float(np.mean(np.concatenate([slopes for _, slopes in parts] or [np.ones(1)])))
+            if not slope > 0.0:
+                raise InputError(
+                    f"Most residuals of {name} lie in the tails of the loss '{loss}', which says "
+                    "nothing of them: state a larger noise for it, or take the loss 'linear'."
+                )
+            for k, (bounded, _) in zip(mine, parts, strict=True):
+                runs[k] = runs[k]._replace(residual=bounded / slope)
     _, prior = problem.unknowns.prior_rows(vector)
     worths = [each.prior.worth for each in problem.unknowns if each.prior is not None]
     exact = isinstance(problem.model, Differentiable)

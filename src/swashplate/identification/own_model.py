@@ -15,7 +15,7 @@ from swashplate.equations import Model as Equations
 from swashplate.errors import FileError, InputError
 from swashplate.identification.model import OFFSET, Model, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
-from swashplate.identification.setup import Free, GivenPrior, Setup, Stage
+from swashplate.identification.setup import Doubt, Free, GivenPrior, Setup, Stage, deviation
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
 
@@ -48,6 +48,8 @@ class ModelSetup:
         Standard deviation of a channel, where the campaign does not state it. [unit]
     fixed : mapping of str to float
         Values of names that are not free.
+    standard_uncertainty : mapping of str to float or str
+        What values of `fixed` may be off by, one standard deviation, also as ``"5 %"``.
     """
 
     model: Model | Equations
@@ -56,6 +58,7 @@ class ModelSetup:
     channels: tuple[str, ...] = ()
     noise: Mapping[str, float] = field(default_factory=dict)
     fixed: Mapping[str, float] = field(default_factory=dict)
+    standard_uncertainty: Mapping[str, Doubt] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         model = self.model
@@ -72,6 +75,12 @@ class ModelSetup:
             object.__setattr__(self, "name", str(name or type(equations).__name__).lower())
         if not self.free:
             raise InputError(f"Nothing of {self.name} is free: name what is to be found.")
+        unfixed = [name for name in self.standard_uncertainty if name not in self.fixed]
+        if unfixed:
+            raise InputError(
+                f"{unfixed[0]} has a standard uncertainty but no value: name it in fixed, or give "
+                "it a prior if it is free."
+            )
         free = {name: _unknown(name, entry) for name, entry in self.free.items()}
         object.__setattr__(self, "free", free)
 
@@ -79,8 +88,9 @@ class ModelSetup:
     def from_file(cls, path: str | Path) -> ModelSetup:
         """The set-up that a Python file states by its names ``model`` and ``free``.
 
-        Besides those it may have ``name``, ``channels``, ``noise`` and ``fixed``. The file is
-        executed, as a module that worker processes import as well.
+        Besides those it may have ``name``, ``channels``, ``noise``, ``fixed`` and
+        ``standard_uncertainty``. The file is executed, as a module that worker processes import as
+        well.
 
         Raises
         ------
@@ -106,8 +116,8 @@ class ModelSetup:
                 f"{path} has no '{missing[0]}': it needs model = Model(...) and free = "
                 "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
             )
-        more = {key: getattr(module, key) for key in ("name", "channels", "noise", "fixed")
-                if hasattr(module, key)}  # fmt: skip
+        known = ("name", "channels", "noise", "fixed", "standard_uncertainty")
+        more = {key: getattr(module, key) for key in known if hasattr(module, key)}
         return cls(module.model, module.free, **more)
 
     @property
@@ -125,7 +135,11 @@ class ModelSetup:
     @property
     def setup(self) -> Setup:
         """The set-up as that of a fit in stages."""
-        return Setup(title=self.name, stages=(self.stage,))
+        return Setup(
+            title=self.name,
+            stages=(self.stage,),
+            standard_uncertainty=dict(self.standard_uncertainty),
+        )
 
     def nominal(self, experiments: Sequence[Experiment]) -> ModelParameters:
         """The model's numbers before a fit to some runs."""
@@ -145,7 +159,9 @@ class ModelSetup:
         of_runs = {each.name for unknowns in own.values() for each in unknowns}
         channels = self.channels or self._given(experiments)
         runs = tuple(
-            each for each in experiments if any(name in each.channels for name in channels)
+            self._with_noise(each)
+            for each in experiments
+            if any(name in each.channels for name in channels)
         )
         if not runs:
             had = ", ".join(dict.fromkeys(name for each in experiments for name in each.channels))
@@ -155,14 +171,17 @@ class ModelSetup:
             )
         machine = [each for each in self._free.values() if each.name not in of_runs]
         unknowns = (*machine, *(unknown for each in runs for unknown in own[each.name]))
-        stated = [name for name in channels if name not in self.noise]
         return Problem(
             self.model,  # type: ignore[arg-type]  # made one that simulates at the beginning
             runs,
             Unknowns(unknowns),
             channels,
-            {**noise_scales(runs, stated), **self.noise},
+            noise_scales(runs, channels),
             dict(self.fixed),
+            tuple(
+                {name: deviation(doubt, self.fixed[name])}
+                for name, doubt in self.standard_uncertainty.items()
+            ),
             threads if isinstance(self.model, OwnModel) else 1,
         )
 
@@ -175,6 +194,15 @@ class ModelSetup:
             for each in self._free.values()
             if each.run is None and (each.name in zeros or (states and each.name.startswith(START)))
         )
+
+    def _with_noise(self, experiment: Experiment) -> Experiment:
+        """The run with the noise of channels that the campaign does not state."""
+        stated = {
+            name: replace(channel, noise=self.noise[name])
+            for name, channel in experiment.channels.items()
+            if channel.noise is None and name in self.noise
+        }
+        return replace(experiment, channels={**experiment.channels, **stated})
 
     @property
     def _free(self) -> dict[str, Unknown]:

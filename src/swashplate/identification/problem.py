@@ -46,6 +46,9 @@ class Problem:
     """What one unit of residual is, by channel: its noise, in its unit."""
     fixed: Mapping[str, float] = field(default_factory=dict)
     """Values of the model's names that are not unknown but differ from the model's own."""
+    doubts: tuple[Mapping[str, float], ...] = ()
+    """Standard uncertainties of fixed numbers, by the model's names; those of one mapping are off
+    together. [unit]"""
     threads: int = 1
     """Threads over experiments, for a model that releases the interpreter's lock."""
     compare: Callable[[Channel, Array], Array] | None = None
@@ -113,7 +116,7 @@ class Problem:
     def outputs(self, vector: Array, number: int) -> Mapping[str, Array]:
         """Simulated samples of the fitted channels of one experiment, offsets included."""
         experiment = self.experiments[number]
-        values, own = self._values(vector, number)
+        values, own = self._values(vector, number), self.model_values(vector, number)
         outputs = simulated(self.model, own, experiment)
         return {
             name: self._output(outputs, experiment, name) + values.get(f"{OFFSET}{name}", 0.0)
@@ -133,7 +136,7 @@ class Problem:
     def linearised(self, vector: Array, number: int) -> Mapping[str, Linearised]:
         """Weighted residuals of each channel of one experiment and derivatives by the vector."""
         experiment = self.experiments[number]
-        values, own = self._values(vector, number)
+        values, own = self._values(vector, number), self.model_values(vector, number)
         names = self._names(number)
         inner = [name for name in names if name in own]
         outputs = linearised(self.model, own, experiment, inner)
@@ -167,16 +170,19 @@ class Problem:
         names = self._names(number)
         assert isinstance(self.model, Reducing)
         triangle = self.model.reduce(
-            self._values(vector, number)[0], experiment, names, self.weights[number]
+            self._values(vector, number), experiment, names, self.weights[number]
         )
         chain = self.unknowns.chain(vector, names, experiment.name)
         return Evaluation(triangle[:, -1], triangle[:, :-1] @ chain)
 
-    def _values(self, vector: Array, number: int) -> tuple[dict[str, float], dict[str, float]]:
-        """Values by name for one experiment, and those that are the model's: no channel's zero."""
-        values = {**self.fixed, **self.unknowns.targets(vector, self.experiments[number].name)}
+    def model_values(self, vector: Array, number: int) -> dict[str, float]:
+        """Values by the model's names for one experiment; a channel's zero is none of them."""
         zeros = {f"{OFFSET}{name}" for name in self.channels}
-        return values, {name: value for name, value in values.items() if name not in zeros}
+        values = self._values(vector, number)
+        return {name: value for name, value in values.items() if name not in zeros}
+
+    def _values(self, vector: Array, number: int) -> dict[str, float]:
+        return {**self.fixed, **self.unknowns.targets(vector, self.experiments[number].name)}
 
     def _names(self, number: int) -> list[str]:
         """Names in the model that the unknowns of one experiment set."""

@@ -20,6 +20,13 @@ if TYPE_CHECKING:
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
 Pair = tuple[Finite, Finite]
+Doubt = (
+    Annotated[PositiveFloat, Field(strict=True, allow_inf_nan=False)]
+    | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")]
+)
+"""A standard uncertainty: in SI units, or as "5 %" of the value."""
+COEFFICIENTS = ("Z19", "Z20", "Z21", "Z22")
+"""Of the solenoids: what `GivenForces` stand for."""
 
 
 class Entry(BaseModel):
@@ -127,6 +134,25 @@ class Setup(Entry):
 
     title: str = ""
     stages: tuple[Stage, ...] = Field(min_length=1)
+    standard_uncertainty: dict[str, Doubt] = Field(
+        {},
+        description="Of parameters that stay fixed: a standard deviation of what their values may "
+        "be off by, in SI units or as '5 %' of the value; the intervals of all estimates take it "
+        "in. Both directions of a symbol are off together.",
+    )
+
+    @model_validator(mode="after")
+    def _fixed(self) -> Setup:
+        for name in self.standard_uncertainty:
+            symbol = _symbol(name)
+            for stage in self.stages:
+                free = any(each in (name, symbol) or _symbol(each) == name for each in stage.free)
+                if free or (stage.forces is not None and symbol in COEFFICIENTS):
+                    raise ValueError(
+                        f"{name} is free in the stage '{stage.name}': only what stays fixed has a "
+                        "standard_uncertainty; what is known of a free parameter is its prior"
+                    )
+        return self
 
     def joint(self) -> Setup:
         """The same unknowns, all at once through the whole chain.
@@ -164,7 +190,18 @@ class Setup(Entry):
             },
             start_pressure=max(pressures, default=None),
         )
-        return Setup(title=self.title, stages=(stage,))
+        return self.model_copy(update={"stages": (stage,)})
+
+
+def _symbol(name: str) -> str:
+    return name.removesuffix("_plus").removesuffix("_minus")
+
+
+def deviation(doubt: float | str, value: float) -> float:
+    """A standard uncertainty as a number: in the value's unit, or ``"5 %"`` of its size."""
+    if isinstance(doubt, str):
+        return 0.01 * float(doubt.removesuffix("%")) * abs(value)
+    return float(doubt)
 
 
 def setup_names() -> tuple[str, ...]:
@@ -220,6 +257,8 @@ def setup_text(setup: Setup, comments: Mapping[str, Sequence[str]] | None = None
     text, stages = document(), aot()
     if setup.title:
         text.add("title", setup.title)
+    if setup.standard_uncertainty:
+        text.add("standard_uncertainty", inline(setup.standard_uncertainty))
     for stage in setup.stages:
         content = stage.model_dump(mode="json", by_alias=True, exclude_defaults=True)
         made = table()

@@ -23,6 +23,14 @@ LEG = 30
 as a step that just reaches the swash plate's stop, it shrinks to nothing."""
 GAINED = 1e-6
 """Relative gain of a leg from which another one is worth it."""
+WAKINGS = 3
+"""How often a search is taken back from where it lost an unknown."""
+NO_EFFECT = 1e-12
+"""Share of its nominal effect that rounding may leave of none."""
+AWAKE = 0.05
+"""Share of its nominal effect at which an unknown counts as awake again."""
+VALUES = 25
+"""Within its bounds that are tried for one."""
 UNCHANGED = 2
 _ENDINGS = {
     0: "stopped at the largest number of evaluations; give it more",
@@ -31,6 +39,23 @@ _ENDINGS = {
     3: "the parameters no longer changed",
     4: "neither cost nor parameters changed any more",
 }
+
+
+def influence(residuals: Array, loss: Loss) -> tuple[Array, Array]:
+    """ψ of each residual, half the derivative of its loss, and the derivative of that.
+
+    The losses are SciPy's, of residuals in units of their noise (Huber 1981, chapter 4).
+    """
+    z = residuals**2
+    if loss == "soft_l1":
+        return residuals / np.sqrt(1.0 + z), (1.0 + z) ** -1.5
+    if loss == "huber":
+        return np.clip(residuals, -1.0, 1.0), np.where(z <= 1.0, 1.0, 0.0)
+    if loss == "cauchy":
+        return residuals / (1.0 + z), (1.0 - z) / (1.0 + z) ** 2
+    if loss == "arctan":
+        return residuals / (1.0 + z**2), (1.0 - 3.0 * z**2) / (1.0 + z**2) ** 2
+    return residuals, np.ones_like(residuals)
 
 
 class Evaluation(NamedTuple):
@@ -114,6 +139,8 @@ class Solution:
     message: str
     """Why it stopped, in words."""
     seconds: float
+    loss: Loss = "linear"
+    """What of each residual was summed."""
 
 
 class _Memory:
@@ -199,16 +226,19 @@ def solve(
             watch(Progress(iteration, float(now.cost), now.x.copy(), seconds, *spent))
 
     def ended(vector: Array, cost: float, message: str, ending: int) -> Solution:
-        how = memory.evaluations, ending > 0, ending < 0, message, perf_counter() - begun
+        how = memory.evaluations, ending > 0, ending < 0, message, perf_counter() - begun, loss
         return Solution(np.asarray(vector, dtype=np.float64), float(cost), start_cost, *how)
 
-    before, spent = np.inf, 0
+    best = begin = vector
+    lowest, spent, unwoken, wakings = np.inf, 0, np.inf, 0
+    # what was woken is held for a leg, in which the others learn to live with it
+    held = np.zeros(vector.size, dtype=bool)
     try:
         while True:
             found = least_squares(
                 lambda vector: memory(vector).residuals,
-                vector,
-                jac=lambda vector: memory(vector).jacobian,
+                begin,
+                jac=lambda vector, held=held: np.where(held, 0.0, memory(vector).jacobian),
                 bounds=objective.bounds,
                 x_scale="jac",
                 loss=loss,
@@ -218,18 +248,65 @@ def solve(
                 max_nfev=min(LEG, max_evaluations - spent),
                 callback=told,
             )
-            first, gained = spent == 0, before - found.cost > GAINED * found.cost
+            gained = lowest - found.cost > GAINED * found.cost
             # steps that round to nothing are counted by SciPy alone
             spent += int(found.nfev)
-            vector, before, ending = found.x, float(found.cost), int(found.status)
-            if not first and not gained:
-                ending = ending or UNCHANGED
+            ending = int(found.status)
+            if found.cost < lowest:
+                best, lowest, message = found.x, float(found.cost), str(found.message)
+            spent = max(spent, memory.evaluations)
+            if spent >= max_evaluations:
                 break
-            if (first and ending > 0) or spent >= max_evaluations:
+            point, released = None, held.any()
+            held = np.zeros_like(held)
+            if not released and wakings < WAKINGS and lowest < unwoken * (1.0 - GAINED):
+                point, held = _woken(memory, best)
+                unwoken, wakings = lowest, wakings + int(held.any())
+            if point is None and (released or (ending == 0 and gained)):
+                begin = found.x
+                continue
+            ending = ending or UNCHANGED
+            spent = max(spent, memory.evaluations)
+            if point is None or spent >= max_evaluations:
                 break
+            begin = point
     except KeyboardInterrupt:
         if memory.best is None:
             raise
-        cost, vector = memory.best
-        return ended(vector, cost, "interrupted: the best so far", -1)
-    return ended(found.x, found.cost, _ENDINGS.get(ending, str(found.message)), ending)
+        cost, best = memory.best
+        return ended(best, cost, "interrupted: the best so far", -1)
+    return ended(best, lowest, _ENDINGS.get(ending, message), ending)
+
+
+def _woken(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.bool_]]:
+    """A point where unknowns that had lost their effect have one, and (K,) which those are.
+
+    A stop that the swash plate no longer reaches has no derivative, and no descent finds back to
+    it. Such an unknown goes to the nearest value within its bounds that has an effect.
+    """
+    low, high = memory.objective.bounds
+
+    def effects(vector: Array) -> Array:
+        memory.evaluations += 1
+        try:
+            jacobian = memory.objective.evaluate(vector).jacobian
+        except DomainError:
+            return np.zeros(vector.size)
+        return np.asarray(np.linalg.norm(jacobian, axis=0))
+
+    present = np.linalg.norm(memory(vector).jacobian, axis=0)
+    asleep, point = np.zeros(present.size, dtype=bool), vector.copy()
+    if present.min(initial=np.inf) > NO_EFFECT * present.max(initial=0.0):
+        return None, asleep
+    nominal = effects(memory.objective.start)
+    for k in np.flatnonzero(present < NO_EFFECT * nominal):
+        values = np.linspace(low[k], high[k], VALUES)
+        away = np.abs(values - vector[k])
+        far = (values - vector[k]) * (memory.objective.start[k] - vector[k]) < 0.0
+        for value in values[np.lexsort((away, far))]:
+            trial = point.copy()
+            trial[k] = value
+            if effects(trial)[k] > AWAKE * nominal[k]:
+                point, asleep[k] = trial, True
+                break
+    return (point if asleep.any() else None), asleep

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from swashplate.identification.drive_model import (
 )
 from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.problem import Problem, noise_scales
-from swashplate.identification.setup import Free, Setup, Stage, load_setup
+from swashplate.identification.setup import Free, Setup, Stage, deviation, load_setup
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
 from swashplate.parameters.definitions import SWITCHES, columns_of, find
 from swashplate.parameters.parameter_set import ParameterSet
@@ -99,6 +100,7 @@ def stage_problem(
     experiments: Sequence[Experiment],
     *,
     threads: int | None = None,
+    doubts: Mapping[str, float | str] = MappingProxyType({}),
 ) -> Problem:
     """The problem of a stage.
 
@@ -112,6 +114,8 @@ def stage_problem(
         The runs to fit.
     threads : int, optional
         Threads over experiments; all cores by default.
+    doubts : mapping of str to float or str, optional
+        Standard uncertainties of what stays fixed, as of `Setup`.
 
     Raises
     ------
@@ -152,8 +156,26 @@ def stage_problem(
         Unknowns(unknowns),
         channels,
         noise_scales(runs, channels),
+        doubts=doubts_of_columns(doubts, parameters),
         threads=threads or available_cores(),
     )
+
+
+def doubts_of_columns(
+    doubts: Mapping[str, float | str], parameters: ParameterSet
+) -> tuple[Mapping[str, float], ...]:
+    """Standard uncertainties of a drive's fixed parameters, by columns; see `Problem.doubts`.
+
+    Raises
+    ------
+    ParameterError
+        If there is no parameter of a name.
+    """
+    made = []
+    for name, doubt in doubts.items():
+        columns = columns_of([name])
+        made.append({each: deviation(doubt, _nominal(parameters, each)) for each in columns})
+    return tuple(made)
 
 
 def with_estimates(parameters: Parameters, problem: Problem, vector: Array) -> Parameters:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from swashplate.documents import read_json
 from swashplate.errors import DomainError, FileError, InputError, SwashplateError
 from swashplate.executors import Executor, Serial
-from swashplate.identification.solving import GAINED, LEG, Objective, Solution, solve
+from swashplate.identification.solving import Objective, Solution, solve
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
@@ -24,20 +24,6 @@ Cost = Annotated[float, Field(ge=0.0)]
 
 TRIES = 200
 """Points that are tried for each start."""
-WAKINGS = 3
-"""How often a search is taken back from where it lost an unknown."""
-NO_EFFECT = 1e-12
-"""Share of its nominal effect that rounding may leave of none."""
-AWAKE = 0.05
-"""Share of its nominal effect at which an unknown counts as awake again."""
-STEPS = 24
-"""Trials on the way to its nominal value."""
-SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03, 0.015)
-"""Of the Gauss-Newton step past an edge."""
-SINGULAR = 1e-10
-"""Singular values below this share of the largest make no step."""
-NOTHING = 1e-20
-"""Share of the cost at the start that is left of it by rounding alone."""
 
 
 def sobol_starts(objective: Objective, count: int, seed: int) -> Iterator[Array]:
@@ -202,7 +188,9 @@ def solve_from(
 def _solve_one(objective: Objective, task: _Task) -> StartResult:
     start = np.array(task.start)
     try:
-        solution = _search(objective, start, task)
+        solution = solve(
+            objective, start, tolerance=task.tolerance, max_evaluations=task.max_evaluations
+        )
     except DomainError as error:
         solution = Solution(start, np.inf, np.inf, 1, False, False, str(error), 0.0)
     if solution.interrupted:
@@ -218,95 +206,6 @@ def _solve_one(objective: Objective, task: _Task) -> StartResult:
         solution.message,
         solution.seconds,
     )
-
-
-def _search(objective: Objective, start: Array, task: _Task) -> Solution:
-    """Leg after leg, past edges of the cost and back from where an unknown has lost its effect."""
-    nominal = _nominal_effects(objective)
-    best = leg = _solved(objective, start, task, LEG)
-    spent, seconds, wakings = 1 + leg.evaluations, leg.seconds, 0
-    while not leg.interrupted and spent < task.max_evaluations:
-        point, trials = None, 0
-        if wakings < WAKINGS:
-            point, trials = _woken(objective, leg.vector, nominal)
-            wakings += point is not None
-        if point is None:
-            point, more = _past_edge(objective, leg.vector, best.start_cost)
-            trials += more
-        spent += trials
-        left = task.max_evaluations - spent
-        if left <= 0 or (point is None and leg.converged):
-            break
-        try:
-            leg = _solved(objective, leg.vector if point is None else point, task, left)
-        except DomainError:  # a point that was woken outside the domain
-            break
-        spent, seconds = spent + leg.evaluations, seconds + leg.seconds
-        if leg.cost < best.cost:
-            best = replace(leg, start_cost=best.start_cost)
-    return replace(best, evaluations=spent, seconds=seconds, interrupted=leg.interrupted)
-
-
-def _solved(objective: Objective, start: Array, task: _Task, left: int) -> Solution:
-    most = min(LEG, left, task.max_evaluations)
-    return solve(objective, start, tolerance=task.tolerance, max_evaluations=most)
-
-
-def _effects(objective: Objective, vector: Array) -> Array:
-    """(K,) length of the change of all residuals for a unit of each number of the vector."""
-    return np.asarray(np.linalg.norm(objective.evaluate(vector).jacobian, axis=0))
-
-
-def _nominal_effects(objective: Objective) -> Array:
-    """(K,) those at the objective's start; zeros, which demand nothing, if it holds not there."""
-    try:
-        return _effects(objective, objective.start)
-    except DomainError:
-        return np.zeros(objective.start.size)
-
-
-def _woken(objective: Objective, vector: Array, nominal: Array) -> tuple[Array | None, int]:
-    """A point where no unknown is without effect, None if there is none, and the evaluations spent.
-
-    A stop that the swash plate no longer reaches has no derivative, and no descent finds back to
-    it: each such unknown is moved towards its nominal value until it has an effect again.
-    """
-    point, evaluations = vector.copy(), 1
-    asleep = (_effects(objective, vector) <= NO_EFFECT * nominal) & (nominal > 0.0)
-    for k in np.flatnonzero(asleep):
-        for share in np.arange(1, STEPS + 1) / STEPS:
-            point[k] = vector[k] + share * (objective.start[k] - vector[k])
-            evaluations += 1
-            try:
-                present = _effects(objective, point)
-            except DomainError:
-                continue
-            if present[k] > AWAKE * nominal[k]:
-                break
-    return (point if asleep.any() else None), evaluations
-
-
-def _past_edge(objective: Objective, vector: Array, start_cost: float) -> tuple[Array | None, int]:
-    """The lowest of some shares of the Gauss-Newton step, None if none gains, and the evaluations.
-
-    Where a step just reaches the swash plate's stop, the derivatives of both sides differ: a region
-    that looks no further than this edge of the cost shrinks to nothing, a longer step passes it.
-    """
-    residuals, jacobian = objective.evaluate(vector)
-    lowest = 0.5 * float(residuals @ residuals)
-    if lowest <= NOTHING * start_cost:
-        return None, 1
-    step = np.linalg.lstsq(jacobian, -residuals, rcond=SINGULAR)[0]
-    point, enough = None, lowest * (1.0 - GAINED)
-    for share in SHARES:
-        trial = np.clip(vector + share * step, *objective.bounds)
-        try:
-            cost = objective.cost(trial)
-        except DomainError:
-            continue
-        if cost < enough:
-            point, enough = trial, cost
-    return point, 1 + len(SHARES)
 
 
 def _keep(store: Path, origin: dict[str, str], result: StartResult) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf, log
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeVar
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.linearised import LinearisedFit, linearised_fit
+from swashplate.identification.model import linearised as linearised_model
 from swashplate.identification.noise import (
     Covariance,
     NoiseColour,
@@ -214,47 +215,88 @@ def slopes_by_earlier(
     model = stage.problem.model
     if not isinstance(model, DriveModel) or model.part != "pump" or earlier.stage.part != "card":
         return None
-    simulated = [
+    if not _driven_by_card(stage):
+        return None
+    unknowns, vector = earlier.problem.unknowns, earlier.solution.vector
+    names = [name for each in unknowns if each.run is None for name in each.targets]
+    return _slopes(stage, linearised, names, unknowns.chain(vector, names, ""))
+
+
+def slopes_by_fixed(stage: StageFit, linearised: LinearisedFit) -> Array:
+    """(K, F) changes of a stage's estimates for a standard uncertainty of each fixed number."""
+    doubts = stage.problem.doubts
+    names = [name for doubt in doubts for name in doubt]
+    deviations = np.array([[doubt.get(name, 0.0) for doubt in doubts] for name in names])
+    if not names:
+        return np.zeros((linearised.variables.count, 0))
+    return _slopes(stage, linearised, names, deviations)
+
+
+def _driven_by_card(stage: StageFit) -> list[int]:
+    """Runs of which the pump is driven by what the card makes of a voltage."""
+    return [
         number
         for number, each in enumerate(stage.problem.experiments)
         if stage.stage.current == "simulated" and each.input.kind == "voltage"
     ]
-    if not simulated:
-        return None
-    chain = DriveModel(
-        model.parameters_at(stage.problem.unknowns.targets(stage.solution.vector, "")), "chain"
-    )
-    unknowns, vector = earlier.problem.unknowns, earlier.solution.vector
-    names = [name for each in unknowns if each.run is None for name in each.targets]
-    products = np.zeros((linearised.rank, len(unknowns)))
+
+
+def _slopes(stage: StageFit, linearised: LinearisedFit, names: Sequence[str], by: Array) -> Array:
+    """Derivatives of a stage's estimates by what moves numbers that it takes for granted.
+
+    Parameters
+    ----------
+    stage, linearised :
+        The stage, at its optimum.
+    names : sequence of str
+        Of the numbers, in the model.
+    by : (len(names), F) array
+        Derivatives of the numbers by what moves them.
+
+    Returns
+    -------
+    (K, F) array
+    """
+    problem, vector = stage.problem, stage.solution.vector
+    model, machine = problem.model, dict(problem.unknowns.targets(vector, ""))
+    chain = model
+    if isinstance(model, DriveModel) and model.part == "pump":
+        chain = DriveModel(model.parameters_at(machine), "chain")
+    driven = _driven_by_card(stage)
+    products = np.zeros((linearised.rank, by.shape[1]))
     rows = {(run.name, run.channel): run for run in linearised.runs}
-    values = dict(stage.problem.unknowns.targets(stage.solution.vector, ""))
-    for number in simulated:
-        experiment = stage.problem.experiments[number]
-        own = stage.problem.unknowns.targets(stage.solution.vector, experiment.name)
-        by_card = chain.linearise(
-            {name: value for name, value in own.items() if name not in values}, experiment, names
-        )
-        by_vector = unknowns.chain(vector, names, "")
-        for name, weight in stage.problem.weights[number].items():
+    for number, experiment in enumerate(problem.experiments):
+        if chain is model or number not in driven:
+            values = problem.model_values(vector, number)
+            moved = linearised_model(model, values, experiment, names)
+        else:
+            values = problem.unknowns.targets(vector, experiment.name)
+            own = {name: value for name, value in values.items() if name not in machine}
+            moved = linearised_model(chain, own, experiment, names)
+        for name, weight in problem.weights[number].items():
             used = weight > 0.0
             if not used.any():
                 continue
             run = rows[experiment.name, name]
-            moved = weight[used, None] * (by_card[name].by[used] @ by_vector)
-            products += (run.jacobian @ linearised.whitening).T @ moved
+            changes = weight[used, None] * (moved[name].by[used] @ by)
+            products += (run.jacobian @ linearised.whitening).T @ changes
     slopes: Array = -linearised.whitening @ products
     return slopes
 
 
-def with_handed(own: Covariance, handed: Sequence[Handed]) -> Covariance:
-    """A stage's covariance with what earlier stages do not know.
+def with_handed(
+    own: Covariance, handed: Sequence[Handed], fixed: Array | None = None
+) -> Covariance:
+    """A stage's covariance with what earlier stages do not know, and what fixed numbers may be off.
 
-    The degrees of freedom are Satterthwaite's, of the sum of the variances.
+    The degrees of freedom are Satterthwaite's, of the sum of the variances; a standard uncertainty
+    that was stated has infinitely many (JCGM 100:2008, G.4).
     """
-    if not handed:
+    if not handed and (fixed is None or not fixed.size):
         return own
     total = own.matrix.copy()
+    if fixed is not None:
+        total += np.where(np.outer(own.determined, own.determined), fixed @ fixed.T, 0.0)
     variance = np.diag(own.matrix).copy()
     spread = _part(variance, own.degrees_of_freedom)
     for each in handed:
@@ -295,6 +337,8 @@ class Uncertainty:
     level: float
     handed: tuple[Handed, ...] = ()
     """What earlier stages do not know."""
+    fixed: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    """(K, F) changes of the solver's vector for a standard uncertainty of each fixed number."""
     lines: tuple[SpectralLine, ...] = ()
     """Of the residuals, removed before it was judged how long they stay correlated."""
     ends: tuple[CheckedEnd, ...] = ()
@@ -367,25 +411,27 @@ class Uncertainty:
                 )
             else:
                 said.append(f"The {side} end of {name} is that of its profile, which is lopsided.")
-        widened = self._widened()
-        if widened is not None:
-            said.append(widened)
+        known = self.own.determined & (np.diag(self.own.matrix) > 0.0)
+        if known.any() and (self.handed or self.fixed.any()):
+            what = [
+                *(["what the stages before do not know"] if self.handed else []),
+                *(["the standard uncertainty of fixed parameters"] if self.fixed.any() else []),
+            ]
+            wider = np.where(known, self.quoted.standard_errors, 1.0) / np.where(
+                known, self.own.standard_errors, 1.0
+            )
+            most = int(np.argmax(wider))
+            said.append(
+                f"Intervals take in {' and '.join(what)}, which widens them by a factor of "
+                f"{float(np.median(wider[known])):.2f} in the middle and of {wider[most]:.2f} for "
+                f"{self.own.variables.names[most]}."
+            )
         return tuple(said)
 
-    def _widened(self) -> str | None:
-        """What the uncertainty of earlier stages does."""
-        known = self.own.determined & (np.diag(self.own.matrix) > 0.0)
-        if not self.handed or not known.any():
-            return None
-        ratio = np.where(known, self.quoted.standard_errors, 1.0) / np.where(
-            known, self.own.standard_errors, 1.0
-        )
-        most = int(np.argmax(ratio))
-        return (
-            "Intervals take in what the stages before do not know: it widens them by a factor of "
-            f"{float(np.median(ratio[known])):.2f} in the middle and of {ratio[most]:.2f} for "
-            f"{self.own.variables.names[most]}."
-        )
+    @property
+    def sampled(self) -> Covariance:
+        """That of all stages' noise: the quoted one without what fixed numbers may be off."""
+        return with_handed(self.own, self.handed)
 
     def _ratio(self) -> float | None:
         """Median of the stage's own over white error."""
@@ -398,7 +444,11 @@ class Uncertainty:
 
 
 def uncertainty(
-    fit: LinearisedFit, *, level: float = 0.95, handed: Sequence[Handed] = ()
+    fit: LinearisedFit,
+    *,
+    level: float = 0.95,
+    handed: Sequence[Handed] = (),
+    fixed: Array | None = None,
 ) -> Uncertainty:
     """Errors of a fit's estimates for coloured residuals, with white-noise ones beside them.
 
@@ -410,6 +460,8 @@ def uncertainty(
         Probability of the intervals.
     handed : sequence of Handed, optional
         What earlier stages do not know.
+    fixed : (K, F) array, optional
+        Changes of the solver's vector for a standard uncertainty of each fixed number.
 
     Raises
     ------
@@ -422,7 +474,7 @@ def uncertainty(
     own = replace(coloured_noise_covariance(fit), variables=bounded)
     worth = {m: colour for colour in colours for m in colour.members}
     made = Uncertainty(
-        with_handed(own, handed),
+        with_handed(own, handed, fixed),
         own,
         replace(white_noise_covariance(fit), variables=bounded),
         colours,
@@ -433,6 +485,7 @@ def uncertainty(
         fit.squares > 0.0,
         level,
         tuple(handed),
+        np.zeros((own.determined.size, 0)) if fixed is None else fixed,
         lines,
     )
     made.estimates  # noqa: B018  refuses a wrong level

@@ -1,0 +1,120 @@
+"""What fixed parameters may be off by, in the intervals of the estimates."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.identification.test_own_model_fit import FREE, NOISE, RUNS, servo
+
+from swashplate import Campaign, Drive, ParameterError
+from swashplate.campaign import rig
+from swashplate.identification import ModelSetup, assess, fit
+from swashplate.identification.lack_of_fit import lack_of_fit
+from swashplate.identification.setup import Setup, load_setup, setup_text
+from swashplate.maneuvers import source_tests
+
+DOUBTS = {"Z9": "3 %", "tau": 1e-3}
+ONE = {"lag": FREE["lag"], "start.place": FREE["start.place"]}
+
+
+def stated(**doubts: float | str) -> Setup:
+    return load_setup("hoist").model_copy(update={"standard_uncertainty": doubts})
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    tests = source_tests("hoist")
+    names = ("step +4 V", "step -4 V", "step +9 V", "step -9 V", "sine 9 V 0.1 Hz")
+    virtual = rig.run("hoist", {name: tests[name] for name in names}, seed=3, perturb=0.05)
+    return Campaign.from_toml(rig.write(virtual, tmp_path_factory.mktemp("t") / "virtual"))
+
+
+@pytest.mark.parametrize(("number", "name", "deviation"), [(0, "Z9", 0.03), (1, "tau", 1e-3)])
+def test_estimates_follow_a_fixed_number_as_in_a_fit_with_another(
+    campaign: Campaign, number: int, name: str, deviation: float
+) -> None:
+    """Of both stages: tau acts on the pump's by itself and through the card's estimates."""
+    published = Drive.preset("hoist")
+    found = assess(fit(published, campaign, stated(**DOUBTS)).stages)
+    value = published.parameters.numbers[name]
+    deviation *= value if name == "Z9" else 1.0
+    step, ends = 0.05 * deviation, []
+    for sign in (1.0, -1.0):
+        moved = published.replace(**{name: value + sign * step})
+        stages = fit(moved, campaign, load_setup("hoist")).stages
+        ends.append([stage.solution.vector for stage in stages])
+    for k, each in enumerate(found):
+        told = each.uncertainty.own.determined
+        expected = ((ends[0][k] - ends[1][k]) * (deviation / (2.0 * step)))[told]
+        changes = each.uncertainty.fixed[told, number]
+        # Gauss and Newton leave out the residuals' curvature, which moves weak unknowns by parts of
+        # their own standard error
+        errors = each.uncertainty.own.standard_errors[told]
+        assert (np.abs(changes - expected) < 0.1 * np.abs(expected) + 0.5 * errors).all()
+        if k == 1:
+            assert (np.abs(changes) > 3.0 * errors).sum() >= 2
+
+
+def test_what_is_added_to_a_model_of_ones_own_is_that_of_other_fits() -> None:
+    bare, doubted = (
+        assess(fit(ModelSetup(servo, ONE, noise=NOISE, fixed={"gain": 1.5}, **more), RUNS).stages)[
+            0
+        ]
+        for more in ({}, {"standard_uncertainty": {"gain": "4 %"}})
+    )
+    up, down = (
+        fit(ModelSetup(servo, ONE, noise=NOISE, fixed={"gain": gain}), RUNS).stages[0]
+        for gain in (1.506, 1.494)
+    )
+    (plain, *_), (wide, *_) = bare.uncertainty.estimates, doubted.uncertainty.estimates
+    # 4 % of the gain are ten times the change that was tried
+    added = 10.0 * (up.values["lag"] - down.values["lag"]) / 2.0
+    assert wide.value == plain.value
+    assert wide.standard_error**2 == pytest.approx(plain.standard_error**2 + added**2, rel=0.05)
+    assert wide.standard_error > 2.0 * plain.standard_error
+    (sentence,) = (s for s in doubted.uncertainty.sentences() if "standard uncertainty" in s)
+    assert "widens them by a factor of" in sentence
+
+
+def test_residuals_within_the_doubt_are_no_lack_of_fit() -> None:
+    """Runs of a gain of 1.5, fitted with one of 1.54: explained by 4 %, not by 0.01 %."""
+
+    def ratio(**more: dict[str, float | str]) -> float:
+        setup = ModelSetup(servo, ONE, noise=NOISE, fixed={"gain": 1.54}, **more)
+        return lack_of_fit(assess(fit(setup, RUNS).stages)).ratios["place"]
+
+    assert ratio() > 1.2
+    assert ratio(standard_uncertainty={"gain": "0.01 %"}) > 1.2
+    assert ratio(standard_uncertainty={"gain": "4 %"}) < 1.1
+
+
+def test_it_is_written_and_read(tmp_path: Path) -> None:
+    setup = stated(**DOUBTS)
+    path = tmp_path / "own.toml"
+    path.write_text(setup_text(setup), "utf-8")
+    assert load_setup(path).standard_uncertainty == DOUBTS
+
+
+@pytest.mark.parametrize(
+    ("name", "doubt", "words"),
+    [
+        ("Z16", "5 %", "Z16 is free in the stage 'pump'"),
+        ("Z16_plus", "5 %", "Z16_plus is free in the stage 'pump'"),
+        ("Z20", 0.1, "Z20 is free in the stage 'pump'"),
+        ("Z9", "5", "standard_uncertainty.Z9"),
+        ("Z9", -1.0, "standard_uncertainty.Z9"),
+    ],
+)
+def test_what_is_wrong_is_refused(
+    tmp_path: Path, name: str, doubt: float | str, words: str
+) -> None:
+    said = f'{{ {name} = "{doubt}" }}' if isinstance(doubt, str) else f"{{ {name} = {doubt} }}"
+    path = tmp_path / "own.toml"
+    path.write_text(f"standard_uncertainty = {said}\n" + setup_text(load_setup("hoist")), "utf-8")
+    with pytest.raises(ParameterError, match=words):
+        load_setup(path)
+
+
+def test_a_name_that_no_parameter_has_is_refused(campaign: Campaign) -> None:
+    with pytest.raises(ParameterError, match="no parameter 'Z99'"):
+        fit(Drive.preset("hoist"), campaign, stated(Z99="5 %"))
