@@ -116,7 +116,8 @@ def _part(part: Model, old: Equation, new: Equation, parameters: type[Any] | Non
     if not leading:
         return part
     own: Any = part.parameters
-    kind = own if parameters is None else _extended(own, parameters)
+    more: Any = parameters
+    kind = own if more is None else _extended(own, more)
     names = {part.parameters.__name__: kind}
     made = {plain(old): _called_like(old, new, part.name, kind)}
     return replace(
