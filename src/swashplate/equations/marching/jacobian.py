@@ -327,6 +327,7 @@ def _march(
         slopes = start_slopes(graph, instance, first, h, observed.start)
     tangent = tangents_of(layout, slopes, instance.model, columns, own.start)
     places = instance.places(signals, h)
+    plan = plan._replace(way=layout.way)
     program = _with_numbers(layout, slopes.constants, places)
     marched = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
     met = np.array([np.inf])

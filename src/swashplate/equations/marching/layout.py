@@ -60,6 +60,8 @@ class Layout:
     """A program without the numbers that depend on parameters, and the memory it needs."""
 
     program: Program
+    way: Indices
+    """(r, d) see `Plan.way`."""
     pieces: frozenset[int]
     """Numbers of the pieces that are called."""
     slots: tuple[tuple[int, Slot], ...]
@@ -166,12 +168,12 @@ class _Planner:
             ),
             seen,
             np.concatenate(self.columns_of),
-            way,
             np.array([self._value_row(number) for number in observed], dtype=np.int64),
             np.array([self.graph.observed[number][1] for number in observed], dtype=np.bool_),
         )
         return Layout(
             program,
+            way,
             frozenset(todo[1] for todo in self.todo if todo[0] in (CALL, CHAIN)),
             tuple((k, term.slot) for k, term in enumerate(terms) if term.slot is not None),
             self.rows,

@@ -239,6 +239,7 @@ class ObservedRecord:
             kept=kept,
             offset_column=none,
             clock_column=none,
+            way=np.zeros((len(self.observations), 0), dtype=np.int64),
         )
 
 

@@ -67,8 +67,6 @@ class Program(NamedTuple):
     columns: Indices
     """For each recurrence what runs it takes: k² places of its factors, then the `columns` of
     `follow`; the number of columns, then theirs; what `follow_out` takes."""
-    way: Indices
-    """(r, d) how the derivatives of an observation get to the sink, one of SET, ADD and DONE."""
     value: Indices
     """(r,) row of each observation's signal."""
     integral: NDArray[np.bool_]
@@ -104,6 +102,8 @@ class Plan(NamedTuple):
     """(r,) column of the derivative by the offset, -1 if not wanted."""
     clock_column: Indices
     """(r,) column of the derivative by the clock offset, -1 if not wanted."""
+    way: Indices
+    """(r, d) how the derivatives that the march gives get to the sink, one of SET, ADD and DONE."""
 
 
 class Sink(NamedTuple):
@@ -367,7 +367,6 @@ def low_pass(
 def place(
     seen: Array,
     base: int,
-    way: Indices,
     plan: Plan,
     r: int,
     at: int,
@@ -383,8 +382,6 @@ def place(
         On the grid: derivatives by the d columns that the drive's march gives, and the signal.
     base : int
         Point of the grid at place 0 of `seen`.
-    way : (d,) array
-        What of the derivatives is still to be done, see `Program.way`.
     r, at, count : int
         The observation, the first of its stamps and how many.
     sink, to :
@@ -396,11 +393,11 @@ def place(
     begin = cell[0] - base
     for c in range(derived):
         column = sink.rows[sink.to[c], to : to + count]
-        if way[c] == DONE:
+        if plan.way[r, c] == DONE:
             continue
         if plan.regular[r]:
             row = seen[c, begin : begin + count]
-            if way[c] == ADD:
+            if plan.way[r, c] == ADD:
                 for i in range(count):
                     column[i] += weight[i] * row[i]
             else:
@@ -437,7 +434,6 @@ def place(
 def rotate(
     seen: Array,
     base: int,
-    way: Indices,
     plan: Plan,
     r: int,
     stamps: tuple[int, int],
@@ -449,7 +445,7 @@ def rotate(
 
     Parameters
     ----------
-    seen, base, way, plan, r, sink :
+    seen, base, plan, r, sink :
         As in `place`.
     stamps : (int, int)
         The first stamp of the observation, and the one behind the last.
@@ -475,7 +471,7 @@ def rotate(
             and plan.weight[at + count] != 0.0
         ):
             count += 1
-        place(seen, base, way, plan, r, at, count, sink, used)
+        place(seen, base, plan, r, at, count, sink, used)
         at, used = at + count, used + count
         if used == sink.rows.shape[1]:
             absorb(sink.rows, sink.factor, products)
@@ -525,7 +521,7 @@ def deliver(
     combine(room.flat, program.terms, program.seen, targets, count, room.flat_seen)
     base, last = first - CARRIED, first + count == size
     for r in range(plan.first.size - 1):
-        rows, way = room.seen[r], program.way[r]
+        rows = room.seen[r]
         signal, value = rows[derived, CARRIED:], room.table[program.value[r]]
         for m in range(count):
             signal[m] = value[m]
@@ -547,9 +543,9 @@ def deliver(
             end += 1
         room.progress[r] = end
         if sink.factor.size > 0:
-            used = rotate(rows, base, way, plan, r, (at, end), sink, used, room.products)
+            used = rotate(rows, base, plan, r, (at, end), sink, used, room.products)
         elif end > at:
-            place(rows, base, way, plan, r, at, end - at, sink, at)
+            place(rows, base, plan, r, at, end - at, sink, at)
     return used
 
 
