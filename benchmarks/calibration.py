@@ -327,18 +327,49 @@ def prewhitened_scores(fit):
     return covariance_of("coloured", fit, matrix, free), np.zeros(fit.variables.count)
 
 
+def autoregression(colour, samples):
+    """Coefficients (p,) of noise of a colour, p by Akaike's criterion, at most 10 log10(samples).
+
+    Yule and Walker's equations by Levinson's recursion, on the autocorrelation with the negative
+    parts of its spectrum cut off: it is then that of a process, and the model stable.
+    """
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    correlation = colour.correlation
+    best, best_score = np.zeros(0), 0.0
+    if not colour.length:
+        return best
+    size = next_fast_len(4 * correlation.size, real=True)
+    mirrored = np.zeros(size)
+    mirrored[: correlation.size] = correlation
+    mirrored[size - correlation.size + 1 :] = correlation[:0:-1]
+    proper = irfft(np.maximum(rfft(mirrored).real, 0.0), size)[: correlation.size]
+    proper = proper / proper[0]
+    most = int(min(10.0 * np.log10(max(samples, 10)), correlation.size - 1, samples // 4))
+    taps, variance = np.zeros(0), 1.0
+    for order in range(1, most + 1):
+        reflection = (proper[order] - taps @ proper[order - 1 : 0 : -1]) / variance
+        if abs(reflection) >= 1.0:
+            break  # only rounding is left to predict
+        taps = np.append(taps - reflection * taps[::-1], reflection)
+        variance *= 1.0 - reflection**2
+        score = samples * float(np.log(variance)) + 2.0 * order
+        if score < best_score:
+            best, best_score = taps, score
+    return best
+
+
 def generalised(fit):
     """Generalised least squares: one Gauss-Newton step on residuals whitened by an AR model."""
-    from swashplate.identification.bootstrap import autoregression
     from swashplate.identification.linearised import triangular_factor, whitening
     from swashplate.identification.noise import covariance_of, grid_of, noise_colours, unweighted
 
     rows, count = [], fit.variables.count
     for colour in noise_colours(fit):
         samples = sum(fit.runs[m].time.size for m in colour.members)
-        process = autoregression(colour, samples)
-        order = process.coefficients.size
-        taps = np.concatenate([[1.0], -process.coefficients])
+        coefficients = autoregression(colour, samples)
+        order = coefficients.size
+        taps = np.concatenate([[1.0], -coefficients])
         parts = []
         for m in colour.members:
             run, grid = fit.runs[m], grid_of(fit.runs[m].time)

@@ -77,7 +77,7 @@ def source(counts: Array) -> Array:
 def savitzky_golay(counts: Array) -> Array:
     """Parabolas through 0.1 s of interpolated counts [rad/s]."""
     angle = radians_per_count(TURN) * interpolate_counts(TIME, counts)
-    return savitzky_golay_speed(TIME, angle, window=0.1, order=2)
+    return savitzky_golay_speed(TIME, angle)
 
 
 class Method(NamedTuple):

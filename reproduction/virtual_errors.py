@@ -8,18 +8,24 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any, Literal
 
+import numpy as np
+
 from reproduction.bench import SEVERITY, Bench
 from reproduction.content import Cell, Table
 from swashplate.campaign import Experiment
 from swashplate.drive import Drive
+from swashplate.errors import InputError
 from swashplate.identification.assessment import RunQuality
-from swashplate.identification.error_tables import SOURCE_RULES, LargestError, sine_error
 from swashplate.identification.fitting import fit
 from swashplate.identification.setup import load_setup
 from swashplate.identification.staging import drawn
 from swashplate.identification.validation import (
-    channel_errors,
+    SOURCE_RULES,
+    ComparedRun,
+    LargestError,
     compared_run,
+    error_tables,
+    kept_by,
     kind_of,
     predict,
     source_rules,
@@ -73,12 +79,12 @@ class ErrorTables:
         source = thesis_errors()[number]
         axis, quantity = source["axis"], source["quantity"]
         cases: tuple[Case, ...] = ("true drive", "fitted", "fitted, with effects")
-        rules = source_rules(axis) if quantity == "speed" else tuple(SOURCE_RULES)
+        rules = source_rules(axis) if quantity == "speed" else SOURCE_RULES
         by_case, notes = [], list[str]()
         for case in cases:
             alike = [q for q in self.qualities(axis, case) if q.channel == CHANNELS[quantity]]
-            (found,) = channel_errors(alike, rules)
-            by_case.append({row.kind: row for row in found.table.rows})
+            (found,) = error_tables(alike, rules)
+            by_case.append({row.kind: row for row in found.rows})
             if not notes and found.average:
                 notes.append(f"Differences of currents are averaged over {found.average:g} s.")
         rows = [
@@ -157,6 +163,32 @@ def _harmonic(qualities: Sequence[RunQuality]) -> str:
             continue
         run = compared_run(each)
         if run is not None:
-            errors.append(abs(sine_error(run).amplitude_percent))
+            errors.append(abs(amplitude_error(run)))
     largest = max(errors)
     return f"{largest:.2f} %" if largest >= 0.005 else "below 0.01 %"
+
+
+def amplitude_error(run: ComparedRun) -> float:
+    """Error of a sine's amplitude by its first harmonic, which errors of its shape do not enter.
+
+    Simulated less measured, of the measured. [%]
+
+    Raises
+    ------
+    InputError
+        If its frequency is not known, less than a period is left, or nothing was measured.
+    """
+    kept = kept_by(run, SOURCE_RULES)[0]
+    time = run.time[kept]
+    length = float(np.ptp(time) + np.median(np.diff(time))) if time.size >= 8 else 0.0
+    if not run.frequency or length < (1.0 - 1e-6) / run.frequency:
+        raise InputError(f"Of {run.name} less than one period is left to judge.")
+    turn = 2.0 * np.pi * run.frequency * time
+    columns = np.column_stack([np.cos(turn), np.sin(turn), np.ones(time.size)])
+    measured, simulated = (
+        float(np.linalg.norm(np.linalg.lstsq(columns, each[kept], rcond=None)[0][:2]))
+        for each in (run.measured, run.simulated)
+    )
+    if measured == 0.0:
+        raise InputError(f"Of {run.name} nothing was measured at {run.frequency:g} Hz.")
+    return 100.0 * (simulated / measured - 1.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import tomllib
 from difflib import get_close_matches
 from pathlib import Path
@@ -49,6 +51,16 @@ def parse_toml(text: str, origin: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise FileError(f"{origin} is not TOML: {error}.") from None
+
+
+def toml_key(name: str) -> str:
+    """A name as a key of TOML: bare, or in quotes."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml_string(name)
+
+
+def toml_string(text: str) -> str:
+    """A string of TOML, whose escapes are those of JSON."""
+    return json.dumps(text, ensure_ascii=False)
 
 
 def validated(content: Any, model: type[Model], origin: str) -> Model:

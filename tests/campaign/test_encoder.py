@@ -1,4 +1,4 @@
-"""Counters without roll-overs, staircases filled, angles, and counts that were lost."""
+"""Counts: roll-overs out, staircases filled, jumps found, counters told from other columns."""
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ from swashplate.campaign import (
     find_lost_counts,
     interpolate_counts,
     radians_per_count,
+    rolls_over_at,
     unwrap_counts,
 )
 from swashplate.errors import InputError
@@ -132,3 +133,42 @@ def test_stamps_count_and_a_record_must_be_long_enough() -> None:
 def test_rest_has_no_lost_counts() -> None:
     flicker = np.array([0, 0, 0, 1, 0, 0, 0, 0, 1, 1, 1, 0], dtype=float)
     assert find_lost_counts(np.arange(12.0), flicker).size == 0
+
+
+# --- columns that are counters --------------------------------------------------------------------
+
+
+LONG = np.linspace(0.0, 10.0, 2001)
+THERE_AND_BACK = np.floor(9000.0 * np.sin(0.6 * LONG))
+"""Up to 9000 counts and back, at most 27 in a sample."""
+
+
+@pytest.mark.parametrize("size", [1000, 3600, 4096])
+def test_a_counter_that_begins_anew(size: int) -> None:
+    assert rolls_over_at(THERE_AND_BACK % size) == size
+
+
+def test_the_counts_of_a_turn_are_likely() -> None:
+    seen = THERE_AND_BACK % 3990
+    assert rolls_over_at(seen) == 4000
+    assert rolls_over_at(seen, 3990.0) == 3990
+
+
+def test_a_signed_counter() -> None:
+    assert rolls_over_at((THERE_AND_BACK + 2048) % 4096 - 2048) == 4096
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        THERE_AND_BACK,  # never begins anew
+        np.arange(2001.0) % 256,  # counts the samples
+        THERE_AND_BACK % 4096 + 0.5,
+        np.where(LONG % 2.0 < 1.0, 0.0, 1000.0),  # a switch
+        np.where(LONG < 8.0, np.floor(400.0 * np.sin(0.3 * LONG)), 0.0),  # set to zero
+        np.full(5, np.nan),
+        np.zeros(0),
+    ],
+)
+def test_what_is_none(values: np.ndarray) -> None:
+    assert rolls_over_at(values) is None

@@ -168,7 +168,7 @@ def test_a_counter_that_rolls_over(edited: Edit) -> None:
 def test_counts_beyond_their_counter(edited: Edit) -> None:
     """They go down to -2040."""
     path = edited("gear_ratio = 2.0", "gear_ratio = 2.0\nrolls_over_at = 1024")
-    said = "up.csv: column 'counts': .* counter of 1024 readings; give the right rolls_over_at"
+    said = "up.csv: column 'counts': .* counter of 1024 readings: give its own size, in a campaign"
     with pytest.raises(InputError, match=said):
         Campaign.from_toml(path)
 

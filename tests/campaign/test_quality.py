@@ -1,4 +1,4 @@
-"""The check finds what is wrong with a measurement, and nothing in a good one."""
+"""What someone should look into before a fit; nothing in a good measurement."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swashplate import Campaign
-from swashplate.campaign import Quality, examine
+from swashplate import Campaign, InputError
+from swashplate.campaign import Quality, beyond_the_card, campaign_findings, examine
 
 Edit = Callable[..., Path]
 
@@ -114,3 +114,85 @@ def test_an_input_that_never_changes(campaign_folder: Path) -> None:
         return table
 
     assert "nothing can be identified" in findings(rewrite(campaign_folder / "campaign.toml", rest))
+
+
+# --- windows that no run takes --------------------------------------------------------------------
+
+
+GEAR = "gear_ratio = 2.0\n"
+
+
+def sentences(path: Path) -> tuple[str, ...]:
+    return campaign_findings(Campaign.from_toml(path))
+
+
+def test_windows_that_are_taken(edited: Edit) -> None:
+    """Records go from 0 to 1 s; a step of +4 V in one run, of -4 V in the other."""
+    path = edited(
+        GEAR,
+        f'{GEAR}ignore = [{{ from = 0.9 }}, {{ maneuver = "step +*" }}]\n'
+        "weights = [{ from = 0.2, to = 0.3, factor = 2.0 }]\n",
+    )
+    assert sentences(path) == ()
+
+
+def test_a_misspelt_manoeuvre(edited: Edit) -> None:
+    path = edited(GEAR, f'{GEAR}ignore = [{{ maneuver = "setp *" }}]\n')
+    (said,) = sentences(path)
+    assert said == (
+        "axes.winch.channels.counts.ignore: no run has the manoeuvre 'setp *', so that its window "
+        "does nothing; there are 'step +4 V', 'step -4 V'"
+    )
+
+
+def test_a_window_on_another_clock(edited: Edit) -> None:
+    """Written in ms, as the log's stamps are."""
+    path = edited(
+        'drive = "hoist"', 'drive = "hoist"\nignore = [{ from = 100.0, to = 200.0, why = "x" }]'
+    )
+    (said,) = sentences(path)
+    assert said.startswith("axes.winch.ignore: the window from 100 s to 200 s holds no sample of")
+    assert said.endswith("any of 2 runs")
+
+
+def test_a_window_of_one_run(edited: Edit) -> None:
+    path = edited(
+        'role = "validate"', 'role = "validate"\nweights = [{ from = 7.0, factor = 2.0 }]'
+    )
+    (said,) = sentences(path)
+    assert said == (
+        "run 2 (down.csv): weights: the window from 7 s to its end holds no sample of down, which "
+        "goes from 0 to 1 s"
+    )
+
+
+def test_a_misspelt_channel_of_a_run(edited: Edit) -> None:
+    path = edited('role = "validate"', 'role = "validate"\naxes.winch.channels.count.sign = 1')
+    with pytest.raises(InputError, match="changes the channel 'count', but the axis has current"):
+        Campaign.from_toml(path)
+
+
+# --- what a campaign lacks to be held against a drive ---------------------------------------------
+
+
+def test_a_campaign_that_lacks_nothing(campaign_folder: Path) -> None:
+    tests = Campaign.from_toml(campaign_folder / "campaign.toml")
+    assert campaign_findings(tests) == ()
+    assert [beyond_the_card(each) for each in tests] == [(), ()]
+
+
+def test_no_channel_measures_the_motion(campaign_folder: Path) -> None:
+    path = campaign_folder / "campaign.toml"
+    head, _, rest = path.read_text("utf-8").partition("[axes.winch.channels.counts]")
+    path.write_text(head + rest[rest.index("[[runs]]") :], "utf-8")
+    (said,) = campaign_findings(Campaign.from_toml(path))
+    assert said.startswith("axis 'winch': no channel measures its motion")
+
+
+def test_a_command_beyond_the_card(edited: Edit) -> None:
+    """Written as 4 V, -4 V and meant as three times that."""
+    path = edited('unit = "mV" }', 'unit = "mV", scale = 3.0 }')
+    (up,), (down,) = (beyond_the_card(each) for each in Campaign.from_toml(path))
+    assert "up.csv: column 'joystick': the voltage is 12 V at 0.5 s, but the card takes" in up
+    assert "the voltage is -12 V" in down
+    assert "[axes.winch.input]" in down

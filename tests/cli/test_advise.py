@@ -54,13 +54,13 @@ def test_small_positive_steps_want_large_and_negative_ones(
     assert best["Z13_plus"].endswith("step 9 V")
     assert best["Z13_minus"].endswith("step -9 V")
     assert "step -" in best["Z19_minus"]
-    ranked = list(section(said, "Tests, with the sensors at hand"))
+    tests = section(said, "Tests, with the sensors at hand")
+    ranked = list(tests)
     # the large negative one tells of the negative force and the negative stop at once
     assert ranked[0] == "step -9 V"
     assert ranked[-1] == "step 2 V"
     assert list(section(said, "A plan")) == ["step -9 V", "step 9 V"]
-    sentence = "step -9 V would be the first to determine Z13_minus, Z19_minus"
-    assert sentence in " ".join(said.split())
+    assert "Z13_minus, Z19_minus" in tests["step -9 V"]
     table = pl.read_csv(tmp_path / "advice.csv")
     stop = table.filter((pl.col("unknown") == "Z13_minus") & (pl.col("first to determine")))
     assert set(stop["test"]) == {"step -9 V"}

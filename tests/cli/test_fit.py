@@ -141,7 +141,7 @@ def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path
     setup = ("--setup", "setup.toml", "--jobs", "1", "--figures", "svg")
     said = done("fit", "virtual/campaign.toml", *setup, *asked)
     assert "bootstrap" in said
-    assert "40 draws of blocks" in said
+    assert "40 draws of noise" in said
     assert "Cross-validation" in said
     assert "Held at their nominal values: V_dz, G1" in said
     header, *rows = (tmp_path / "fitted" / "estimates.csv").read_text("utf-8").splitlines()

@@ -1,123 +1,181 @@
-"""Estimates from resampled noise."""
+"""Estimates from other noise, and profiles, of models that can be followed by hand."""
+
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from swashplate import Experiment
 from swashplate.errors import InputError
-from swashplate.identification.bootstrap import Bootstrap, Resampling, refit_bootstrap
+from swashplate.executors import Serial
+from swashplate.identification.assessment import Assessment
+from swashplate.identification.bootstrap import Bootstrap, NoiseDraws, bootstraps_of
+from swashplate.identification.fitting import StageFit
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import spectral_covariance
-from swashplate.identification.unknowns import Unknowns
+from swashplate.identification.problem import Problem
+from swashplate.identification.profile import profiles_of
+from swashplate.identification.setup import Free, Stage
+from swashplate.identification.solving import solve
+from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.parameters.files import load_preset
 
 N, RUNS = 2048, 4
 TIME = np.arange(N) / 512.0
-DESIGN = np.column_stack([1.0 - np.exp(-TIME / 0.3), np.sin(2.0 * TIME), TIME * 0.0])
+DESIGN = np.column_stack([1.0 - np.exp(-TIME / 0.3), np.sin(2.0 * TIME)])
+LINE_TIME = np.linspace(0.0, 4.0, 81)
 
 
-def fit(rho: float, seed: int, **more: object) -> tuple[LinearisedFit, np.ndarray]:
+def coloured(rho: float, seed: int) -> np.ndarray:
     white = np.random.default_rng(seed).normal(size=(RUNS, N + 400))
-    noise = lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], white)[:, 400:]
-    some = DESIGN[:, :2]
-    estimate = np.zeros(3)
-    estimate[:2] = -np.linalg.solve(RUNS * some.T @ some, some.T @ noise.sum(axis=0))
+    return lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], white)[:, 400:]
+
+
+def regression(noise: np.ndarray) -> LinearisedFit:
+    """Two unknowns fitted to noise alone, by linear least squares."""
+    estimate = -np.linalg.solve(RUNS * DESIGN.T @ DESIGN, DESIGN.T @ noise.sum(axis=0))
     runs = [
         LinearisedRun(f"run {k}", "speed", TIME, each + DESIGN @ estimate, DESIGN)
         for k, each in enumerate(noise)
     ]
-    variables = Unknowns.of("abc", [2.0, 1.0, 1.0], **more)
-    return LinearisedFit.of(runs, variables), estimate
+    return LinearisedFit.of(runs, Unknowns.of("ab", [2.0, 1.0]))
 
 
-def refitted(resampling: Resampling, draws: int) -> Bootstrap:
-    """Bootstrap of the regression, each draw solved anew."""
-    made, some = resampling.fit, DESIGN[:, :2]
-
-    def refit(draw: int) -> np.ndarray:
-        noise = resampling.differences(draw)
-        vector = made.variables.vector.copy()
-        vector[:2] -= np.linalg.solve(RUNS * some.T @ some, some.T @ np.sum(noise, axis=0))
-        return vector
-
-    return refit_bootstrap(resampling, refit, draws)
+def test_estimates_from_draws_scatter_as_the_covariance_says() -> None:
+    made = regression(coloured(0.95, 1))
+    draws = NoiseDraws(made, seed=1)
+    total = np.array([np.sum(draws.differences(k), axis=0) for k in range(500)])
+    found = np.linalg.solve(RUNS * DESIGN.T @ DESIGN, DESIGN.T @ total.T)
+    # 500 draws tell a deviation to 3 %, and each method knows the noise at the low frequencies of
+    # the derivatives to some 10 %
+    expected = spectral_covariance(made).standard_errors
+    np.testing.assert_allclose(found.std(axis=1), expected, rtol=0.2)
 
 
-def test_it_agrees_with_the_covariance() -> None:
-    made, _ = fit(0.95, 1)
-    found = refitted(Resampling(made, seed=1), 1000)
-    expected = spectral_covariance(made).standard_errors[:2]
-    # draws come from an autoregression, the covariance from a smoothed spectrum: each knows the
-    # noise at the low frequencies of the derivatives to some 10 %
-    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance))[:2], expected, rtol=0.2)
-    assert found.covariance[2, 2] == 0.0
+@pytest.mark.parametrize("rho", [0.0, 0.9, 0.98])
+def test_draws_have_the_colour_and_size_of_the_noise(rho: float) -> None:
+    drawn = np.array(NoiseDraws(regression(coloured(rho, 2)), seed=3).differences(0))
+    # of 4 runs of 4 s: at 0.98 their size is known to 10 %
+    assert drawn.std() == pytest.approx(1.0, rel=0.25)
+    lag_one = np.mean(drawn[:, 1:] * drawn[:, :-1]) / np.mean(drawn**2)
+    assert lag_one == pytest.approx(rho, abs=0.05)
 
 
-def test_intervals_cover_the_truth() -> None:
-    """25 campaigns of two unknowns: 95 % less three standard deviations is 86 %."""
-    inside = []
-    for seed in range(25):
-        made, estimate = fit(0.95, 100 + seed)
-        found = refitted(Resampling(made, seed=seed), 100).intervals()
-        truth = made.variables.to_values(made.variables.vector - estimate)
-        inside += [
-            low <= value <= high
-            for (low, high), value in zip([found[0], found[1]], truth[:2], strict=True)
-        ]
-    assert np.mean(inside) >= 0.86
+def test_a_draw_is_the_same_whenever_it_is_drawn() -> None:
+    made = regression(coloured(0.9, 1))
+    first, later = NoiseDraws(made, seed=7), NoiseDraws(made, seed=7)
+    later.differences(0)
+    for a, b in zip(first.differences(3), later.differences(3), strict=True):
+        np.testing.assert_array_equal(a, b)
+    others = (first.differences(4)[0], first.differences(3)[1], NoiseDraws(made).differences(3)[0])
+    assert not any(np.array_equal(first.differences(3)[0], each) for each in others)
 
 
-def test_a_positive_unknown_stays_positive() -> None:
-    made, _ = fit(0.98, 4, logarithmic=[True, False, False])
-    found = refitted(Resampling(made), 200)
-    low, high = found.intervals()[0]
-    assert low > 0.0
-    assert high / 2.0 == pytest.approx(2.0 / low, rel=0.3)
+def test_no_residual_draws_nothing() -> None:
+    assert not np.any(NoiseDraws(regression(np.zeros((RUNS, N)))).differences(0))
 
 
-def test_an_undetermined_unknown_has_no_interval() -> None:
-    made, _ = fit(0.9, 5)
-    assert refitted(Resampling(made), 100).intervals()[2] is None
-
-
-def test_refits_that_fail_are_counted() -> None:
-    made, _ = fit(0.9, 6)
-    vector = made.variables.vector
-    found = refit_bootstrap(
-        Resampling(made), lambda draw: None if draw % 4 == 0 else vector + draw, 40
-    )
-    assert found.failed == 10
-    assert found.vectors.shape == (30, 3)
-    assert any("10 of 40 refits did not end" in each for each in found.sentences())
-
-
-def test_any_pool_may_map() -> None:
-    made, _ = fit(0.9, 7)
-    seen: list[int] = []
-
-    def backwards(function, numbers):  # type: ignore[no-untyped-def]
-        seen.extend(reversed(numbers))
-        return [function(number) for number in numbers]
-
-    found = refit_bootstrap(
-        Resampling(made), lambda draw: np.full(3, float(draw)), 5, mapped=backwards
-    )
-    assert seen == [4, 3, 2, 1, 0]
-    assert found.vectors[:, 0].tolist() == [0, 1, 2, 3, 4]
+def test_samples_over_a_gap_are_hardly_related() -> None:
+    slow = coloured(0.98, 5)[0]
+    kept = np.r_[0:100, 1500:1600]
+    run = LinearisedRun("gap", "speed", TIME[kept], slow[kept], np.ones((200, 1)))
+    whole = LinearisedRun("whole", "speed", TIME, slow, np.ones((N, 1)))
+    draws = NoiseDraws(LinearisedFit.of([run, whole], Unknowns.of("a", [1.0])), seed=2)
+    pairs = np.array([draws.differences(k)[0][[98, 99, 100]] for k in range(300)])
+    correlation = np.corrcoef(pairs.T)
+    assert correlation[0, 1] > 0.9
+    assert abs(correlation[1, 2]) < 0.3
 
 
 def test_quantiles_by_hand() -> None:
-    variables = Unknowns.of(["a"], [1.0])
-    found = Bootstrap(variables, np.arange(101.0)[:, None], np.ones(1, bool), 0, (0.1,), 0)
+    found = Bootstrap(Unknowns.of("a", [1.0]), np.arange(101.0)[:, None], np.ones(1, bool), 0, 0)
     assert found.intervals(0.9)[0] == pytest.approx((5.0, 95.0))
+    unknown = Bootstrap(found.variables, found.vectors, np.zeros(1, bool), 3, 0)
+    assert unknown.intervals() == (None,)
+    assert "3 of 104 refits did not end" in unknown.sentences()[1]
 
 
 def test_too_few_draws_are_refused() -> None:
-    made, _ = fit(0.9, 8)
-    with pytest.raises(InputError, match="1 draws do not make a distribution"):
-        refitted(Resampling(made), 1)
+    found = Bootstrap(Unknowns.of("a", [1.0]), np.arange(10.0)[:, None], np.ones(1, bool), 0, 0)
     with pytest.raises(InputError, match="10 draws do not reach the ends"):
-        refitted(Resampling(made), 10).intervals()
-    with pytest.raises(InputError, match="0 of 5 refits ended"):
-        refit_bootstrap(Resampling(made), lambda draw: None, 5)
+        found.intervals()
     with pytest.raises(InputError, match="between 0 and 1"):
-        refitted(Resampling(made), 10).intervals(95.0)
+        found.intervals(95.0)
+
+
+class Line:
+    """y = slope · t + level."""
+
+    def simulate(
+        self, values: Mapping[str, float], experiment: Experiment
+    ) -> Mapping[str, np.ndarray]:
+        return {"y": values["slope"] * experiment["y"].time + values["level"]}
+
+
+class Backwards(Serial):
+    """Results in another order than asked for, as from several processes."""
+
+    def run(self, function, shared, items):  # type: ignore[no-untyped-def]
+        yield from reversed(list(super().run(function, shared, items)))
+
+
+@pytest.fixture
+def assessed(experiment: Callable[..., Experiment]) -> Assessment:
+    """A line fitted to four runs with white noise of 0.1."""
+    rng = np.random.default_rng(7)
+    runs = tuple(
+        experiment(f"run {k}", 1.0, 2.0 * LINE_TIME + 1.0 + 0.1 * rng.normal(size=81))
+        for k in range(4)
+    )
+    unknowns = Unknowns((Unknown("slope", 1.5, 0.0, 4.0), Unknown("level", 0.5, -3.0, 3.0)))
+    problem = Problem(Line(), runs, unknowns, ("y",), {"y": 0.1})
+    stage = Stage(name="line", part="chain", free={"J": Free(relative=(0.5, 2.0))})
+    return Assessment(StageFit(stage, problem, solve(problem), load_preset("neutral")))
+
+
+def textbook() -> np.ndarray:
+    """Standard errors of slope and level from 4 times 81 samples with noise 0.1."""
+    design = np.column_stack([LINE_TIME, np.ones(81)])
+    return 0.1 * np.sqrt(np.diag(np.linalg.inv(4.0 * design.T @ design)))
+
+
+def test_refits_scatter_as_the_textbook_says(assessed: Assessment) -> None:
+    found = bootstraps_of([assessed], 200, seed=3)["line"]
+    assert found.failed == 0
+    # 200 draws tell a standard deviation to 5 %, and the noise itself is known to 4 %
+    np.testing.assert_allclose(found.values.std(axis=0), textbook(), rtol=0.2)
+    np.testing.assert_allclose(
+        found.values.mean(axis=0),
+        list(assessed.stage.values.values()),
+        atol=float(4.0 * textbook().max() / np.sqrt(200.0)),
+    )
+    with pytest.raises(InputError, match="1 draws do not make a distribution"):
+        bootstraps_of([assessed], 1)
+
+
+def test_draws_do_not_depend_on_the_order_in_which_they_are_done(assessed: Assessment) -> None:
+    counts: list[int] = []
+    forwards = bootstraps_of([assessed], 40, seed=3)["line"]
+    backwards = bootstraps_of([assessed], 40, seed=3, executor=Backwards(), watch=counts.append)
+    np.testing.assert_array_equal(forwards.vectors, backwards["line"].vectors)
+    assert counts == list(range(1, 41))
+    other = bootstraps_of([assessed], 40, seed=4)["line"]
+    assert not np.array_equal(forwards.vectors, other.vectors)
+
+
+def test_profiles_of_a_linear_model_are_its_intervals(assessed: Assessment) -> None:
+    found = profiles_of(assessed, executor=Backwards())
+    assert list(found) == ["slope", "level"]
+    variables = assessed.uncertainty.own.variables
+    for k, (name, each) in enumerate(found.items()):
+        estimate = assessed.uncertainty.estimates[k]
+        assert (estimate.name, each.index) == (name, k)
+        ends = variables.to_values(np.array([[each.lower] * 2, [each.upper] * 2]))[:, k]
+        np.testing.assert_allclose(ends, [estimate.lower, estimate.upper], rtol=2e-3)
+
+
+def test_a_profile_of_nothing_is_refused(assessed: Assessment) -> None:
+    assert list(profiles_of(assessed, ["level"])) == ["level"]
+    with pytest.raises(InputError, match="There is no unknown Z99; there are slope, level"):
+        profiles_of(assessed, ["Z99"])

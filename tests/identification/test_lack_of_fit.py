@@ -151,3 +151,18 @@ def test_a_run_of_another_machine_is_named(tmp_path: Path) -> None:
 def test_a_constant_channel_at_rest_is_not_clipped(experiment) -> None:
     still: Experiment = experiment("still", 1.0, np.zeros(81))
     assert clipped_channels([still]) == ()
+
+
+@pytest.mark.parametrize("rounding", [0.001, 0.5])
+def test_a_rounded_channel_that_lags_is_not_clipped(experiment, rounding: float) -> None:
+    """It stands at its largest value through a pulse, and 0.3 s longer than that."""
+    time = np.linspace(0.0, 4.0, 81)
+    pulse = np.where((time > 0.5) & (time < 3.0), 5.0, 0.0) + 2.0 * np.sin(time) * (time >= 3.0)
+    late = np.where((time > 0.8) & (time < 3.3), 4.0, 0.0) + np.sin(time - 0.3) * (time >= 3.3)
+    run: Experiment = experiment("pulse", 1.0, np.round(late / rounding) * rounding)
+    run = replace(run, input=replace(run.input, values=pulse))
+    assert clipped_channels([run]) == ()
+    cut: Experiment = experiment("cut", 1.0, np.minimum(3.0 * np.sin(time), 1.5))
+    cut = replace(cut, input=replace(cut.input, values=3.0 * np.sin(time)))
+    (said,) = clipped_channels([cut])
+    assert "'y' stands at exactly 1.5 1" in said

@@ -13,7 +13,7 @@ from swashplate.campaign import rig
 from swashplate.identification.assessment import Measures, assess
 from swashplate.identification.cross_validation import CrossValidation, Fold, FoldEstimate, HeldRun
 from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.profile import Point, Profile, Threshold
+from swashplate.identification.profile import Point, Profile
 from swashplate.identification.setup import Setup
 from swashplate.identification.starts import StartResult
 from swashplate.identification.storing import StageProfile, fingerprint, load_fit, save_fit
@@ -101,9 +101,7 @@ def test_profiles_folds_and_notes_come_back(
     tmp_path: Path, campaign: Campaign, fitted: Fit
 ) -> None:
     points = tuple(Point(x, 3.0 + x * x, np.array([x, 0.5])) for x in (-0.1, 0.0, 0.1))
-    profile = Profile(
-        0, 3.0, points, Threshold(1.0, 0.95, 2.0), -0.1, None, ("crossed", "bound"), points[0]
-    )
+    profile = Profile(0, 3.0, points, 1.0, -0.1, None, ("crossed", "bound"), points[0])
     held = HeldRun("a", "step +4 V", "current", "A", Measures(10, 0.1, 0.5), 0.2)
     fold = Fold(0, ("a",), (FoldEstimate("card", "J", "A", 0.3),), ("J",), (held,), True, "")
     folds = CrossValidation(3, 2, (fold,))
@@ -121,7 +119,7 @@ def test_profiles_folds_and_notes_come_back(
     assert stored.notes == {"seed": "3"}
     (back,) = stored.profiles
     assert back.stage == "card"
-    assert back.profile.threshold == profile.threshold
+    assert back.profile.rise == profile.rise
     assert (back.profile.lower, back.profile.upper) == (-0.1, None)
     assert [each.cost for each in back.profile.points] == [each.cost for each in points]
     assert np.array_equal(back.profile.points[2].vector, points[2].vector)

@@ -17,7 +17,7 @@ from swashplate.campaign import Source, rig
 from swashplate.identification.assessment import Measures, assess, run_qualities
 from swashplate.identification.cross_validation import CrossValidation, Fold, FoldEstimate, HeldRun
 from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.profile import Point, Profile, Threshold
+from swashplate.identification.profile import Point, Profile
 from swashplate.identification.setup import Setup
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.starts import StartResult
@@ -109,9 +109,7 @@ def page(tmp_path_factory, campaign, fitted, assessments, validation) -> Path:
     path = tmp_path_factory.mktemp("report") / "fit.html"
     optimum = Point(0.0, 3.0, np.zeros(1))
     points = (Point(-0.1, 4.0, np.zeros(1)), optimum, Point(0.1, 4.5, np.zeros(1)))
-    profile = Profile(
-        0, 3.0, points, Threshold(1.0, 0.95, 1.0), -0.1, 0.08, ("crossed", "crossed"), None
-    )
+    profile = Profile(0, 3.0, points, 1.0, -0.1, 0.08, ("crossed", "crossed"), None)
     write_fit_report(
         fitted,
         campaign,
@@ -460,9 +458,7 @@ def test_a_page_that_cannot_be_written_leaves_the_old_one(
 
 
 def test_a_profile_of_no_stage_is_refused(tmp_path, campaign, fitted, assessments) -> None:
-    profile = StageProfile(
-        "brake", Profile(0, 1.0, (), Threshold(1, 0.95, 1), None, None, ("open", "open"), None)
-    )
+    profile = StageProfile("brake", Profile(0, 1.0, (), 1.0, None, None, ("open", "open"), None))
     with pytest.raises(InputError, match="'brake' belongs to no stage; there are card, pump"):
         write_fit_report(
             fitted, campaign, tmp_path / "f.html", assessments=assessments, profiles=[profile]
@@ -539,8 +535,8 @@ def test_the_page_renders_and_zooms_in_a_browser_without_errors(
     said = [line for line in done.stderr.splitlines() if ":CONSOLE" in line]
     assert [line for line in said if "setting log level" not in line] == []
     figures = len(re.findall(r'class="figure[ "]', page.read_text("utf-8")))
-    # 3 runs, 3 for each of two stages less the pump's correlations, starts, a profile
-    assert figures == 3 + 2 + 2 + 1 + 1 + done.stdout.count('data-item="correlation-')
+    # 3 runs, sensitivities of each of two stages, starts, a profile, and correlations
+    assert figures == 3 + 2 + 1 + 1 + done.stdout.count('data-item="correlation-')
     assert done.stdout.count('data-drawn="yes"') == figures
     # a second in view: every sample of it
     time = fitted.stages[0].problem.experiments[0]["current"].time

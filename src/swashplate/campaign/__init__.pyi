@@ -1,12 +1,10 @@
 from . import rig as rig
-from .ammeter import SignedCurrent as SignedCurrent
 from .ammeter import ZeroCrossings as ZeroCrossings
 from .ammeter import signed_by_command as signed_by_command
 from .ammeter import zero_crossings as zero_crossings
 from .campaign import Campaign as Campaign
 from .campaign import json_schema as json_schema
 from .draft import draft_campaign as draft_campaign
-from .encoder import CounterRangeError as CounterRangeError
 from .encoder import ambiguous_gaps as ambiguous_gaps
 from .encoder import find_lost_counts as find_lost_counts
 from .encoder import interpolate_counts as interpolate_counts

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from swashplate.campaign.stamps import Array, Mask, increasing, signal
 from swashplate.errors import InputError
-from swashplate.maneuvers.pieces import not_negative, positive
+from swashplate.maneuvers.pieces import not_negative, positive, row
 
 
 class ZeroCrossings(NamedTuple):
@@ -22,15 +22,6 @@ class ZeroCrossings(NamedTuple):
     """Instants of the crossings; of a stay at zero, when it begins and ends. [s]"""
     masked: Mask
     """True for samples within half the width of an instant: leave them out."""
-
-
-class SignedCurrent(NamedTuple):
-    """A rectified current with the command's sign."""
-
-    current: Array
-    """Positive where the command is. [A]"""
-    masked: Mask
-    """True where the sign is a guess: leave these samples out."""
 
 
 def zero_crossings(
@@ -83,58 +74,43 @@ def zero_crossings(
     return ZeroCrossings(instants, masked)
 
 
-def signed_by_command(
-    time: ArrayLike,
-    rectified: ArrayLike,
-    command: ArrayLike,
-    *,
-    width: float,
-    level: float = 0.0,
-) -> SignedCurrent:
-    """Give a rectified current the sign of the command; the mask belongs to the answer.
+def signed_by_command(rectified: ArrayLike, command: ArrayLike, *, level: float = 0.0) -> Array:
+    """Give a rectified current the sign of the command.
 
     Parameters
     ----------
-    time : array_like, shape (n,)
-        Stamps. [s]
     rectified : array_like, shape (n,)
         Reading of the ammeter, not negative. [A]
     command : array_like, shape (n,)
         Voltage, or any signal with the current's sign. [V]
-    width : float
-        Length of the mask around each crossing: twice the time by which the current lags the
-        command, at least. [s]
     level : float
         A command no larger than this has no sign of its own. [V]
 
     Returns
     -------
-    SignedCurrent
-        While the command has no sign the last one it had holds, because the current is still on
-        its way to zero; before the first, the sign is positive and masked.
+    array, shape (n,)
+        Current, positive where the command is. While the command has no sign the last one it had
+        holds, because the current is still on its way to zero; before the first it is positive. [A]
 
     Raises
     ------
     InputError
-        As `zero_crossings`, or if a reading is negative: it would have its sign already.
+        If a number is not finite, the lengths differ, or a reading is negative: it would have its
+        sign already.
 
     Notes
     -----
     The true current passes zero smoothly; this one jumps where the command does, by twice the
     reading. Its derivative, and that of a cost through it, mean nothing there.
     """
-    crossings = zero_crossings(time, command, width=width, level=level)
-    rows = crossings.masked.size
-    reading, drive = signal("rectified", rectified, rows), signal("command", command, rows)
-    below = np.flatnonzero(reading < 0.0)
-    if below.size:
+    numbers = row("command", command)
+    readings = signal("rectified", rectified, numbers.size)
+    negative = np.flatnonzero(readings < 0.0)
+    if negative.size:
         raise InputError(
-            f"rectified must not be negative, but row {below[0]} (the first is 0) is "
-            f"{reading[below[0]]:g} A; take off the ammeter's offset first, or keep the sign."
+            f"rectified must not be negative, but row {negative[0]} (the first is 0) is "
+            f"{readings[negative[0]]} A."
         )
-    known = np.abs(drive) > level
-    # row of the last command that had a sign, -1 before the first
-    last = np.maximum.accumulate(np.where(known, np.arange(rows), -1))
-    sign = np.where(last < 0, 1.0, np.sign(drive[last]))
-    masked = crossings.masked | (last < 0)
-    return SignedCurrent(sign * reading, masked)
+    signs = np.where(np.abs(numbers) > level, np.sign(numbers), 0.0)
+    last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.size), 0))
+    return np.where(signs[last] < 0.0, -readings, readings)

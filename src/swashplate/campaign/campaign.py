@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import schema
-from swashplate.campaign.encoder import CounterRangeError, ambiguous_gaps, unwrap_counts
+from swashplate.campaign.encoder import ambiguous_gaps, unwrap_counts
 from swashplate.campaign.experiment import Channel, Encoder, Experiment, InputSignal, Source
 from swashplate.campaign.recognition import recognise
 from swashplate.campaign.schema import applying, conversion, inside
@@ -353,7 +353,12 @@ def _experiment(
             encoder = Encoder(
                 entry.counts_per_turn, entry.gear_ratio, entry.sign, entry.rolls_over_at
             )
-            counts = _unwrapped(read, entry.rolls_over_at)
+            counts = values
+            if entry.rolls_over_at is not None:
+                try:
+                    counts = unwrap_counts(values, entry.rolls_over_at).counts
+                except InputError as error:
+                    raise InputError(f"{read.source}: {error}") from None
             values = counts * encoder.angle_per_count
         weighted = applying((*entry.weights, *run.weights), maneuver)
         left_out = (*ignored, *applying(entry.ignore, maneuver))
@@ -392,17 +397,6 @@ def _experiment(
         ),
         notes,
     )
-
-
-def _unwrapped(read: _Read, modulus: int | None) -> Array:
-    if modulus is None:
-        return read.values
-    try:
-        return unwrap_counts(read.values, modulus=modulus).counts
-    except CounterRangeError as error:
-        raise InputError(f"{read.source}: {error.said}; give the right rolls_over_at.") from None
-    except InputError as error:
-        raise InputError(f"{read.source}: {error}") from None
 
 
 def _weights(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -15,13 +16,13 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.campaign import read_run
 from swashplate.campaign.encoder import rolls_over_at
-from swashplate.campaign.quality import signed
+from swashplate.campaign.quality import has_sign
 from swashplate.campaign.recognition import recognise
 from swashplate.campaign.schema import KINDS, CampaignFile, ChannelKind, InputKind, conversion
-from swashplate.documents import parse_toml, validated
+from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
 from swashplate.logs import Column, Log, open_log
-from swashplate.units import speed_unit
+from swashplate.units import speed_unit, to_si
 
 Array = NDArray[np.float64]
 
@@ -63,6 +64,8 @@ UNITS: Mapping[str, ChannelKind] = {
     "m/s": "shaft_speed",
     "mm/s": "shaft_speed",
 }
+GIVEN = ("time", "voltage", "current")
+"""What one column alone can be said to be."""
 MANY = 4
 """Runs from which on one is held back for validation."""
 
@@ -92,14 +95,15 @@ def guess(column: Column) -> ColumnGuess:
     stem, _, ending = name.rpartition("_")
     if column.unit is None and stem:
         found = _by_name(column, stem)._replace(unit=ending)
-        si = "s" if found.role == "time" else None
-        if found.kind is not None or si:
-            try:
-                conversion(found.kind or "other", ending, "")
-                if si is None or _seconds(ending):
-                    return found
-            except InputError:
-                pass
+        try:
+            if found.role == "time":
+                to_si(1.0, ending, "s", "")
+                return found
+            if found.kind is not None:
+                conversion(found.kind, ending, "")
+                return found
+        except InputError:
+            pass
     found = _by_name(column, name)._replace(unit=column.unit)
     unit = found.unit or ("rpm" if re.search(r"rpm|drehzahl", name.lower()) else None)
     if found.kind == "shaft_speed":
@@ -128,16 +132,6 @@ def _by_name(column: Column, name: str) -> ColumnGuess:
         if axis is not None:
             return ColumnGuess(column, "channel", kind, axis, words == ROD)
     return ColumnGuess(column, "unknown")
-
-
-def _seconds(unit: str) -> float | None:
-    """Size of a unit of time [s], None where it is none."""
-    from swashplate.units import to_si
-
-    try:
-        return to_si(1.0, unit, "s", "")
-    except InputError:
-        return None
 
 
 class _Look(NamedTuple):
@@ -209,7 +203,7 @@ def draft_campaign(
     axes = _by_axis(_refined(looks, counts_per_turn, given))
     plain = Path(drive).stem if drive is not None else "drive"
     named = {prefix or plain: guesses for prefix, guesses in axes.items()}
-    lines = [HEADER, f"title = {_string(Path(folder).resolve().name)}", ""]
+    lines = [HEADER, f"title = {toml_string(Path(folder).resolve().name)}", ""]
     for name, guesses in named.items():
         lines += _axis(name, guesses, first, drive, counts_per_turn)
     taken = {each.column.name for guesses in named.values() for each in guesses}
@@ -233,29 +227,19 @@ def draft_campaign(
 
 
 def _look(log: Log, given: Mapping[str, str], units: Mapping[str, str]) -> _Look:
+    # a column that is said to be time or input takes the place of those that were guessed
+    said = {"time" if what == "time" else "input" for what in given.values() if what in GIVEN}
     guesses = []
     for column in log.columns:
-        guessed = guess(column)
-        what = given.get(column.name)
+        guessed, what = guess(column), given.get(column.name)
         if what is not None:
-            role = "time" if what == "time" else "channel"
-            role = "input" if what in ("voltage", "current", "other") else role
-            kind = None if what == "time" else what
-            guessed = guessed._replace(role=role, kind=cast("InputKind | ChannelKind | None", kind))
-        elif given and guessed.role in ("time", "input") and guessed.role in _given_roles(given):
+            role = "time" if what == "time" else "input" if what in (*GIVEN, "other") else "channel"
+            kind = None if what == "time" else cast("InputKind | ChannelKind", what)
+            guessed = guessed._replace(role=role, kind=kind)
+        elif guessed.role in said:
             guessed = guessed._replace(role="unknown", kind=None)
-        if column.name in units:
-            guessed = guessed._replace(unit=units[column.name])
-        guesses.append(guessed)
+        guesses.append(guessed._replace(unit=units.get(column.name, guessed.unit)))
     return _Look(log, guesses, _numbers(log, [each.column.name for each in guesses]))
-
-
-def _given_roles(given: Mapping[str, str]) -> set[str]:
-    return {
-        "time" if what == "time" else "input"
-        for what in given.values()
-        if what in ("time", "voltage", "current")
-    }
 
 
 def _numbers(log: Log, names: list[str]) -> dict[str, Array]:
@@ -291,7 +275,7 @@ def _refined(
             if size is not None:
                 met[name] = each._replace(role="channel", kind="encoder_counts", rolls_over_at=size)
         known = name in given
-        if each.kind == "rectified_current" and values and not known and signed(values):
+        if each.kind == "rectified_current" and values and not known and has_sign(values):
             met[name] = each._replace(kind="signed_current")
     for one, other in (("A", "B"), ("a", "b"), ("1", "2")):
         for name, each in met.items():
@@ -334,59 +318,53 @@ def _axis(
 ) -> list[str]:
     from swashplate.parameters.files import preset_names
 
-    lines = [f"[axes.{_key(name)}]"]
+    lines = [f"[axes.{toml_key(name)}]"]
     if drive is not None:
-        lines.append(f"drive = {_string(name if name in preset_names() else drive)}")
+        lines.append(f"drive = {toml_string(name if name in preset_names() else drive)}")
     else:
         lines.append('# drive = "hoist"    # a packaged drive or a parameter file, to be fitted')
+    column = None if look.time is None else look.time.column
+    clock = f"{{ rate = 512 }}    # {FIXME}: no column of time found; samples a second"
+    if look.time is not None and column is not None:
+        unit = f', unit = "{look.time.unit or "s"}"' if column.unit is None else ""
+        clock = f"{{ column = {toml_string(column.name)}{unit} }}"
+    table = f"axes.{toml_key(name)}"
     lines += [
-        _clock(look),
+        f"time = {clock}",
         'start = "rest"    # at the first sample: rest, steady or estimated',
         "",
-        f"[axes.{_key(name)}.input]",
+        f"[{table}.input]",
     ]
     names = ", ".join(repr(each.name) for each in look.log.columns)
+    left_open = f'column = "{FIXME}"    # which of {names}'
     drives = [each for each in guesses if each.role == "input"]
     if drives:
         lines += _signal(drives[0], look, None)
     else:
-        lines += [f'kind = "voltage"    # {FIXME}: or current, or other', _open("commands", names)]
+        lines += [f'kind = "voltage"    # {FIXME}: or current, or other', f"{left_open} commands?"]
     lines += ['interpolation = "previous"    # guessed: held between samples; or "linear"', ""]
     lines += [f"# another input? '{each.column.name}'" for each in drives[1:]]
-    used: set[str] = set()
-    for each in guesses:
-        if each.role != "channel":
-            continue
-        channel = str(each.kind)
-        number = 2
-        while channel in used:
-            channel, number = f"{each.kind}_{number}", number + 1
-        used.add(channel)
+    channels = _channels(guesses)
+    for channel, each in channels.items():
+        lines += [f"[{table}.channels.{channel}]", *_signal(each, look, counts_per_turn), ""]
+    if not channels:
         lines += [
-            f"[axes.{_key(name)}.channels.{channel}]",
-            *_signal(each, look, counts_per_turn),
-            "",
-        ]
-    if not used:
-        lines += [
-            f"[axes.{_key(name)}.channels.measured]",
+            f"[{table}.channels.measured]",
             f'kind = "shaft_speed"    # {FIXME}: or position, encoder_counts ...',
-            _open("was measured", names),
+            f"{left_open} was measured?",
             "",
         ]
     return lines
 
 
-def _open(what: str, names: str) -> str:
-    return f'column = "{FIXME}"    # which of {names} {what}?'
-
-
-def _clock(look: _Look) -> str:
-    if look.time is None:
-        return f"time = {{ rate = 512 }}    # {FIXME}: no column of time found; samples a second"
-    column = look.time.column
-    unit = f', unit = "{look.time.unit or "s"}"' if column.unit is None else ""
-    return f"time = {{ column = {_string(column.name)}{unit} }}"
+def _channels(guesses: Iterable[ColumnGuess]) -> dict[str, ColumnGuess]:
+    """An axis's channels by their names in the file: the kind, and a number from the second on."""
+    named: dict[str, ColumnGuess] = {}
+    for each in guesses:
+        if each.role == "channel":
+            number = 1 + sum(each.kind == other.kind for other in named.values())
+            named[str(each.kind) if number == 1 else f"{each.kind}_{number}"] = each
+    return named
 
 
 def _signal(guessed: ColumnGuess, look: _Look, counts_per_turn: float | None) -> list[str]:
@@ -395,7 +373,7 @@ def _signal(guessed: ColumnGuess, look: _Look, counts_per_turn: float | None) ->
     kind = "voltage" if percent else kind
     lines = [
         f'kind = "{kind}"    # guessed: {KINDS[kind].meaning}',
-        f"column = {_string(column.name)}",
+        f"column = {toml_string(column.name)}",
     ]
     scale = 1.0
     if percent:
@@ -415,7 +393,7 @@ def _signal(guessed: ColumnGuess, look: _Look, counts_per_turn: float | None) ->
     elif column.unit is None:
         unit = "mm" if guessed.linear else next(iter(KINDS[kind].units), "1")
         why = "from its name" if guessed.unit else "guessed: the header gives none"
-        lines.append(f"unit = {_string(guessed.unit or unit)}    # {why}")
+        lines.append(f"unit = {toml_string(guessed.unit or unit)}    # {why}")
     if guessed.empty:
         lines.append(f'missing = "drop"    # guessed: {guessed.empty} cells are empty')
     if guessed.role == "input" and str(guessed.kind) == "other":
@@ -431,43 +409,41 @@ def _signal(guessed: ColumnGuess, look: _Look, counts_per_turn: float | None) ->
 # --- runs -----------------------------------------------------------------------------------------
 
 
+@dataclass
 class _Draft:
     """A run's lines, its role, and kind and direction, and the size, of its manoeuvre."""
 
-    def __init__(self, lines: list[str], stratum: str, peak: float, *, testable: bool) -> None:
-        self.lines, self.stratum, self.peak = lines, stratum, peak
-        self.role, self.why = ("fit", "") if testable else ("ignore", "    # it has no input")
+    lines: list[str]
+    stratum: str
+    peak: float
+    role: str
+    why: str = ""
 
 
 def _run(look: _Look, axes: Mapping[str, list[ColumnGuess]], folder: Path) -> _Draft:
     path, root = look.log.path.resolve(), folder.resolve()
     file = path.relative_to(root) if path.is_relative_to(root) else path
     seen, stratum, peak = _seen(look, axes)
-    lines = ["[[runs]]", f"file = {_string(file.as_posix())}    # {seen}"]
+    lines = ["[[runs]]", f"file = {toml_string(file.as_posix())}    # {seen}"]
     names = {column.name for column in look.log.columns}
-    tested = []
-    without: list[str] = []
+    tested, without = list[str](), list[str]()
     for axis, guesses in axes.items():
         drives = [each for each in guesses if each.role == "input"][:1]
-        counts: dict[str, int] = {}
-        missing, channels = [], 0
-        for each in guesses:
-            if each.role != "channel":
-                continue
-            counts[str(each.kind)] = number = counts.get(str(each.kind), 0) + 1
-            channels += 1
-            if each.column.name not in names:
-                key = f"{each.kind}_{number}" if number > 1 else str(each.kind)
-                missing.append(
-                    f"axes.{_key(axis)}.channels.{key} = false    # no column "
-                    f"{_string(each.column.name)}"
-                )
-        if all(each.column.name in names for each in drives) and len(missing) < max(channels, 1):
+        channels = _channels(guesses)
+        missing = [
+            f"axes.{toml_key(axis)}.channels.{key} = false    # no column "
+            f"{toml_string(each.column.name)}"
+            for key, each in channels.items()
+            if each.column.name not in names
+        ]
+        if all(d.column.name in names for d in drives) and len(missing) < max(len(channels), 1):
             tested.append(axis)
             without += missing
     if tested and len(tested) < len(axes):
-        lines.append(f"only = [{', '.join(_string(axis) for axis in tested)}]")
-    return _Draft([*lines, *without], stratum, peak, testable=bool(tested))
+        lines.append(f"only = [{', '.join(toml_string(axis) for axis in tested)}]")
+    if tested:
+        return _Draft([*lines, *without], stratum, peak, "fit")
+    return _Draft([*lines, *without], stratum, peak, "ignore", "    # it has no input")
 
 
 def _seen(look: _Look, axes: Mapping[str, list[ColumnGuess]]) -> tuple[str, str, float]:
@@ -475,11 +451,13 @@ def _seen(look: _Look, axes: Mapping[str, list[ColumnGuess]]) -> tuple[str, str,
     time = None if look.time is None else look.values.get(look.time.column.name)
     if look.time is None or time is None or time.size < 2:
         return f"{len(next(iter(look.values.values()), []))} samples", "", 0.0
-    factor = _seconds(look.time.unit or "s")
     seen = [f"{time.size} samples"]
-    if factor is None or not np.all(np.diff(time) > 0.0):
+    try:
+        time = to_si(1.0, look.time.unit or "s", "s", "") * (time - time[0])
+    except InputError:
         return seen[0], "", 0.0
-    time = factor * (time - time[0])
+    if not np.all(np.diff(time) > 0.0):
+        return seen[0], "", 0.0
     seen.append(f"{np.ptp(time):.4g} s at {1.0 / np.median(np.diff(time)):.4g} Hz")
     strata, peak = [], 0.0
     for guesses in axes.values():
@@ -527,13 +505,3 @@ def _hold_back(runs: list[_Draft]) -> None:
     others = [each for each in fitted if each is not largest[each.stratum]]
     if len(fitted) >= MANY and others:
         others[-1].role = "validate"
-
-
-def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _string(name)
-
-
-def _string(text: str) -> str:
-    """A string of TOML: names with backslashes and quotes escaped."""
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{escaped}"'

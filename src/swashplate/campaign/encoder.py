@@ -26,14 +26,6 @@ NEAR = 1.05
 """The counts of a turn are the size where they are at most this much more than the range."""
 
 
-class CounterRangeError(InputError):
-    """A reading outside its counter; `said` leaves out what would be right."""
-
-    def __init__(self, said: str) -> None:
-        super().__init__(f"{said}; give the right modulus.")
-        self.said = said
-
-
 class Unwrapped(NamedTuple):
     """A counter's position without its roll-overs."""
 
@@ -73,9 +65,10 @@ def unwrap_counts(counts: ArrayLike, modulus: int) -> Unwrapped:
     low, high = (-(size // 2), (size - 1) // 2) if signed else (0, size - 1)
     outside = np.flatnonzero((readings < low) | (readings > high))
     if outside.size:
-        raise CounterRangeError(
+        raise InputError(
             f"counts hold {readings[outside[0]]:.0f} in row {outside[0]} (the first is 0), outside "
-            f"the {low} to {high} of a {'signed ' if signed else ''}counter of {size} readings"
+            f"the {low} to {high} of a {'signed ' if signed else ''}counter of {size} readings: "
+            "give its own size, in a campaign file rolls_over_at."
         )
     steps = np.diff(readings)
     short = steps - size * np.floor(steps / size + 0.5)
@@ -162,23 +155,14 @@ def interpolated(time: Array, counts: Array) -> Array:
 def radians_per_count(counts_per_turn: float, gear_ratio: float = 1.0, sign: int = 1) -> float:
     """Angle of the shaft for one count, negative where the count runs the other way. [rad]
 
-    Parameters
-    ----------
-    counts_per_turn : float
-        Counts in one turn of the encoder.
-    gear_ratio : float
-        Turns of the encoder in one turn of the shaft.
-    sign : {1, -1}
-        -1 if the counter goes down where the shaft's speed is positive.
+    From counts in one turn of the encoder, turns of it in one turn of the shaft, and -1 if the
+    counter goes down where the shaft's speed is positive: Kruse (2001), eqs. 7.2-7.4 before their
+    derivative, with the 2π that they leave out.
 
     Raises
     ------
     InputError
         If a ratio is not positive or the sign another.
-
-    Notes
-    -----
-    Kruse (2001), eqs. 7.2-7.4 before their derivative, with the 2π that they leave out.
     """
     if sign not in (1, -1):
         raise InputError(f"sign must be 1 or -1, not {sign!r}.")
@@ -189,19 +173,16 @@ def radians_per_count(counts_per_turn: float, gear_ratio: float = 1.0, sign: int
 def find_lost_counts(time: ArrayLike, counts: ArrayLike) -> Rows:
     """Rows at which the count changed faster than the shaft can turn.
 
+    Rows that jumps lead to: faster than 1.5 times the greatest speed that lasts (the median over
+    five neighbouring intervals, which isolated jumps do not reach), one count of rounding granted.
+    A loss that is no larger than the motion within a sample is not seen.
+
     Parameters
     ----------
     time : array_like, shape (n,)
         Stamps, even or not, six or more. [s]
     counts : array_like, shape (n,)
         Position without roll-overs. [count]
-
-    Returns
-    -------
-    array of int
-        Rows that jumps lead to: faster than 1.5 times the greatest speed that lasts (the median
-        over five neighbouring intervals, which isolated jumps do not reach), one count of rounding
-        granted. A loss that is no larger than the motion within a sample is not seen.
 
     Raises
     ------
@@ -219,18 +200,9 @@ def find_lost_counts(time: ArrayLike, counts: ArrayLike) -> Rows:
 def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int | None:
     """Counts after which a counter begins anew, None where the numbers are not such a counter's.
 
-    Parameters
-    ----------
-    values : (n,) array
-        Of a column.
-    counts_per_turn : float, optional
-        Of its encoder: a likely size.
-
-    Notes
-    -----
     The numbers are whole and many, and some steps go over more than half of their range, which
     become as small as the others when they are taken the other way round. Numbers that only go up
-    by the same step each time count the samples.
+    by the same step each time count the samples. The counts of a turn are a likely size.
     """
     if values.size < 2 or not np.isfinite(values).all() or np.any(values != np.floor(values)):
         return None

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from math import inf, isfinite, log, sqrt
 from typing import NamedTuple
 
@@ -48,6 +49,8 @@ ANGLE = 0.2
 STEEPEST = 30.0
 """Volts that a radian takes at least, so that at 10 V and at the upper bounds of all gains the
 solenoids do not overpower the feedback spring. [V/rad]"""
+NONE = 30.0
+"""Logarithm of a limit, over the greatest speed, that is none. [1]"""
 FAR_STOP = 0.39
 """Stop of the swash plate where none was seen. [rad]"""
 
@@ -91,18 +94,10 @@ def march_guess(
 ) -> None:
     """March speed and position behind dead zone, gain, limits and lag.
 
-    Parameters
-    ----------
-    command : (n,) array
-        Delayed command. [V]
-    h : float
-        Step. [s]
-    dead, gain, top, pull : (2,) arrays
-        Dead zones, gains, top speeds and accelerations, plus and minus.
-    began : (float, float)
-        Share of the way to its target that the speed takes in a step [1], and speed at first.
-    position : (n,) array
-        Output, 0 at the first sample.
+    From a delayed command (n,) [V] with a step [s]; dead zones, gains, top speeds and accelerations
+    (2,) are those of plus and minus; `began` is the share of the way to its target that the speed
+    takes in a step [1], and the speed at first. `position` (n,) is the output, 0 at the first
+    sample.
     """
     share, speed = began
     position[0] = 0.0
@@ -256,47 +251,39 @@ def _searched(runs: Sequence[_Run], size: Array, scale: float) -> _Numbers:
     """The least squares: a grid first, on which gains are linear, then all numbers at once."""
     from scipy.optimize import least_squares
 
-    free, tried = np.full(2, inf), size > 0.0
+    tried = size > 0.0
     candidates: list[tuple[float, _Numbers]] = []
     speeds = np.concatenate([run.speeds for run in runs])
-    for lag in LAGS:
-        for delay in DELAYS:
-            for share in DEAD_ZONES:
-                numbers = _Numbers(share * size, np.ones(2), free, free, lag, delay)
-                ways = []
-                for way in np.flatnonzero(tried):
-                    only = np.zeros(2)
-                    only[way] = 1.0
-                    alone = replace(numbers, gain=only)
-                    still = replace(numbers, gain=np.zeros(2))
-                    ways.append(
-                        np.concatenate([_errors(r, alone) - _errors(r, still) for r in runs])
-                    )
-                design = np.transpose(ways)
-                gains, *_ = np.linalg.lstsq(design, speeds, rcond=None)
-                full = np.zeros(2)
-                full[tried] = gains
-                cost = float(np.sum((design @ gains - speeds) ** 2))
-                candidates.append((cost, replace(numbers, gain=full)))
+
+    def errors(numbers: _Numbers) -> Array:
+        return np.concatenate([_errors(run, numbers) for run in runs])
+
+    for lag, delay, share in product(LAGS, DELAYS, DEAD_ZONES):
+        still = _Numbers(share * size, np.zeros(2), np.full(2, inf), np.full(2, inf), lag, delay)
+        at_rest = errors(still)
+        ways = [errors(replace(still, gain=way)) - at_rest for way in np.eye(2)[tried]]
+        design, gain = np.transpose(ways), np.zeros(2)
+        gain[tried] = np.linalg.lstsq(design, speeds, rcond=None)[0]
+        cost = float(np.sum((design @ gain[tried] - speeds) ** 2))
+        candidates.append((cost, replace(still, gain=gain)))
     candidates.sort(key=lambda each: each[0])
-    best = candidates[0][1]
-    if (best.gain[tried] <= 0.0).any():
+    if (candidates[0][1].gain[tried] <= 0.0).any():
         raise InputError(
             "The speed goes against the command: turn it round with sign = -1 in its channel."
         )
 
-    def numbers_of(vector: Array, *, limited: bool) -> _Numbers:
+    def numbers_of(vector: Array) -> _Numbers:
+        """From dead zones, gains, lag and delay, and where there are ten, limits."""
+        limits = np.exp([*vector[6:], *[NONE] * (10 - vector.size)]) * scale
+        limits[limits > np.exp(0.5 * NONE) * scale] = inf
         gain = np.exp(vector[2:4]) * scale / size.max()
-        top, pull = free, free
-        if limited:
-            top, pull = np.exp(vector[6:8]) * scale, np.exp(vector[8:10]) * scale
-        return _Numbers(vector[:2] * size, gain, top, pull, float(np.exp(vector[4])), vector[5])
+        lag, delay = float(np.exp(vector[4])), vector[5]
+        return _Numbers(vector[:2] * size, gain, limits[:2], limits[2:], lag, delay)
 
-    def residuals(vector: Array, *, limited: bool) -> Array:
-        numbers = numbers_of(vector, limited=limited)
-        return np.concatenate([_errors(run, numbers) for run in runs]) / scale
+    def residuals(vector: Array) -> Array:
+        return errors(numbers_of(vector)) / scale
 
-    def solved(vector: Array, *, limited: bool) -> tuple[float, Array]:
+    def solved(vector: Array) -> tuple[float, Array]:
         low = np.array([0.0, 0.0, -5.0, -5.0, log(0.002), 0.0, -1.5, -1.5, -2.0, -2.0])
         high = np.array([0.95, 0.95, 7.0, 7.0, log(5.0), LONGEST_DELAY, 1.5, 1.5, 6.0, 6.0])
         n = vector.size
@@ -304,7 +291,6 @@ def _searched(runs: Sequence[_Run], size: Array, scale: float) -> _Numbers:
             residuals,
             np.clip(vector, low[:n] + 1e-6, high[:n] - 1e-6),
             bounds=(low[:n], high[:n]),
-            kwargs={"limited": limited},
             loss="soft_l1",
             f_scale=0.05,
             x_scale=np.array([0.05, 0.05, 0.2, 0.2, 0.3, 0.02, 0.1, 0.1, 0.5, 0.5])[:n],
@@ -318,28 +304,20 @@ def _searched(runs: Sequence[_Run], size: Array, scale: float) -> _Numbers:
         share = np.divide(each.dead, size, out=np.full(2, 0.1), where=tried)
         gain = np.log(np.maximum(each.gain, 1e-3 * scale / size.max()) * size.max() / scale)
         begins.append(np.array([*share, *gain, log(each.lag), each.delay]))
-    _, plain = min((solved(each, limited=False) for each in begins), key=lambda each: each[0])
-    steep = np.log([0.7 / np.exp(plain[4])] * 2)
-    limits = [*np.log([1.0, 1.0]), *steep]
+    _, plain = min((solved(each) for each in begins), key=lambda each: each[0])
+    steep = log(0.7) - plain[4]
     tries = [plain, np.array([*plain[:2], *(plain[2:4] + 0.7), plain[4] - 0.7, plain[5]])]
-    cost, whole = min(
-        (solved(np.array([*each, *limits]), limited=True) for each in tries),
-        key=lambda each: each[0],
-    )
+    limited = (solved(np.array([*each, 0.0, 0.0, steep, steep])) for each in tries)
+    cost, whole = min(limited, key=lambda each: each[0])
     # a limit that makes no difference was not reached
     for index in range(6, 10):
         without = whole.copy()
-        without[index] = 30.0
-        rough = residuals(without, limited=True) / 0.05
+        without[index] = NONE
+        rough = residuals(without) / 0.05
         loss = 0.05**2 * float(np.sum(np.sqrt(1.0 + rough**2) - 1.0))
         if loss < SEEN * cost + NEXT_TO_NOTHING * float(np.sum((speeds / scale) ** 2)):
             whole = without
-    made = numbers_of(whole, limited=True)
-    return replace(
-        made,
-        top=np.where(whole[6:8] > 20.0, inf, made.top),
-        pull=np.where(whole[8:10] > 20.0, inf, made.pull),
-    )
+    return numbers_of(whole)
 
 
 def _both(values: Array, size: Array) -> tuple[float, float]:

@@ -152,7 +152,7 @@ def _of_channel(experiment: Experiment, channel: Channel, *, signed: bool) -> Qu
             findings.append(f"jumps {times} as no motion does: lost or doubled counts")
         findings += _rollover_findings(channel)
         findings += _spike_findings(experiment, channel)
-        if channel.kind == "rectified_current" and _has_sign(values):
+        if channel.kind == "rectified_current" and has_sign([values], NEGATIVE):
             findings.append("turns negative, so it is not rectified: should it be signed_current?")
         if signed and _moves_against(drive, channel):
             findings.append("moves against the input: should its sign be -1?")
@@ -214,18 +214,13 @@ def _away(drive: InputSignal, time: Array) -> Flags:
 def _stuck(channel: Channel, away: Flags) -> float | None:
     """Longest time without any change, of a signal that changes from most samples to the next."""
     same = np.diff(channel.values) == 0.0
-    if (
-        channel.kind == "encoder_counts"
-        or np.mean(~same[away[1:]] if away.any() else ~same) < LIVELY
-    ):
+    lively = np.mean(~same[away[1:]] if away.any() else ~same)
+    if channel.kind == "encoder_counts" or lively < LIVELY:
         return None
     counted = away & channel.used
     still = same & counted[1:] & counted[:-1]
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]])))
-    starts, stops = edges[::2], edges[1::2]
-    if not starts.size:
-        return 0.0
-    return float((channel.time[stops] - channel.time[starts]).max())
+    return float(np.max(channel.time[edges[1::2]] - channel.time[edges[::2]], initial=0.0))
 
 
 def _rollover_findings(channel: Channel) -> Iterator[str]:
@@ -265,18 +260,15 @@ def _noise(values: Array) -> float:
     return float(np.median(np.abs(np.diff(values)))) / (0.6745 * 2.0**0.5) if values.size > 1 else 0
 
 
-def _has_sign(current: Array) -> bool:
-    """Whether a current goes below zero by more than noise; single samples do not count."""
-    low, high = np.quantile(current, (0.002, 0.998))
-    return bool(-low > max(NEGATIVE * high, SURE * _noise(current)))
+def has_sign(currents: Sequence[Array], share: float = 0.25) -> bool:
+    """Whether a current of several runs goes below zero by more than noise and a share of its peak.
 
-
-def signed(currents: Sequence[Array]) -> bool:
-    """Whether a current of several runs has a sign: it goes to a quarter of minus its peak."""
+    Single samples do not count.
+    """
     finite = [each[np.isfinite(each)] for each in currents if np.isfinite(each).any()]
     ends = np.array([[*np.quantile(each, (0.002, 0.998))] for each in finite] or [[0.0, 0.0]])
     noise = max((_noise(each) for each in finite), default=0.0)
-    return bool(-ends[:, 0].min() > max(0.25 * ends[:, 1].max(), SURE * noise))
+    return bool(-ends[:, 0].min() > max(share * ends[:, 1].max(), SURE * noise))
 
 
 def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str], str]:
@@ -294,21 +286,19 @@ def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
     """
     met: dict[tuple[str, str], list[tuple[Array, float]]] = {}
     for each in experiments:
+        driven = each.input.values - each.input.values[0]
+        down = float(driven.min() / np.abs(driven).max()) if np.any(driven) else 0.0
         for channel in each.of_kind("signed_current"):
             if channel.used.any():
-                driven = each.input.values - each.input.values[0]
-                met.setdefault((each.axis, channel.name), []).append(
-                    (channel.values[channel.used], float(driven.min() / np.abs(driven).max()))
-                    if np.any(driven)
-                    else (channel.values[channel.used], 0.0)
-                )
+                of_runs = met.setdefault((each.axis, channel.name), [])
+                of_runs.append((channel.values[channel.used], down))
     return {
         (axis, name): (
             f"'{name}' of the axis '{axis}' never turns negative although the input does: it is "
             f'rectified; write kind = "rectified_current" in [axes.{axis}.channels.{name}]'
         )
         for (axis, name), runs in met.items()
-        if min(down for _, down in runs) < -AT_REST and not signed([values for values, _ in runs])
+        if min(down for _, down in runs) < -AT_REST and not has_sign([values for values, _ in runs])
     }
 
 
@@ -349,9 +339,7 @@ def spikes(channel: Channel, drive: InputSignal) -> list[tuple[float, float, flo
         found |= quiet & (off > max(0.25 * (high - low), least))
     rows = np.flatnonzero(found & (off > least))
     half = 0.5 * float(np.median(np.diff(time)))
-    groups = (
-        np.split(rows, np.flatnonzero(np.diff(rows) > NEIGHBOURS // 2) + 1) if rows.size else []
-    )
+    groups = np.split(rows, np.flatnonzero(np.diff(rows) > NEIGHBOURS // 2) + 1)
     return [
         (
             float(time[group[0]] - half),
@@ -359,7 +347,7 @@ def spikes(channel: Channel, drive: InputSignal) -> list[tuple[float, float, flo
             float(values[group[np.argmax(off[group])]]),
         )
         for group in groups
-        if group[-1] - group[0] < NEIGHBOURS // 2
+        if group.size and group[-1] - group[0] < NEIGHBOURS // 2
     ]
 
 

@@ -8,6 +8,7 @@ errors puts together; the numbers beside it are what the name is made of.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import floor, log10
 from typing import Literal, NamedTuple
@@ -15,7 +16,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.errors import InputError
+from swashplate.campaign.stamps import increasing, signal
+from swashplate.maneuvers.pieces import row
 
 Array = NDArray[np.float64]
 Kind = Literal["rest", "step", "stairs", "ramp", "sine", "free"]
@@ -28,8 +30,6 @@ LARGEST_ZERO = 0.5
 """Reading at rest beyond which it is no zero error of an instrument. [V]"""
 SHORTEST = 16
 """Samples below which nothing is told apart."""
-ENOUGH = 20_000
-"""Samples that a curve is fitted to; more do not make it better where noise is small."""
 JUMP_SAMPLES, JUMP_SECONDS = 3, 0.03
 """A jump takes so many samples or seconds at most, whichever is more."""
 SMALLEST_JUMP = 0.05
@@ -52,8 +52,7 @@ COARSEST = 6.0
 class Recognised:
     """The manoeuvre of a record. Numbers are rounded to what the data support.
 
-    Levels and amplitudes are relative to `rest`, in `unit`; positive and negative as in the record.
-    A number that does not belong to the kind is None.
+    Levels and amplitudes in the name are relative to `rest`, with their sign in the record.
     """
 
     kind: Kind
@@ -62,14 +61,6 @@ class Recognised:
     unit: str
     rest: float
     """The input at rest, not rounded. [unit]"""
-    levels: tuple[float, ...] = ()
-    """Levels of a step or of stairs in their order, without the rest at the end. [unit]"""
-    slope: float | None = None
-    """Slope of a ramp. [unit/s]"""
-    limit: float | None = None
-    """Level at which a ramp ends and is held, None for one that is cut short. [unit]"""
-    amplitude: float | None = None
-    """Amplitude of a sine, negative for one that begins downwards. [unit]"""
     frequency: float | None = None
     """Frequency of a sine. [Hz]"""
 
@@ -171,30 +162,11 @@ class _Trace:
         """Index of the first true element of a mask that begins at `start`, or the length."""
         return start + int(mask.argmax()) if mask.any() else self.time.size
 
-    def picked(self, start: int, stop: int) -> NDArray[np.intp]:
-        """Indices from `start` to before `stop`: all, or `ENOUGH` spread unevenly over them.
-
-        Evenly picked ones would hide what happens between two, at their own rhythm.
-        """
-        if stop - start <= ENOUGH:
-            return np.arange(start, stop)
-        steps = np.arange(ENOUGH)
-        share = (steps + np.mod(steps * 0.6180339887498949, 1.0)) / ENOUGH
-        chosen: NDArray[np.intp] = start + (share * (stop - start)).astype(np.intp)
-        return chosen
-
 
 def _trace(time: ArrayLike, voltage: ArrayLike, unit: str) -> _Trace:
-    stamps, values = _row(time, "time"), _row(voltage, "input")
-    if stamps.size != values.size:
-        raise InputError(f"There are {stamps.size} time stamps for {values.size} input samples.")
+    stamps = increasing(time) if np.size(time) > 1 else row("time", time)
+    values = signal("input", voltage, stamps.size)
     steps = np.diff(stamps)
-    if steps.size and steps.min() <= 0.0:
-        late = int(np.argmax(steps <= 0.0)) + 1
-        raise InputError(
-            f"The time must increase, but row {late} (the first is 0) has {stamps[late]:g} s "
-            f"after {stamps[late - 1]:g} s."
-        )
     noise = _noise(stamps, values)
     zero, error = _rest(values, noise)
     values = values - zero
@@ -204,19 +176,6 @@ def _trace(time: ArrayLike, voltage: ArrayLike, unit: str) -> _Trace:
     least = max(smallest, min(SURE * noise, SURE * smallest), 1e-12 * abs(zero))
     spacing = float(np.median(steps)) if steps.size else 0.0
     return _Trace(stamps, values, zero, error, min(noise, 0.05 * peak), least, peak, spacing)
-
-
-def _row(values: ArrayLike, what: str) -> Array:
-    data = np.asarray(values, dtype=np.float64)
-    if data.ndim != 1 or data.size == 0:
-        raise InputError(f"The {what} must be one row of numbers, not of shape {data.shape}.")
-    wrong = np.flatnonzero(~np.isfinite(data))
-    if wrong.size:
-        raise InputError(
-            f"The {what} is {data[wrong[0]]} in row {wrong[0]} (the first is 0); leave out the "
-            "rows without a number."
-        )
-    return data
 
 
 def _noise(time: Array, values: Array) -> float:
@@ -281,27 +240,23 @@ def _ending(trace: _Trace, first: int, earliest: float) -> _Ending | None:
     return _Ending("return", first, last)
 
 
-def _judged(
-    trace: _Trace, model: Array, ending: _Ending, jumps: list[tuple[int, int]] | None = None
-) -> float | None:
-    """RMS of record less model, None where the whole or any part of it is too large."""
+def _fits(
+    trace: _Trace, model: Array, ending: _Ending, jumps: Sequence[tuple[int, int]] = ()
+) -> bool:
+    """Whether the RMS of record less model is small, as a whole and in every part."""
     kept = np.ones(model.size, dtype=np.bool_)
     if ending.kind != "none":
         model[ending.last :] = 0.0
         kept[max(ending.first - 1, 0) : ending.last] = False
-    for before, after in jumps or ():
+    for before, after in jumps:
         kept[before:after] = False
     squares = (trace.values - model)[kept] ** 2
     # one percent of the peak, and noise with a margin for its estimate
     quality = float(np.hypot(0.01 * trace.peak, 1.5 * trace.noise))
-    rms = float(np.sqrt(squares.mean()))
-    if not rms <= quality:
-        return None
     parts = max(min(50, squares.size // 8), 1)
     edges = np.linspace(0, squares.size, parts, endpoint=False).astype(np.intp)
     means = np.add.reduceat(squares, edges) / np.diff(edges, append=squares.size)
-    worst = float(np.sqrt(means.max()))
-    return rms if worst <= 3.0 * quality else None
+    return bool(squares.mean() <= quality**2 and means.max() <= (3.0 * quality) ** 2)
 
 
 # --- steps and stairs -----------------------------------------------------------------------------
@@ -320,7 +275,7 @@ def _stairs(trace: _Trace, unit: str) -> Recognised | None:
     """Levels that are held, with jumps between them, None of other records."""
     held = _held_levels(trace)
     if held is None:
-        return held
+        return None
     levels, ending = held
     model = np.zeros_like(trace.values)
     # of the jump to the first level it is known when it is complete
@@ -331,9 +286,8 @@ def _stairs(trace: _Trace, unit: str) -> Recognised | None:
             jumps.append((before.last, level.first))
     if ending.kind == "fall":
         jumps.append((levels[-1].last, ending.first))
-    rms = _judged(trace, model, ending, jumps)
-    if rms is None:
-        return rms
+    if not _fits(trace, model, ending, jumps):
+        return None
     errors = [
         np.hypot(trace.noise / (each.last - each.first) ** 0.5, trace.rest_error) for each in levels
     ]
@@ -346,13 +300,7 @@ def _stairs(trace: _Trace, unit: str) -> Recognised | None:
     else:
         shown = [*heights, 0.0] if ending.kind == "fall" else heights
         name = f"stairs {'/'.join(f'{height:g}' for height in shown)} {unit}"
-    return Recognised(
-        "step" if len(levels) == 1 else "stairs",
-        name,
-        unit,
-        trace.rest,
-        levels=heights,
-    )
+    return Recognised("step" if len(levels) == 1 else "stairs", name, unit, trace.rest)
 
 
 def _held_levels(trace: _Trace) -> tuple[list[_Level], _Ending] | None:
@@ -428,7 +376,7 @@ def _ramp(trace: _Trace, unit: str) -> Recognised | None:
         leaves = trace.first(np.abs(trace.values[low:] - line[low:]) > trace.tolerance, low)
         if leaves < high:
             return None
-    ending, limit = _ending(trace, leaves, start), None
+    ending = _ending(trace, leaves, start)
     near = trace.values[leaves + 2 : leaves + 2 + HELD]
     if (ending is None or ending.kind == "return") and near.size == HELD:
         away = np.abs(trace.values[leaves + 2 :] - np.median(near)) > trace.tolerance
@@ -439,24 +387,15 @@ def _ramp(trace: _Trace, unit: str) -> Recognised | None:
             line = np.minimum(line, limit) if limit > 0.0 else np.maximum(line, limit)
     if ending is None:
         return ending
-    rms = _judged(trace, line, ending)
-    if rms is None:
-        return rms
+    if not _fits(trace, line, ending):
+        return None
     shown = roundest(slope, max(3.0 * error, 0.002 * abs(slope)))
-    return Recognised(
-        "ramp",
-        f"ramp {shown:+g} {unit}/s",
-        unit,
-        trace.rest,
-        slope=shown,
-        limit=None if limit is None else roundest(limit, 0.002 * trace.peak),
-    )
+    return Recognised("ramp", f"ramp {shown:+g} {unit}/s", unit, trace.rest)
 
 
 def _line(trace: _Trace, first: int, last: int) -> tuple[float, float, float]:
     """Slope [unit/s], instant of zero [s] and the slope's standard error, by least squares."""
-    chosen = trace.picked(first, last)
-    time, values = trace.time[chosen], trace.values[chosen]
+    time, values = trace.time[first:last], trace.values[first:last]
     middle = time.mean()
     spread = float(((time - middle) ** 2).sum())
     slope = float(((time - middle) @ values) / spread)
@@ -496,7 +435,7 @@ def _sine(trace: _Trace, unit: str) -> Recognised | None:
     """One frequency, at least a whole period of it, None of other records."""
     guess = _guessed(trace)
     if guess is None:
-        return guess
+        return None
     departs = trace.first(np.abs(trace.values) > trace.tolerance, 0)
     certain = int(np.searchsorted(trace.time, guess[1]))
     if certain - departs < COARSEST:
@@ -504,7 +443,8 @@ def _sine(trace: _Trace, unit: str) -> Recognised | None:
     tone = _fitted(trace, guess[0], departs, certain)
     start = _start(trace, tone, departs)
     first = int(np.searchsorted(trace.time, start - 1e-9))
-    leaves = _leaves(trace, tone, first)
+    away = np.abs(trace.values[first:] - tone(trace.time[first:])) > trace.tolerance
+    leaves = trace.first(away, first)
     if leaves < certain:
         return None
     tone = _fitted(trace, tone, first, leaves)
@@ -518,22 +458,16 @@ def _sine(trace: _Trace, unit: str) -> Recognised | None:
         return None
     model = tone(trace.time)
     model[:first] = 0.0
-    rms = _judged(trace, model, ending)
-    if rms is None:
-        return rms
+    if not _fits(trace, model, ending):
+        return None
     hertz = tone.omega / (2.0 * np.pi)
     frequency = roundest(hertz, max(3.0 * tone.error / (2.0 * np.pi), 0.001 * hertz))
     down = float(np.cos(tone.omega * (start - tone.crossing))) < -1e-9
     amplitude = roundest(-tone.amplitude if down else tone.amplitude, 0.002 * tone.amplitude)
-    return Recognised(
-        "sine",
-        f"sine {amplitude:g} {unit} {frequency:g} Hz",
-        unit,
-        # where it begins within the sine there is no rest to see
-        trace.rest if first else trace.rest + tone.mean,
-        amplitude=amplitude,
-        frequency=frequency,
-    )
+    # where it begins within the sine there is no rest to see
+    rest = trace.rest if first else trace.rest + tone.mean
+    name = f"sine {amplitude:g} {unit} {frequency:g} Hz"
+    return Recognised("sine", name, unit, rest, frequency)
 
 
 def _guessed(trace: _Trace) -> tuple[_Tone, float] | None:
@@ -566,8 +500,7 @@ def _fitted(trace: _Trace, guess: _Tone, first: int, last: int) -> _Tone:
     Gauss-Newton from a guess whose phase is right to a small part of a turn over the whole record,
     as IEEE Std 1057 does it.
     """
-    chosen = trace.picked(first, last)
-    time, values = trace.time[chosen], trace.values[chosen]
+    time, values = trace.time[first:last], trace.values[first:last]
     origin = float(0.5 * (time[0] + time[-1]))
     omega = guess.omega
     # carried along to where it hardly correlates with the frequency
@@ -601,15 +534,3 @@ def _start(trace: _Trace, tone: _Tone, departs: int) -> float:
     if abs(crossing - (seen - hidden)) > 0.1 * half + trace.spacing or crossing > seen:
         return seen
     return max(float(crossing), float(trace.time[0]))
-
-
-def _leaves(trace: _Trace, tone: _Tone, first: int) -> int:
-    """First sample that is not on the tone, or the record's length; long records are leapt over."""
-    chosen = trace.picked(first, trace.time.size)
-    away = np.abs(trace.values[chosen] - tone(trace.time[chosen])) > trace.tolerance
-    if not away.any():
-        return trace.time.size
-    late = int(away.argmax())
-    begin, end = int(chosen[max(late - 1, 0)]), int(chosen[late]) + 1
-    near = slice(begin, end)
-    return trace.first(np.abs(trace.values[near] - tone(trace.time[near])) > trace.tolerance, begin)

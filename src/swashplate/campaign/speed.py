@@ -18,12 +18,14 @@ from swashplate.campaign.experiment import Channel
 from swashplate.campaign.stamps import Array, Stamps, signal, stamps_of
 from swashplate.equations.cache import kernel
 from swashplate.errors import InputError
-from swashplate.maneuvers.pieces import positive, whole
+from swashplate.maneuvers.pieces import positive
 
 LOW_PASS = 2.0 * np.pi * 10.0
 """a, cut-off of the low pass. [rad/s]"""
 DIFFERENTIATOR = 2.0 * np.pi * 30.0
 """b, cut-off of the band-limited differentiator. [rad/s]"""
+WINDOW = 0.1
+"""Length of the moving parabola. [s]"""
 Form = Literal["source", "exact"]
 """How the filters are made discrete.
 
@@ -32,7 +34,7 @@ Form = Literal["source", "exact"]
 """
 Method = Literal["source", "exact", "savitzky_golay", "difference"]
 """How a position becomes a speed: by the source's filters for 512 Hz, by the same at any rate,
-without phase by a moving polynomial, by the change between neighbours for comparison."""
+without phase by a moving parabola, by the change between neighbours for comparison."""
 
 
 class Speed(NamedTuple):
@@ -111,11 +113,6 @@ def speed_from_counts(
     -------
     array, shape (n,)
         Speed, delayed by `path_delay`. [rad/s]
-
-    Raises
-    ------
-    InputError
-        As `encoder.interpolate_counts`, `encoder.radians_per_count` and `speed_from_angle`.
     """
     stamps = stamps_of(time)
     position = interpolated(stamps.time, signal("counts", counts, stamps.time.size))
@@ -175,18 +172,7 @@ def matched_speed(
     form :
         As of the measured path.
     aligned : bool
-        Without it, the source's own filters, whose output comes half a sample later than the
-        measured path's.
-
-    Returns
-    -------
-    array, shape (n,)
-        Speed, delayed by `path_delay`, and by half a sample more if not aligned. [rad/s]
-
-    Raises
-    ------
-    InputError
-        As `speed_from_angle`.
+        Without it, the source's own filters, whose output is half a sample later.
 
     Notes
     -----
@@ -202,20 +188,10 @@ def matched_speed(
 
 
 def path_delay(period: float, *, form: Form = "source") -> float:
-    """Delay of a slow change of speed on its way through the measured path [s].
+    """Delay of a slow change of speed on its way through the measured path. [s]
 
-    Parameters
-    ----------
-    period : float
-        Sample period h. [s]
-    form :
-        As in `speed_from_angle`.
-
-    Returns
-    -------
-    float
-        1/a + 1/b - h/2 in the explicit form, 20.2 ms at 512 Hz, and 1/a + 1/b but for terms in h²
-        in the exact one, 21.2 ms. [s]
+    Of a sample period h [s], 1/a + 1/b - h/2 in the explicit form, 20.2 ms at 512 Hz, and 1/a + 1/b
+    but for terms in h² in the exact one, 21.2 ms.
 
     Raises
     ------
@@ -231,10 +207,8 @@ def path_delay(period: float, *, form: Form = "source") -> float:
     return h * (0.5 + through_state + second / (1.0 - second))
 
 
-def savitzky_golay_speed(
-    time: ArrayLike, angle: ArrayLike, *, window: float = 0.1, order: int = 2
-) -> Array:
-    """Slope of the polynomial that fits the samples around each instant best.
+def savitzky_golay_speed(time: ArrayLike, angle: ArrayLike) -> Array:
+    """Slope of the parabola that fits the samples within 0.05 s of each instant best.
 
     Parameters
     ----------
@@ -242,44 +216,36 @@ def savitzky_golay_speed(
         Evenly spaced stamps. [s]
     angle : array_like, shape (n,)
         Position; of an encoder, interpolated (`encoder.interpolate_counts`). [rad]
-    window : float
-        Length of the fit; the nearest odd number of samples is taken. [s]
-    order : int
-        Order of the polynomial.
 
     Returns
     -------
     array, shape (n,)
         Speed, not delayed: half of each window lies in the future. Within half a window of either
-        end it is the slope of the polynomial through the first or last window, and noisier. [rad/s]
+        end it is the slope of the first or last window's parabola, and noisier. [rad/s]
 
     Raises
     ------
     InputError
-        If the stamps are uneven, the window holds too few samples for the order or more than the
-        record has, or a number is not finite.
+        If the stamps are uneven, the window holds fewer than three samples or more than the record
+        has, or a number is not finite.
     """
     from scipy.signal import savgol_filter
 
     stamps, period = stamps_of(time)
+    position = signal("angle", angle, stamps.size)
     if period is None:
         raise InputError(
             "The Savitzky-Golay filter needs evenly spaced stamps; take the exact filters, or "
             "resample the record first."
         )
-    position = signal("angle", angle, stamps.size)
-    length = positive("window", window)
-    count = 2 * round(0.5 * (length / period - 1.0)) + 1
-    degree = whole("order", order)
-    if degree < 1:
-        raise InputError("order must be 1 at least: a constant has no slope.")
-    if not degree < count <= stamps.size:
+    count = 2 * round(0.5 * (WINDOW / period - 1.0)) + 1
+    if not 3 <= count <= stamps.size:
         raise InputError(
-            f"window must hold more than {degree} samples for order {degree} and at most the "
-            f"record's {stamps.size}, but {length:g} s hold {max(count, 0)}."
+            f"The window of {WINDOW:g} s must hold from 3 samples to the record's {stamps.size}, "
+            f"but at {1.0 / period:.4g} Hz it holds {max(count, 0)}."
         )
-    slope = savgol_filter(position, count, degree, deriv=1, delta=period, mode="interp")
-    return np.asarray(slope, dtype=np.float64)
+    slope: Array = savgol_filter(position, count, 2, deriv=1, delta=period, mode="interp")
+    return slope
 
 
 # --- the two low passes ---------------------------------------------------------------------------

@@ -52,12 +52,7 @@ class StampStatistics(NamedTuple):
 
 
 def increasing(time: ArrayLike) -> Array:
-    """Copy stamps to a row; they must increase from each of two or more to the next.
-
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        Stamps. [s]
+    """Copy stamps [s] to a row; they must increase from each of two or more to the next.
 
     Raises
     ------
@@ -78,12 +73,7 @@ def increasing(time: ArrayLike) -> Array:
 
 
 def stamps_of(time: ArrayLike) -> Stamps:
-    """Check stamps, and put those that are even but for their rounding onto their grid.
-
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        Stamps, two or more. [s]
+    """Check two stamps [s] or more; those that are even but for their rounding go onto their grid.
 
     Raises
     ------
@@ -99,17 +89,12 @@ def stamps_of(time: ArrayLike) -> Stamps:
 
 
 def stamp_statistics(time: ArrayLike) -> StampStatistics:
-    """Rate, jitter and gaps of stamps.
-
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        Stamps, two or more. [s]
+    """Rate, jitter and gaps of two stamps [s] or more.
 
     Raises
     ------
     InputError
-        If the stamps do not increase or a number is not finite.
+        As `increasing`.
     """
     stamps = increasing(time)
     intervals = np.diff(stamps)
@@ -129,16 +114,7 @@ def stamp_statistics(time: ArrayLike) -> StampStatistics:
 
 
 def signal(name: str, values: ArrayLike, rows: int) -> Array:
-    """Samples of a signal, one a stamp, all finite; not copied if they are an array already.
-
-    Parameters
-    ----------
-    name : str
-        What they are, for the error's sentence.
-    values : array_like, shape (rows,)
-        The samples.
-    rows : int
-        Number of stamps.
+    """Samples of a signal, one for each of so many stamps, all finite; an array is not copied.
 
     Raises
     ------

@@ -140,8 +140,6 @@ def advise(
     if out is not None:
         write_advice(ranked, sensors, out)
     show(tests_table("Tests, with the sensors at hand", ranked[:top]))
-    for each in ranked[: min(top, 3)]:
-        say(f"- {each.sentence}")
     if plan:
         show(tests_table("A plan, each test chosen beside those before it", plan))
         undetermined = [gain.name for gain in plan[-1].gains if not gain.after <= 1.0]

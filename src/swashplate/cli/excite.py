@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from swashplate.identification.excitation import Outlook
-    from swashplate.identification.identifiability import Identifiability
 
 EXAMPLES = """\
 Examples:
@@ -59,12 +59,6 @@ def excitation(
             show_default=False,
         ),
     ] = None,
-    faint: Annotated[
-        bool,
-        typer.Option(
-            "--faint", help="Propose to hold what is hardly told as well: only for values you know."
-        ),
-    ] = False,
     write: Annotated[
         Path | None,
         typer.Option(
@@ -80,7 +74,7 @@ def excitation(
         ),
     ] = None,
 ) -> None:
-    """Say before a fit what the runs can tell of each unknown, and what to hold.
+    """Say before a fit what the runs can tell of each unknown, and what to fix.
 
     Simulates the runs with the drive as it is: which thresholds and limits they
     reach, how much each unknown changes what was measured, and which unknowns
@@ -106,8 +100,7 @@ def excitation(
     with working("Simulating"):
         doubts = refuse_unsound(check_sound(runs, smooth(drive), plan, rank=False))
         looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
-        proposals = [propose(each, faint=faint) for each in looks]
-        verdicts = [each.identifiability for each in looks]
+        proposals = [propose(each) for each in looks]
     comments = {each.stage.name: each.comments() for each in proposals}
     if write is not None:
         write_text(setup_text(proposed_setup(plan, proposals), comments), write)
@@ -116,10 +109,11 @@ def excitation(
     for sentence in doubts:
         say(f"! {sentence}")
     names = [each.name for each in runs]
-    for look, verdict, proposal in zip(looks, verdicts, proposals, strict=True):
+    for look, proposal in zip(looks, proposals, strict=True):
         show(_table(look, names))
-        say(_singular_values(verdict))
-        for sentence in (*_said(verdict), *look.sentences()):
+        # what no run exercises is said with its reason
+        verdict = replace(look.identifiability, unexcited=())
+        for sentence in (*verdict.sentences(), *look.sentences()):
             say(f"- {sentence}")
         for sentence in proposal.sentences():
             say(f"* {sentence}")
@@ -143,34 +137,16 @@ def _table(look: Outlook, runs: Sequence[str]) -> Table:
     made = table(
         f"Stage {look.stage.name}", "unknown", "needs", ">s", ">effect", "runs", wrap="needs"
     )
-    own = look.activation
-    for k, name in enumerate(own.names):
-        letters = dict(zip(own.runs, (_LETTERS[each] for each in look.marks(name)), strict=True))
+    for k, name in enumerate(look.names):
+        letters = {r: _LETTERS[m] for r, m in zip(look.simulations, look.marks(name), strict=True)}
         made.add_row(
             name,
-            own.needs[k],
-            f"{own.seconds[:, k].sum():.3g}",
+            look.need(name),
+            f"{look.seconds[:, k].sum():.3g}",
             f"{look.effect(name):.3g}",
             "".join(letters.get(run, "-") for run in runs),
         )
     return made
-
-
-def _singular_values(verdict: Identifiability) -> str:
-    sizes = verdict.singular_values
-    if not sizes.size:
-        return "No unknown changes anything: there is no singular value."
-    said = ", ".join(f"{each:.2g}" for each in sizes[: verdict.rank] / sizes[0])
-    none = sizes.size - verdict.rank
-    more = f", and {none} of nothing" if none else ""
-    return f"Singular values of the scaled derivatives, over the largest: {said}{more}."
-
-
-def _said(verdict: Identifiability) -> tuple[str, ...]:
-    """The verdict without what no run exercises, which is said with its reason."""
-    from dataclasses import replace
-
-    return replace(verdict, unexcited=()).sentences()
 
 
 def _written(looks: Sequence[Outlook], out: Path) -> None:
@@ -180,19 +156,18 @@ def _written(looks: Sequence[Outlook], out: Path) -> None:
 
     rows = []
     for look in looks:
-        own = look.activation
-        for k, name in enumerate(own.names):
+        for k, name in enumerate(look.names):
             share = look.shares[:, look.linearised.variables.index(name)]
             rows += [
                 {
                     "stage": look.stage.name,
                     "unknown": name,
-                    "needs": own.needs[k],
+                    "needs": look.need(name),
                     "run": run,
-                    "seconds": float(own.seconds[r, k]),
+                    "seconds": float(look.seconds[r, k]),
                     "share": float(share[r]),
                     "effect of 1 %": look.effect(name) * float(share[r]) ** 0.5,
                 }
-                for r, run in enumerate(own.runs)
+                for r, run in enumerate(look.simulations)
             ]
     write_table(pl.DataFrame(rows), out)

@@ -196,7 +196,7 @@ def _check(names: Sequence[str], assessments: Sequence[Assessment]) -> None:
 def _profiles(
     assessment: Assessment, wanted: Wanted, show: Callable[[str], None]
 ) -> list[StageProfile]:
-    from swashplate.identification.bootstrap import profiles_of
+    from swashplate.identification.profile import profiles_of
     from swashplate.identification.storing import StageProfile
 
     name = assessment.stage.stage.name

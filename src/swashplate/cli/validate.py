@@ -75,7 +75,7 @@ def validate(
     """
     from swashplate.campaign import Campaign
     from swashplate.identification.validation import (
-        channel_errors,
+        error_tables,
         predict,
         source_rules,
         with_speeds,
@@ -104,7 +104,7 @@ def validate(
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
         judged = verdict((), predicted, required=require / 100.0)
         qualities = with_speeds(predicted)
-        errors = channel_errors(qualities, source_rules(parameters.name))
+        errors = error_tables(qualities, source_rules(parameters.name))
     lines = []
     if out is not None:
         with working("Writing the report"):

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from swashplate.identification.assessment import Measures, RunQuality
-    from swashplate.identification.validation import ChannelErrors
+    from swashplate.identification.validation import ErrorTable
     from swashplate.identification.verdict import Verdict
 
 
@@ -80,7 +80,7 @@ def _display(unit: str) -> tuple[float, str]:
     return {"A": (1e3, "mA"), "Pa": (1e-5, "bar"), "m": (1e3, "mm")}.get(unit, (1.0, unit))
 
 
-def errors_table(found: ChannelErrors) -> Table:
+def errors_table(found: ErrorTable) -> Table:
     """The source's table of one channel: the largest error of each kind of test."""
     made = table(
         f"Largest per cent error of {found.channel}, by kind of test",
@@ -92,7 +92,7 @@ def errors_table(found: ChannelErrors) -> Table:
         ">runs",
         wrap="in",
     )
-    for row in found.table.rows:
+    for row in found.rows:
         made.add_row(
             row.kind,
             "-" if row.percent is None else f"{row.percent:.2f} %",
@@ -104,18 +104,16 @@ def errors_table(found: ChannelErrors) -> Table:
     return made
 
 
-def left_out(errors: Sequence[ChannelErrors]) -> list[str]:
+def left_out(errors: Sequence[ErrorTable]) -> list[str]:
     """What the error tables leave out, each rule that acted once, and what else belongs to them."""
     said = []
     if errors:
         said.append("Per cent of what is measured at that instant.")
-    acted = {rule for each in errors for rule in each.table.acted}
-    for rule in dict.fromkeys(rule for each in errors for rule in each.table.rules):
+    acted = {rule for each in errors for rule in each.acted}
+    for rule in dict.fromkeys(rule for each in errors for rule in each.rules):
         if rule not in acted:
             continue
-        runs = dict.fromkeys(
-            run for each in errors for run, by in each.table.left_out if by == rule.name
-        )
+        runs = dict.fromkeys(run for each in errors for run, by in each.left_out if by == rule.name)
         whole = f" All of: {', '.join(runs)}." if runs else ""
         said.append(f"Left out ({rule.name}): {rule.why}{whole}")
     averages = {each.average for each in errors if each.average}

@@ -62,7 +62,6 @@ class ResidualTest:
     input."""
     duration: float
     """Time over which the residuals stay correlated; 0 if they are white. [s]"""
-    samples: int
     verdict: str
     """In words."""
 
@@ -87,10 +86,8 @@ def residual_test(
     ----------
     time : (n,) array
         Stamps of the samples that count; gaps are respected. [s]
-    residual : (n,) array
-        Simulated less measured, weights left out.
-    command : (n,) array
-        The input at the same stamps, in its unit.
+    residual, command : (n,) arrays
+        Simulated less measured, weights left out, and the input at the same stamps.
     longest : float
         Largest lag of the curves; at most a quarter of the run is shown. [s]
 
@@ -112,66 +109,61 @@ def residual_test(
         )
     if time.size < 8:
         raise InputError(f"{time.size} samples tell nothing of correlation; 8 are the least.")
+    first = float(residual[0])
     if not (np.isfinite(residual).all() and np.isfinite(command).all()):
         raise InputError("Residuals and input must be finite; leave the other samples out.")
     grid = grid_of(time)
     most = max(int(LONGEST * grid.size), 1)
-    own, counts = _autocorrelation(residual - residual.mean(), grid, most)
-    theirs, _ = _autocorrelation(command - command.mean(), grid, most)
-    length = correlation_length(own, counts)
     shown = min(most, max(int(longest / grid.step), 1))
-    cross = _cross_correlation(residual - residual.mean(), command - command.mean(), grid, shown)
+    residual, command = residual - residual.mean(), command - command.mean()
+    own, counts = _autocorrelation(residual, grid, most)
+    length = correlation_length(own, counts)
     # beyond the residuals' own length their estimated correlation is chance
     kept = slice(1, max(length, 1) + 1)
+    theirs = _autocorrelation(command, grid, most)[0]
     inflation = max(1.0, 1.0 + 2.0 * float(own[kept] @ theirs[kept]))
-    band = DEVIATIONS * float(np.sqrt(inflation / time.size))
+    band = min(DEVIATIONS * float(np.sqrt(inflation / time.size)), 1.0)
+    cross = np.zeros(2 * shown + 1)
+    scale = float(np.linalg.norm(residual) * np.linalg.norm(command))
+    if scale > 0.0:
+        size = next_fast_len(grid.size + shown, real=True)
+        spectra = rfft(grid.spread(command), size).conj() * rfft(grid.spread(residual), size)
+        products = irfft(spectra, size)
+        cross = np.concatenate([products[size - shown :], products[: shown + 1]]) / scale
     lags: Array = np.arange(shown + 1.0) * grid.step
-    made = ResidualTest(
-        lags,
-        own[: shown + 1],
-        DEVIATIONS / float(np.sqrt(time.size)),
-        np.concatenate([-lags[:0:-1], lags]),
-        cross,
-        min(band, 1.0),
-        length * grid.step,
-        time.size,
-        "",
-    )
-    return _judged(made, residual, command)
+    both = np.concatenate([-lags[:0:-1], lags])
+    white = DEVIATIONS / float(np.sqrt(time.size))
+    duration = length * grid.step
+    made = ResidualTest(lags, own[: shown + 1], white, both, cross, band, duration, "")
+    return replace(made, verdict=_in_words(made, first))
 
 
-def _judged(test: ResidualTest, residual: Array, command: Array) -> ResidualTest:
-    if not np.any(residual != residual[0]):
-        what = "exactly zero" if residual[0] == 0.0 else f"{residual[0]:.4g} throughout"
-        return replace(test, verdict=f"The residuals are {what}: there is no noise to test.")
+def _in_words(test: ResidualTest, first: float) -> str:
+    """The verdict of a test; `first` is the first residual."""
+    if not test.autocorrelation[1:].any():
+        what = "exactly zero" if first == 0.0 else f"{first:.4g} throughout"
+        return f"The residuals are {what}: there is no noise to test."
     colour = (
         "The residuals are white"
         if test.white
         else f"The residuals stay correlated over {test.duration:.2g} s"
     )
-    if not np.any(command != command[0]):
-        return replace(test, verdict=f"{colour}; the input is constant and explains nothing.")
-    from scipy.stats import norm
+    if not test.cross_correlation.any():
+        return f"{colour}; the input is constant and explains nothing."
+    from scipy.special import ndtri
 
     # neighbouring lags say the same: as many looks as correlation lengths fit
     looks = max(test.cross_lags.size / max(test.duration / test.lags[1], 1.0), 1.0)
-    limit = float(norm.isf(0.5 * CHANCE / looks)) / DEVIATIONS * test.cross_band
+    limit = -float(ndtri(0.5 * CHANCE / looks)) / DEVIATIONS * test.cross_band
     lag, value = test.peak
     if abs(value) <= limit:
-        return replace(test, verdict=f"{colour} and have no relation to the input.")
+        return f"{colour} and have no relation to the input."
     when = (
-        f"{lag:.2g} s after it"
-        if lag > 0.0
-        else f"{-lag:.2g} s before it"
-        if lag < 0.0
-        else "at the same time"
+        f"{abs(lag):.2g} s {'after' if lag > 0.0 else 'before'} it" if lag else "at the same time"
     )
-    return replace(
-        test,
-        verdict=(
-            f"{colour} and follow the input (correlation {value:+.2f} {when}): the model leaves "
-            "out something that the input causes."
-        ),
+    return (
+        f"{colour} and follow the input (correlation {value:+.2f} {when}): the model leaves out "
+        "something that the input causes."
     )
 
 
@@ -181,17 +173,6 @@ def _autocorrelation(samples: Array, grid: Grid, lags: int) -> tuple[Array, Arra
     if not means[0] > 0.0:
         return np.where(np.arange(lags + 1) == 0, 1.0, 0.0), counts
     return np.clip(means / means[0], -1.0, 1.0), counts
-
-
-def _cross_correlation(residual: Array, command: Array, grid: Grid, lags: int) -> Array:
-    """(2 lags + 1,) at the lags -lags to lags, the residual after the input."""
-    scale = float(np.linalg.norm(residual) * np.linalg.norm(command))
-    if not scale > 0.0:
-        return np.zeros(2 * lags + 1)
-    size = next_fast_len(grid.size + lags, real=True)
-    spectra = rfft(grid.spread(command), size).conj() * rfft(grid.spread(residual), size)
-    products = irfft(spectra, size)
-    return np.concatenate([products[size - lags :], products[: lags + 1]]) / scale
 
 
 class Measures(NamedTuple):
@@ -227,9 +208,7 @@ class Measures(NamedTuple):
         return f"RMSE {self.rmse:.4g}, fit {self.fit_percent:.1f} %, R² {self.r_squared:.4f}"
 
 
-def measures(
-    measured: Array, simulated: Array, weight: Array | None = None, *, weighted: bool = False
-) -> Measures:
+def measures(measured: Array, simulated: Array, weight: Array | None = None) -> Measures:
     """Measures of one channel of one run.
 
     Parameters
@@ -237,57 +216,33 @@ def measures(
     measured, simulated : (n,) arrays
         In the channel's unit.
     weight : (n,) array, optional
-        Factors on the squared errors; samples with 0 are ignored.
-    weighted : bool
-        Whether the factors weigh mean, error and spread as well. By default they only say which
-        samples count: a window of weight ten would otherwise pass for the whole run.
+        Factors on the squared errors, of which those that are 0 say which samples do not count. The
+        others weigh nothing here: a window of weight ten would otherwise pass for the whole run.
 
     Raises
     ------
     InputError
         If lengths differ, no sample counts, one that does is not finite, or a weight is negative.
     """
-    return pooled_measures([(measured, simulated, weight)], weighted=weighted)
+    return pooled_measures([(measured, simulated, weight)])
 
 
-def pooled_measures(
-    runs: list[tuple[Array, Array, Array | None]], *, weighted: bool = False
-) -> Measures:
-    """Measures of one channel over several runs, each about the mean of all.
-
-    Parameters
-    ----------
-    runs : list of (measured, simulated, weight)
-        As of `measures`.
-    weighted : bool
-        See there.
-
-    Raises
-    ------
-    InputError
-        As `measures`.
-    """
+def pooled_measures(runs: list[tuple[Array, Array, Array | None]]) -> Measures:
+    """Measures of one channel over several runs, each about the mean of all; else as `measures`."""
     parts = [_counting(*run) for run in runs]
-    measured, simulated, factor = (np.concatenate(column) for column in zip(*parts, strict=True))
+    measured, simulated = (np.concatenate(column) for column in zip(*parts, strict=True))
     if not measured.size:
         raise InputError("No sample counts: all are ignored or have weight 0.")
-    if not weighted:
-        factor = np.ones(measured.size)
-    total = float(factor.sum())
-    mean = float(factor @ measured) / total
-    squares = float(factor @ (simulated - measured) ** 2) / total
+    mean = float(measured.mean())
     # a constant channel's own mean is off by rounding
     about = measured - mean
     about[np.abs(about) <= 4.0 * np.finfo(np.float64).eps * abs(mean)] = 0.0
-    return Measures(
-        measured.size, float(np.sqrt(squares)), float(np.sqrt(factor @ about**2 / total))
-    )
+    rmse, spread = (float(np.sqrt(np.mean(each**2))) for each in (simulated - measured, about))
+    return Measures(measured.size, rmse, spread)
 
 
-def _counting(
-    measured: Array, simulated: Array, weight: Array | None
-) -> tuple[Array, Array, Array]:
-    """The samples that count, and their factors."""
+def _counting(measured: Array, simulated: Array, weight: Array | None) -> tuple[Array, Array]:
+    """The samples that count."""
     factor = np.ones(measured.shape) if weight is None else weight
     if measured.shape != simulated.shape or measured.shape != factor.shape:
         raise InputError(
@@ -303,7 +258,7 @@ def _counting(
         if not np.isfinite(samples[used]).all():
             row = int(np.flatnonzero(used & ~np.isfinite(samples))[0])
             raise InputError(f"Sample {row + 1} of what was {what} is not finite; ignore it.")
-    return measured[used], simulated[used], factor[used]
+    return measured[used], simulated[used]
 
 
 LIMITS = ("Z13", "Z14", "Z15", "Z16")
@@ -383,13 +338,9 @@ class Assessment:
         found = replace(found, priors=said)
         if not found.noisy:
             return found
-        half = reach(found.own, found.level)
-        limits = [
-            number
-            for number, unknown in enumerate(self.stage.problem.unknowns)
-            if unknown.targets[0].startswith(LIMITS)
-        ]
-        fit = released(self.linearised)
+        half, fit = reach(found.own, found.level), released(self.linearised)
+        unknowns = enumerate(self.stage.problem.unknowns)
+        limits = [number for number, each in unknowns if each.targets[0].startswith(LIMITS)]
         ends = checked_ends(self.stage.problem, self._vector, fit, half, limits)
         return replace(found, ends=ends)
 
@@ -412,20 +363,12 @@ def run_qualities(problem: Problem, vector: Array) -> tuple[RunQuality, ...]:
 def compared(experiment: Experiment, name: str, simulated: Array) -> RunQuality:
     """Quality of one channel of one run, simulated at its stamps."""
     channel = experiment[name]
-    used = channel.used
-    return RunQuality(
-        experiment,
-        name,
-        simulated,
-        measures(channel.values, simulated, channel.weight),
-        _tested(experiment, channel.time[used], (simulated - channel.values)[used]),
-    )
-
-
-def _tested(experiment: Experiment, time: Array, residual: Array) -> ResidualTest | None:
-    if time.size < 8:
-        return None
-    return residual_test(time, residual, experiment.input.at(time))
+    used, test = channel.used, None
+    if np.count_nonzero(used) >= 8:
+        time, residual = channel.time[used], (simulated - channel.values)[used]
+        test = residual_test(time, residual, experiment.input.at(time))
+    found = measures(channel.values, simulated, channel.weight)
+    return RunQuality(experiment, name, simulated, found, test)
 
 
 def assess(stages: Sequence[StageFit]) -> tuple[Assessment, ...]:

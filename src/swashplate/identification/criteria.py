@@ -13,6 +13,7 @@ from swashplate.errors import InputError
 from swashplate.identification.assessment import Assessment, Measures, RunQuality
 from swashplate.identification.data_checks import contradicting_runs
 from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.identifiability import listed
 from swashplate.identification.lack_of_fit import (
     EXPLAINS,
     LackOfFit,
@@ -38,9 +39,6 @@ REQUIRED = 0.10
 """Largest error of held-out runs over their range, where the user requires nothing else."""
 MOST = 0.5
 """Share of unknowns without a value of their own from which a fit has found nothing."""
-WIDE = 0.1
-"""Half width of an interval, over the estimate, from which a value is not determined: any other
-within 10 % would then do as well."""
 MOVES = 0.05
 """A run that moves by less than this part of the channel's movement is not judged by itself; where
 the measurement error is known, by less than five times that."""
@@ -103,11 +101,6 @@ def percent(part: float) -> str:
     """A part in per cent, two digits."""
     number = 100.0 * part
     return f"{number:.0f} %" if number >= 9.95 else f"{number:.2g} %"
-
-
-def listed(words: Sequence[str]) -> str:
-    """``a, b and c``; empty for none."""
-    return " and ".join([*([", ".join(words[:-1])] if words[:-1] else []), *words[-1:]])
 
 
 def convergence(assessments: Sequence[Assessment], planned: Sequence[str]) -> list[Criterion]:
@@ -251,7 +244,7 @@ def determined(assessments: Sequence[Assessment]) -> Criterion:
     for each in assessments:
         shared = {unknown.name for unknown in each.stage.problem.unknowns if unknown.run is None}
         found = each.identifiability
-        lost += len(shared & {*found.at_bounds, *found.to_hold})
+        lost += len(shared & {*found.at_bounds, *found.to_fix})
         total += len(shared)
     words = f"{lost} of {total} unknowns stand at a bound or are not determined"
     return Criterion(

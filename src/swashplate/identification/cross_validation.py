@@ -130,7 +130,14 @@ class CrossValidation:
                 values = found.setdefault(each[:3], [])
                 if each.name not in fold.lost:
                     values.append(each.value)
-        return tuple(_spread(key, values) for key, values in found.items())
+        made = []
+        for key, values in found.items():
+            told, error = np.array(values or [np.nan]), None
+            if len(values) > 1:
+                error = float(np.sqrt((told.size - 1) * told.var()))
+            ends = float(told.mean()), float(told.min()), float(told.max())
+            made.append(Spread(*key, len(values), *ends, error))
+        return tuple(made)
 
     def sentences(self) -> tuple[str, ...]:
         """What must be known besides the numbers."""
@@ -173,41 +180,10 @@ def _pooled(runs: list[HeldRun]) -> Measures:
     return Measures(int(samples.sum()), sqrt(squares), sqrt(variance))
 
 
-def _spread(key: tuple[str, str, str], values: list[float]) -> Spread:
-    if not values:
-        return Spread(*key, 0, float("nan"), float("nan"), float("nan"), None)
-    found = np.array(values)
-    error = None
-    if found.size > 1:
-        deviations = found - found.mean()
-        error = float(np.sqrt((found.size - 1) / found.size * np.sum(deviations**2)))
-    return Spread(
-        *key, found.size, float(found.mean()), float(found.min()), float(found.max()), error
-    )
-
-
 LEFT = 0.01
 """Share of what all runs tell of an unknown, below which the runs left in a fold do not tell it."""
 ONE_WAY = 0.25
 """A command whose smaller extreme is below this part of the larger one goes one way."""
-
-
-@dataclass(frozen=True)
-class _Task:
-    """What the fits of all folds share."""
-
-    experiments: tuple[Experiment, ...]
-    nominal: Parameters
-    setup: Setup
-    loss: Loss
-    tolerance: float
-    max_evaluations: int
-    threads: int | None
-
-
-class _Item(NamedTuple):
-    number: int
-    held: tuple[int, ...]
 
 
 def cross_validate(
@@ -219,8 +195,6 @@ def cross_validate(
     seed: int = 0,
     executor: Executor | None = None,
     loss: Loss = "linear",
-    tolerance: float = 1e-10,
-    max_evaluations: int = 300,
     watch: Callable[[Fold, int], None] | None = None,
 ) -> CrossValidation:
     """Fit to all runs but some, predict those from the command alone, and so on for each part.
@@ -239,7 +213,7 @@ def cross_validate(
         Of the dealing; the same seed, the same folds.
     executor : Executor, optional
         Where the fits run; here, one after another, by default. The results do not depend on it.
-    loss, tolerance, max_evaluations :
+    loss : Loss
         As of `fit.fit`.
     watch : callable, optional
         Told of each fold and how many there are by now. Ctrl-C ends it; folds that are done are
@@ -252,19 +226,11 @@ def cross_validate(
     """
     parts = deal(experiments, folds, seed)
     here = executor or Serial()
-    task = _Task(
-        tuple(experiments),
-        nominal,
-        setup,
-        loss,
-        tolerance,
-        max_evaluations,
-        # fits run side by side elsewhere, so each of them runs on one thread
-        None if isinstance(here, Serial) else 1,
-    )
+    # fits run side by side elsewhere, so each of them runs on one thread
+    shared = tuple(experiments), nominal, setup, loss, None if isinstance(here, Serial) else 1
     done: dict[int, Fold] = {}
     try:
-        for _, fold in here.run(_fold, task, [_Item(k, part) for k, part in enumerate(parts)]):
+        for _, fold in here.run(_fold, shared, list(enumerate(parts))):
             done[fold.number] = fold
             if watch is not None:
                 watch(fold, len(done))
@@ -277,19 +243,8 @@ def cross_validate(
 def deal(experiments: Sequence[Experiment], folds: int, seed: int) -> tuple[tuple[int, ...], ...]:
     """Deal runs into folds, those of a kind and direction apart as far as there are folds.
 
-    Parameters
-    ----------
-    experiments : sequence of Experiment
-        The runs.
-    folds : int
-        How many parts.
-    seed : int
-        Of the order within each kind.
-
-    Returns
-    -------
-    tuple of tuple of int
-        Places of each fold's runs, increasing. Folds differ by at most one run.
+    Places of each fold's runs, increasing; folds differ by at most one run. The seed is that of the
+    order within each kind.
 
     Raises
     ------
@@ -324,39 +279,29 @@ def _direction(experiment: Experiment) -> str:
     return "plus" if high >= low else "minus"
 
 
-def _fold(task: _Task, item: _Item) -> Fold:
-    held = [task.experiments[place] for place in item.held]
-    others = [each for place, each in enumerate(task.experiments) if place not in item.held]
+def _fold(
+    shared: tuple[tuple[Experiment, ...], Parameters, Setup, Loss, int | None],
+    item: tuple[int, tuple[int, ...]],
+) -> Fold:
+    (experiments, nominal, setup, loss, threads), (number, part) = shared, item
+    held = [experiments[place] for place in part]
+    others = [each for place, each in enumerate(experiments) if place not in part]
     names = tuple(each.name for each in held)
     try:
-        result = fit(
-            task.nominal,
-            others,
-            task.setup,
-            loss=task.loss,
-            tolerance=task.tolerance,
-            max_evaluations=task.max_evaluations,
-            threads=task.threads,
-        )
+        result = fit(nominal, others, setup, loss=loss, threads=threads)
         if result.stages[-1].solution.interrupted:
             raise KeyboardInterrupt
         runs = tuple(HeldRun.of(each) for each in with_speeds(predict(result.parameters, held)))
     except (InputError, DomainError) as error:
-        return Fold(item.number, names, (), (), (), False, str(error))
-    return Fold(
-        item.number,
-        names,
-        tuple(
-            FoldEstimate(each.stage.name, unknown.name, unknown.unit, each.values[unknown.name])
-            for each in result.stages
-            for unknown in each.problem.unknowns
-            if unknown.run is None
-        ),
-        _lost(result, held, task.threads),
-        runs,
-        all(each.solution.converged for each in result.stages),
-        "",
+        return Fold(number, names, (), (), (), False, str(error))
+    estimates = tuple(
+        FoldEstimate(each.stage.name, unknown.name, unknown.unit, each.values[unknown.name])
+        for each in result.stages
+        for unknown in each.problem.unknowns
+        if unknown.run is None
     )
+    converged = all(each.solution.converged for each in result.stages)
+    return Fold(number, names, estimates, _lost(result, held, threads), runs, converged, "")
 
 
 def _lost(result: Fit, held: Sequence[Experiment], threads: int | None) -> tuple[str, ...]:
@@ -371,8 +316,13 @@ def _lost(result: Fit, held: Sequence[Experiment], threads: int | None) -> tuple
             before = stage.parameters
             continue
         before = stage.parameters
-        left = _information(stage.problem.evaluate(stage.solution.vector).jacobian)
-        there = _information(apart.evaluate(apart.unknowns.vector_of(stage.values)).jacobian)
+        left, there = (
+            np.sum(problem.evaluate(vector).jacobian ** 2, axis=0)
+            for problem, vector in (
+                (stage.problem, stage.solution.vector),
+                (apart, apart.unknowns.vector_of(stage.values)),
+            )
+        )
         told = dict(zip(apart.unknowns.names, there, strict=True))
         lost += [
             unknown.name
@@ -380,8 +330,3 @@ def _lost(result: Fit, held: Sequence[Experiment], threads: int | None) -> tuple
             if unknown.run is None and kept < LEFT * (kept + told.get(unknown.name, 0.0))
         ]
     return tuple(lost)
-
-
-def _information(jacobian: Array) -> Array:
-    squares: Array = np.sum(jacobian**2, axis=0)
-    return squares

@@ -63,15 +63,10 @@ def simulated_current(experiment: Experiment, parameters: ParameterSet) -> Recor
 def at_rate_of(
     experiments: Sequence[Experiment], parameters: ParameterSet
 ) -> tuple[ParameterSet, tuple[str, ...]]:
-    """A set whose card's filter holds at the rate of the runs, and what was changed for that.
+    """A set whose card's filter holds at the rate of the runs, and a sentence if it was changed.
 
-    Returns
-    -------
-    parameters : ParameterSet
-        With the filter's differential equation, if a run is marched at another rate than the one
-        that its recursion belongs to; otherwise as they are.
-    said : tuple of str
-        A sentence, if they were changed.
+    It then has the filter's differential equation, if a run is marched at another rate than the one
+    that its recursion belongs to.
     """
     if parameters.rate is None:
         return parameters, ()
@@ -168,27 +163,16 @@ class Forces:
         }
 
 
-SIGN_WIDTH = 0.05
-"""Width that `signed_by_command` masks; the mask is not used to drive a pump. [s]"""
 REST = 0.01
 """Share of the largest command below which it has no sign of its own. [1]"""
 
 
 def measured_current(experiment: Experiment, scale: float = 1.0) -> Record:
-    """The signed current that was measured, on the march's grid.
+    """The signed current that was measured, times a factor, on the march's grid. [A]
 
-    Parameters
-    ----------
-    experiment : Experiment
-        Driven by a current, or with a channel of it: signed, of both solenoids, or of one ammeter
-        around both leads, which is given the command's sign.
-    scale : float
-        Factor on it. [1]
-
-    Returns
-    -------
-    Record
-        Positive towards positive speed. [A]
+    Of an experiment driven by a current, or with a channel of it: signed, of both solenoids, or of
+    one ammeter around both leads, which is given the command's sign. Positive towards positive
+    speed.
 
     Raises
     ------
@@ -216,14 +200,9 @@ def _signed_channel(experiment: Experiment) -> tuple[Channel, Array]:
     for channel in experiment.of_kind("rectified_current"):
         command = experiment.input.at(channel.time)
         # noise about zero leaves readings just below it, and a command at rest without a sign
-        signed = signed_by_command(
-            channel.time,
-            np.maximum(channel.values, 0.0),
-            command,
-            width=SIGN_WIDTH,
-            level=REST * float(np.abs(command).max()),
-        )
-        return channel, signed.current
+        readings = np.maximum(channel.values, 0.0)
+        level = REST * float(np.abs(command).max())
+        return channel, signed_by_command(readings, command, level=level)
     raise InputError(
         f"{experiment.name} has no measured current to drive the pump: it needs a channel of the "
         "kind signed_current, current_plus and current_minus, or rectified_current."

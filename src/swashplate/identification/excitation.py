@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,8 +15,12 @@ from numpy.typing import NDArray
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel, Forces, current_record, voltage_record
-from swashplate.identification.identifiability import NAMED as NAMED_OTHERS
-from swashplate.identification.identifiability import Identifiability, identifiability
+from swashplate.identification.identifiability import (
+    NAMED,
+    Identifiability,
+    identifiability,
+    listed,
+)
 from swashplate.identification.linearised import LinearisedFit, linearised_fit
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Free, GivenForces, Setup, Stage
@@ -67,19 +70,9 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
 
 
 def acting(simulation: Simulation, parameters: ParameterSet) -> dict[str, float]:
-    """How long what a parameter needs happens in a run, for every column such as ``"Z16_plus"``.
+    """How long what a parameter needs happens in a run [s], for every column (``"Z16_plus"``).
 
-    Parameters
-    ----------
-    simulation : Simulation
-        Of the run.
-    parameters : ParameterSet
-        What was simulated.
-
-    Returns
-    -------
-    dict of str to float
-        Durations, 0 where it never happens. Without a card its parameters have 0. [s]
+    0 where it never happens; without a card its parameters have 0.
     """
     numbers, found = parameters.numbers, dict.fromkeys(COLUMNS, 0.0)
     for side, sign in (("plus", 1.0), ("minus", -1.0)):
@@ -141,59 +134,27 @@ def _of_channel(simulation: Simulation, side: str, numbers: Mapping[str, float])
     }
 
 
-@dataclass(frozen=True, eq=False)
-class Activation:
-    """How long each run makes happen what each unknown needs."""
-
-    runs: tuple[str, ...]
-    names: tuple[str, ...]
-    """The unknowns, those of single runs left out."""
-    needs: tuple[str, ...]
-    """What each needs, in words."""
-    seconds: Array
-    """(runs, K) how long it happens. [s]"""
-
-    def __getitem__(self, name: str) -> Array:
-        """(runs,) durations for one unknown. [s]"""
-        return self.seconds[:, self.names.index(name)]
-
-
 def activation(
     simulations: Mapping[str, Simulation],
     parameters: ParameterSet,
     unknowns: Sequence[Unknown],
     forces: Forces | None = None,
-) -> Activation:
-    """The table of runs and unknowns.
+) -> Array:
+    """How long each run makes happen what each unknown of the machine needs: (runs, K). [s]
 
-    Parameters
-    ----------
-    simulations : mapping of str to Simulation
-        Of each run by its name, see `simulated_run`.
-    parameters : ParameterSet
-        What was simulated.
-    unknowns : sequence of Unknown
-        Of a fit; those of single runs are left out.
-    forces : Forces, optional
-        Where forces stand for the solenoids' coefficients.
+    `parameters` are those that were simulated, `forces` stand for the solenoids' coefficients.
     """
-    ours = [each for each in unknowns if each.run is None]
     rows = []
     for simulation in simulations.values():
         found = acting(simulation, parameters)
-        row = []
-        for each in ours:
-            if forces is not None and each.name in forces.names:
-                row.append(_near(simulation, each.name, forces, parameters.numbers["Z17"]))
-            else:
-                row.append(max(found[target] for target in each.targets))
-        rows.append(row)
-    return Activation(
-        tuple(simulations),
-        tuple(each.name for each in ours),
-        tuple(need_of(each.name, forces) for each in ours),
-        np.array(rows).reshape(len(rows), len(ours)),
-    )
+        if forces is not None:
+            for name in forces.names:
+                # from half way to the force's effective current on
+                signed = (1.0 if "_plus_" in name else -1.0) * simulation.current
+                reached = signed - simulation.pump.Z17 >= _current_of(name, forces)[1]
+                found[name] = float(np.count_nonzero(reached)) / simulation.record.rate
+        rows.append([max(found[t] for t in each.targets) for each in unknowns if each.run is None])
+    return np.array(rows)
 
 
 def need_of(name: str, forces: Forces | None = None) -> str:
@@ -206,18 +167,10 @@ def need_of(name: str, forces: Forces | None = None) -> str:
 
 def _current_of(name: str, forces: Forces) -> tuple[float, float]:
     """Effective current of a force, and where its neighbourhood begins. [A]"""
-    match = re.fullmatch(r"force_(plus|minus)_(\d)", name)
-    assert match is not None
-    currents = forces.plus if match[1] == "plus" else forces.minus
-    k = int(match[2]) - 1
-    return currents[k], 0.5 * (currents[k] + (currents[k - 1] if k else 0.0))
-
-
-def _near(simulation: Simulation, name: str, forces: Forces, Z17: float) -> float:
-    """How long the effective current is at that of a force or beyond, from half way to it. [s]"""
-    sign = 1.0 if "_plus_" in name else -1.0
-    reached = sign * simulation.current - Z17 >= _current_of(name, forces)[1]
-    return float(np.count_nonzero(reached)) / simulation.record.rate
+    _, side, number = name.split("_")
+    currents = (0.0, *getattr(forces, side))
+    k = int(number)
+    return currents[k], 0.5 * (currents[k] + currents[k - 1])
 
 
 Mark = Literal["most", "some", "unseen", "none"]
@@ -226,8 +179,14 @@ ALONE = 0.9
 """Share of a single run from which an unknown is said to rest on it."""
 MOST = 0.2
 """Share of a run's information from which it is one of those that tell most."""
-NAMED = 8
-"""Unknowns that a sentence names."""
+
+
+def _alone(name: str, share: Array, runs: Sequence[str], what: str) -> list[str]:
+    """A sentence on an unknown that rests on one run."""
+    most = int(np.argmax(share))
+    if len(runs) < 2 or share[most] < ALONE:
+        return []
+    return [f"{name}: {100.0 * share[most]:.0f} % of {what} of it comes from {runs[most]} alone."]
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,16 +206,10 @@ class Excitation:
     def sentences(self) -> tuple[str, ...]:
         """What rests on nothing, and what on one run alone."""
         said = []
-        for column, name in enumerate(self.names):
-            share = self.share[:, column]
-            most = int(np.argmax(share))
+        for name, share in zip(self.names, self.share.T, strict=True):
+            said += _alone(name, share, self.runs, "what is known")
             if not share.any():
                 said.append(f"{name}: no run depends on it.")
-            elif len(self.runs) > 1 and share[most] >= ALONE:
-                said.append(
-                    f"{name}: {100.0 * share[most]:.0f} % of what is known of it comes from "
-                    f"{self.runs[most]} alone."
-                )
         return tuple(said)
 
 
@@ -281,33 +234,43 @@ class Outlook:
     problem: Problem
     simulations: Mapping[str, Simulation]
     """The nominal drive in each run that the stage fits, by the run's name."""
-    activation: Activation
     linearised: LinearisedFit
+    seconds: Array
+    """(runs, K) how long what each unknown of `names` needs happens. [s]"""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The unknowns, those of single runs left out."""
+        return tuple(each.name for each in self.problem.unknowns if each.run is None)
+
+    @property
+    def _model(self) -> DriveModel:
+        assert isinstance(self.problem.model, DriveModel)
+        return self.problem.model
+
+    def need(self, name: str) -> str:
+        """What an unknown needs, in words."""
+        return need_of(name, self._model.forces)
 
     @cached_property
     def identifiability(self) -> Identifiability:
-        """Singular values, and directions that change nothing."""
-        model = self.problem.model
-        assert isinstance(model, DriveModel)
+        """Which unknowns the runs determine, and directions that change nothing."""
         taken = {target for each in self.problem.unknowns for target in each.targets}
         return identifiability(
             self.linearised.triangle,
             self.linearised.variables,
             tolerance=self.linearised.tolerance,
-            fixed={k: v for k, v in model.parameters.numbers.items() if k not in taken},
+            fixed={k: v for k, v in self._model.parameters.numbers.items() if k not in taken},
         )
-
-    @cached_property
-    def excitation(self) -> Excitation:
-        """Shares of the runs and channels."""
-        return excitation(self.linearised)
 
     @cached_property
     def shares(self) -> Array:
         """(runs, K) part of what is known of an unknown from each run, its channels together."""
-        shares = np.zeros((len(self.activation.runs), len(self.linearised.variables.names)))
-        for run, share in zip(self.linearised.runs, self.excitation.share, strict=True):
-            shares[self.activation.runs.index(run.name)] += share
+        runs = list(self.simulations)
+        shares = np.zeros((len(runs), len(self.linearised.variables.names)))
+        found = excitation(self.linearised).share
+        for run, share in zip(self.linearised.runs, found, strict=True):
+            shares[runs.index(run.name)] += share
         return shares
 
     def effect(self, name: str) -> float:
@@ -329,43 +292,39 @@ class Outlook:
             else "unseen"
             if seconds > 0.0
             else "none"
-            for part, seconds in zip(share, self.activation[name], strict=True)
+            for part, seconds in zip(share, self._seconds(name), strict=True)
         )
 
     def sentences(self) -> tuple[str, ...]:
         """What no run tells of, why, and what rests on one run alone."""
         groups: dict[str, list[str]] = {}
         for name in self.identifiability.unexcited:
-            if name in self.activation.names:
+            if name in self.names:
                 groups.setdefault(self._missing(name), []).append(name)
         said = [
-            f"{_listed(names)} need{'s' if len(names) == 1 else ''} {why}."
+            f"{listed(names)} need{'s' if len(names) == 1 else ''} {why}."
             for why, names in groups.items()
         ]
-        several = len(self.activation.runs) > 1
-        for name in self.activation.names:
+        for name in self.names:
             share = self.shares[:, self.linearised.variables.index(name)]
-            most = int(np.argmax(share))
-            if several and share[most] >= ALONE:
-                said.append(
-                    f"{name}: {100.0 * share[most]:.0f} % of what the runs tell of it comes from "
-                    f"{self.activation.runs[most]} alone."
-                )
+            said += _alone(name, share, list(self.simulations), "what the runs tell")
         return tuple(said)
 
     def _missing(self, name: str) -> str:
         """What an unknown that no sample depends on needs, and whether a run has it."""
-        need = self.activation.needs[self.activation.names.index(name)]
+        need = self.need(name)
         if name.startswith("force_"):
             need = "currents of their size beyond Z17"
         side = next((each for each in ("plus", "minus") if f"_{each}" in name), None)
         need = need if side is None else f"{need} ({side})"
-        having = np.flatnonzero(self.activation[name] > 0.0)
-        if not having.size:
+        having = [run for run, s in zip(self.simulations, self._seconds(name), strict=True) if s]
+        if not having:
             return f"{need}, which no run has"
-        return (
-            f"{need}: {self.activation.runs[having[0]]} has it, but no sample that counts shows it"
-        )
+        return f"{need}: {having[0]} has it, but no sample that counts shows it"
+
+    def _seconds(self, name: str) -> Array:
+        seconds: Array = self.seconds[:, self.names.index(name)]
+        return seconds
 
 
 def outlook(stage: Stage, parameters: ParameterSet, experiments: Sequence[Experiment]) -> Outlook:
@@ -391,21 +350,9 @@ def outlook(stage: Stage, parameters: ParameterSet, experiments: Sequence[Experi
     model = problem.model
     assert isinstance(model, DriveModel)
     simulations = {each.name: simulated_run(each, parameters) for each in problem.experiments}
-    return Outlook(
-        stage,
-        problem,
-        simulations,
-        activation(simulations, parameters, problem.unknowns.items, model.forces),
-        linearised_fit(problem, problem.start),
-    )
-
-
-def _listed(names: Sequence[str]) -> str:
-    named = list(names[:NAMED])
-    more = len(names) - len(named)
-    if more:
-        return f"{', '.join(named)} and {more} more"
-    return named[0] if len(named) == 1 else f"{', '.join(named[:-1])} and {named[-1]}"
+    seconds = activation(simulations, parameters, problem.unknowns.items, model.forces)
+    fit = linearised_fit(problem, problem.start)
+    return Outlook(stage, problem, simulations, fit, seconds)
 
 
 ROOM = 0.98
@@ -423,8 +370,8 @@ class Proposal:
     """As it was."""
     proposed: Stage | None
     """As it could be; None if nothing of it can be determined."""
-    held: Mapping[str, str]
-    """Unknowns to hold, each with the reason."""
+    fixed: Mapping[str, str]
+    """Unknowns to fix, each with the reason."""
     notes: tuple[str, ...] = ()
     """What else is changed, or cannot be."""
 
@@ -435,22 +382,24 @@ class Proposal:
 
     def sentences(self) -> tuple[str, ...]:
         """The offer in words."""
-        said = [f"Hold {', '.join(names)}: {reason}." for names, reason in self._by_reason()]
+        said = [f"Fix {', '.join(names)}: {reason}." for names, reason in self._by_reason()]
         if self.proposed is None:
             said.append(f"Nothing is then left of the stage '{self.stage.name}'.")
         return (*said, *self.notes)
 
     def comments(self) -> tuple[str, ...]:
-        """What is held, as lines for the file."""
-        lines = []
-        for names, reason in self._by_reason():
-            are = "is" if len(names) == 1 else "are"
-            lines += wrap(f"{', '.join(names)} {are} held: {reason}", COMMENT)
-        return tuple(lines)
+        """What is fixed, as lines for the file."""
+        return tuple(
+            line
+            for names, reason in self._by_reason()
+            for line in wrap(
+                f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} fixed: {reason}", COMMENT
+            )
+        )
 
     def _by_reason(self) -> list[tuple[list[str], str]]:
         reasons: dict[str, list[str]] = {}
-        for name, reason in self.held.items():
+        for name, reason in self.fixed.items():
             reasons.setdefault(reason, []).append(name)
         return [
             (names, "no run exercises them" if reason == IDLE and len(names) > 1 else reason)
@@ -458,53 +407,34 @@ class Proposal:
         ]
 
 
-def propose(outlook: Outlook, *, faint: bool = False) -> Proposal:
-    """What to hold, or to ask for instead, from what the runs cannot tell.
-
-    Parameters
-    ----------
-    outlook : Outlook
-        Of one stage.
-    faint : bool
-        Hold as well what the runs hardly tell: for values that are known, as they are then taken
-        for exact.
-    """
+def propose(outlook: Outlook) -> Proposal:
+    """What to fix in one stage, or to ask for instead, from what the runs cannot tell."""
     verdict = outlook.identifiability
     reasons = dict.fromkeys(verdict.unexcited, IDLE)
-    for direction in (*verdict.null, *(verdict.faint if faint else ())):
-        others = [name for name in direction.changes if name != direction.hold]
-        if direction.gauge is not None:
-            reason = direction.gauge.determined
-        elif direction.sharpness > 0.0:
-            more = len(others) - NAMED_OTHERS
-            told = f"{', '.join(others[:NAMED_OTHERS])}{f' and {more} others' if more > 0 else ''}"
-            reason = f"the runs hardly tell it from {told}, but a wrong value shows in them"
-        else:
-            reason = f"the runs cannot tell it from {', '.join(others)}"
-        reasons[direction.hold] = reason
-    own = [each for each in reasons if "(" in each]
-    notes = [f"{name} belongs to one run and stays free." for name in own]
-    reasons = {name: why for name, why in reasons.items() if name not in own}
+    for direction in verdict.null:
+        others = [name for name in direction.changes if name != direction.fix]
+        more = f" and {len(others) - NAMED} others" if len(others) > NAMED else ""
+        told = f"the runs cannot tell it from {', '.join(others[:NAMED])}{more}"
+        reasons[direction.fix] = told if direction.gauge is None else direction.gauge.determined
+    notes = [f"{name} belongs to one run and stays free." for name in reasons if "(" in name]
+    reasons = {name: why for name, why in reasons.items() if "(" not in name}
     stage = outlook.stage
     forces, of_forces, said = _forces(outlook, reasons)
     for name in of_forces:
         del reasons[name]
-    notes += said
     free = _without(stage.free, tuple(reasons))
-    proposed = None
-    if free:
-        proposed = stage.model_copy(update={"free": free, "forces": forces})
-    return Proposal(stage, proposed, reasons, tuple(notes))
+    changed = stage.model_copy(update={"free": free, "forces": forces}) if free else None
+    return Proposal(stage, changed, reasons, (*notes, *said))
 
 
-def _without(free: Mapping[str, Free], held: Sequence[str]) -> dict[str, Free]:
-    """Entries of a stage without some unknowns; a direction alone where the other one is held."""
+def _without(free: Mapping[str, Free], fixed: Sequence[str]) -> dict[str, Free]:
+    """Entries of a stage without some unknowns; a direction alone where the other one is fixed."""
     kept: dict[str, Free] = {}
     for name, entry in free.items():
-        if name in held:
+        if name in fixed:
             continue
         columns = CATALOGUE[name].columns if name in CATALOGUE else (name,)
-        left = [column for column in columns if column not in held]
+        left = [column for column in columns if column not in fixed]
         if entry.tied or len(left) == len(columns):
             kept[name] = entry
         else:
@@ -526,8 +456,11 @@ def _forces(
     for side, sign in (("plus", 1.0), ("minus", -1.0)):
         names = [name for name in concerned if f"_{side}_" in name]
         currents = getattr(given, side)
-        largest = _largest_current(outlook, sign)
-        outermost = outlook.activation[f"force_{side}_{len(currents)}"]
+        largest = max(
+            float(np.max(sign * each.current, initial=0.0)) - each.pump.Z17
+            for each in outlook.simulations.values()
+        )
+        outermost = outlook.seconds[:, outlook.names.index(f"force_{side}_{len(currents)}")]
         if largest <= 0.0 and names:
             notes.append(
                 f"{', '.join(names)} cannot be left out of [stages.forces]: without a current "
@@ -543,18 +476,10 @@ def _forces(
             )
         elif names:
             notes.append(
-                f"{', '.join(names)} cannot be held alone in [stages.forces]: add a run that "
+                f"{', '.join(names)} cannot be fixed alone in [stages.forces]: add a run that "
                 f"dwells at more levels between {currents[0]:g} and {currents[-1]:g} A ({side})."
             )
     return given.model_copy(update=changes), concerned, notes
-
-
-def _largest_current(outlook: Outlook, sign: float) -> float:
-    """Largest current beyond the solenoids' dead zone in any run, one way. [A]"""
-    return max(
-        float(np.max(sign * each.current, initial=0.0)) - each.pump.Z17
-        for each in outlook.simulations.values()
-    )
 
 
 def proposed_setup(setup: Setup, proposals: Sequence[Proposal]) -> Setup:

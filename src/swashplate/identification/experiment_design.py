@@ -19,7 +19,6 @@ from swashplate.errors import InputError
 from swashplate.identification.drive_model import CURRENTS, SIGNALS
 from swashplate.identification.linearised import (
     TOLERANCE,
-    LinearisedFit,
     linearised_fit,
     triangular_factor,
     whitening,
@@ -118,83 +117,55 @@ def measured_sensors(
 ) -> dict[str, Sensor]:
     """The campaign's own sensors, by channel.
 
-    Parameters
-    ----------
-    problem : Problem
-        The tests, begun at the drive's values.
-    machine : sequence of int
-        Places of the unknowns that belong to no single run.
-    fitted : bool
-        Whether the residuals of that drive are noise; else it is as the campaign states.
+    `machine` are the places of the unknowns that belong to no single run. If the drive at which the
+    problem begins is `fitted`, its residuals are the noise; else that is as the campaign states.
 
     Raises
     ------
     InputError
         If the residuals are zero, or so large that the drive was not fitted to these tests.
     """
-    kinds = {
-        name: each[name].kind
-        for each in problem.experiments
+    channels = {
+        name: [each[name] for each in problem.experiments if name in each.channels]
         for name in problem.channels
-        if name in each.channels
     }
     if not fitted:
         return {
-            name: Sensor(kind, problem.scales[name], origin="as in the campaign")
-            for name, kind in kinds.items()
+            name: Sensor(ours[0].kind, problem.scales[name], origin="as in the campaign")
+            for name, ours in channels.items()
         }
-    fit = _zeroed(problem, machine)
-    made = {}
-    for name, kind in kinds.items():
-        ours = [run for run in fit.runs if run.channel == name]
-        residual = np.concatenate([run.residual for run in ours])
-        deviation = float(np.sqrt(np.mean(residual**2)))
+    fit, made = linearised_fit(problem, problem.start), {}
+    for name, measured in channels.items():
+        runs = []
+        for run in (run for run in fit.runs if run.channel == name):
+            # with free zeros and other unknowns of single runs fitted
+            own = np.delete(run.jacobian, list(machine), axis=1)
+            shift = np.linalg.lstsq(own, -run.residual, rcond=None)[0]
+            runs.append(run._replace(residual=run.residual + own @ shift))
+        deviation = float(np.sqrt(np.mean(np.concatenate([run.residual for run in runs]) ** 2)))
         if not deviation > NOISELESS:
             raise InputError(
                 f"The residuals of '{name}' are as good as zero: without noise any test is perfect."
             )
-        reached = [each[name].values for each in problem.experiments if name in each.channels]
-        whole = max(float(np.ptp(each)) for each in reached)
         noise = problem.scales[name] * deviation
-        if noise > FARTHEST * whole:
-            share = 100.0 * noise / whole
+        share = noise / max(float(np.ptp(each.values)) for each in measured)
+        if share > FARTHEST:
             raise InputError(
-                f"The drive misses '{name}' by {share:.2g} % of its range, so that its residuals "
-                "are no noise; give a drive that was fitted to these tests, or none."
+                f"The drive misses '{name}' by {100.0 * share:.2g} % of its range, so that its "
+                "residuals are no noise; give a drive that was fitted to these tests, or none."
             )
-        alone = replace(fit, runs=tuple(ours))
-        told = uncertainty(alone)
+        told = uncertainty(replace(fit, runs=tuple(runs)))
         # not of all that the residuals hold, but of what meets the unknowns' derivatives
         worth = float(np.median(told.inflation[told.own.determined]))
         memory = worth * interval(problem, name)
-        made[name] = Sensor(kind, noise, memory, "residuals of the drive")
+        made[name] = Sensor(measured[0].kind, noise, memory, "residuals of the drive")
     return made
-
-
-def _zeroed(problem: Problem, machine: Sequence[int]) -> LinearisedFit:
-    """The tests at the drive's values, the free zeros and other unknowns of single runs fitted."""
-    fit = linearised_fit(problem, problem.start)
-    runs = []
-    for run in fit.runs:
-        own = np.delete(run.jacobian, list(machine), axis=1)
-        shift = np.linalg.lstsq(own, -run.residual, rcond=None)[0]
-        runs.append(run._replace(residual=run.residual + own @ shift))
-    return replace(fit, runs=tuple(runs))
 
 
 def interval(problem: Problem, channel: str) -> float:
     """Median interval between samples of a channel. [s]"""
-    return float(
-        np.median(
-            np.concatenate(
-                [
-                    np.diff(each[channel].time)
-                    for each in problem.experiments
-                    if channel in each.channels and each[channel].time.size > 1
-                ]
-            )
-        )
-    )
+    runs = [each[channel].time for each in problem.experiments if channel in each.channels]
+    return float(np.median(np.concatenate([np.diff(time) for time in runs])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,9 +188,11 @@ class Bench:
         """(<= K, K) factor of what one sensor would tell in a test, its free zero spent."""
         key = (maneuver.name, sensor)
         if key not in self._tried:
-            experiment = _imagined(maneuver, sensor)
-            problem = stage_problem(_without_priors(self.stage), self.parameters, [experiment])
-            self._tried[key] = _machine_rows(problem, problem.start)
+            # what is known beforehand counts once, not once a test
+            free = {k: v.model_copy(update={"prior": None}) for k, v in self.stage.free.items()}
+            stage = self.stage.model_copy(update={"free": free})
+            problem = stage_problem(stage, self.parameters, [_imagined(maneuver, sensor)])
+            self._tried[key] = _machine_rows(problem)
         return self._tried[key]
 
     def candidate(
@@ -253,14 +226,9 @@ def bench(
         Whether the drive is fitted to them: noise and its colour are then those of the residuals.
         Else noise is as the campaign states it, correlated over `MEMORY`.
     free : sequence of str
-        Symbols or columns that are held in the set-up and count as unknown here.
+        Symbols or columns that are fixed in the set-up and count as unknown here.
     sensors : sequence of Sensor
         Of a fresh plan; beside experiments they replace those of the same kind.
-
-    Raises
-    ------
-    InputError, ParameterError
-        If set-up, runs and parameters do not fit each other.
     """
     stage = _together(setup, free, parameters)
     if not experiments:
@@ -286,7 +254,7 @@ def bench(
         name: sensor.noise * float(np.sqrt(max(sensor.memory / interval(problem, name), 1.0)))
         for name, sensor in named.items()
     }
-    present = _machine_rows(replace(problem, scales=scales), problem.start)
+    present = _machine_rows(replace(problem, scales=scales))
     kept = {sensor.kind: sensor for sensor in named.values()}
     return Bench(parameters, stage, variables, present, (*kept.values(), *own.values()))
 
@@ -311,12 +279,6 @@ def _together(setup: Setup, free: Sequence[str], parameters: ParameterSet) -> St
         zero = any(parameters.numbers[column] == 0.0 for column in columns)
         more[name] = Free(bounds=(-1.0, 1.0)) if zero else Free(relative=(0.5, 2.0), log=positive)
     return stage.model_copy(update={"free": {**stage.free, **more}})
-
-
-def _without_priors(stage: Stage) -> Stage:
-    """What is known beforehand counts once, not once a test."""
-    free = {name: each.model_copy(update={"prior": None}) for name, each in stage.free.items()}
-    return stage.model_copy(update={"free": free})
 
 
 def _imagined(maneuver: Maneuver, sensor: Sensor) -> Experiment:
@@ -344,9 +306,9 @@ def _machine(problem: Problem) -> tuple[Unknowns, list[int]]:
     return Unknowns(tuple(problem.unknowns[k] for k in places)), places
 
 
-def _machine_rows(problem: Problem, vector: Array) -> Array:
+def _machine_rows(problem: Problem) -> Array:
     """(<= K, K) factor of the derivatives by the machine's unknowns, those of single runs spent."""
-    derivatives = problem.evaluate(vector).jacobian
+    derivatives = problem.evaluate(problem.start).jacobian
     _, machine = _machine(problem)
     own = [k for k in range(derivatives.shape[1]) if k not in machine]
     factor = triangular_factor(np.column_stack([derivatives[:, own], derivatives[:, machine]]))
@@ -358,9 +320,6 @@ KNOWN = 1.0
 
 WORTH = 1e-3
 """Relative gain below which nothing is said of it."""
-
-NAMED = 6
-"""Unknowns that a sentence names."""
 
 
 class Candidate(NamedTuple):
@@ -423,32 +382,9 @@ class Advice:
         known = [gain for gain in self.gains if gain.after <= KNOWN]
         return min(known, key=lambda gain: gain.ratio) if known else None
 
-    @property
-    def sentence(self) -> str:
-        """What an engineer would say."""
-        if self.newly_determined:
-            named = ", ".join(self.newly_determined[:NAMED])
-            more = len(self.newly_determined) - NAMED
-            first = f"{self.candidate} would be the first to determine {named}"
-            first += f" and {more} more" if more > 0 else ""
-        elif self.best is not None and self.best.ratio < 1.0 - WORTH:
-            first = (
-                f"{self.candidate} would tell most of {self.best.name}: its standard error would "
-                f"shrink to {100.0 * self.best.ratio:.0f} %"
-            )
-        else:
-            return f"{self.candidate} would tell next to nothing new."
-        if self.d_gain < 1.0 + WORTH:
-            return f"{first}."
-        return f"{first}; what is known already would be known {self.d_gain:.3g} times better."
-
 
 def advise(
-    present: Array,
-    candidates: Sequence[Candidate],
-    variables: Unknowns,
-    *,
-    tolerance: float = TOLERANCE,
+    present: Array, candidates: Sequence[Candidate], variables: Unknowns
 ) -> tuple[Advice, ...]:
     """Rank candidate tests by what they would add.
 
@@ -461,8 +397,6 @@ def advise(
         Tests to choose from.
     variables : Unknowns
         The unknowns; those at a bound count as known.
-    tolerance : float
-        As of `whitening`.
 
     Returns
     -------
@@ -479,27 +413,20 @@ def advise(
     _check("what is known at present", present, variables.count)
     for each in candidates:
         _check(each.name, each.derivatives, variables.count)
-    judged = [_judge(present, each, variables, tolerance) for each in candidates]
+    judged = [_judge(present, each, variables) for each in candidates]
     return tuple(sorted(judged, key=lambda each: each.rank))
 
 
-def _judge(present: Array, candidate: Candidate, variables: Unknowns, tolerance: float) -> Advice:
+def _judge(present: Array, candidate: Candidate, variables: Unknowns) -> Advice:
     free = variables.free
-    now, known_now = whitening(present, free, tolerance)
-    both = np.vstack([present, candidate.rows])
-    then, known_then = whitening(both, free, tolerance)
+    now, known_now = whitening(present, free, TOLERANCE)
+    then, known_then = whitening(np.vstack([present, candidate.rows]), free, TOLERANCE)
     before = np.where(known_now, np.sqrt(np.sum(now**2, axis=1)), inf)
     after = np.where(known_then, np.sqrt(np.sum(then**2, axis=1)), inf)
     names = variables.names
-    # along the directions known now the candidate adds (candidate W)ᵀ(candidate W) to the identity;
-    # what it says of them through directions unknown now has to be spent on those first
-    hidden = _unknown_directions(present, free, tolerance)
-    seen = candidate.rows @ now
-    if hidden.shape[1]:
-        basis = np.linalg.svd(candidate.rows @ hidden, full_matrices=False)
-        spent = basis[0][:, basis[1] > tolerance * max(float(basis[1].max(initial=0.0)), 1e-300)]
-        seen = seen - spent @ (spent.T @ seen)
-    shrinking = np.log1p(np.linalg.svd(seen, compute_uv=False) ** 2).sum() if seen.size else 0.0
+    # errors afterwards along the directions known now, in which they are 1 and independent now
+    along = (present @ now).T @ (present @ then)
+    shrinking = -np.linalg.slogdet(along @ along.T)[1]
     return Advice(
         candidate.name,
         tuple(
@@ -511,19 +438,6 @@ def _judge(present: Array, candidate: Candidate, variables: Unknowns, tolerance:
         float(np.exp(0.5 * shrinking / max(now.shape[1], 1))),
         candidate.duration,
     )
-
-
-def _unknown_directions(rows: Array, free: NDArray[np.bool_], tolerance: float) -> Array:
-    """(K, k) basis of the directions of the free unknowns that rows do not determine."""
-    moving = np.flatnonzero(free)
-    rows = triangular_factor(rows)
-    lengths = np.linalg.norm(rows[:, moving], axis=0)
-    lengths = np.where(lengths > 0.0, lengths, 1.0)
-    _, sizes, basis = np.linalg.svd(rows[:, moving] / lengths, full_matrices=True)
-    rank = int(np.count_nonzero(sizes > tolerance * sizes.max(initial=0.0)))
-    hidden = np.zeros((rows.shape[1], moving.size - rank))
-    hidden[moving] = basis[rank:].T / lengths[:, None]
-    return hidden
 
 
 def _check(name: str, rows: Array, count: int) -> None:
@@ -578,18 +492,9 @@ def judge_sensors(
     *,
     beside: Sequence[str] = (),
 ) -> tuple[SensorAdvice, ...]:
-    """For each sensor the test in which it tells most, and what it adds there.
+    """For each sensor, one by one, the test in which it tells most, and what it adds there.
 
-    Parameters
-    ----------
-    bench : Bench
-        What is known so far.
-    maneuvers : sequence of Maneuver
-        Tests in which it could be read.
-    added : sequence of Sensor
-        To be judged, one by one.
-    beside : sequence of str
-        Names of manoeuvres that count as made where the bench has no tests yet.
+    `beside` are names of manoeuvres that count as made where the bench has no tests yet.
     """
     known = [bench.present]
     if not len(bench.present):
@@ -612,21 +517,14 @@ def in_turn(
     candidates: Sequence[Candidate],
     variables: Unknowns,
     count: int,
-    *,
-    tolerance: float = TOLERANCE,
 ) -> tuple[Advice, ...]:
     """A plan of tests: the best one, then the best beside it, and so on, each at most once.
 
-    Parameters
-    ----------
-    present, candidates, variables, tolerance :
-        As of `advise`.
-    count : int
-        Tests to choose; fewer if none of the others tells anything new.
+    As many as `count`, fewer if none of the others tells anything new; otherwise as `advise`.
     """
     left, chosen = list(candidates), list[Advice]()
     while left and len(chosen) < count:
-        best = advise(present, left, variables, tolerance=tolerance)[0]
+        best = advise(present, left, variables)[0]
         if not best.newly_determined and not best.ranks and best.d_gain < 1.0 + WORTH:
             break
         taken = next(each for each in left if each.name == best.candidate)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from math import exp
+from dataclasses import dataclass, replace
+from math import exp, inf, isfinite, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -42,25 +42,16 @@ class Gauge:
     """By the parameter's symbol, without direction or number."""
     determined: str
     """What the tests can tell instead, as an engineer writes it."""
-    hold: tuple[str, ...]
-    """Symbols to hold, the best first; the others then follow."""
+    fix: tuple[str, ...]
+    """Symbols to fix, the best first; the others then follow."""
     needs: frozenset[str] = frozenset()
     """Symbols whose values the moves depend on."""
 
     def tangent(self, variables: Unknowns, fixed: Known | None = None) -> Array:
-        """Derivative of the solver's vector along the gauge.
+        """Derivative (K,) of the solver's vector along the gauge.
 
-        Parameters
-        ----------
-        variables : Unknowns
-            The unknowns.
-        fixed : mapping of str to float, optional
-            Values of parameters that are no unknowns, by symbol.
-
-        Returns
-        -------
-        (K,) array
-            0 for what does not move, and throughout if a value that the gauge needs is not known.
+        0 for what does not move, and throughout if a value that the gauge needs is neither among
+        the unknowns nor among the `fixed` ones, by symbol.
         """
         symbols = [symbol_of(name) for name in variables.names]
         estimates = map(float, variables.estimates)
@@ -162,233 +153,65 @@ MENTIONED = 0.02
 """Parts of a direction below this share of its largest, by effect, are not part of it."""
 
 NAMED = 6
-"""Changes, or correlated pairs, that a sentence names, the largest first."""
+"""Changes that a sentence names, the largest first."""
+
+WIDE = 0.1
+"""Half width of a 95 % interval, of the value or the scale, from which an unknown is weak. [1]"""
+
+HALF = 1.96
+"""Half width of a 95 % interval, in standard errors."""
 
 
 class Direction(NamedTuple):
-    """A way for the unknowns to move that the tests do not see, or hardly."""
+    """A way for the unknowns to move together that the tests do not see, or hardly."""
 
     changes: Mapping[str, float]
     """By name, strongest effect first, in per cent of the value (of the scale, where the unknown
     is not logarithmic); the largest is 1 %. [%]"""
-    sharpness: float
-    """Effect, as a part of that of the best determined direction; 0 for none."""
+    half_width: float
+    """Of the 95 % interval of the unknown to fix, of its value or scale; inf for no effect. [1]"""
     gauge: Gauge | None
     """The known gauge that it is, if it is one."""
-    hold: str
-    """The unknown to hold, by which the least is lost; in a faint direction only if its value is
-    known, as a wrong one shows in the others."""
+    fix: str
+    """The unknown to fix; in a weak direction only if its value is known, as a wrong one shows in
+    the others."""
+
+    @property
+    def weak(self) -> bool:
+        """Whether it has some effect."""
+        return isfinite(self.half_width)
 
     @property
     def sentence(self) -> str:
         """What an engineer would say."""
-        faint = self.sharpness > 0.0
-        advice = (
-            "; hold one of them only if you know it, or make a test that tells them apart."
-            if faint
-            else f". Hold {self.hold}."
-        )
+        begin, end = "", f". Fix {self.fix}."
+        if self.weak:
+            begin = f"Weak: {self.fix} is known to ±{100.0 * self.half_width:.3g} % only"
+            end = "; fix one of them only if you know it, or add a test that tells them apart."
+            if len(self.changes) == 1:
+                return f"{begin}; add a test that tells it."
         if self.gauge is not None:
-            together = _listed(sorted(self.changes, key=_in_order))
-            how = "move together all but unseen" if faint else "can move together unseen"
+            together = listed(sorted(self.changes, key=_in_order))
+            how = "move together all but unseen" if self.weak else "can move together unseen"
             words = f"{together} {how} ({self.gauge.name}): {self.gauge.determined}"
-            return f"{'Faint: ' if faint else ''}{words}{advice}"
-        named = list(self.changes.items())[:NAMED]
-        moves = ", ".join(f"{name} {change:+.2g} %" for name, change in named)
+            return f"{begin}{', as ' if begin else ''}{words}{end}"
+        moves = ", ".join(f"{name} {by:+.2g} %" for name, by in [*self.changes.items()][:NAMED])
         if len(self.changes) > NAMED:
             moves += f" and {len(self.changes) - NAMED} others"
-        if not faint:
-            together = "together change nothing" if len(self.changes) > 1 else "changes nothing"
-            return f"{moves} {together}{advice}"
-        return (
-            f"Faint: {moves} move together and change the residuals {1.0 / self.sharpness:,.0f} "
-            f"times less than the clearest direction{advice}"
-        )
+        if self.weak:
+            return f"{begin}, as {moves} move together all but unseen{end}"
+        change = "together change" if len(self.changes) > 1 else "changes"
+        return f"{moves} {change} nothing{end}"
 
 
-class Space(NamedTuple):
-    """Derivatives with columns of length 1, of those unknowns that change anything."""
-
-    scaled: Array
-    """(m, k)"""
-    lengths: Array
-    """(k,) lengths of the columns before."""
-    places: NDArray[np.intp]
-    """(k,) numbers of these unknowns."""
-
-    def without(self, numbers: Sequence[int]) -> Space:
-        """The same without some unknowns."""
-        kept = ~np.isin(self.places, numbers)
-        return Space(self.scaled[:, kept], self.lengths[kept], self.places[kept])
-
-    def along(self, tangent: Array) -> Array:
-        """(k,) unit vector of a tangent (K,) in scaled coordinates; 0 if it moves nothing here."""
-        scaled = tangent[self.places] * self.lengths
-        length = float(np.linalg.norm(scaled))
-        return scaled / length if length > 0.0 else scaled
-
-
-def null_directions(
-    space: Space,
-    variables: Unknowns,
-    gauges: Sequence[Gauge],
-    fixed: Known,
-    tolerance: float,
-) -> list[Direction]:
-    """Directions that change nothing, known gauges first, each with the unknown to hold.
-
-    Parameters
-    ----------
-    space : Space
-        Derivatives.
-    variables : Unknowns
-        All unknowns.
-    gauges : sequence of Gauge
-        Those to recognise.
-    fixed : mapping of str to float
-        Values of parameters that are no unknowns, by symbol.
-    tolerance : float
-        Singular values below this part of the largest count as zero.
-    """
-    sizes, rows = _singular(space)
-    null = rows[np.count_nonzero(sizes > tolerance * sizes[0]) :].T
-    found, held = [], list[int]()
-    for gauge in gauges:
-        vector = space.along(gauge.tangent(variables, fixed))
-        # as long as its part in the null space: it changes nothing
-        if np.linalg.norm(null.T @ vector) < 1.0 - 1e-6:
-            continue
-        place = _place_to_hold(gauge, vector, null, held, space, variables)
-        if place is not None:
-            held.append(place)
-            found.append(_direction(vector, 0.0, gauge, place, space, variables))
-    # what is left when those are held, with one unknown of its own for each direction
-    left = null if not held else null @ null_space(null[held])
-    if left.shape[1]:
-        order = qr(left.T, mode="r", pivoting=True)[1][: left.shape[1]]
-        for column, place in zip((left @ np.linalg.inv(left[order])).T, order, strict=True):
-            found.append(_direction(column, 0.0, None, int(place), space, variables))
-    return found
-
-
-def faint_directions(
-    space: Space,
-    variables: Unknowns,
-    gauges: Sequence[Gauge],
-    fixed: Known,
-    faint: float,
-) -> list[Direction]:
-    """Directions that change hardly anything, each with those before it held, the faintest first.
-
-    Parameters
-    ----------
-    space : Space
-        Derivatives without null directions.
-    variables, gauges, fixed :
-        As of `null_directions`.
-    faint : float
-        Singular values below this part of the largest are faint.
-    """
-    found: list[Direction] = []
-    while space.places.size:
-        sizes, rows = _singular(space)
-        if sizes[-1] > faint * sizes[0]:
-            break
-        direction, place = _faintest(space, sizes, rows[-1], variables, gauges, fixed, faint)
-        found.append(direction)
-        space = space.without([int(space.places[place])])
-    return found
-
-
-def _faintest(
-    space: Space,
-    sizes: Array,
-    row: Array,
-    variables: Unknowns,
-    gauges: Sequence[Gauge],
-    fixed: Known,
-    faint: float,
-) -> tuple[Direction, int]:
-    """The faintest direction, by a gauge's name if it is nearly one, and which unknown to hold."""
-    for gauge in gauges:
-        vector = space.along(gauge.tangent(variables, fixed))
-        sharpness = float(np.linalg.norm(space.scaled @ vector)) / sizes[0]
-        if np.count_nonzero(vector) > 1 and sharpness <= faint:
-            place = _place_to_hold(gauge, vector, vector[:, None], [], space, variables)
-            if place is not None:
-                return _direction(vector, sharpness, gauge, place, space, variables), place
-    # of those whose holding removes the direction the one that moves most: it costs least
-    part = np.abs(row)
-    place = int(np.argmax(np.where(part >= 0.5 * part.max(), part / space.lengths, 0.0)))
-    return _direction(row, float(sizes[-1] / sizes[0]), None, place, space, variables), place
-
-
-def _singular(space: Space) -> tuple[Array, Array]:
-    _, sizes, rows = np.linalg.svd(space.scaled, full_matrices=True)
-    return sizes, rows
-
-
-def _place_to_hold(
-    gauge: Gauge,
-    vector: Array,
-    null: Array,
-    held: Sequence[int],
-    space: Space,
-    variables: Unknowns,
-) -> int | None:
-    """The unknown that removes a gauge beside those held already; None if none does."""
-    symbols = [symbol_of(variables.names[k]) for k in space.places]
-    wanted = [k for symbol in gauge.hold for k, each in enumerate(symbols) if each == symbol]
-    for place in (*wanted, *np.argsort(-np.abs(vector))):
-        if abs(vector[place]) < 1e-3 or place in held:
-            continue
-        singular = np.linalg.svd(null[[*held, int(place)]], compute_uv=False)
-        if singular.size == len(held) + 1 and singular[-1] > 1e-6:
-            return int(place)
-    return None
-
-
-def _direction(
-    vector: Array,
-    sharpness: float,
-    gauge: Gauge | None,
-    place: int,
-    space: Space,
-    variables: Unknowns,
-) -> Direction:
-    # a short column needs a large change for the same effect: judged by effect, not by size
-    spoken = np.abs(vector) >= MENTIONED * np.abs(vector).max()
-    relative = np.where(spoken, vector / space.lengths, 0.0)
-    # written with the largest change as +1 %
-    relative = relative / relative[np.argmax(np.abs(relative))]
-    names = [variables.names[k] for k in space.places]
-    order = [k for k in np.argsort(-np.abs(vector), kind="stable") if spoken[k]]
-    changes = {names[k]: float(relative[k]) for k in order}
-    return Direction(changes, sharpness, gauge, names[place])
+def listed(words: Sequence[str]) -> str:
+    """``a, b and c``; empty for none."""
+    return " and ".join([*([", ".join(words[:-1])] if words[:-1] else []), *words[-1:]])
 
 
 def _in_order(name: str) -> tuple[str | int, ...]:
     """Z4 before Z16."""
     return tuple(int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name))
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-FAINT = 1e-3
-"""Singular values below this part of the largest are reported as hardly determined."""
-
-CORRELATED = 0.95
-"""Correlations from here on are listed."""
-
-
-class Pair(NamedTuple):
-    """Two unknowns whose estimates move together."""
-
-    first: str
-    second: str
-    correlation: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -398,21 +221,14 @@ class Identifiability:
     variables: Unknowns
     sensitivity: Array
     """(K,) length of the change of all weighted residuals for 1 % of each unknown."""
-    singular_values: Array
-    """(k,) of the derivatives with columns scaled to length 1, largest first, of those unknowns
-    that are free and change anything."""
-    tolerance: float
-    """Part of the largest below which a singular value counts as zero."""
     rank: int
     """How many combinations of the unknowns are determined."""
     unexcited: tuple[str, ...]
     """Unknowns that change nothing by themselves: no test exercises them."""
     null: tuple[Direction, ...]
     """Directions that change nothing."""
-    faint: tuple[Direction, ...]
-    """Directions that change hardly anything, when those to hold are held."""
-    correlated: tuple[Pair, ...]
-    """Pairs of estimates with a correlation beyond 0.95 when those to hold are held."""
+    weak: tuple[Direction, ...]
+    """Directions along which intervals are wider than ±10 %, those before it fixed."""
 
     @property
     def complete(self) -> bool:
@@ -420,9 +236,9 @@ class Identifiability:
         return not self.unexcited and not self.null
 
     @property
-    def to_hold(self) -> tuple[str, ...]:
-        """Unknowns to hold so that all others are determined; nothing is lost by it."""
-        return (*self.unexcited, *(each.hold for each in self.null))
+    def to_fix(self) -> tuple[str, ...]:
+        """Unknowns to fix so that all others are determined; nothing is lost by it."""
+        return (*self.unexcited, *(each.fix for each in self.null))
 
     @property
     def at_bounds(self) -> dict[str, str]:
@@ -436,45 +252,29 @@ class Identifiability:
     def sentences(self) -> tuple[str, ...]:
         """The verdict in words, one sentence each."""
         free = int(np.count_nonzero(self.variables.free))
-        said = [self._summary(free)]
+        noun = "combination" if self.rank == 1 else "combinations"
+        said = [
+            "All unknowns stand at a bound: there is nothing left to determine."
+            if not free
+            else "The tests determine none of the unknowns."
+            if not self.rank
+            else f"The tests determine {self.rank} {noun} of {free} free unknowns."
+            if self.rank < free
+            else f"The tests determine all {free} free unknowns."
+        ]
         if self.unexcited:
             said.append(
-                f"No test exercises {', '.join(self.unexcited)}: hold "
+                f"No test exercises {', '.join(self.unexcited)}: fix "
                 f"{'them' if len(self.unexcited) > 1 else 'it'}, or add a test that does."
             )
-        said += [each.sentence for each in (*self.null, *self.faint)]
-        said += [
-            f"{name} = {self.variables.estimates[self.variables.index(name)]:.4g} stands at its "
-            f"{side} bound: no interval is given for it; those of the others let it move."
-            for name, side in self.at_bounds.items()
-        ]
-        if self.correlated:
-            named = [
-                f"{pair.first} and {pair.second} {pair.correlation:+.3f}"
-                for pair in self.correlated[:NAMED]
-            ]
-            more = len(self.correlated) - len(named)
-            said.append(
-                f"Strongly correlated estimates: {', '.join(named)}"
-                f"{f', and {more} more pairs' if more else ''}."
-            )
-        return tuple(said)
-
-    def _summary(self, free: int) -> str:
-        if not free:
-            return "All unknowns stand at a bound: there is nothing left to determine."
-        if not self.rank:
-            return "The tests determine none of the unknowns."
-        smallest = self.singular_values[self.rank - 1] / self.singular_values[0]
-        noun = "combination" if self.rank == 1 else "combinations"
-        what = (
-            f"{self.rank} {noun} of {free} free unknowns"
-            if self.rank < free
-            else f"all {free} free unknowns"
-        )
+        said += [each.sentence for each in (*self.null, *self.weak)]
         return (
-            f"The tests determine {what}; the faintest direction has {smallest:.1e} of the "
-            f"effect of the clearest, and below {self.tolerance:.0e} counts as none."
+            *said,
+            *(
+                f"{name} = {self.variables.estimates[self.variables.index(name)]:.4g} stands at "
+                f"its {side} bound: no interval is given for it; those of the others let it move."
+                for name, side in self.at_bounds.items()
+            ),
         )
 
 
@@ -494,16 +294,17 @@ def identifiability(
     derivatives : (m, K) array
         Derivatives of all weighted residuals by the solver's vector, or their triangular factor.
     variables : Unknowns
-        The unknowns; those at a bound count as held.
+        The unknowns; those at a bound count as fixed.
     covariance : (K, K) array, optional
-        Of the solver's vector, for the correlations; by default that of white noise.
+        Of the solver's vector, by which directions are weak; by default that of residuals that are
+        independent and of variance 1.
     tolerance : float
         Singular values below this part of the largest count as zero: 1e-10 for exact derivatives,
         1e-6 for central differences.
     fixed : mapping of str to float, optional
         Values of parameters that are no unknowns, by symbol; some gauges need them.
     gauges : sequence of Gauge
-        Null directions that have a name.
+        Directions that have a name.
 
     Raises
     ------
@@ -524,54 +325,128 @@ def identifiability(
     lengths = np.linalg.norm(triangle, axis=0)
     # a column of mere rounding is none
     moving = variables.free & (lengths > 1e-14 * lengths.max(initial=0.0))
-    places = np.flatnonzero(moving)
-    unexcited = tuple(
-        name
-        for name, free, moves in zip(variables.names, variables.free, moving, strict=True)
-        if free and not moves
-    )
-    space = Space(triangle[:, places] / lengths[places], lengths[places], places)
-    sizes: Array = np.zeros(0)
-    null, faint = list[Direction](), list[Direction]()
-    kept = space
-    if places.size:
-        sizes = np.asarray(np.linalg.svd(space.scaled, compute_uv=False), dtype=np.float64)
-        null = null_directions(space, variables, gauges, fixed or {}, tolerance)
-        kept = space.without([variables.names.index(each.hold) for each in null])
-        faint = faint_directions(kept, variables, gauges, fixed or {}, FAINT)
-        kept = kept.without([variables.names.index(each.hold) for each in faint])
+    unexcited = variables.free & ~moving
+    tangents = {each.name: each.tangent(variables, fixed) for each in gauges}
+    space = _Space(triangle, lengths, np.flatnonzero(moving), variables, gauges, tangents)
+    null, rank = space.null(tolerance)
+    left = space.without([variables.names.index(each.fix) for each in null])
     return Identifiability(
         variables,
         0.01 * lengths,
-        sizes,
-        tolerance,
-        int(np.count_nonzero(sizes > tolerance * sizes[0])) if sizes.size else 0,
-        unexcited,
+        rank,
+        tuple(name for name, none in zip(variables.names, unexcited, strict=True) if none),
         tuple(null),
-        tuple(faint),
-        correlated_pairs(kept, variables, covariance, tolerance),
+        tuple(left.weak(covariance)),
     )
 
 
-def correlated_pairs(
-    space: Space, variables: Unknowns, covariance: Array | None, tolerance: float
-) -> tuple[Pair, ...]:
-    """Pairs of unknowns in `space` with a correlation beyond 0.95, the strongest first."""
-    if covariance is None:
-        free = np.ones(space.places.size, dtype=np.bool_)
-        inverse, _ = whitening(space.scaled, free, tolerance)
-        part = inverse @ inverse.T
-    else:
-        part = covariance[np.ix_(space.places, space.places)]
-    errors = np.sqrt(np.maximum(np.diag(part), 0.0))
-    scaled = part / np.outer(
-        np.where(errors > 0.0, errors, 1.0), np.where(errors > 0.0, errors, 1.0)
-    )
-    names = [variables.names[k] for k in space.places]
-    pairs = [
-        Pair(names[i], names[k], float(scaled[i, k]))
-        for i in range(len(names))
-        for k in range(i + 1, len(names))
-        if abs(scaled[i, k]) >= CORRELATED
-    ]
-    return tuple(sorted(pairs, key=lambda pair: -abs(pair.correlation)))
+@dataclass(frozen=True, eq=False)
+class _Space:
+    """The unknowns that change anything."""
+
+    triangle: Array
+    """(m, K)"""
+    lengths: Array
+    """(K,) of the columns."""
+    places: NDArray[np.intp]
+    """(k,) numbers of these unknowns."""
+    variables: Unknowns
+    gauges: Sequence[Gauge]
+    tangents: Mapping[str, Array]
+    """(K,) of each gauge."""
+
+    def without(self, numbers: Sequence[int]) -> _Space:
+        """The same without some unknowns."""
+        return replace(self, places=self.places[~np.isin(self.places, numbers)])
+
+    def null(self, tolerance: float) -> tuple[list[Direction], int]:
+        """Directions that change nothing, known gauges first, and the rank of the others."""
+        if not self.places.size:
+            return [], 0
+        lengths = self.lengths[self.places]
+        _, sizes, rows = np.linalg.svd(self.triangle[:, self.places] / lengths, full_matrices=True)
+        rank = int(np.count_nonzero(sizes > tolerance * sizes[0]))
+        null, found, fixed = rows[rank:].T, list[Direction](), list[int]()
+        for gauge in self.gauges:
+            vector = self.tangents[gauge.name][self.places] * lengths
+            vector /= np.linalg.norm(vector) or 1.0
+            # as long as its part in the null space: it changes nothing
+            if np.linalg.norm(null.T @ vector) < 1.0 - 1e-6:
+                continue
+            place = self._place_to_fix(gauge, vector, null, fixed)
+            if place is not None:
+                fixed.append(place)
+                found.append(self._direction(vector / lengths, inf, gauge, place))
+        # what is left when those are fixed, with one unknown of its own for each direction
+        left = null if not fixed else null @ null_space(null[fixed])
+        if left.shape[1]:
+            order = qr(left.T, mode="r", pivoting=True)[1][: left.shape[1]]
+            for column, place in zip((left @ np.linalg.inv(left[order])).T, order, strict=True):
+                found.append(self._direction(column / lengths, inf, None, int(place)))
+        return found, rank
+
+    def weak(self, covariance: Array | None) -> list[Direction]:
+        """Directions along which an unknown's interval is wide, the widest first.
+
+        How the others follow an unknown is its column of the covariance, over its variance. Each
+        found is fixed, so that the next ones are what is left without it.
+        """
+        if covariance is None:
+            every = np.ones(self.places.size, dtype=np.bool_)
+            inverse, _ = whitening(self.triangle[:, self.places], every, TOLERANCE)
+            left = inverse @ inverse.T
+        else:
+            left = covariance[np.ix_(self.places, self.places)]
+        found, space = list[Direction](), self
+        machine = np.array([each.run is None for each in self.variables])
+        while space.places.size:
+            variances = np.where(machine[space.places], np.diag(left), 0.0)
+            place = int(np.argmax(variances))
+            half = HALF * sqrt(max(variances[place], 0.0))
+            if half <= WIDE:
+                break
+            gauge, vector = space._gauge(left, place)
+            found.append(space._direction(vector, half, gauge, place))
+            rest = np.arange(space.places.size) != place
+            left = (left - np.outer(left[place], left[place]) / left[place, place])[rest][:, rest]
+            space = space.without([int(space.places[place])])
+        return found
+
+    def _gauge(self, covariance: Array, place: int) -> tuple[Gauge | None, Array]:
+        """A gauge along which an unknown is weak, if there is one, and how all others follow it."""
+        for gauge in self.gauges:
+            tangent = self.tangents[gauge.name][self.places]
+            if np.count_nonzero(tangent) < 2 or tangent[place] == 0.0:
+                continue
+            vector = tangent / tangent[place]
+            told = vector @ np.linalg.lstsq(covariance, vector, rcond=1e-14)[0]
+            if WIDE * sqrt(max(told, 0.0)) < HALF:
+                return gauge, vector
+        return None, covariance[place] / covariance[place, place]
+
+    def _place_to_fix(
+        self, gauge: Gauge, vector: Array, null: Array, fixed: Sequence[int]
+    ) -> int | None:
+        """The unknown that removes a gauge beside those fixed already; None if none does."""
+        symbols = [symbol_of(self.variables.names[k]) for k in self.places]
+        wanted = [k for symbol in gauge.fix for k, each in enumerate(symbols) if each == symbol]
+        for place in (*wanted, *np.argsort(-np.abs(vector))):
+            if abs(vector[place]) < 1e-3 or place in fixed:
+                continue
+            singular = np.linalg.svd(null[[*fixed, int(place)]], compute_uv=False)
+            if singular.size == len(fixed) + 1 and singular[-1] > 1e-6:
+                return int(place)
+        return None
+
+    def _direction(
+        self, moved: Array, half_width: float, gauge: Gauge | None, place: int
+    ) -> Direction:
+        """From changes (k,) of the solver's numbers."""
+        # a short column needs a large change for the same effect: judged by effect, not by size
+        effect = np.abs(moved) * self.lengths[self.places]
+        least = MENTIONED * effect.max()
+        order = [k for k in np.argsort(-effect, kind="stable") if effect[k] >= least]
+        largest = max((float(moved[k]) for k in order), key=abs)
+        names = [self.variables.names[k] for k in self.places]
+        changes = {names[k]: float(moved[k]) / largest for k in order}
+        return Direction(changes, half_width, gauge, names[place])

@@ -263,6 +263,11 @@ def clipped_channels(experiments: Sequence[Experiment]) -> tuple[str, ...]:
                 continue
             moved = max((_moved_at(end, each, name) for each in runs), default=0.0)
             if moved > 0.1 * reach:
+                # a rounded reading stands still by itself for as long as a step of it lasts
+                shares = np.concatenate([each[name].values for each in runs]) / (high - low)
+                coarse = float(np.diff(np.unique(np.round(shares, 9))).min())
+                if moved <= (0.1 + 2.0 * coarse) * reach:
+                    continue
                 unit = runs[0][name].unit
                 said.append(
                     f"'{name}' stands at exactly {end:.6g} {unit} while the input moves by "
@@ -273,13 +278,18 @@ def clipped_channels(experiments: Sequence[Experiment]) -> tuple[str, ...]:
 
 
 def _moved_at(end: float, experiment: Experiment, name: str) -> float:
-    """By how much the input moves in the longest stretch in which a channel stands at an end."""
+    """By how much the input moves in any stretch in which a channel stands at an end.
+
+    In its first three quarters: a rounded reading that lags stays where it is when the input has
+    left already.
+    """
     channel = experiment[name]
     edges = np.flatnonzero(np.diff(np.concatenate([[0], channel.values == end, [0]])))
     most = 0.0
     for first, after in zip(edges[::2], edges[1::2], strict=True):
         if channel.time[after - 1] - channel.time[first] >= DWELLS:
-            most = max(most, float(np.ptp(experiment.input.at(channel.time[first:after]))))
+            stretch = channel.time[first : after - (after - first) // 4]
+            most = max(most, float(np.ptp(experiment.input.at(stretch))))
     return most
 
 

@@ -80,29 +80,6 @@ class Differentiable(Protocol):
         ...
 
 
-@runtime_checkable
-class Reducing(Protocol):
-    """A model that gives the triangular factor of [J r] without ever holding J."""
-
-    def reduce(
-        self,
-        values: Mapping[str, float],
-        experiment: Experiment,
-        names: Sequence[str],
-        weights: Mapping[str, Array],
-    ) -> Array:
-        """Triangular factor by some of the unknowns: (k+1, k+1) array R of [J r].
-
-        Parameters
-        ----------
-        values, experiment, names :
-            As in `Differentiable.linearise`.
-        weights : mapping of str to (m,) array
-            Channels that count, and the factors on their residuals.
-        """
-        ...
-
-
 RELATIVE_STEP = 1e-6
 """Step of the central differences, in units of each number's size."""
 
@@ -128,16 +105,7 @@ def linearised(
     """
     if isinstance(model, Differentiable):
         made = model.linearise(values, experiment, names)
-        _check_mapping(made, experiment, "linearise", "a Linearised")
-        for channel, part in made.items():
-            shape = (*experiment[channel].time.shape, len(names))
-            if not isinstance(part, Linearised):
-                raise InputError(
-                    f"{experiment.name}: linearise must return a Linearised for {channel}, not "
-                    f"{_said(part)}."
-                )
-            _check_array(part.values, experiment, channel, shape[:1], "linearise")
-            _check_array(part.by, experiment, channel, shape, "linearise")
+        _check(made, experiment, "linearise", "a Linearised", (len(names),))
         return made
     middle = simulated(model, values, experiment)
     columns: dict[str, list[Array]] = {channel: [] for channel in middle}
@@ -169,50 +137,52 @@ def simulated(
         If what it returns is no array of real numbers for each channel, one a sample.
     """
     outputs = model.simulate(values, experiment)
-    _check_mapping(outputs, experiment, "simulate", "an array of floats")
+    _check(outputs, experiment, "simulate", "an array of floats")
     for name, output in outputs.items():
-        channel = experiment[name]
-        _check_array(output, experiment, name, channel.time.shape, "simulate")
         if not np.isfinite(output).all():
             row = int(np.argmax(~np.isfinite(output)))
             raise DomainError(
                 f"{experiment.name}: the model gives {output[row]} for {name} at "
-                f"{channel.time[row]:g} s."
+                f"{experiment[name].time[row]:g} s."
             )
     return outputs
 
 
-def _check_mapping(made: object, experiment: Experiment, method: str, each: str) -> None:
-    if not isinstance(made, Mapping):
-        raise InputError(
-            f"{experiment.name}: {method} must return a mapping of channel names to {each}, such "
-            f"as {{'{next(iter(experiment.channels), 'speed')}': ...}}, not {_said(made)}."
-        )
-
-
-def _check_array(
-    made: object, experiment: Experiment, name: str, shape: tuple[int, ...], method: str
+def _check(
+    made: object,
+    experiment: Experiment,
+    method: str,
+    each: str,
+    names: tuple[int, ...] | None = None,
 ) -> None:
-    if not isinstance(made, np.ndarray) or made.dtype.kind not in "fiu":
-        raise InputError(
-            f"{experiment.name}: {method} must return a NumPy array of real numbers for {name}, "
-            f"not {_said(made)}."
-        )
-    if made.shape != shape:
-        columns = "" if len(shape) == 1 else ", and a column for each name asked for"
-        raise InputError(
-            f"{experiment.name}: {method} returns an array of shape {made.shape} for {name}, but "
-            f"must return {shape}: a row for each of the channel's own time stamps{columns}."
-        )
+    """Refuse what a model must not return; with `names`, of a Linearised by so many."""
 
+    def refused(must: str, other: object) -> InputError:
+        said = f"a {type(other).__name__}"
+        if other is None:
+            said = "None (is a return missing?)"
+        elif isinstance(other, np.ndarray):
+            said = f"an array of {other.dtype.name}"
+        return InputError(f"{experiment.name}: {method} must return {must}, not {said}.")
 
-def _said(made: object) -> str:
-    """What something is, in words."""
-    if made is None:
-        return "None (is a return missing?)"
-    if isinstance(made, np.ndarray):
-        return f"an array of {made.dtype.name}"
-    return f"a {type(made).__name__}"
+    if not isinstance(made, Mapping):
+        first = next(iter(experiment.channels), "speed")
+        raise refused(f"a mapping of channel names to {each}, such as {{'{first}': ...}}", made)
+    for name, part in made.items():
+        if names is not None and not isinstance(part, Linearised):
+            raise refused(f"a Linearised for {name}", part)
+        size = experiment[name].time.shape
+        arrays = [(part, size)] if names is None else [(part.values, size), (part.by, size + names)]
+        for array, shape in arrays:
+            if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiu":
+                raise refused(f"a NumPy array of real numbers for {name}", array)
+            if array.shape != shape:
+                columns = "" if len(shape) == 1 else ", and a column for each name asked for"
+                raise InputError(
+                    f"{experiment.name}: {method} returns an array of shape {array.shape} for "
+                    f"{name}, but must return {shape}: a row for each of the channel's own time "
+                    f"stamps{columns}."
+                )
 
 
 OFFSET, CLOCK = "offset ", "clock "
@@ -255,10 +225,7 @@ class EquationModel(ABC):
     ) -> Ready:
         """The model with numbers, and columns as the engine names them.
 
-        Parameters
-        ----------
-        shifts : (sequence, sequence)
-            Offsets and clock offsets of the observations.
+        `shifts` are offsets and clock offsets of the observations.
         """
 
     def moves(self, name: str) -> Mapping[str, float]:
@@ -295,7 +262,10 @@ class EquationModel(ABC):
         names: Sequence[str],
         weights: Mapping[str, Array],
     ) -> Array:
-        """Triangular factor of weighted residuals and derivatives; see `model.Reducing`."""
+        """Triangular factor (k+1, k+1) of [J r] by some of the unknowns, without ever holding J.
+
+        `weights` are the channels that count, and the factors (m,) on their residuals.
+        """
         known = self.signals_of(experiment)
         channels = [name for name in weights if name in known]
         observed = self._record(experiment, {name: weights[name] for name in channels}, names)
@@ -359,7 +329,7 @@ class EquationModel(ABC):
                     unknown=tuple(unknown),
                 )
             )
-            by, record, others = self.driven(experiment)
+        by, record, others = self.driven(experiment)
         return ObservedRecord(record, observations, by, experiment.begins, others)
 
 

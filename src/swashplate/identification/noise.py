@@ -326,7 +326,9 @@ FEWEST_BANDS = 20.0
 """Bands up to half the sampling rate, where that is low."""
 
 
-def spectral_covariance(fit: LinearisedFit) -> Covariance:
+def spectral_covariance(
+    fit: LinearisedFit, spectra: Sequence[_Spectrum] | None = None
+) -> Covariance:
     """Covariance of the least-squares estimate under coloured noise, from its smoothed spectrum.
 
     Parameters
@@ -349,9 +351,10 @@ def spectral_covariance(fit: LinearisedFit) -> Covariance:
     of squares are divided by sums of 1 - h, as in HC2 of MacKinnon and White (1985). Degrees of
     freedom follow from the frequencies that an unknown's variance is an average over.
     """
+    spectra = spectra or spectra_of(fit)
     sums = _Sums(fit)
     for channel in dict.fromkeys(run.channel for run in fit.runs):
-        parts = [_Spectrum(run, fit.whitening) for run in fit.runs if run.channel == channel]
+        parts = [s for s, run in zip(spectra, fit.runs, strict=True) if run.channel == channel]
         frequencies = np.concatenate([part.frequencies for part in parts])
         order = np.argsort(frequencies, kind="stable")
         level = np.concatenate([np.full(part.frequencies.size, part.level) for part in parts])
@@ -402,16 +405,19 @@ class _Spectrum:
 
     def __init__(self, run: LinearisedRun, whitening: Array) -> None:
         grid = grid_of(run.time)
-        scale = 1.0 / np.sqrt(grid.size)
+        self.step, scale = grid.step, 1.0 / np.sqrt(grid.size)
         directions, residual = run.jacobian @ whitening, unweighted(run)
-        weight = 1.0 if run.weight is None else run.weight[:, None]
+        weight = np.ones((1, 1)) if run.weight is None else run.weight[:, None]
         self.derivatives = scale * rfft(grid.spread(weight * directions), axis=0)
         """(F, rank) by which the noise enters the scores: with the weights twice."""
         self.frequencies: Array = rfftfreq(grid.size, grid.step)
         self.residual = scale * rfft(grid.spread(residual))
         """(F,) without the weights."""
         self.power: Array = np.abs(self.residual) ** 2
-        by_estimate = scale * rfft(grid.spread(directions / weight), axis=0)
+        if weight.min() == weight.max():
+            by_estimate = self.derivatives / weight[:1] ** 2
+        else:
+            by_estimate = scale * rfft(grid.spread(directions / weight), axis=0)
         self.leverage: Array = np.clip(
             np.sum((self.derivatives.conj() * by_estimate).real, axis=1), 0.0, 1.0
         )
@@ -422,6 +428,11 @@ class _Spectrum:
         if grid.size % 2 == 0:
             self.twice[-1] = 1.0
         self.level = float(np.mean(residual**2))
+
+
+def spectra_of(fit: LinearisedFit) -> list[_Spectrum]:
+    """The spectra of each run, from which both sandwiches are made."""
+    return [_Spectrum(run, fit.whitening) for run in fit.runs]
 
 
 def _ends(parts: Sequence[_Spectrum]) -> list[int]:
@@ -439,7 +450,9 @@ def _smoothed(values: Array) -> Array:
     return made
 
 
-def band_score_covariance(fit: LinearisedFit) -> Covariance:
+def band_score_covariance(
+    fit: LinearisedFit, spectra: Sequence[_Spectrum] | None = None
+) -> Covariance:
     """Covariance of the least-squares estimate under noise that may differ along the runs.
 
     Parameters
@@ -461,10 +474,9 @@ def band_score_covariance(fit: LinearisedFit) -> Covariance:
     each band and run.
     """
     sums = _Sums(fit)
-    for run in fit.runs:
-        grid, part = grid_of(run.time), _Spectrum(run, fit.whitening)
+    for part in spectra or spectra_of(fit):
         products = part.derivatives.conj() * (part.twice * part.residual)[:, None]
-        width = min(BAND, 0.5 / grid.step / FEWEST_BANDS)
+        width = min(BAND, 0.5 / part.step / FEWEST_BANDS)
         band = (part.frequencies / width).astype(np.intp)
         scores = np.add.reduceat(products, np.flatnonzero(np.diff(band, prepend=-1)), axis=0)
         sums.middle += 0.5 * (scores.conj().T @ scores).real
@@ -489,7 +501,8 @@ def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
     InputError
         If there are no more samples than unknowns.
     """
-    first, second = spectral_covariance(fit), band_score_covariance(fit)
+    spectra = spectra_of(fit)
+    first, second = spectral_covariance(fit, spectra), band_score_covariance(fit, spectra)
     known = first.determined & (first.standard_errors > 0.0)
     ratio = np.divide(
         second.standard_errors, first.standard_errors, out=np.ones(known.size), where=known

@@ -15,10 +15,10 @@ from swashplate.equations import Model as OfEquations
 from swashplate.errors import InputError
 from swashplate.identification.model import (
     OFFSET,
+    EquationModel,
     Linearised,
     Model,
     OwnModel,
-    Reducing,
     linearised,
     simulated,
 )
@@ -97,7 +97,7 @@ class Problem:
 
     def evaluate(self, vector: Array, *, compressed: bool = True) -> Evaluation:
         """Residuals and Jacobian by the vector, see `solving.Objective`."""
-        if compressed and self.compare is None and isinstance(self.model, Reducing):
+        if compressed and self.compare is None and isinstance(self.model, EquationModel):
             parts = self._each(lambda k: self._reduced(vector, k))
         else:
             parts = self._each(lambda k: self._full(vector, k))
@@ -168,7 +168,7 @@ class Problem:
     def _reduced(self, vector: Array, number: int) -> Evaluation:
         experiment = self.experiments[number]
         names = self._names(number)
-        assert isinstance(self.model, Reducing)
+        assert isinstance(self.model, EquationModel)
         triangle = self.model.reduce(
             self._values(vector, number), experiment, names, self.weights[number]
         )

@@ -2,58 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import DomainError, InputError
+from swashplate.executors import Executor, Serial
 from swashplate.identification.linearised import LinearisedFit
 from swashplate.identification.problem import Problem
 from swashplate.identification.solving import Evaluation, solve
 from swashplate.identification.unknowns import Vector
 
+if TYPE_CHECKING:
+    from swashplate.identification.assessment import Assessment
+
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """The other unknowns of a problem, for `solving.solve`."""
+class _Beside:
+    """A problem with one of its unknowns fixed, as `solving.Objective` has it."""
 
     problem: Problem
     index: int
-    """Of the unknown that is held."""
     number: float
-    """Where, in the solver's vector."""
+    """Of the fixed unknown, in the solver's vector."""
     start: Array
-    """(K - 1,) where the others begin."""
+    """(K - 1,)"""
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """(K - 1,) bounds of the others."""
         low, high = self.problem.bounds
         return np.delete(low, self.index), np.delete(high, self.index)
 
     def evaluate(self, vector: Array, *, compressed: bool = True) -> Evaluation:
-        """As of the problem, without the held unknown's column."""
         whole = self.problem.evaluate(self.whole(vector), compressed=compressed)
         return Evaluation(whole.residuals, np.delete(whole.jacobian, self.index, axis=1))
 
     def cost(self, vector: Array) -> float:
-        """As of the problem."""
         return self.problem.cost(self.whole(vector))
 
     def whole(self, vector: Array) -> Array:
-        """(K,) vector with the held unknown put in."""
         return np.insert(vector, self.index, self.number)
 
 
 def minimiser(
     problem: Problem, *, tolerance: float = 1e-8, max_evaluations: int = 60
 ) -> Callable[[int, float, Array], tuple[float, Array]]:
-    """What `profiles.profile` asks for: the least cost with one unknown held."""
+    """What `profile` asks for: the least cost with one unknown fixed."""
 
     def minimise(index: int, number: float, start: Array) -> tuple[float, Array]:
         low, high = problem.bounds
@@ -61,16 +60,16 @@ def minimiser(
         if not others.size:
             vector = np.array([number])
             return problem.cost(vector), vector
-        held = Held(problem, index, number, others)
-        found = solve(held, others, tolerance=tolerance, max_evaluations=max_evaluations)
-        return found.cost, held.whole(found.vector)
+        beside = _Beside(problem, index, number, others)
+        found = solve(beside, tolerance=tolerance, max_evaluations=max_evaluations)
+        return found.cost, beside.whole(found.vector)
 
     return minimise
 
 
 Minimise = Callable[[int, float, Array], tuple[float, Array]]
-"""Number of the unknown held, its number in the vector, and a (K,) start to the least cost of all
-vectors that have it there, and the vector; cost is half the sum of squares."""
+"""Number of the unknown that is fixed, its number in the vector, and a (K,) start to the least cost
+of all vectors that have it there, and the vector; cost is half the sum of squares."""
 
 Ending = Literal["crossed", "bound", "open", "domain", "better optimum"]
 """How a side ended: beyond the threshold, at the bound below it, below it as far as was looked,
@@ -102,37 +101,36 @@ class Point(NamedTuple):
     vector: Vector
 
 
+@dataclass(eq=False)
 class ProfileSide:
     """One side of a profile, outwards."""
 
-    def __init__(
-        self,
-        minimise: Minimise,
-        optimum: Point,
-        index: int,
-        rise: float,
-        direction: float,
-        step: float,
-        bound: float,
-        most: int,
-    ) -> None:
-        self._minimise, self._optimum, self._index = minimise, optimum, index
-        self._rise, self._direction, self._step, self._most = rise, direction, step, most
-        self._room = abs(bound - optimum.number)
-        self.points: list[Point] = []
-        self.end: float | None = None
-        self.better: Point | None = None
+    minimise: Minimise
+    optimum: Point
+    index: int
+    rise: float
+    """Of the cost, at which the side ends."""
+    direction: float
+    """1 upwards, -1 downwards."""
+    step: float
+    """Of about one standard error."""
+    bound: float
+    most: int
+    """Largest number of points."""
+    points: list[Point] = field(default_factory=list)
+    end: float | None = None
+    better: Point | None = None
 
     def march(self) -> Ending:
         """Outwards until the cost has risen enough, or something else ends the side."""
         # roots of the rise over the threshold's, by distance: nearly a straight line
         path = [(0.0, 0.0)]
-        stride, halvings = STRIDE * self._step, 0
-        while len(self.points) < self._most:
-            distance = min(path[-1][0] + stride, self._room)
+        stride, halvings = STRIDE * self.step, 0
+        while len(self.points) < self.most:
+            distance = min(path[-1][0] + stride, abs(self.bound - self.optimum.number))
             if distance <= path[-1][0]:
                 return "bound"
-            if distance > FURTHEST * self._step:
+            if distance > FURTHEST * self.step:
                 return "open"
             point = self._at(distance)
             if point is None:
@@ -167,7 +165,8 @@ class ProfileSide:
                 break
             if self._improves(point):
                 return "better optimum"
-            self._insert(point)
+            self.points.append(point)
+            self.points.sort(key=lambda each: abs(each.number - self.optimum.number))
             value = self._height(point) - 1.0
             if abs(value) <= CLOSE:
                 break
@@ -176,45 +175,29 @@ class ProfileSide:
             else:
                 low *= 0.5
             far, high = distance, value
-        self.end = self._optimum.number + self._direction * distance
+        self.end = self.optimum.number + self.direction * distance
         return "crossed"
 
     def _at(self, distance: float) -> Point | None:
         """The least cost at a distance from the optimum; None outside the model's domain."""
-        number = self._optimum.number + self._direction * distance
-        start = self._nearest(number).vector.copy()
-        start[self._index] = number
+        number = self.optimum.number + self.direction * distance
+        known = (self.optimum, *self.points)
+        start = min(known, key=lambda point: abs(point.number - number)).vector.copy()
+        start[self.index] = number
         try:
-            cost, vector = self._minimise(self._index, number, start)
+            cost, vector = self.minimise(self.index, number, start)
         except DomainError:
             return None
         return Point(number, float(cost), vector) if np.isfinite(cost) else None
 
-    def _nearest(self, number: float) -> Point:
-        return min((self._optimum, *self.points), key=lambda point: abs(point.number - number))
-
-    def _insert(self, point: Point) -> None:
-        self.points.append(point)
-        self.points.sort(key=lambda each: abs(each.number - self._optimum.number))
-
     def _improves(self, point: Point) -> bool:
-        better = point.cost < self._optimum.cost - BETTER * self._rise
+        better = point.cost < self.optimum.cost - BETTER * self.rise
         if better:
             self.better = point
         return better
 
     def _height(self, point: Point) -> float:
-        return float(np.sqrt(max(point.cost - self._optimum.cost, 0.0) / self._rise))
-
-
-class Threshold(NamedTuple):
-    """Rise of the cost up to which a value is within the interval."""
-
-    rise: float
-    """Of half the sum of squares."""
-    level: float
-    inflation: float
-    """Samples that stand for one independent one."""
+        return float(np.sqrt(max(point.cost - self.optimum.cost, 0.0) / self.rise))
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +209,8 @@ class Profile:
     """Of the optimum that it starts from."""
     points: tuple[Point, ...]
     """In order of the unknown, the optimum among them."""
-    threshold: Threshold
+    rise: float
+    """Of the cost, up to which a value is within the interval."""
     lower: float | None
     """End of the interval, in the solver's vector; None where there is none on that side."""
     upper: float | None
@@ -262,19 +246,18 @@ def threshold(
     inflation: float = 1.0,
     freedom: float | None = None,
     level: float = 0.95,
-) -> Threshold:
-    """Rise of the cost that ends an interval, for coloured residuals.
+) -> float:
+    """Rise of the cost (half the sum of squares) that ends an interval, for coloured residuals.
 
     Parameters
     ----------
     cost : float
-        Half the sum of squares at the optimum.
+        At the optimum.
     samples, unknowns : int
         Numbers of samples and of combinations determined.
     inflation : float
         Samples that stand for one independent one, at least 1: the ratio of the unknown's variance
-        under coloured noise to that under white noise, or a channel's samples over its effective
-        ones.
+        under coloured noise to that under white noise.
     freedom : float, optional
         Degrees of freedom of Student's quantile; by default samples/inflation - unknowns.
     level : float
@@ -283,8 +266,7 @@ def threshold(
     Raises
     ------
     InputError
-        If there are no more samples than unknowns, the residuals are worth no more independent
-        samples than there are unknowns, or inflation or level are out of range.
+        If nothing is left to tell the noise from, or inflation or level are out of range.
 
     Notes
     -----
@@ -304,11 +286,10 @@ def threshold(
             f"{samples} samples are worth {samples / inflation:.1f} independent ones, no more than "
             f"the {unknowns} unknowns: no interval follows from them."
         )
-    from scipy.stats import t as student
+    from scipy.special import stdtrit
 
-    quantile = float(student.ppf(0.5 + 0.5 * level, freedom))
-    rise = quantile**2 * inflation * cost / (samples - unknowns)
-    return Threshold(rise, level, inflation)
+    quantile = float(stdtrit(freedom, 0.5 + 0.5 * level))
+    return quantile**2 * inflation * cost / (samples - unknowns)
 
 
 def profile(
@@ -316,7 +297,7 @@ def profile(
     vector: Array,
     cost: float,
     index: int,
-    threshold: Threshold,
+    rise: float,
     step: float,
     bounds: tuple[float, float] = (-np.inf, np.inf),
     *,
@@ -328,14 +309,12 @@ def profile(
     ----------
     minimise : callable
         See `Minimise`. It may raise DomainError where the model does not hold.
-    vector : (K,) array
-        The optimum.
-    cost : float
-        Its half sum of squares.
+    vector, cost :
+        The optimum (K,), and its half sum of squares.
     index : int
         Number of the unknown.
-    threshold : Threshold
-        Where the interval ends.
+    rise : float
+        Of the cost at which the interval ends, see `threshold`.
     step : float
         About one standard error of the unknown's number, positive: how far the first step goes.
     bounds : (float, float)
@@ -346,11 +325,11 @@ def profile(
     Raises
     ------
     InputError
-        If the step or the threshold is not positive, or the optimum lies outside the bounds.
+        If the step or the rise is not positive, or the optimum lies outside the bounds.
     """
     if not (step > 0.0 and np.isfinite(step)):
         raise InputError(f"The first step of a profile, {step:g}, must be positive and finite.")
-    if not threshold.rise > 0.0:
+    if not rise > 0.0:
         raise InputError(
             "The residuals are exactly zero: there is no noise that a profile could weigh against."
         )
@@ -358,7 +337,7 @@ def profile(
         raise InputError("The optimum of a profile lies outside the bounds of its unknown.")
     optimum = Point(float(vector[index]), cost, vector)
     sides = [
-        ProfileSide(minimise, optimum, index, threshold.rise, direction, step, bound, most)
+        ProfileSide(minimise, optimum, index, rise, direction, step, bound, most)
         for direction, bound in ((-1.0, bounds[0]), (1.0, bounds[1]))
     ]
     endings: list[Ending] = []
@@ -373,7 +352,7 @@ def profile(
         index,
         cost,
         points,
-        threshold,
+        rise,
         sides[0].end if better is None else None,
         sides[1].end if better is None else None,
         (endings[0], endings[1]),
@@ -413,19 +392,8 @@ def checked_ends(
     """Sides on which the cost does not rise as the linearised fit says, and how it does.
 
     Unknowns of single runs, such as a free zero, are passed over: residuals are linear in them.
-
-    Parameters
-    ----------
-    problem : Problem
-        What was fitted.
-    vector : (K,) array
-        The optimum.
-    linearised : LinearisedFit
-        The fit there.
-    reach : (K,) array
-        Half width of each interval in the solver's vector; 0 for unknowns without one.
-    limits : collection of int
-        Numbers of the unknowns that limit something, such as a stop.
+    `reach` (K,) is the half width of each interval in the solver's vector, 0 for unknowns without
+    one; `limits` are the numbers of the unknowns that limit something, such as a stop.
 
     Notes
     -----
@@ -500,3 +468,79 @@ def _unneeded(problem: Problem, vector: Array, index: int, allowed: float) -> bo
             return False
         before = cost
     return False
+
+
+class _Sideways(NamedTuple):
+    """What a worker needs to follow a profile."""
+
+    problem: Problem
+    vector: Array
+    cost: float
+    rises: dict[int, float]
+    steps: Array
+
+
+def profiles_of(
+    assessment: Assessment,
+    names: Sequence[str] | None = None,
+    *,
+    executor: Executor | None = None,
+    watch: Callable[[int], None] | None = None,
+) -> dict[str, Profile]:
+    """Profile likelihoods of a stage's unknowns.
+
+    Parameters
+    ----------
+    assessment : Assessment
+        Of the stage.
+    names : sequence of str, optional
+        Which unknowns; by default all of the machine that have an interval.
+    executor, watch :
+        Where they are followed, here by default; told how many are done.
+
+    Returns
+    -------
+    dict of str to Profile
+        In the order of the unknowns. What earlier stages do not know is not in them.
+
+    Raises
+    ------
+    InputError
+        For a name that is none of the stage's unknowns.
+    """
+    problem, found, fit = assessment.stage.problem, assessment.uncertainty, assessment.linearised
+    variables, vector = found.own.variables, assessment.stage.solution.vector
+    if names is None:
+        known = zip(problem.unknowns, found.own.determined, strict=True)
+        chosen = [k for k, (each, told) in enumerate(known) if each.run is None and told]
+    else:
+        chosen = sorted({variables.index(name) for name in names})
+    cost = problem.cost(vector)
+    rises = {
+        k: threshold(
+            cost,
+            fit.samples,
+            fit.rank,
+            inflation=float(found.inflation[k]),
+            freedom=float(found.own.degrees_of_freedom[k]),
+            level=found.level,
+        )
+        for k in chosen
+    }
+    steps = found.own.standard_errors
+    shared = _Sideways(replace(problem, threads=1), vector, cost, rises, steps)
+    made: dict[str, Profile] = {}
+    for position, each in (executor or Serial()).run(_profiled, shared, chosen):
+        made[variables.names[chosen[position]]] = each
+        if watch is not None:
+            watch(len(made))
+    return {variables.names[k]: made[variables.names[k]] for k in chosen}
+
+
+def _profiled(shared: _Sideways, index: int) -> Profile:
+    low, high = (float(each[index]) for each in shared.problem.bounds)
+    step = float(shared.steps[index])
+    if not (np.isfinite(step) and step > 0.0):
+        step = 0.01 * (high - low)
+    least, rise = minimiser(shared.problem), shared.rises[index]
+    return profile(least, shared.vector, shared.cost, index, rise, step, (low, high))

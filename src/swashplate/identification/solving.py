@@ -133,7 +133,7 @@ class Solution:
     """Half the weighted sum of squares; with a robust loss, of the loss."""
     start_cost: float
     evaluations: int
-    """Of the residuals; each but those of SLSQP's differences with Jacobian."""
+    """Of the residuals, each with its Jacobian."""
     converged: bool
     interrupted: bool
     message: str

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft, rfftfreq
-from scipy.signal.windows import dpss
+from scipy.linalg import eigh_tridiagonal
 
 from swashplate.identification.linearised import LinearisedFit
 from swashplate.identification.noise import Grid, grid_of, unweighted
@@ -106,7 +106,7 @@ def _grid(fit: LinearisedFit, number: int) -> Grid:
 
 def _frequencies(runs: Sequence[Array], grids: Sequence[Grid]) -> list[float]:
     """Frequencies of significant lines, the strongest first, no two within a bandwidth. [Hz]"""
-    from scipy.stats import f as fisher
+    from scipy.special import fdtri
 
     step = float(np.median([grid.step for grid in grids]))
     size = next_fast_len(PADDING * max(grid.size for grid in grids), real=True)
@@ -126,7 +126,8 @@ def _frequencies(runs: Sequence[Array], grids: Sequence[Grid]) -> list[float]:
     looks = 0.5 * shortest / step  # independent frequencies
     ratio = (count - 1.0) * explained / np.maximum(unexplained, 1e-300)
     freedom = 2.0 * len(runs), 2.0 * len(runs) * (count - 1.0)
-    limit = float(fisher.isf(FALSE_ALARM / looks, *freedom))
+    # the upper quantile of F is one over the lower one with its freedoms exchanged
+    limit = 1.0 / float(fdtri(*freedom[::-1], FALSE_ALARM / looks))
     told = (ratio > limit) & (frequencies > LOWEST * bandwidth) & (frequencies < 0.5 / step)
     chosen: list[float] = []
     for place in np.argsort(-np.where(told, explained, 0.0)):
@@ -149,6 +150,14 @@ def _aside(power: Array, place: int) -> float:
 
 @lru_cache(maxsize=32)
 def _tapers(size: int, count: int) -> Array:
-    """(count, size) Slepian sequences of unit energy."""
-    tapers: Array = dpss(size, HALF_BANDWIDTH, Kmax=count)
+    """(count, size) Slepian sequences of unit energy, each of either sign.
+
+    Eigenvectors of Slepian's (1978) tridiagonal matrix, as in SciPy's ``dpss``, which comes with
+    all of `scipy.signal` and half a second to load it.
+    """
+    n = np.arange(size)
+    middle = (0.5 * (size - 1) - n) ** 2 * np.cos(2.0 * np.pi * HALF_BANDWIDTH / size)
+    beside = 0.5 * n[1:] * (size - n[1:])
+    wanted = (size - count, size - 1)
+    tapers: Array = eigh_tridiagonal(middle, beside, select="i", select_range=wanted)[1].T[::-1]
     return tapers

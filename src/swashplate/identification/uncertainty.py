@@ -87,9 +87,9 @@ def reach(covariance: Covariance, level: float = 0.95) -> Array:
     """
     if not 0.0 < level < 1.0:
         raise InputError(f"The level {level:g} of an interval must lie between 0 and 1.")
-    from scipy.stats import t as student
+    from scipy.special import stdtrit  # of scipy.stats, without its second to load
 
-    quantiles = student.ppf(0.5 + 0.5 * level, covariance.degrees_of_freedom)
+    quantiles = stdtrit(covariance.degrees_of_freedom, 0.5 + 0.5 * level)
     errors = np.where(covariance.determined, covariance.standard_errors, 0.0)
     known = covariance.determined & covariance.variables.free
     half: Array = np.where(known, quantiles * errors, 0.0)

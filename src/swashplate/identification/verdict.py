@@ -20,7 +20,6 @@ from swashplate.identification.criteria import (
     REQUIRED,
     SAME,
     SERIOUS,
-    WIDE,
     Criterion,
     bounded_predictions,
     carried_over,
@@ -30,7 +29,6 @@ from swashplate.identification.criteria import (
     fitted_runs,
     followed,
     following,
-    listed,
     misfit_criteria,
     misfit_of,
     model_error,
@@ -40,6 +38,7 @@ from swashplate.identification.criteria import (
     required_accuracy,
 )
 from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.identifiability import WIDE, listed
 from swashplate.identification.lack_of_fit import (
     LackOfFit,
 )
@@ -286,7 +285,7 @@ def _unknowns(assessments: Sequence[Assessment]) -> Statement:
         name, found = each.stage.stage.name, each.identifiability
         said += [f"{name}: {words}" for words in found.sentences()]
         wide = weak_unknowns(each)
-        look = look or bool(wide or found.at_bounds or found.to_hold)
+        look = look or bool(wide or found.at_bounds or found.to_fix)
         if wide:
             said.append(f"{name}: not determined to within ±{percent(WIDE)}: {listed(wide)}.")
     return Statement("Identifiability", "look" if look else "good", tuple(said))

@@ -6,13 +6,15 @@ stamps are uneven and have gaps, so that stretches of time are taken here.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from swashplate.report.style import LINE, Dashes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]

@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.metadata import version
-from json import dumps
 from pathlib import Path
 from platform import python_version
 from typing import Literal
@@ -26,6 +25,7 @@ from swashplate.campaign.rig.instruments import (
     stream,
 )
 from swashplate.campaign.schema import CHANNEL_KINDS, KINDS, ChannelKind
+from swashplate.documents import toml_key, toml_string
 from swashplate.drive import Drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import FileError, InputError, ParameterError
@@ -157,16 +157,34 @@ def run(
     simulated = Drive(replace(simulated.parameters, card_switch="split"))
     axis = axis or nominal.name
     tests = _named(maneuvers, axis)
-    kinds = _checked(channels)
-    turn = _counts_per_turn(axis, counts_per_turn, kinds)
-    held_back = _held_back(validate, axis, tests, default=maneuvers is None)
+    possible = [kind for kind in CHANNEL_KINDS if kind != "other"]
+    for kind in channels:
+        if kind not in possible:
+            raise InputError(f"There is no channel {kind!r}; there are {', '.join(possible)}.")
+    kinds = tuple(channels)
+    if not kinds or len(set(kinds)) < len(kinds):
+        raise InputError("channels must be one or more kinds, each once.")
+    turn = COUNTS_PER_TURN.get(axis, 1.0)
+    if counts_per_turn is not None:
+        turn = positive("counts_per_turn", counts_per_turn)
+    elif axis not in COUNTS_PER_TURN and "encoder_counts" in kinds:
+        raise InputError(
+            f"The encoder of '{axis}' is not known: give counts_per_turn, or as axis one of "
+            f"{', '.join(COUNTS_PER_TURN)}."
+        )
+    held_back = HELD_BACK[axis] if validate is None and maneuvers is None else validate or ()
+    for name in held_back:
+        if name not in tests:
+            raise InputError(f"There is no run '{name}' to validate; there are {', '.join(tests)}.")
     tools = SEVERITIES[severity] if instruments is None else instruments
     runs = {}
     for name, maneuver in tests.items():
         happened = simulated.simulate(put_out(maneuver.sample(SOURCE_RATE), tools))
         columns = logged(happened, kinds, tools, turn, seed, name)
         role: Literal["fit", "validate"] = "validate" if name in held_back else "fit"
-        runs[name] = VirtualRun(name, _stem(axis, name), role, columns, happened)
+        # as a file's name: hoist_step_+4_V, hoist_ramp_+1_V-s
+        stem = re.sub(r"[^\w.+-]+", "_", f"{axis} {name}".replace("/", "-"))
+        runs[name] = VirtualRun(name, stem, role, columns, happened)
     stems = [each.stem.lower() for each in runs.values()]
     if len(set(stems)) < len(stems):
         raise InputError("Two manoeuvres would have the same file; give them other names.")
@@ -199,43 +217,6 @@ def _named(
     if not tests:
         raise InputError("A campaign needs at least one manoeuvre.")
     return tests
-
-
-def _checked(channels: Sequence[ChannelKind]) -> tuple[ChannelKind, ...]:
-    possible = [kind for kind in CHANNEL_KINDS if kind != "other"]
-    for kind in channels:
-        if kind not in possible:
-            raise InputError(f"There is no channel {kind!r}; there are {', '.join(possible)}.")
-    if not channels or len(set(channels)) < len(channels):
-        raise InputError("channels must be one or more kinds, each once.")
-    return tuple(channels)
-
-
-def _counts_per_turn(axis: str, given: float | None, kinds: tuple[ChannelKind, ...]) -> float:
-    if given is not None:
-        return positive("counts_per_turn", given)
-    if axis not in COUNTS_PER_TURN and "encoder_counts" in kinds:
-        raise InputError(
-            f"The encoder of '{axis}' is not known: give counts_per_turn, or as axis one of "
-            f"{', '.join(COUNTS_PER_TURN)}."
-        )
-    return COUNTS_PER_TURN.get(axis, 1.0)
-
-
-def _held_back(
-    given: Collection[str] | None, axis: str, tests: Mapping[str, Maneuver], *, default: bool
-) -> Collection[str]:
-    if given is None:
-        return HELD_BACK[axis] if default else ()
-    for name in given:
-        if name not in tests:
-            raise InputError(f"There is no run '{name}' to validate; there are {', '.join(tests)}.")
-    return given
-
-
-def _stem(axis: str, name: str) -> str:
-    """Axis and manoeuvre as a file's name: ``hoist_step_+4_V``, ``hoist_ramp_+1_V-s``."""
-    return re.sub(r"[^\w.+-]+", "_", f"{axis} {name}".replace("/", "-"))
 
 
 def perturbed(drive: Drive, spread: float, seed: int) -> Drive:
@@ -319,7 +300,15 @@ def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -
     FileError
         If the folder is not empty or something cannot be written.
     """
-    place = _prepared(Path(folder), overwrite)
+    place = Path(folder)
+    try:
+        if place.exists() and not place.is_dir():
+            raise FileError(f"{place} is a file; name a folder.")
+        if place.is_dir() and not overwrite and any(place.iterdir()):
+            raise FileError(f"{place} is not empty; name a new folder, or allow overwriting.")
+        (place / "truth").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{place} cannot be written: {error.strerror or error}.") from None
     for each in tests.runs.values():
         write_whole(place / f"{each.stem}.csv", partial(_write_log, tests, each))
     if tests.preset is None:
@@ -329,19 +318,6 @@ def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -
     campaign = place / "campaign.toml"
     write_text(campaign_text(tests), campaign)
     return campaign
-
-
-def _prepared(place: Path, overwrite: bool) -> Path:
-    """The folder, made if need be."""
-    try:
-        if place.exists() and not place.is_dir():
-            raise FileError(f"{place} is a file; name a folder.")
-        if place.is_dir() and not overwrite and any(place.iterdir()):
-            raise FileError(f"{place} is not empty; name a new folder, or allow overwriting.")
-        (place / "truth").mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(f"{place} cannot be written: {error.strerror or error}.") from None
-    return place
 
 
 def _write_log(tests: VirtualTests, run: VirtualRun, path: Path) -> None:
@@ -369,80 +345,60 @@ def campaign_text(tests: VirtualTests) -> str:
     The input is joined by straight lines, because that is what was simulated between two samples.
     """
     refinements = ", ".join(tests.drive.parameters.refinements) or "none"
-    drive = tests.preset or DRIVE_FILE
+    axis = f"axes.{toml_key(tests.axis)}"
+    missing = ['missing = "drop"    # cells without a number'] * bool(tests.instruments.empty_cells)
     lines = [
         f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.",
         f"# Instruments: {tests.severity}; refinements: {refinements}; seed {tests.seed}.",
         "# What was simulated stands in truth/truth.toml: look only after the fit.",
-        f"title = {dumps(f'Virtual tests, {tests.axis}', ensure_ascii=False)}",
+        f"title = {toml_string(f'Virtual tests, {tests.axis}')}",
         "virtual = true",
         "",
-        f"[axes.{_key(tests.axis)}]",
-        f'drive = "{drive}"    # the model that a fit starts from',
+        f"[{axis}]",
+        f'drive = "{tests.preset or DRIVE_FILE}"    # the model that a fit starts from',
         'time = { column = "time", unit = "s" }',
         'start = "rest"',
         "",
-        f"[axes.{_key(tests.axis)}.input]",
+        f"[{axis}.input]",
         'kind = "voltage"',
         'column = "voltage"',
         'unit = "V"',
         'interpolation = "linear"',
-        *_missing(tests),
+        *missing,
     ]
     for kind in tests.channels:
         column = COLUMNS.get(kind, kind)
-        lines += ["", f"[axes.{_key(tests.axis)}.channels.{column}]", f'kind = "{kind}"']
-        lines.append(f'column = "{column}"')
+        lines += ["", f"[{axis}.channels.{column}]", f'kind = "{kind}"', f'column = "{column}"']
         if kind == "encoder_counts":
             lines.append(f"counts_per_turn = {tests.counts_per_turn!r}    # of the shaft")
             if tests.instruments.counter_bits:
                 lines.append(f"rolls_over_at = {2**tests.instruments.counter_bits}")
         else:
             lines.append(f'unit = "{KINDS[kind].units[0]}"')
-        lines += _missing(tests)
+        lines += missing
     for run in tests.runs.values():
         lines += ["", "[[runs]]", f'file = "{run.stem}.csv"', f'role = "{run.role}"']
     return "\n".join(lines) + "\n"
 
 
-def _key(axis: str) -> str:
-    """A name as a key of TOML, whose strings are escaped as those of JSON."""
-    return axis if re.fullmatch(r"[A-Za-z0-9_-]+", axis) else dumps(axis, ensure_ascii=False)
-
-
-def _missing(tests: VirtualTests) -> list[str]:
-    if not tests.instruments.empty_cells:
-        return []
-    return ['missing = "drop"    # cells without a number']
-
-
 def truth_text(tests: VirtualTests) -> str:
     """What was simulated: instruments, seed and versions; the drive has its own file."""
-    from tomlkit import comment, document, table
+    from tomlkit import dumps
 
-    text = document()
-    text.add(comment("The truth behind the virtual tests beside this folder."))
-    text.add("virtual", True)
-    text.add("axis", tests.axis)
-    text.add("drive", DRIVE_FILE)
-    text.add("severity", tests.severity)
-    text.add("seed", tests.seed)
-    text.add("counts_per_turn", tests.counts_per_turn)
-    text.add("runs", list(tests.runs))
-    for name, values in (
-        ("instruments", asdict(tests.instruments)),
-        (
-            "versions",
-            {
-                "swashplate": __version__,
-                "numpy": version("numpy"),
-                "numba": version("numba"),
-                "python": python_version(),
-            },
-        ),
-    ):
-        entries = table()
-        for key, value in values.items():
-            entries.add(key, value)
-        text.add(name, entries)
-    return text.as_string()
+    content = {
+        "virtual": True,
+        "axis": tests.axis,
+        "drive": DRIVE_FILE,
+        "severity": tests.severity,
+        "seed": tests.seed,
+        "counts_per_turn": tests.counts_per_turn,
+        "runs": list(tests.runs),
+        "instruments": asdict(tests.instruments),
+        "versions": {
+            "swashplate": __version__,
+            "numpy": version("numpy"),
+            "numba": version("numba"),
+            "python": python_version(),
+        },
+    }
+    return f"# The truth behind the virtual tests beside this folder.\n{dumps(content)}"

@@ -249,18 +249,10 @@ def logged(
 def sampled_instants(
     grid: Array, instruments: Instruments, generator: Generator
 ) -> tuple[Array, Array]:
-    """Instants at which samples are taken, and the stamps that are written for them.
+    """Instants (n,) at which samples are taken, and stamps (n,) that are written for them. [s]
 
-    Parameters
-    ----------
-    grid : (n,) array
-        Even instants from the run's beginning to its end. [s]
-
-    Returns
-    -------
-    instants, stamps : (n,) arrays
-        Instants lie within the run. The stamps leave the hidden part of the jitter out and are
-        rounded; without jitter both are the grid. [s]
+    Both about an even grid (n,), instants within it. The stamps leave the hidden part of the jitter
+    out and are rounded.
     """
     told = instruments.jitter * generator.standard_normal(grid.size)
     hidden = instruments.hidden_jitter * generator.standard_normal(grid.size)
@@ -283,13 +275,7 @@ def rounded(values: Array, step: float) -> Array:
 
 
 def lost(size: int, share: float, longest: int, generator: Generator) -> Mask:
-    """Which of `size` rows are lost: in runs of 1 to `longest`, together about a share of all.
-
-    Parameters
-    ----------
-    share : float
-        Expected share of rows that are lost, as long as it is small. [1]
-    """
+    """Which of `size` rows are lost: in runs of 1 to `longest`, together about a share of all."""
     mask = np.zeros(size, dtype=np.bool_)
     begins = np.flatnonzero(generator.random(size) < share / (0.5 * (1 + longest)))
     lengths = generator.integers(1, longest, size=begins.size, endpoint=True)
@@ -324,16 +310,9 @@ def put_out(voltage: Array, instruments: Instruments) -> Array:
 
 
 def read_voltage(voltage: Array, instruments: Instruments, generator: Generator) -> Array:
-    """The command as it is read back. [V]
-
-    Parameters
-    ----------
-    voltage : (n,) array
-        Command at the instants sampled. [V]
-    """
-    reading = voltage + instruments.voltage_offset
-    reading = reading + instruments.voltage_noise * generator.standard_normal(voltage.size)
-    return _converted(reading, instruments.voltage_bits)
+    """The command as it is read back at the instants sampled. [V]"""
+    noise = instruments.voltage_noise * generator.standard_normal(voltage.size)
+    return _converted(voltage + instruments.voltage_offset + noise, instruments.voltage_bits)
 
 
 def _converted(voltage: Array, bits: int) -> Array:
@@ -347,22 +326,12 @@ def _converted(voltage: Array, bits: int) -> Array:
 
 
 def dither_ripple(time: Array, current: Array, phase: float, instruments: Instruments) -> Array:
-    """What pulse width modulation adds to the mean of a channel's current. [A]
+    """What pulse width modulation adds to the mean of a channel's current (n,), not negative. [A]
 
-    Parameters
-    ----------
-    time : (n,) array
-        Instants. [s]
-    current : (n,) array
-        Mean current of the channel, not negative. [A]
-    phase : float
-        Share of a period that has passed at 0 s. [1]
-
-    Notes
-    -----
-    Pulses of the length D T, D = I / I_full, raise the current of an inductive coil along a
-    straight line and let it fall along another: a triangle of mean zero whose height goes with
-    D (1 − D). It has all multiples of the frequency; at 512 Hz the fifth of 100 Hz shows at 12 Hz.
+    `phase` is the share of a period that has passed at 0 s. Pulses of the length D T, D = I /
+    I_full, raise the current of an inductive coil along a straight line and let it fall along
+    another: a triangle of mean zero whose height goes with D (1 − D). It has all multiples of the
+    frequency; at 512 Hz the fifth of 100 Hz shows at 12 Hz.
     """
     duty = np.clip(current / instruments.full_current, 0.0, 1.0)
     height = 4.0 * instruments.dither * duty * (1.0 - duty)
@@ -380,19 +349,11 @@ def read_current(
     instruments: Instruments,
     generator: Generator,
 ) -> Array:
-    """The ammeter around both leads. [A]
+    """The ammeter around both leads, read at some instants (m,). [A]
 
-    Parameters
-    ----------
-    time, plus, minus : (n,) arrays
-        Even grid [s] and currents of both channels on it, magnitudes. [A]
-    instants : (m,) array
-        When it is read. [s]
-
-    Notes
-    -----
-    With i = |I₊ + ripple| + |I₋ + ripple| the meter shows y = √(p + floor²), T p' + p = i², and
-    p = i² where the averaging time T is 0. The reading is (1 + gain error) y + zero error + noise.
+    `plus` and `minus` are the currents (n,) of both channels on an even grid, magnitudes. With i =
+    |I₊ + ripple| + |I₋ + ripple| the meter shows y = √(p + floor²), T p' + p = i², and p = i² where
+    the averaging time T is 0. The reading is (1 + gain error) y + zero error + noise.
     """
     phase = float(generator.random())
     noise = instruments.current_noise * generator.standard_normal(instants.size)
@@ -434,17 +395,8 @@ def _followed(current: Array, fine: Array, instruments: Instruments) -> Array:
 def read_counts(
     position: Array, counts_per_turn: float, instruments: Instruments, generator: Generator
 ) -> Array:
-    """The encoder's counter, 0 at the first sample. [count]
+    """The encoder's counter, 0 at the first sample, from angles of the shaft (n,). [count]
 
-    Parameters
-    ----------
-    position : (n,) array
-        Angle of the shaft at the instants sampled. [rad]
-    counts_per_turn : float
-        Counts in a turn of the shaft.
-
-    Notes
-    -----
     The counter shows how many edges were passed. Where between two edges the shaft stands at first
     is chance, so that on average the steps are no error. A counter of b bits counts from −2ᵇ⁻¹ to
     2ᵇ⁻¹ − 1 and begins anew.
@@ -467,17 +419,8 @@ def read_transducer(signal: Array, instruments: Instruments, generator: Generato
 
 
 def play(position: Array, width: float) -> Array:
-    """Position behind a gear with backlash: the play operator. [rad]
+    """Position (n,) behind a gear with backlash of a width: the play operator. [rad]
 
-    Parameters
-    ----------
-    position : (n,) array
-        Position of what drives. [rad]
-    width : float
-        Way that it can go without taking the other along. [rad]
-
-    Notes
-    -----
     yₙ = max(xₙ − b/2, min(xₙ + b/2, yₙ₋₁)), in the middle of the gap at first. Between two
     reversals of x it is one maximum or minimum, which is how it is computed.
     """

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from swashplate.identification.error_tables import ErrorTable, Rule
-from swashplate.identification.validation import ChannelErrors, channel_errors
+from swashplate.identification.validation import ErrorTable, Rule, error_tables
 from swashplate.report.fit_page.numbers import listed
 from swashplate.report.fit_page.runs import ShownRun
 
@@ -34,13 +33,13 @@ def error_sections(runs: Sequence[ShownRun], rules: Sequence[Rule]) -> tuple[Err
             if (run.role, each.stage) == (role, stage)
         ]
         sections += [
-            ErrorSection(found.channel, role, found.table, error_remarks(found))
-            for found in channel_errors(alike, rules)
+            ErrorSection(found.channel, role, found, error_remarks(found))
+            for found in error_tables(alike, rules)
         ]
     return tuple(sections)
 
 
-def error_remarks(found: ChannelErrors) -> tuple[str, ...]:
+def error_remarks(found: ErrorTable) -> tuple[str, ...]:
     """What must be known of a table besides its rules."""
     remarks = []
     if found.average:

@@ -30,7 +30,6 @@ from swashplate.report.fit_page.statistics_plots import (
     correlation_item,
     profile_item,
     sensitivity_item,
-    singular_value_item,
     waterfall_item,
 )
 from swashplate.report.fit_page.truth import in_the_fits_scales
@@ -178,7 +177,6 @@ def _stage_items(assessments: Sequence[Assessment]) -> dict[str, Any]:
     for number, each in enumerate(assessments):
         general = [unknown.run is None for unknown in each.stage.problem.unknowns]
         items[f"sensitivity-{number}"] = sensitivity_item(each.identifiability, general)
-        items[f"singular-{number}"] = singular_value_item(each.identifiability)
         try:
             covariance = each.uncertainty.quoted
         except InputError:

@@ -154,7 +154,7 @@ def held_rows(fit: Fit, truth: ParameterSet | None = None) -> tuple[HeldRow, ...
 def _why_held(parameters: ParameterSet, column: str, symbol: str, moved: set[str]) -> str:
     """Why nothing was to be found out about a parameter, as far as that can be told."""
     for gauge in GAUGES:
-        held = next((each for each in gauge.hold if not _is_moved(each, moved)), None)
+        held = next((each for each in gauge.fix if not _is_moved(each, moved)), None)
         others = [each for each in gauge.moves if each != symbol and _is_moved(each, moved)]
         if gauge.name in SCALES and held == symbol and others:
             return f"fixes the {gauge.name}: {gauge.determined}"

@@ -17,7 +17,7 @@ from swashplate.identification.profile import Profile
 from swashplate.identification.starts import StartResult
 from swashplate.identification.unknowns import Unknown
 from swashplate.report.fit_page.bokeh_style import dress
-from swashplate.report.style import BLUE, FAINT, GREY, VERMILION
+from swashplate.report.style import BLUE, GREY, VERMILION
 
 ROW = 15
 """Height of a bar with its name. [px]"""
@@ -52,33 +52,6 @@ def sensitivity_item(found: Identifiability, shown: Sequence[bool]) -> Any:
     panel.hbar(y="name", right="size", left=low, height=0.62, color="color", source=source)
     dress(panel, "", "change of all weighted residuals for 1 % of the unknown")
     panel.ygrid.grid_line_color = None
-    return json_item(panel)
-
-
-def singular_value_item(found: Identifiability) -> Any:
-    """Singular values of the derivatives, each column scaled to length 1."""
-    sizes = found.singular_values
-    largest = float(sizes.max(initial=0.0)) or 1.0
-    floor = 1e-16
-    relative = np.maximum(sizes / largest, floor)
-    panel = figure(
-        height=260,
-        y_axis_type="log",
-        tools="hover,save",
-        tooltips=[("number", "@number"), ("part of the largest", "@size{0.00e+0}")],
-        sizing_mode="stretch_width",
-        toolbar_location=None,
-        y_range=(0.3 * min(float(relative.min(initial=1.0)), 1e-3), 2.0),
-    )
-    number = np.arange(1, sizes.size + 1)
-    zero = relative <= found.tolerance
-    source = ColumnDataSource(
-        {"number": number, "size": relative, "color": np.where(zero, VERMILION, BLUE)}
-    )
-    panel.scatter("number", "size", size=6, color="color", source=source)
-    for level, dash in ((found.tolerance, "solid"), (1e-3, "dashed")):
-        panel.add_layout(Span(dimension="width", location=level, line_color=FAINT, line_dash=dash))
-    dress(panel, "part of the largest", "number")
     return json_item(panel)
 
 
@@ -183,7 +156,7 @@ def profile_item(profile: Profile, unknown: Unknown, name: str) -> Any:
     panel.add_layout(
         Span(
             dimension="width",
-            location=profile.threshold.rise,
+            location=profile.rise,
             line_color=VERMILION,
             line_dash="dashed",
         )

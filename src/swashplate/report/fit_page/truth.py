@@ -69,7 +69,7 @@ def _held(gauge: Gauge, free: set[str], target: Mapping[str, float]) -> str | No
     if gauge.name in NEARLY:
         found = [each for each in gauge.moves if each not in free and target.get(each, 0.0) != 0.0]
         return found[0] if len(found) == 1 else None
-    return next((each for each in gauge.hold if each in target and each not in free), None)
+    return next((each for each in gauge.fix if each in target and each not in free), None)
 
 
 def moved_columns(fit: Fit) -> set[str]:

@@ -1,12 +1,20 @@
-"""Profile likelihoods."""
+"""Profile likelihoods, and ends of intervals where derivatives mislead."""
+
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq, least_squares, minimize_scalar
 from scipy.stats import t as student
 
+from swashplate import Experiment
 from swashplate.errors import DomainError, InputError
-from swashplate.identification.profile import Profile, Threshold, profile, threshold
+from swashplate.identification.linearised import linearised_fit
+from swashplate.identification.problem import Problem
+from swashplate.identification.profile import Profile, checked_ends, minimiser, profile, threshold
+from swashplate.identification.solving import solve
+from swashplate.identification.uncertainty import estimates, reach, uncertainty
+from swashplate.identification.unknowns import Unknown, Unknowns
 
 RNG = np.random.default_rng(6)
 J = RNG.normal(size=(60, 3)) @ np.array([[1.0, 0.0, 0.0], [0.9, 0.3, 0.0], [0.0, 0.2, 2.0]])
@@ -74,7 +82,7 @@ def test_a_nonlinear_model_agrees_with_a_root_search() -> None:
     def over(rate: float) -> float:
         shape = np.exp(-rate * time)
         gain = shape @ measured / (shape @ shape)
-        return 0.5 * float(np.sum((gain * shape - measured) ** 2)) - best.cost - limit.rise
+        return 0.5 * float(np.sum((gain * shape - measured) ** 2)) - best.cost - limit
 
     assert found.lower == pytest.approx(brentq(over, 0.5, best.x[1]), rel=1e-3)
     assert found.upper == pytest.approx(brentq(over, best.x[1], 4.0), rel=1e-3)
@@ -101,7 +109,7 @@ def bowl(height: float = 1.0) -> tuple:
     return lambda index, value, start: (1.0 + 0.5 * height * value**2, np.array([value]))
 
 
-LIMIT = Threshold(0.5, 0.95, 1.0)
+LIMIT = 0.5
 ZERO = np.zeros(1)
 
 
@@ -164,9 +172,9 @@ def test_the_root_of_a_kinked_cost_is_found() -> None:
 
 def test_thresholds_by_hand() -> None:
     # s² = 2·28.5/57 = 1, q = 2.0025 for 57 degrees of freedom
-    assert threshold(28.5, 60, 3).rise == pytest.approx(0.5 * 2.002465**2, rel=1e-5)
+    assert threshold(28.5, 60, 3) == pytest.approx(0.5 * 2.002465**2, rel=1e-5)
     given = threshold(28.5, 60, 3, inflation=4.0, freedom=1e9)
-    assert given.rise == pytest.approx(4.0 * 0.5 * 1.959964**2, rel=1e-5)
+    assert given == pytest.approx(4.0 * 0.5 * 1.959964**2, rel=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -187,11 +195,71 @@ def test_thresholds_that_mean_nothing_are_refused(change: dict, said: str) -> No
     ("change", "said"),
     [
         ({"step": 0.0}, "must be positive"),
-        ({"threshold": Threshold(0.0, 0.95, 1.0)}, "exactly zero"),
+        ({"rise": 0.0}, "exactly zero"),
         ({"bounds": (1.0, 2.0)}, "outside the bounds"),
     ],
 )
 def test_profiles_that_cannot_begin_are_refused(change: dict, said: str) -> None:
-    arguments = {"threshold": LIMIT, "step": 1.0, "bounds": (-9.0, 9.0), **change}
+    arguments = {"rise": LIMIT, "step": 1.0, "bounds": (-9.0, 9.0), **change}
     with pytest.raises(InputError, match=said):
         _: Profile = profile(bowl(), ZERO, 1.0, 0, **arguments)
+
+
+# --- where the cost does not rise as derivatives say ----------------------------------------------
+
+
+TIME = np.linspace(0.0, 4.0, 81)
+
+
+class Limited:
+    """y = min(gain · t, stop): the stop is told only where it is reached."""
+
+    def simulate(
+        self, values: Mapping[str, float], experiment: Experiment
+    ) -> Mapping[str, np.ndarray]:
+        return {"y": np.minimum(values["gain"] * experiment["y"].time, values["stop"])}
+
+
+def limited_problem(experiment: Callable[..., Experiment], y: np.ndarray) -> Problem:
+    unknowns = Unknowns((Unknown("gain", 1.0, 0.1, 3.0), Unknown("stop", 3.0, 0.5, 20.0)))
+    return Problem(Limited(), (experiment("run", 1.0, y),), unknowns, ("y",), {"y": 0.1})
+
+
+def test_a_stop_that_is_reached_has_both_ends(experiment: Callable[..., Experiment]) -> None:
+    noise = 0.1 * np.random.default_rng(1).normal(size=TIME.size)
+    found = limited_problem(experiment, np.minimum(TIME, 2.5) + noise)
+    best = solve(found).vector
+    linearised = linearised_fit(found, best)
+    assert checked_ends(found, best, linearised, reach(uncertainty(linearised).own)) == ()
+
+
+def test_a_stop_that_is_just_touched_has_no_upper_end(
+    experiment: Callable[..., Experiment],
+) -> None:
+    """The truth never reaches it; the last sample happens to lie low, so that the fit touches."""
+    noise = 0.02 * np.random.default_rng(2).normal(size=TIME.size)
+    noise[-2:] = -0.012  # less than one standard deviation
+    found = limited_problem(experiment, TIME + noise)
+    best = solve(found, found.unknowns.vector_of({"stop": 3.9})).vector
+    values = found.unknowns.values(best)
+    assert 3.9 < values["stop"] < 4.0
+    linearised = linearised_fit(found, best)
+    told = uncertainty(linearised)
+    ends = checked_ends(found, best, linearised, reach(told.own))
+    assert [(end.number, end.upper, end.distance) for end in ends] == [(1, True, np.inf)]
+    gain, stop = estimates(told.own, ends={(1, True): np.inf})
+    assert gain.status == "estimated"
+    assert stop.status == "no upper end"
+    assert stop.upper is None
+    assert stop.lower is not None
+    assert stop.lower < values["stop"]
+
+
+def test_the_least_cost_with_one_unknown_held(experiment: Callable[..., Experiment]) -> None:
+    """By hand: with the stop out of reach, the gain that fits best is the regression's."""
+    y = 0.8 * TIME + 0.05 * np.sin(7.0 * TIME)
+    found = limited_problem(experiment, y)
+    cost, vector = minimiser(found)(1, 20.0 / 3.0, found.start)
+    gain = float(TIME @ y / (TIME @ TIME))
+    assert found.unknowns.values(vector)["gain"] == pytest.approx(gain, rel=1e-6)
+    assert cost == pytest.approx(0.5 * np.sum((gain * TIME - y) ** 2) / 0.01, rel=1e-9)
