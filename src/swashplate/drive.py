@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, Unpack, overload
+from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, Record, record_of
 from swashplate.equations.marching.run import Start
+from swashplate.equations.model import Equation
+from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError
 from swashplate.parameters.files import dump_set, load_preset, load_set
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.batch import Batch, SquaredError, simulate_drives
-from swashplate.simulation.instance import at_every_rate
+from swashplate.simulation.instance import at_every_rate, with_equation
 from swashplate.simulation.residuals import Sensitivities, sensitivities
 from swashplate.simulation.result import Simulation
 from swashplate.simulation.run import check_voltage, measured_records, simulate_drive, steady_states
@@ -109,6 +111,31 @@ class Drive:
     def scale(self, **factors: Change) -> Drive:
         """A drive with values multiplied, e.g. ``scale(Z16=1.5, Z10=1.5)``; as `replace`."""
         return Drive(self.parameters.scale(factors))
+
+    def with_equation(
+        self, old: Equation, new: Equation, parameters: type[NamedTuple] | None = None
+    ) -> Drive:
+        """A drive with an equation of one's own in the place of one of the pump's.
+
+        Parameters
+        ----------
+        old : equation
+            Of `swashplate.models.pump` or `swashplate.models.refinements`.
+        new : equation
+            The same arguments, and behind them, by name, any of `parameters`.
+        parameters : class of named tuples, optional
+            What the equation brings along, each a float with its `Definition` and a default. They
+            are parameters of the drive from then on: ``drive.replace(seal_drag=1e-5)``, a fit's
+            unknowns, columns of `sensitivities`.
+
+        Raises
+        ------
+        InputError
+            If the pump does not use the equation, or the arguments do not fit.
+        ParameterError
+            If a parameter has no definition, or the name of another one.
+        """
+        return Drive(with_equation(self.parameters, Replacement(old, new, parameters)))
 
     def renamed(self, name: str, title: str | None = None) -> Drive:
         """The same drive under another name."""

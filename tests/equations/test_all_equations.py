@@ -31,7 +31,13 @@ SLOW = 25
 """Floats among the arguments from which on fewer points do."""
 H = 1.0 / 512.0
 
-IMPLICIT = {"tight_step": {"Z7"}, "pump_step": {"p.Z7"}}
+IMPLICIT = {
+    "tight_step": {"Z7"},
+    "pump_step": {"p.Z7"},
+    "unloaded_leakage": {"Z12"},
+    "flow_speed": {"k.Z12"},
+    "pump_sample": {"k.Z12"},
+}
 """Declared as that at zero leakage, of an equation that leaves leakage out."""
 
 

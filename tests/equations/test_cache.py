@@ -7,6 +7,7 @@ import subprocess
 import sys
 import traceback
 from pathlib import Path
+from time import time
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ import pytest
 from numba import config
 
 from swashplate.equations import closure, closure_hash, derive, equation, generated, kernel, source
-from swashplate.equations.cache import UNCACHED
+from swashplate.equations.cache import DAY, UNCACHED, tidy
 
 SLOPE = 2.0
 
@@ -257,6 +258,67 @@ def test_kept_with_the_user_where_no_folder_is_named(tmp_path: Path) -> None:
     home = {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "home" / "cache")}
     generate(tmp_path, NUMBA_CACHE_DIR="", **home)
     assert list((tmp_path / "home").rglob("generated/machine_*.py"))
+
+
+def files(folder: Path, *names: str, age: float = 0.0, size: int = 10) -> None:
+    folder.mkdir(exist_ok=True)
+    for name in names:
+        (folder / name).write_bytes(b"x" * size)
+        os.utime(folder / name, (time() - age, time() - age))
+
+
+def left(*folders: Path) -> set[str]:
+    return {path.name for folder in folders for path in folder.iterdir()}
+
+
+def test_modules_that_nobody_used_lately_are_removed(tmp_path: Path) -> None:
+    modules, code = tmp_path / "generated", tmp_path / "generated_1a"
+    files(modules, "old_1.py", "kept_2.py", age=5.0 * DAY)
+    files(code, "old_1.march-3.py311.nbi", "old_1.march-3.py311.ab.nbc", age=5.0 * DAY)
+    # compiled for another signature since: the module is in use
+    files(code, "kept_2.march-3.py311.nbi", age=1.0 * DAY)
+    files(modules, "tidied", age=5.0 * DAY)
+    tidy([modules, code, tmp_path / "none"], unused=4.0 * DAY)
+    assert left(modules, code) == {"kept_2.py", "kept_2.march-3.py311.nbi", "tidied"}
+
+
+def test_beyond_a_size_those_go_first_that_were_not_used_for_longest(tmp_path: Path) -> None:
+    for k in range(5):
+        files(tmp_path, f"module_{k}.py", f"module_{k}.march-3.py311.nbi", age=100.0 * k)
+    tidy([tmp_path], largest=50)
+    assert left(tmp_path) == {
+        name for k in (0, 1) for name in (f"module_{k}.py", f"module_{k}.march-3.py311.nbi")
+    }
+
+
+def test_the_folder_is_tidied_once_a_day_and_use_counts(tmp_path: Path) -> None:
+    modules = tmp_path / "cache" / "swashplate_generated"
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    generate(tmp_path, **environment)
+    files(modules, "old_1.py", age=1000.0 * DAY)
+    (own,) = modules.glob("machine_*.py")
+    os.utime(own, (0.0, 0.0))
+    generate(tmp_path, **environment)  # nothing new
+    assert time() - own.stat().st_mtime < DAY
+    assert (modules / "old_1.py").exists()
+    own.unlink()
+    generate(tmp_path, **environment)  # tidied already today
+    assert (modules / "old_1.py").exists()
+    own.unlink()
+    os.utime(modules / "tidied", (0.0, 0.0))
+    generate(tmp_path, **environment)
+    assert not (modules / "old_1.py").exists()
+    assert own.exists()
+
+
+def test_a_function_that_moved_in_its_file_is_kept_once(tmp_path: Path) -> None:
+    run(tmp_path)
+    before = sorted(path.name for path in (tmp_path / "cache").rglob("machine.march-*"))
+    moved = run(tmp_path, EQUATIONS.replace("GAIN = 2.0", "GAIN = 2.5\n\n"))
+    assert moved["march"] == 55.0
+    after = sorted(path.name for path in (tmp_path / "cache").rglob("machine.march-*"))
+    assert len(after) == len(before)
+    assert not {*after} & {*before}
 
 
 @pytest.mark.skipif(os.name == "nt", reason="a file is no folder everywhere, but not by this name")

@@ -11,24 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive
-from swashplate.equations.cache import kernel
+from swashplate.equations.marching.march import Stored
 from swashplate.equations.marching.record import SOURCE_RATE
-from swashplate.models.pump import (
-    Pump,
-    PumpConstants,
-    PumpOptions,
-    arm_sine,
-    orifice_opening,
-    plate_rate,
-    pressure_rate,
-    shaft_speed,
-    solenoid_force,
-    solenoids_of,
-    spool_balance,
-    swash_angle,
-    swash_tangent,
-)
-from swashplate.models.refinements import static_leakage
+from swashplate.equations.marching.run import Instance, Part, observe_kernel
+from swashplate.models.pump import PumpOptions
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import instance_of
 from swashplate.simulation.run import pressure_limits, settled_state
@@ -125,7 +111,6 @@ def saturation(drive: Drive, way: float) -> float | None:
 # --- acceleration ---------------------------------------------------------------------------------
 
 
-Codes = NDArray[np.int64]
 AcceleratedBy = Literal["valve", "spool stop", "orifice"]
 
 CODES: tuple[AcceleratedBy, ...] = ("valve", "spool stop", "orifice")
@@ -145,37 +130,6 @@ class AccelerationCurve(NamedTuple):
     """With its sign. [rad/s²]"""
     by: tuple[AcceleratedBy, ...]
     """What sets it."""
-
-
-@kernel
-def accelerations(
-    pressure: Array,
-    current: float,
-    p: Pump,
-    k: PumpConstants,
-    options: PumpOptions,
-    speed: Array,
-    acceleration: Array,
-    code: Codes,
-) -> None:
-    """Speed [rad/s] and acceleration [rad/s²] at stroking pressures [Pa], under one current [A].
-
-    The speed is that of the plate's angle less what leaks under a load that stands still; what
-    leaks while it accelerates is left out.
-    """
-    leakage = 0.0 if options.leakage is None else static_leakage(p.motor_leakage, p.load_torque)
-    force = solenoid_force(current, solenoids_of(p))
-    for n in range(pressure.size):
-        free = spool_balance(force, arm_sine(pressure[n], p), p)
-        orifice = p.Z16_plus if free > 0.0 else p.Z16_minus
-        opening = orifice_opening(free, p)
-        angle = swash_angle(swash_tangent(pressure[n], p), p, options.steep)
-        rising = pressure_rate(pressure[n], opening, p.Z6, p.Z7, p.Z8, p.Z9, options.symmetric)
-        speed[n] = shaft_speed(angle, leakage, p.Z10, p.Z11)
-        acceleration[n] = p.Z10 * plate_rate(pressure[n], rising, p, k)
-        code[n] = 1 if abs(free) > p.Z14 else 0
-        if min(abs(free), p.Z14) > orifice:
-            code[n] = 2
 
 
 def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> AccelerationCurve:
@@ -226,18 +180,29 @@ def starting_acceleration(drive: Drive, way: float) -> tuple[float, AcceleratedB
 
 
 def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
+    """Speed and acceleration at stroking pressures [Pa] under one command.
+
+    The speed is that of the plate's angle less what leaks under a load that stands still; what
+    leaks while it accelerates is left out.
+    """
     instance = instance_of(drive.parameters, False)
-    p, options, _ = instance.parts[1]
+    front, (p, options, _) = instance.parts
     # a line at rest leaks as a stiff one does
     leaks = options.leakage if options.line is None else options.line
     forms = PumpOptions(symmetric=options.symmetric, steep=options.steep, leakage=leaks)
-    speed, acceleration = np.empty_like(pressure), np.empty_like(pressure)
-    code = np.empty(pressure.size, dtype=np.int64)
-    accelerations(
-        *(pressure, drive.steady_current(voltage), p, pressure_limits(instance), forms),
-        *(speed, acceleration, code),
-    )
-    return AccelerationCurve(speed, acceleration, tuple(CODES[each] for each in code))
+    still = Part(p._replace(Z12=0.0, load_inertia=0.0), forms)
+    instance = Instance(instance.model, (front, still), instance.name)
+    kept = (Stored(0, "signals", "current"), Stored(1, "state", "pressure"))
+    wanted = tuple(Stored(1, "signals", s) for s in ("shaft_speed", "swash_rate", "spool_free"))
+    rows = np.stack([np.full_like(pressure, drive.steady_current(voltage)), pressure])
+    out = np.empty((3, pressure.size))
+    observe = observe_kernel(instance.model, 1, ("current",), instance.options, kept, wanted)
+    observe(instance.params, instance.given, 1.0, rows, out)
+    speed, rate, free = out
+    orifice = np.where(free > 0.0, p.Z16_plus, p.Z16_minus)
+    limited = np.minimum(np.abs(free), p.Z14) > orifice
+    code = np.where(limited, 2, np.where(np.abs(free) > p.Z14, 1, 0))
+    return AccelerationCurve(speed, p.Z10 * rate, tuple(CODES[each] for each in code))
 
 
 # --- envelope -------------------------------------------------------------------------------------

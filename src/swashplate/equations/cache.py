@@ -2,7 +2,8 @@
 
 Kernels inline the equations that they call, which Numba's disk cache does not know: it looks at a
 kernel's own file alone. Here the stamp is a hash of the kernel and of all that it reaches, so that
-a changed equation is never answered by old machine code, and leaves all others' alone.
+a changed equation is never answered by old machine code, and leaves all others' alone. What was not
+used for long is removed.
 """
 
 import os
@@ -10,10 +11,12 @@ import pickle
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache, cached_property
+from glob import escape
 from hashlib import blake2b
 from pathlib import Path
+from time import time
 from types import ModuleType
 from typing import Any, ParamSpec, TypeVar
 from warnings import warn
@@ -33,6 +36,12 @@ UNCACHED = (
     "swashplate's compiled kernels cannot be kept, so that every session compiles them anew; set "
     "NUMBA_CACHE_DIR to a folder that can be written."
 )
+DAY = 86400.0
+"""[s]"""
+UNUSED = 60.0 * DAY
+"""Time after which a generated module that nobody used is removed. [s]"""
+LARGEST = 1_000_000_000
+"""Size that all generated modules may have with their machine code. [bytes]"""
 DOCSTRING = re.compile(r'^ *""".*?"""\n', re.MULTILINE | re.DOTALL)
 
 
@@ -56,6 +65,20 @@ class _Index(IndexDataCacheFile):
         self._save_data(name, data)
         overloads[key] = name
         self._save_index(overloads)  # type: ignore[no-untyped-call]
+        self._drop_moved()
+
+    def _drop_moved(self) -> None:
+        """Remove what was kept of the same function when it stood on another line of its file."""
+        function, _, rest = self._index_name.rpartition("-")
+        line, _, version = rest.partition(".")
+        if "locals" in function:  # such a name may stand for several functions
+            return
+        for path in Path(self._cache_path).glob(
+            f"{escape(function)}-*.{version.partition('.')[0]}.*"
+        ):
+            other = path.name.removeprefix(f"{function}-").partition(".")[0]
+            if other.isdecimal() and other != line:
+                path.unlink(missing_ok=True)
 
     def load(self, key: Any) -> Any:
         try:
@@ -126,17 +149,18 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
         If there is no place for the cache; the function works all the same.
     """
     known[plain(function)] = None
-    compiled: Any = njit(nogil=True, error_model="numpy")(function)
+    without: Any = {"no_cfunc_wrapper": True}
+    compiled: Any = njit(nogil=True, error_model="numpy", **without)(function)
     if not config.DISABLE_JIT:  # type: ignore[attr-defined]
         on_disk(compiled, function)
     return compiled  # type: ignore[no-any-return]
 
 
 def subroutine(function: Callable[P, R]) -> Callable[P, R]:
-    """A `kernel` that only kernels call: without the code that takes arguments from Python."""
+    """A `kernel` that only kernels call: no arguments from Python, no counting of references."""
     known[plain(function)] = None
-    inner: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    compiled: Any = njit(nogil=True, error_model="numpy", **inner)(function)
+    without: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
+    compiled: Any = njit(nogil=True, error_model="numpy", **without)(function)
     if not config.DISABLE_JIT:  # type: ignore[attr-defined]
         on_disk(compiled, function)
     return compiled  # type: ignore[no-any-return]
@@ -207,14 +231,71 @@ def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
     digest.update(hash_of(reached).encode())
     stem = f"{name}_{digest.hexdigest()}"
     path = _folder(str(config.CACHE_DIR or "")) / f"{stem}.py"  # type: ignore[attr-defined]
-    if not path.exists() or path.read_text("utf-8") != text:
+    if path.exists() and path.read_text("utf-8") == text:
+        if time() - path.stat().st_mtime > DAY:
+            path.touch()  # still in use
+    else:
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=stem, suffix=".tmp")
         with os.fdopen(handle, "w", encoding="utf-8") as file:
             file.write(text)
         Path(temporary).replace(path)
+        _tidy_daily(path.parent)
     module = ModuleType(f"swashplate_generated.{stem}")
     module.__file__ = str(path)
     module.__dict__.update(names)
     sys.modules[module.__name__] = module
     exec(compile(text, str(path), "exec"), module.__dict__)
     return module.__dict__
+
+
+def _tidy_daily(folder: Path) -> None:
+    """Remove what nobody needs any more, at most once a day."""
+    mark = folder / "tidied"
+    try:
+        if not mark.exists() or time() - mark.stat().st_mtime > DAY:
+            mark.touch()
+            tidy([folder, *_beside(folder)])
+    except OSError:  # another process tidies, or the folder is no longer ours
+        return
+
+
+def _beside(folder: Path) -> list[Path]:
+    """Where Numba keeps the machine code of the modules in a folder."""
+    return [folder / "__pycache__", *folder.parent.glob(f"{escape(folder.name)}_*")]
+
+
+def tidy(folders: Iterable[Path], unused: float = UNUSED, largest: int = LARGEST) -> None:
+    """Remove generated modules that were not used lately, with their machine code.
+
+    Other processes may use the folders at once: what they miss, they write and compile anew.
+
+    Parameters
+    ----------
+    folders : iterable of Path
+        Those of modules and of their machine code; whatever belongs to one module begins with its
+        name.
+    unused : float
+        Time after which it goes. [s]
+    largest : int
+        What all files may take; beyond it those go first that were not used for the longest time.
+        [bytes]
+    """
+    modules: dict[str, list[Path]] = {}
+    used: dict[str, float] = {}
+    sizes: dict[str, int] = {}
+    for path in (each for folder in folders if folder.is_dir() for each in folder.iterdir()):
+        stem, dot, _ = path.name.partition(".")
+        try:
+            found = path.stat()
+        except FileNotFoundError:
+            continue
+        if dot and path.is_file():
+            modules.setdefault(stem, []).append(path)
+            used[stem] = max(used.get(stem, 0.0), found.st_mtime)
+            sizes[stem] = sizes.get(stem, 0) + found.st_size
+    total = sum(sizes.values())
+    for stem in sorted(modules, key=used.__getitem__):
+        if time() - used[stem] > unused or total > largest:
+            total -= sizes[stem]
+            for path in modules[stem]:
+                path.unlink(missing_ok=True)

@@ -168,6 +168,9 @@ class Model:
     """Models in series, this one alone if it is not joined."""
     links: Mapping[str, Link] = field(default_factory=dict)
     """Signals that are equations over the parts' signals, by name."""
+    recipe: tuple[Any, ...] = ()
+    """A function and its arguments that make the model again in another process; by default it is
+    looked up by its name."""
 
     def __post_init__(self) -> None:
         if not self.parts:
@@ -181,7 +184,9 @@ class Model:
         return id(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """By its name in a module, from which another process imports it and its equations."""
+        """By its recipe, or its name in a module, from which another process imports it."""
+        if self.recipe:
+            return self.recipe
         # the main module last: that of another process may be another one
         for name in sorted(sys.modules, key=lambda name: name == "__main__"):
             for word, thing in list(getattr(sys.modules[name], "__dict__", {}).items()):

@@ -10,13 +10,49 @@ from __future__ import annotations
 from collections import namedtuple
 from collections.abc import Mapping
 from dataclasses import fields, replace
+from functools import cache
+from importlib import import_module
 from types import CellType, FunctionType
-from typing import Any, get_type_hints
+from typing import Any, NamedTuple, get_type_hints
 
 from swashplate.equations.equation import closure, equation, equation_of_text, is_function
 from swashplate.equations.model import Equation, Model, arguments_of, join
 from swashplate.equations.syntax import is_named_tuple, plain
 from swashplate.errors import InputError
+
+
+class Replacement(NamedTuple):
+    """One's own equation in the place of a model's."""
+
+    old: Equation
+    new: Equation
+    parameters: type[Any] | None = None
+    """What it brings along, see `replaced`."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # by name: another process must find the very equation that its model uses
+        named = [None if each is None else _place_of(each) for each in self]
+        return _found, tuple(named)
+
+
+def _place_of(thing: Any) -> tuple[str, str]:
+    return plain(thing).__module__, plain(thing).__qualname__
+
+
+def _found(*places: tuple[str, str] | None) -> Replacement:
+    found: list[Any] = [
+        None if each is None else getattr(import_module(each[0]), each[1]) for each in places
+    ]
+    return Replacement(*found)
+
+
+def uses(model: Model, equation: Equation) -> bool:
+    """Whether any of a model's equations is or calls this one."""
+    return any(
+        is_function(getattr(part, each.name)) and _reaches(getattr(part, each.name), equation)
+        for part in model.parts
+        for each in fields(part)
+    )
 
 
 def replaced(
@@ -49,17 +85,24 @@ def replaced(
     parts = [_part(part, old, new, parameters) for part in model.parts]
     if all(part is own for part, own in zip(parts, model.parts, strict=True)):
         raise InputError(f"Model {model.name} does not use {plain(old).__name__}.")
-    if len(parts) == 1:
-        return parts[0]
-    links = {name: link.equation for name, link in model.links.items() if link.equation}
-    return join(
-        model.name,
-        *parts,
-        links=links,
-        integrals=model.integrals,
-        outputs=model.outputs,
-        free_start=model.free_start,
-    )
+    made = parts[0]
+    if len(parts) > 1:
+        made = join(
+            model.name,
+            *parts,
+            links={name: link.equation for name, link in model.links.items() if link.equation},
+            integrals=model.integrals,
+            outputs=model.outputs,
+            free_start=model.free_start,
+        )
+    object.__setattr__(made, "recipe", (again, (model, Replacement(old, new, parameters))))
+    return made
+
+
+@cache
+def again(model: Model, made: Replacement) -> Model:
+    """What `replaced` gives, once in a process."""
+    return replaced(model, *made)
 
 
 def _part(part: Model, old: Equation, new: Equation, parameters: type[Any] | None) -> Model:
@@ -72,7 +115,9 @@ def _part(part: Model, old: Equation, new: Equation, parameters: type[Any] | Non
     leading = {name: each for name, each in equations.items() if _reaches(each, old)}
     if not leading:
         return part
-    kind = part.parameters if parameters is None else _extended(part.parameters, parameters)
+    own: Any = part.parameters
+    more: Any = parameters
+    kind = own if more is None else _extended(own, more)
     names = {part.parameters.__name__: kind}
     made = {plain(old): _called_like(old, new, part.name, kind)}
     return replace(
@@ -87,7 +132,8 @@ def _reaches(function: Any, old: Equation) -> bool:
     return any(plain(each) is plain(old) for each in closure(function).values())
 
 
-def _extended(kind: type[Any], more: type[Any]) -> type[Any]:
+@cache
+def _extended(kind: Any, more: Any) -> type[Any]:
     """A class of named tuples with the fields of two."""
     hints: dict[str, Any] = {}
     defaults: dict[str, Any] = {}

@@ -17,7 +17,7 @@ from swashplate.equations.marching.observation import ObservedRecord
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.model import EquationModel
-from swashplate.parameters.definitions import COLUMNS, REFINEMENTS
+from swashplate.parameters.definitions import is_column
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.instance import START_PRESSURE, at_every_rate
 from swashplate.simulation.residuals import Own, Ready, made_ready
@@ -294,7 +294,7 @@ class DriveModel(EquationModel):
         """Derivatives by a name of the columns that it moves: of coefficients by a force."""
         if self.forces is not None and name in self.forces.names:
             return self.forces.slopes(name)
-        known = name in COLUMNS or name in REFINEMENTS or name == START_PRESSURE
+        known = is_column(name) or name == START_PRESSURE
         return {name: 1.0} if known else {}
 
     def parameters_at(self, values: Mapping[str, float]) -> ParameterSet:
@@ -311,7 +311,7 @@ class DriveModel(EquationModel):
         last = self._last.get("set")
         if last is not None and last[0] == key:
             return last[1]
-        changes = {name: v for name, v in own.items() if name in COLUMNS or name in REFINEMENTS}
+        changes = {name: v for name, v in own.items() if is_column(name)}
         if self.forces is not None:
             changes |= self.forces.coefficients(own, self.parameters)
         try:
@@ -323,5 +323,5 @@ class DriveModel(EquationModel):
         return made
 
     def _is_parameter(self, name: str) -> bool:
-        known = name in COLUMNS or name in REFINEMENTS
+        known = is_column(name)
         return known or (self.forces is not None and name in self.forces.names)

@@ -26,7 +26,7 @@ from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Free, GivenForces, Setup, Stage
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.unknowns import Unknown
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS, OWN, REFINEMENTS
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.result import Limit, Simulation
 from swashplate.simulation.run import simulate_drive, simulate_pump
@@ -88,7 +88,7 @@ def acting(simulation: Simulation, parameters: ParameterSet) -> dict[str, float]
         if definition.block == "pump_motor" and not definition.directional and symbol != "Z17":
             mask = rest.get(symbol, tilted)
             found[symbol] = float(np.count_nonzero(mask)) / simulation.record.rate
-    return {**found, **dict.fromkeys(REFINEMENTS, found["Z1"])}
+    return {**found, **dict.fromkeys((*REFINEMENTS, *OWN), found["Z1"])}
 
 
 def _of_pump(simulation: Simulation, sign: float, Z17: float) -> dict[str, Mask]:

@@ -14,7 +14,8 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.equations import Model as Equations
 from swashplate.equations import instance_of, parameter_paths, state_paths
 from swashplate.equations.fields import made, numbers_of
-from swashplate.equations.marching.jacobian import jacobian, residuals, started_by, triangle
+from swashplate.equations.marching.jacobian import jacobian, residuals, triangle
+from swashplate.equations.marching.layout import started_by
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.observation import Own as EngineOwn

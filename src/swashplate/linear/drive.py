@@ -24,13 +24,13 @@ from swashplate.linear.operating_point import (
     operating_point,
 )
 from swashplate.models.card import COULOMB_WIDTH, Card
-from swashplate.models.drive import flowing_drive, flowing_pump_drive
 from swashplate.models.pump import PumpState
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.instance import (
     card_of,
     check_filter_stability,
     instance_of,
+    models_of,
     without_ripple,
 )
 from swashplate.tables import UNIT, Cell, Column, Table
@@ -149,7 +149,8 @@ def _known(
         at = {"current": point.solenoid_force}
     model = instance.model
     if step == 0.0:
-        model = flowing_drive if by_voltage else flowing_pump_drive
+        models = models_of(parameters.equations)
+        model = models.flowing_drive if by_voltage else models.flowing_pump_drive
     instance = Instance(model, (front, machine), instance.name)
     p = machine.p
     at |= {"load_torque": p.load_torque, "pump_speed": p.pump_speed, "supply_pressure": p.Z9}

@@ -17,8 +17,6 @@ from swashplate.models.pump import (
     Pump,
     moment_sine,
     overpowered,
-    pump_sample,
-    pump_settled,
     solenoid_force,
 )
 from swashplate.parameters.parameter_set import ParameterSet
@@ -126,9 +124,10 @@ def operating_point(
         sides += _check_solenoid(instance, parameters, current, voltage)
     _check_friction(instance)
     known = pump_arguments(instance, current)
-    known["state"] = called(pump_settled, known)
+    equations: Any = instance.model.parts[1]
+    known["state"] = called(equations.settled, known)
     _check_limits(instance.name, known["state"].pressure, known["k"])
-    signals = called(pump_sample, known)
+    signals = called(equations.sample, known)
     opening, position = signals.orifice_opening, signals.spool_position
     options = instance.parts[1].options
     if options.leaky is None:

@@ -42,6 +42,7 @@ from swashplate.models.refinements import (
     rippled_angle,
     static_leakage,
     stiff_line_torque,
+    unloaded_leakage,
 )
 
 WELL_CONDITIONED = 0.25
@@ -182,6 +183,7 @@ class PumpOptions(NamedTuple):
     damping: Flag = OFF  # Damping of the swash plate, see `plate_follows`.
     leakage: Flag = OFF  # Leakage of the motor under load, see `static_leakage`.
     line: Flag = OFF  # Line and inertia, see `line_step`.
+    own: Flag = OFF  # An equation is the user's own: the steady state is searched for.
 
 
 class PumpConstants(NamedTuple):
@@ -554,6 +556,8 @@ def flow_speed(
         lost = load_leakage(tangent, rate, k.Z12 * inputs.pump_speed)
     elif options.loaded is not None:
         lost = load_leakage(tangent, rate, k.Z12 * inputs.pump_speed)
+    else:
+        lost = unloaded_leakage(tangent, rate * inputs.pump_speed, k.Z12)
     return shaft_speed(angle, lost, p.Z10 * inputs.pump_speed, Z11)
 
 
@@ -829,9 +833,10 @@ def settled_pressure(inputs: PumpInputs, p: Pump, k: PumpConstants, options: Pum
     """δP that the pump settles at under a constant current. [Pa]
 
     Without leakage where the spool closes, with it where the flow through the spool is what leaks.
+    Where it closes is known in closed form of the package's equations alone.
     """
     force = solenoid_force(inputs.current, solenoids_of(p))
-    if options.leaky is None:
+    if options.leaky is None and options.own is None:
         closed = closed_pressure(force, p, k)
         return closed - leaked_pressure(closed, inputs.supply_pressure, p, k, options.symmetric)
     return root(pressure_gain, k.lower, k.upper, force, inputs.supply_pressure, p, options)

@@ -40,6 +40,7 @@ stiff (k → ∞), which leaves Ω = Ω_0 - K_mL (C_g + J Ω').
 
 from math import exp, sin, sqrt
 
+from swashplate.equations.derivatives import declared
 from swashplate.equations.equation import equation
 
 
@@ -158,6 +159,17 @@ def load_leakage(tangent: float, swash_rate: float, Z12: float) -> float:
     one (erratum 22).
     """
     return Z12 * (swash_rate / sqrt(1.0 + tangent * tangent))
+
+
+@equation
+def unloaded_leakage(tangent: float, swash_rate: float, Z12: float) -> float:
+    """`load_leakage` at Z12 = 0: none, and there for the derivative by Z12. [rad/s]"""
+    return 0.0
+
+
+@declared(unloaded_leakage)
+def _unloaded_leakage(tangent: float, swash_rate: float, Z12: float) -> tuple[float, float, float]:
+    return 0.0, 0.0, swash_rate / sqrt(1.0 + tangent * tangent)
 
 
 @equation

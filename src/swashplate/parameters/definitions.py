@@ -8,7 +8,7 @@ A definition stands once, on the field of `swashplate.models.card.Card` or
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from typing import Literal
 
@@ -80,9 +80,48 @@ OPTIONS: tuple[str, ...] = tuple(dict.fromkeys(SWITCHES.values()))
 """Those options, along the chain."""
 
 
+def is_column(name: str) -> bool:
+    """Whether a set can have a value of this name, e.g. ``Z16_plus``."""
+    return name in COLUMNS or name in REFINEMENTS or name in OWN
+
+
 def options_of(numbers: Mapping[str, float]) -> frozenset[str]:
     """Options whose parameters are not all zero; what is not among the numbers is off."""
     return frozenset(each for name, each in SWITCHES.items() if numbers.get(name, 0.0) != 0.0)
+
+
+OWN: dict[str, Definition] = {}
+"""Definitions of what users' own equations brought along, by symbol."""
+
+
+def declare(kind: type) -> None:
+    """Make the parameters of one's own equation known by name.
+
+    Parameters
+    ----------
+    kind : class of named tuples
+        Each field a float with its `Definition`, of one value, and a default.
+
+    Raises
+    ------
+    ParameterError
+        If one has no definition or is called like another one.
+    """
+    for each in declared_by(kind):
+        default = kind._field_defaults.get(each.symbol)  # type: ignore[attr-defined]
+        if len(each.fields) != 1 or default is None or not each.definition.unit:
+            raise ParameterError(
+                f"{kind.__name__}.{each.symbol} needs a Definition with a unit, one value and a "
+                "default."
+            )
+        made = replace(definition_of(each, "refinements"), default=default)
+        known = (CATALOGUE | REFINEMENTS | OWN).get(each.symbol, made)
+        if known != made:
+            raise ParameterError(
+                f"{kind.__name__}.{each.symbol}: there is another parameter {each.symbol}, "
+                f"{known.name}; give yours a name of its own."
+            )
+        OWN[each.symbol] = made
 
 
 def find(name: str) -> Definition:
@@ -99,6 +138,8 @@ def find(name: str) -> Definition:
         return CATALOGUE[COLUMNS[name]]
     if name in REFINEMENTS:
         return REFINEMENTS[name]
+    if name in OWN:
+        return OWN[name]
     raise unknown_parameter(name)
 
 

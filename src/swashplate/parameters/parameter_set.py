@@ -6,13 +6,16 @@ from itertools import groupby
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
+from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.definitions import (
     CATALOGUE,
     DEFAULTS,
+    OWN,
     REFINEMENTS,
     SWITCHES,
     Definition,
+    declare,
     find,
     options_of,
     unknown_parameter,
@@ -101,15 +104,28 @@ class ParameterSet(Mapping[str, Parameter]):
     filter's differential equation, whose ζ, ω and C mean the same at every rate. [Hz]"""
     options: frozenset[str] = frozenset()
     """Terms of the pump that count: of `swashplate.parameters.definitions.OPTIONS`."""
+    equations: tuple[Replacement, ...] = ()
+    """One's own equations in the place of the pump's, see `Drive.with_equation`."""
     numbers: Mapping[str, float] = field(init=False, repr=False, compare=False)
     """Every single value by column, e.g. ``Z16_plus``."""
 
     def __post_init__(self) -> None:
+        kinds = [each.parameters for each in self.equations if each.parameters is not None]
+        for kind in kinds:
+            declare(kind)
+        own = {name for kind in kinds for name in kind._fields}
+        strange = [name for name in self.parameters if name in OWN and name not in own]
+        if strange:
+            raise ParameterError(
+                f"{self.name}: {strange[0]} belongs to an equation of your own, which this drive "
+                "does not have; see Drive.with_equation."
+            )
         missing = [symbol for symbol in CATALOGUE if symbol not in self.parameters]
         if missing:
             raise ParameterError(f"{self.name}: no value for {', '.join(missing)}.")
         ordered = {symbol: self.parameters[symbol] for symbol in CATALOGUE}
-        ordered |= {each: self.parameters[each] for each in REFINEMENTS if each in self.parameters}
+        more = [each for each in (*REFINEMENTS, *OWN) if each in self.parameters]
+        ordered |= {each: self.parameters[each] for each in more}
         numbers = {}
         for parameter in ordered.values():
             for column, value in zip(parameter.definition.columns, parameter.values, strict=True):
@@ -131,6 +147,10 @@ class ParameterSet(Mapping[str, Parameter]):
             return self.parameters[symbol]
         if symbol in REFINEMENTS:
             return Parameter(REFINEMENTS[symbol], DEFAULTS[symbol], status="inactive")
+        if symbol in OWN:
+            default = OWN[symbol].default
+            assert default is not None
+            return Parameter(OWN[symbol], default, status="inactive")
         raise unknown_parameter(symbol)
 
     def __contains__(self, symbol: object) -> bool:
@@ -143,7 +163,7 @@ class ParameterSet(Mapping[str, Parameter]):
         return len(self.parameters)
 
     def __hash__(self) -> int:
-        return hash((self.name, self.options, *self.numbers.values()))
+        return hash((self.name, self.options, self.equations, *self.numbers.values()))
 
     def __reduce__(self) -> tuple[object, ...]:
         # read-only views cannot be pickled, so a copy in another process is built anew
@@ -157,6 +177,7 @@ class ParameterSet(Mapping[str, Parameter]):
             self.card_switch,
             self.rate,
             self.options,
+            self.equations,
         )
 
     @property
@@ -171,11 +192,11 @@ class ParameterSet(Mapping[str, Parameter]):
     @property
     def plain(self) -> "ParameterSet":
         """The set without refinements, itself if it has none."""
-        if REFINEMENTS.keys().isdisjoint(self.parameters):
+        if REFINEMENTS.keys().isdisjoint(self.parameters) and not self.equations:
             return self
         parameters = {symbol: self.parameters[symbol] for symbol in CATALOGUE}
         own = {SWITCHES[symbol] for symbol in CATALOGUE if symbol in SWITCHES}
-        return replace(self, parameters=parameters, options=self.options & own)
+        return replace(self, parameters=parameters, options=self.options & own, equations=())
 
     def refuse_refinements(self, what: str) -> None:
         """Refuse the set where a computation knows the source's equations alone.

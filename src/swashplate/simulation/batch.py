@@ -25,11 +25,17 @@ from swashplate.equations.marching.run import outside
 from swashplate.equations.marching.use import records_of
 from swashplate.errors import FileError, InputError
 from swashplate.executors import Executor, Threads
-from swashplate.models.drive import drive, pump_drive
 from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import broken_rules
-from swashplate.simulation.instance import PATHS, SIDES, card_options, pump_options, step_limit
+from swashplate.simulation.instance import (
+    PATHS,
+    SIDES,
+    card_options,
+    models_of,
+    pump_options,
+    step_limit,
+)
 from swashplate.tables import write_whole
 
 Array = NDArray[np.float64]
@@ -355,7 +361,8 @@ def simulate_drives(
         raise InputError(f"A batch has no output '{observed}'; it has {', '.join(OUTPUTS)}.")
     by_path = {PATHS[column]: values for column, values in numbers.items()}
     records = {"voltage" if by_voltage else "current": record.values}
-    model = drive if by_voltage else pump_drive
+    models = models_of(parameters.equations)
+    model = models.drive if by_voltage else models.pump_drive
     shared = _shared(model, by_path, record, records, observed, cost, to)
 
     def why(worst: float) -> str:

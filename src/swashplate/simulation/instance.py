@@ -6,7 +6,7 @@ from cmath import log, sqrt
 from dataclasses import replace
 from functools import lru_cache
 from math import floor, tan
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,11 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.fields import floats_of
 from swashplate.equations.library import TAN_22_5
 from swashplate.equations.marching.run import Instance, Part
+from swashplate.equations.model import Model
+from swashplate.equations.replacement import Replacement, again, uses
+from swashplate.equations.syntax import plain
 from swashplate.errors import InputError
 from swashplate.models.card import Card, CardOptions, Channel
 from swashplate.models.drive import Source as CurrentSource
-from swashplate.models.drive import drive, pump_drive
+from swashplate.models.drive import drive, flowing_drive, flowing_pump_drive, pump_drive
 from swashplate.models.pump import Pump, PumpOptions
+from swashplate.parameters.definitions import OWN
 from swashplate.parameters.parameter_set import ParameterSet
 
 SIDES: Final = ("plus", "minus")
@@ -26,11 +30,22 @@ MOST_SUBSTEPS = 1000
 """Steps a sample that anyone would wait for."""
 
 
-PATHS = {
-    **{path: f"pump.{path}" for path in floats_of(Pump)},
-    **{f"{name}_{side}": f"card.{side}.{name}" for side in SIDES for name in Channel._fields},
-    "tau": "card.tau",
-}
+class _Paths(dict[str, str]):
+    """Paths of columns, those of users' own equations among them."""
+
+    def __missing__(self, column: str) -> str:
+        if column not in OWN:
+            raise KeyError(column)
+        return f"pump.{column}"
+
+
+PATHS = _Paths(
+    {
+        **{path: f"pump.{path}" for path in floats_of(Pump)},
+        **{f"{name}_{side}": f"card.{side}.{name}" for side in SIDES for name in Channel._fields},
+        "tau": "card.tau",
+    }
+)
 """Path in the model of every column such as ``Z16_plus``."""
 START_PRESSURE = "start_pressure"
 """Column of δP at the first sample, where it is an unknown of the experiment."""
@@ -39,6 +54,40 @@ START_PRESSURE = "start_pressure"
 def path_of(column: str) -> str:
     """Path in the model of a column, or of the pressure at the start."""
     return "start.pump.pressure" if column == START_PRESSURE else PATHS[column]
+
+
+class Models(NamedTuple):
+    """The drive's models: behind a voltage and a current, by samples and in continuous time."""
+
+    drive: Model
+    pump_drive: Model
+    flowing_drive: Model
+    flowing_pump_drive: Model
+
+
+@lru_cache(maxsize=64)
+def models_of(equations: tuple[Replacement, ...]) -> Models:
+    """The drive's models with one's own equations in them."""
+    models = Models(drive, pump_drive, flowing_drive, flowing_pump_drive)
+    for each in equations:
+        models = Models(*(again(m, each) if uses(m, each.old) else m for m in models))
+    return models
+
+
+def with_equation(parameters: ParameterSet, made: Replacement) -> ParameterSet:
+    """The set with an equation of one's own; see `Drive.with_equation`."""
+    own = (*parameters.equations, made)
+    if not uses(models_of(parameters.equations).pump_drive, made.old):
+        raise InputError(
+            f"{plain(made.old).__name__} is no equation of the pump: swashplate.models.pump and "
+            "swashplate.models.refinements have those."
+        )
+    models_of(own)  # refuses what does not fit
+    found = replace(parameters, equations=own)
+    if made.parameters is None:
+        return found
+    defaults = made.parameters._field_defaults
+    return found.replace(defaults, found.options)
 
 
 def card_of(parameters: ParameterSet) -> Card:
@@ -52,9 +101,10 @@ def card_of(parameters: ParameterSet) -> Card:
 
 def pump_of(parameters: ParameterSet) -> Pump:
     """The pump's numbers; of the refinements those that are given."""
-    return Pump(
-        **{name: parameters.numbers[name] for name in Pump._fields if name in parameters.numbers}
-    )
+    kind: Any = models_of(parameters.equations).pump_drive.parts[1].parameters
+    numbers = parameters.numbers
+    made: Pump = kind(**{name: numbers[name] for name in kind._fields if name in numbers})
+    return made
 
 
 def card_options(parameters: ParameterSet) -> CardOptions:
@@ -73,6 +123,8 @@ def pump_options(parameters: ParameterSet) -> PumpOptions:
         on.add("steep")
     if parameters.pressure_root == "symmetric":
         on.add("symmetric")
+    if parameters.equations:
+        on.add("own")
     return PumpOptions(**dict.fromkeys(on, True))
 
 
@@ -82,8 +134,9 @@ def instance_of(parameters: ParameterSet, by_voltage: bool) -> Instance:
     pump = Part(pump_of(parameters), pump_options(parameters))
     if by_voltage:
         card = Part(card_of(parameters), card_options(parameters))
-        return Instance(drive, (card, pump), parameters.name)
-    return Instance(pump_drive, (Part(CurrentSource()), pump), parameters.name)
+        return Instance(models_of(parameters.equations).drive, (card, pump), parameters.name)
+    model = models_of(parameters.equations).pump_drive
+    return Instance(model, (Part(CurrentSource()), pump), parameters.name)
 
 
 def without_ripple(instance: Instance) -> Instance:
@@ -112,6 +165,7 @@ def step_limit(zeta: ArrayLike, exact: bool) -> NDArray[np.float64]:
     return limit
 
 
+@lru_cache(maxsize=256)
 def check_filter_stability(parameters: ParameterSet, step: float) -> None:
     """Refuse a step at which the filter would settle on wrong values without a word.
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -143,8 +143,20 @@ def moved_by(
     }
     moved = {"card.plus": driven["plus"], "card.minus": driven["minus"]}
     moved["card"] = any(driven.values())
-    pump = any(each.signal not in CURRENTS for each in observed.observations)
-    return [moved.get(path_of(name).rpartition(".")[0], pump) for name in names]
+    moved["pump"] = any(each.signal not in CURRENTS for each in observed.observations)
+    return [moved[part] for part in _parts(tuple(names))]
+
+
+@lru_cache(maxsize=256)
+def _parts(names: tuple[str, ...]) -> list[str]:
+    """What of the drive each column belongs to."""
+    return [path_of(name).removeprefix("start.").rpartition(".")[0] for name in names]
+
+
+@lru_cache(maxsize=256)
+def _paths(names: tuple[str, ...]) -> list[str]:
+    """Path in the model of each column."""
+    return [path_of(name) for name in names]
 
 
 def made_ready(
@@ -159,8 +171,8 @@ def made_ready(
             )
     if by_voltage:
         check_filter_stability(parameters, observed.record.step)
-    # what is differentiated by counts, at 0 as well; at Z7 = 0 there are derivatives for that
-    asked = frozenset(SWITCHES[name] for name in names if name in SWITCHES) - {"leaky"}
+    # what is differentiated by counts, at 0 as well, unless equations have derivatives for that
+    asked = frozenset(SWITCHES[name] for name in names if name in SWITCHES) - {"leaky", "loaded"}
     instance = instance_of(_switched_on(parameters, asked), by_voltage)
     start: dict[str, float] = {}
     if own.start_pressure is not None:
@@ -172,7 +184,7 @@ def made_ready(
     return Ready(
         instance,
         EngineOwn(start, own.offsets, own.clock_offsets),
-        [path_of(name) for name in names],
+        _paths(tuple(names)),
         moved_by(parameters, observed, names),
     )
 
@@ -202,9 +214,9 @@ ALL_COLUMNS = (
 
 def _columns(found: Sensitivities, signal: str) -> Array:
     """The Jacobian of unit weights: every sample observed as zero."""
-    run = found.simulation
-    seen = Observation(signal, run.time, np.zeros(run.time.size))
-    observed = ObservedRecord(run.record, [seen], run.driven_by, found.start, run.measured)
+    time = found.record.time
+    seen = Observation(signal, time, np.zeros(time.size))
+    observed = ObservedRecord(found.record, [seen], found.driven_by, found.start)
     return jacobian(found.parameters, observed, found.names).columns
 
 
@@ -216,15 +228,21 @@ class Sensitivities:
     dead zone, a limit just reached) they are the one-sided derivatives that the equations declare.
     """
 
-    simulation: Simulation
-    """The plain simulation, the same to the last bit as without sensitivities."""
+    parameters: ParameterSet
+    record: Record
+    """The input on the march's grid."""
+    driven_by: Driver
+    start: Start
     names: tuple[str, ...]
     """Columns such as ``Z16_plus``, in the order asked for."""
-    parameters: ParameterSet = field(repr=False)
-    start: Start = "rest"
 
     def __repr__(self) -> str:
         return f"Sensitivities({self.simulation!r}, by {', '.join(self.names)})"
+
+    @cached_property
+    def simulation(self) -> Simulation:
+        """The plain simulation, the same to the last bit as without sensitivities."""
+        return simulate_drive(self.parameters, self.record, self.start, driver=self.driven_by)
 
     current_positive = Named(_columns)
     """(n, k) derivatives of the positive channel's current. [A/...]"""
@@ -252,9 +270,7 @@ class Sensitivities:
         """
         rows = getattr(self, output)
         stamps = np.asarray(time, dtype=np.float64)
-        return np.column_stack(
-            [np.interp(stamps, self.simulation.time, column) for column in rows.T]
-        )
+        return np.column_stack([np.interp(stamps, self.record.time, column) for column in rows.T])
 
 
 def sensitivities(
@@ -275,5 +291,4 @@ def sensitivities(
         raise InputError(
             f"{foreign[0]} belongs to the card, which a given current does not go through."
         )
-    run = simulate_drive(parameters, record, start, driver=driver)
-    return Sensitivities(run, chosen, parameters, start)
+    return Sensitivities(parameters, record, driver, start, chosen)

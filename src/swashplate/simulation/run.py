@@ -19,14 +19,10 @@ from swashplate.equations.model import Model
 from swashplate.equations.writing import lines_of
 from swashplate.errors import DomainError, InputError
 from swashplate.models.card import channel_level
-from swashplate.models.drive import drive
 from swashplate.models.pump import (
     PumpConstants,
     PumpInputs,
     PumpState,
-    pump_constants,
-    pump_sample,
-    pump_settled,
 )
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -148,7 +144,6 @@ def measured_records(
         "supply_pressure": supply_pressure,
     }
     found: dict[str, Array] = {}
-    grid = np.arange(record.values.size)
     size = (record.values.size - 1) // record.substeps + 1
     for name, values in given.items():
         if values is None:
@@ -161,6 +156,7 @@ def measured_records(
         if not np.isfinite(samples).all():
             bad = int(np.argmax(~np.isfinite(samples)))
             raise InputError(f"{name} is {samples[bad]} at sample {bad}; it must be finite.")
+        grid = np.arange(record.values.size)
         found[name] = np.interp(grid, grid[:: record.substeps], samples)
     return found
 
@@ -169,9 +165,9 @@ def measured_records(
 
 
 @generating
-def _kernel(options: tuple[Any, ...]) -> Callable[..., None]:
+def _kernel(model: Model, options: tuple[Any, ...]) -> Callable[..., None]:
     """The compiled map from constant voltages to currents and speeds."""
-    sampler = Sampler(drive, ("voltage",), options, [])
+    sampler = Sampler(model, ("voltage",), options, [])
     card, pump = sampler.parts
     code = Code(pump.code.taken)
     volts = ex.name("volts")
@@ -184,8 +180,10 @@ def _kernel(options: tuple[Any, ...]) -> Callable[..., None]:
     current = ex.make("-", plus, minus)  # type: ignore[arg-type]
     given = (current, *(value_of(pump.p, name) for name in ("pump_speed", "load_torque", "Z9")))
     known = {**pump.known, "inputs": Tuple(PumpInputs, given)}
-    known["state"] = pump.call(code, pump_settled, known)
-    speed = value_of(pump.call(code, pump_sample, known), "shaft_speed")
+    assert pump.own.settled is not None
+    assert pump.own.sample is not None
+    known["state"] = pump.call(code, pump.own.settled, known)
+    speed = value_of(pump.call(code, pump.own.sample, known), "shaft_speed")
     results = [current, speed]
     sampler.ends = [[ex.name(node.value) for _, node in leaves(part.p)] for part in sampler.parts]
     read = code.reads(results)
@@ -212,7 +210,7 @@ def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Arra
     instance = instance_of(parameters, True)
     card, pump = instance.options
     current, speed = np.empty(voltage.size), np.empty(voltage.size)
-    _kernel((card, pump._replace(ripple=None)))(
+    _kernel(instance.model, (card, pump._replace(ripple=None)))(
         voltage, instance.params, instance.given, 1.0, current, speed
     )
     return current, speed
@@ -222,14 +220,16 @@ def pump_arguments(instance: Instance, current: float, step: float = 1.0) -> dic
     """What the pump's equations take under a constant current, by the arguments' names."""
     p, options, _ = instance.parts[1]
     known: dict[str, Any] = {"p": p, "options": options, "h": step}
-    known["k"] = called(pump_constants, known)
+    pump: Any = instance.model.parts[1]
+    known["k"] = called(pump.constants, known)
     known["inputs"] = PumpInputs(current, p.pump_speed, p.load_torque, p.Z9)
     return known
 
 
 def settled_state(instance: Instance, current: float) -> PumpState:
     """State of the pump that a constant signed current settles at."""
-    made: PumpState = called(pump_settled, pump_arguments(instance, current))
+    pump: Any = instance.model.parts[1]
+    made: PumpState = called(pump.settled, pump_arguments(instance, current))
     return made
 
 

@@ -12,8 +12,8 @@ from swashplate.equations.code import generating
 from swashplate.equations.marching.march import Stored, advance_source
 from swashplate.equations.marching.record import Interpolation, least_substeps
 from swashplate.equations.marching.run import Start, check_domain, check_start, module
+from swashplate.equations.model import Model
 from swashplate.errors import InputError
-from swashplate.models.drive import drive
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import check_filter_stability, instance_of
@@ -66,9 +66,11 @@ def steps(last, voltage, held, substeps, begun, h, machine, states, lines, out):
 
 
 @generating
-def _kernels(options: tuple[Any, ...]) -> tuple[Callable[..., int], Callable[..., float]]:
+def _kernels(
+    model: Model, options: tuple[Any, ...]
+) -> tuple[Callable[..., int], Callable[..., float]]:
     """The compiled constants and steps of a drive."""
-    text, names = advance_source(drive, ("voltage",), options, SHOWN)
+    text, names = advance_source(model, ("voltage",), options, SHOWN)
     made = module("drive_step", text + DRIVER, {**names, "np": np})
     return made["prepare"], made["steps"]
 
@@ -103,7 +105,7 @@ class Stepper:
         check_filter_stability(parameters, self._step)
         self._instance = instance_of(parameters, True)
         self._start = start
-        prepare, self._steps = _kernels(self._instance.options)
+        prepare, self._steps = _kernels(self._instance.model, self._instance.options)
         places = self._instance.places(("voltage",), self._step)
         constants = np.zeros(64)
         params, given = self._instance.params, self._instance.given

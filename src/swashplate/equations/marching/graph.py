@@ -39,6 +39,8 @@ from swashplate.equations.reading import read
 from swashplate.equations.writing import Writer, lines_of
 from swashplate.errors import InputError
 
+PAIR = 2
+"""Columns of a generated recurrence side by side."""
 WORD = re.compile(r"\b[A-Za-z_]\w*")
 
 
@@ -69,6 +71,8 @@ class Group:
     """Whether a state's row holds the derivative behind the sample, as its signal needs it."""
     stored: tuple[bool, ...]
     """Whether anyone reads a state's row."""
+    piece: int = -1
+    """Piece that runs the recurrence; -1 where kernels of the library do, for one state or two."""
 
 
 @dataclass
@@ -78,7 +82,7 @@ class Component:
     piece: int
     groups: list[Group]
     signals: bool = False
-    """Whether the piece fills in the derivatives of signals as well."""
+    """Whether the piece fills in signals and their derivatives as well."""
 
 
 @dataclass
@@ -229,9 +233,16 @@ class _Builder:
         file = f"{self.model.name}_{name}"
         return Planned(lambda: module(file, text, {"piece": piece, **names})[name])
 
-    def _piece(self, name: str, says: str, lines: Sequence[str], names: Mapping[str, Any]) -> int:
+    def _piece(
+        self,
+        name: str,
+        says: str,
+        lines: Sequence[str],
+        names: Mapping[str, Any],
+        arguments: str = PIECE,
+    ) -> int:
         """Number of a new piece."""
-        text = function_source(f"{name}({PIECE})", says, lines, "@piece")
+        text = function_source(f"{name}({arguments})", says, lines, "@piece")
         self.pieces.append(self._planned(name, text, {**self.sampler.names, **names}))
         return len(self.pieces)
 
@@ -394,28 +405,35 @@ class _Builder:
         own = part.own.name
         derivatives, partials = self.found[self.graphs.index(graph)]
 
-        def fill(name: str, outs: Iterable[str]) -> int:
+        def fill(name: str, outs: Iterable[str], values: Mapping[int, Node]) -> int:
             wanted = {*outs}
             some = {key: node for key, node in partials.items() if key[0] in wanted}
-            return self._fill(graph, part, name, derivatives, some)
+            return self._fill(graph, part, name, derivatives, some, values)
 
         signals = [
             each
             for each in self._results(part)
             if each.startswith("signals.") and each.removeprefix("signals.") not in graph.aliases
         ]
-        # derivatives are carried through sub-steps once, for states and signals
-        together = part.code.repeats
-        if signals and not together:
-            graph.signal_piece = fill(f"{own}_signals", signals)
         states = list(dict.fromkeys(out for out, _ in partials if out.startswith("state.")))
         flows = {
             out: {f"state.{by.path}" for each, by in partials if each == out and by.kind == "state"}
             & {*states}
             for out in states
         }
+        components = _weakly_connected(states, flows)
+        # what leads to states leads to signals, sub-steps above all: once for both
+        together = part.code.repeats or (bool(signals) and len(components) == 1)
         if together:
-            filled = fill(own, [*states, *signals])
+            components = [states]
+            values = {
+                row: part.signal(path)
+                for (number, path), row in self.values.items()
+                if number == part.part
+            }
+            filled = fill(own, [*states, *signals], values)
+        elif signals:
+            graph.signal_piece = fill(f"{own}_signals", signals, {})
         at_sample = {
             by.path
             for out, by in graph.entries
@@ -423,10 +441,10 @@ class _Builder:
         } | {place.path for place, _ in self.observed if place.kind == "state"}
         at_sample |= {s.signal for s in self.sampler.sources if s.part == part.part}
         graph.aliases = {s: path for s, path in graph.aliases.items() if path not in at_sample}
-        for c, outs in enumerate([states] if together else _weakly_connected(states, flows)):
+        for c, outs in enumerate(components):
             name = f"{own}_{c}" if len(outs) < len(states) else own
             if not together:
-                filled = fill(name, outs)
+                filled = fill(name, outs, {})
             groups = []
             for members in _strongly_connected(outs, flows):
                 bare = tuple(each.removeprefix("state.") for each in members)
@@ -443,6 +461,8 @@ class _Builder:
                     for path, behind in zip(bare, after, strict=True)
                 )
                 groups.append(Group(bare, after, stored))
+                if len(bare) > 2:
+                    groups[-1].piece = self._recurrence(graph, f"{own}_{bare[0]}", groups[-1])
             graph.components.append(Component(filled, groups, together))
         starts = {"rest": self._starting(part, rest_of(part))}
         settled = settled_of(part)
@@ -507,6 +527,49 @@ class _Builder:
 
     # -- pieces --------------------------------------------------------------------------------
 
+    def _recurrence(self, graph: PartGraph, name: str, group: Group) -> int:
+        """Piece that runs y[n+1] = A[n] y[n] + g[n] for some columns, PAIR of them side by side.
+
+        Its second argument is the number of columns. In place of ``whole`` it takes, for each state
+        and all columns, the places of inputs g and results in ``flat`` and of y in ``tangent``; and
+        that vector in place of ``params``.
+        """
+        states, abreast = range(len(group.states)), range(PAIR)
+        ahead, inner, behind, loads = [], [], [], {}
+        for i in states:
+            for j in abreast:
+                for k, what in enumerate(("g", "d", "p")):
+                    if what != "d" or group.stored[i]:
+                        ahead.append(f"{what}{i}_{j} = columns[{3 * i + k} * width + c + {j}]")
+                ahead.append(f"y{i}_{j} = tangent[p{i}_{j}]")
+                behind.append(f"tangent[p{i}_{j}] = y{i}_{j}")
+                terms = [f"flat[g{i}_{j} + m]"]
+                for l in states:
+                    by = By("state", group.states[l])
+                    entry = graph.entries.get((f"state.{group.states[i]}", by))
+                    if entry is not None and entry.row >= 0:
+                        loads[f"a{i}_{l}"] = f"a{i}_{l} = {_place(entry.row, 'm')}"
+                        terms.append(f"a{i}_{l} * y{l}_{j}")
+                    elif entry is not None:
+                        terms.append(f"{entry.value!r} * y{l}_{j}")
+                inner.append(f"n{i}_{j} = {_sum(terms)}")
+        for i in (i for i in states if group.stored[i]):
+            shown = "n" if group.after[i] else "y"
+            inner += [f"flat[d{i}_{j} + m] = {shown}{i}_{j}" for j in abreast]
+        inner += [f"y{i}_{j} = n{i}_{j}" for i in states for j in abreast]
+        head = PIECE.replace("first", "width").replace("whole", "columns")
+        return self._piece(
+            f"recur_{name}",
+            f"Derivatives of {', '.join(group.states)}.",
+            [
+                f"for c in range(0, width, {PAIR}):",
+                *indented([*ahead, "for m in range(count):", *indented([*loads.values(), *inner])]),
+                *indented(behind),
+            ],
+            {},
+            head.replace("params", "tangent"),
+        )
+
     def _fill(
         self,
         graph: PartGraph,
@@ -514,8 +577,9 @@ class _Builder:
         name: str,
         derivatives: Derivatives,
         partials: Mapping[tuple[str, By], Node],
+        values: Mapping[int, Node],
     ) -> int:
-        """Piece that writes partial derivatives at known states into rows of the block."""
+        """Piece that writes partial derivatives, and values, at known states into rows."""
         rows = {}
         for key, partial in partials.items():
             if partial.op == "number":
@@ -523,9 +587,9 @@ class _Builder:
             else:
                 rows[key] = self._new_row()
                 graph.entries[key] = Entry(rows[key])
-        if not rows:
+        if not rows and not values:
             return -1
-        taken, wanted = {*part.code.taken}, [partials[key] for key in rows]
+        taken, wanted = {*part.code.taken}, [*(partials[key] for key in rows), *values.values()]
         writer = Writer(taken, derivatives.items, wanted, derivatives.hints)
         ahead, loads = self._arguments(part, writer.needed)
         # what only one side of a choice makes would carry its value from one sample to the next, as
@@ -533,7 +597,7 @@ class _Builder:
         begun = [f"{name} = {value}" for name, value in writer.inner.items()]
         stores = [
             f"{_place(row, 'm')} = {made}"
-            for row, made in zip(rows.values(), writer.texts, strict=True)
+            for row, made in zip([*rows.values(), *values], writer.texts, strict=True)
         ]
         return self._piece(
             f"fill_{name}",
@@ -550,6 +614,12 @@ class _Builder:
 def _place(row: int, at: str) -> str:
     """Text of a number in a row of the block."""
     return f"flat[{row * STRIDE} + {at}]"
+
+
+def _sum(terms: Sequence[str]) -> str:
+    """Text of a sum, its parts beside each other: none waits for all before it."""
+    half = len(terms) // 2
+    return terms[0] if not half else f"({_sum(terms[:half])} + {_sum(terms[half:])})"
 
 
 def _weakly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> list[list[str]]:

@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code import generating, leaves
 from swashplate.equations.fields import floats_of, value_at
-from swashplate.equations.marching.graph import By, Entry, Graph, Group, PartGraph, graph_of
+from swashplate.equations.marching.graph import Graph, graph_of
+from swashplate.equations.marching.layout import Layout, Slot, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
 from swashplate.equations.marching.pieces import addresses
 from swashplate.equations.marching.rows import (
-    ABREAST,
     BLOCK,
-    CALL,
-    CARRIED,
-    COMBINE,
-    RECUR,
-    STRIDE,
-    Indices,
+    Plan,
     Program,
     Sink,
-    Terms,
     march_observed,
     room_for,
 )
@@ -35,311 +28,6 @@ from swashplate.equations.model import Model, Source
 from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
-
-
-class Slot(NamedTuple):
-    """A factor that is known only with the parameters: by a constant, or by a tap's delay."""
-
-    kind: str
-    part: int
-    first: str
-    second: str = ""
-
-
-class Term(NamedTuple):
-    """A product of one or two rows and a number."""
-
-    a: int
-    b: int
-    scale: float
-    slot: Slot | None = None
-
-
-class Reference(NamedTuple):
-    """A row that holds a derivative, but for a factor."""
-
-    row: int
-    scale: float
-
-
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """A program without the numbers that depend on parameters, and the memory it needs."""
-
-    program: Program
-    pieces: frozenset[int]
-    """Numbers of the pieces that are called."""
-    slots: tuple[tuple[int, Slot], ...]
-    """Terms with a factor of this kind."""
-    rows: int
-    constant: Mapping[int, float]
-    """Rows that hold just one value."""
-    states: int
-    """Most states of a recurrence."""
-    tangents: int
-    """Numbers in the vector of tangents."""
-    places: Mapping[tuple[int, str, int], int]
-    """Place of a tangent by part, state and column."""
-
-
-@generating
-def layout_of(
-    graph: Any, model: Model, columns: tuple[str, ...], observed: tuple[int, ...]
-) -> Layout:
-    """What to do in every block for some columns.
-
-    Parameters
-    ----------
-    graph : Graph
-        Structure of the model.
-    model : Model
-        The model.
-    columns : tuple of str
-        Paths of parameters, and ``start.`` with the path of a state.
-    observed : tuple of int
-        For each observation, which of the graph's observed signals it is.
-    """
-    return _Planner(graph, model, columns).layout(observed)
-
-
-class _Planner:
-    def __init__(self, graph: Graph, model: Model, columns: tuple[str, ...]) -> None:
-        self.graph, self.model, self.columns = graph, model, columns
-        self.rows = graph.rows
-        self.constant: dict[float, int] = {}
-        self.idle = self._row()
-        self.tangents = 1  # the first belongs to idle columns
-        self.places: dict[tuple[int, str, int], int] = {}
-        self.references: dict[tuple[str, int, str], dict[int, Reference]] = {}
-        self.made: list[tuple[int, list[Term]]] = []
-        """Rows that are sums of terms."""
-        self.todo: list[tuple[int, int, int, int]] = []
-        self.columns_of: list[Indices] = [np.zeros(0, dtype=np.int64)]
-        self.states = 1
-        self.linked = set(graph.sources)
-
-    def layout(self, observed: tuple[int, ...]) -> Layout:
-        pieces = [0, *(part.value_piece for part in self.graph.parts)]
-        self.todo += [(CALL, each, 0, 0) for each in pieces if each >= 0]
-        for part in self.graph.parts if self.columns else ():
-            by_result = _by_result(part)
-            for component in part.components:
-                at = len(self.todo)
-                some = [self._group(part, group, by_result) for group in component.groups]
-                if (any(some) or component.signals) and component.piece >= 0:
-                    self.todo.insert(at, (CALL, component.piece, 0, 0))
-            if part.signal_piece >= 0:
-                self.todo.append((CALL, part.signal_piece, 0, 0))
-            self._signals(part, by_result)
-        seen, width = len(self.made), len(self.columns) + 2
-        for r, number in enumerate(observed):
-            for c in range(len(self.columns)):
-                self.made.append((r * width + c, self._observed(number, c)))
-        terms = [term for _, made in self.made for term in made]
-        program = Program(
-            len(self.columns),
-            np.array(self.todo, dtype=np.int64),
-            Terms(
-                np.array([target for target, _ in self.made], dtype=np.int64) * STRIDE
-                + np.where(np.arange(len(self.made)) < seen, 0, CARRIED),
-                np.cumsum([0, *(len(made) for _, made in self.made)]).astype(np.int64),
-                np.array([term.a for term in terms], dtype=np.int64) * STRIDE,
-                np.array([term.b for term in terms], dtype=np.int64) * STRIDE,
-                np.array([term.scale for term in terms], dtype=np.float64),
-            ),
-            seen,
-            np.concatenate(self.columns_of),
-            np.array([self._value_row(number) for number in observed], dtype=np.int64),
-            np.array([self.graph.observed[number][1] for number in observed], dtype=np.bool_),
-        )
-        return Layout(
-            program,
-            frozenset(todo[1] for todo in self.todo if todo[0] == CALL),
-            tuple((k, term.slot) for k, term in enumerate(terms) if term.slot is not None),
-            self.rows,
-            {row: value for value, row in self.constant.items()},
-            self.states,
-            self.tangents,
-            self.places,
-        )
-
-    def _constant(self, value: float) -> int:
-        """Row that holds just this value."""
-        if value not in self.constant:
-            self.constant[value] = self._row()
-        return self.constant[value]
-
-    def _combine(self, since: int) -> None:
-        """Have the rows made that are new since then."""
-        if len(self.made) > since:
-            self.todo.append((COMBINE, since, len(self.made), 0))
-
-    def _row(self) -> int:
-        self.rows += 1
-        return self.rows - 1
-
-    def _prefix(self, part: int) -> str:
-        return f"{self.model.parts[part].name}." if len(self.model.parts) > 1 else ""
-
-    def _terms(
-        self, part: PartGraph, entries: Mapping[By, Entry], c: int, within: Sequence[str] = ()
-    ) -> Iterator[Term]:
-        """What moves a result with a column, apart from the states of its own group."""
-        prefix, column = self._prefix(part.part), self.columns[c]
-        name = column.removeprefix(prefix) if column.startswith(prefix) else ""
-        for by, entry in entries.items():
-            constant = entry.row < 0
-            row, scale = (self._constant(1.0), entry.value) if constant else (entry.row, 1.0)
-            if by.kind == "p":
-                if by.path == name:
-                    yield Term(row, -1, scale)
-            elif by.kind == "k":
-                if (by.path, name) in part.constants:
-                    yield Term(row, -1, scale, Slot("k", part.part, by.path, name))
-            elif by.kind == "tap":
-                if part.delays[int(by.path)] == name:
-                    yield Term(row, -1, scale, Slot("tap", part.part, by.path))
-            elif by.kind == "signal":
-                yield from self._through(entry, ("signal", by.part, by.path), c)
-            elif by.path not in within:
-                yield from self._through(entry, ("state", part.part, by.path), c)
-
-    def _through(self, entry: Entry, node: tuple[str, int, str], c: int) -> Iterator[Term]:
-        """A known derivative, multiplied by a partial one."""
-        found = self.references.get(node, {}).get(c)
-        if found is None:
-            return
-        if entry.row < 0:
-            yield Term(found.row, -1, entry.value * found.scale)
-        else:
-            yield Term(entry.row, found.row, found.scale)
-
-    def _made(self, terms: list[Term], whole: bool = False) -> Reference | None:
-        """Row that holds a sum of terms: one that is there already, or a new one.
-
-        With `whole` the row needs no factor any more.
-        """
-        if not terms:
-            return None
-        only = terms[0]
-        alone = len(terms) == 1 and only.b < 0 and only.slot is None
-        if alone and (not whole or only.scale == 1.0):
-            return Reference(only.a, only.scale)
-        row = self._row()
-        self.made.append((row, terms))
-        return Reference(row, 1.0)
-
-    def _group(
-        self, part: PartGraph, group: Group, by_result: Mapping[str, Mapping[By, Entry]]
-    ) -> bool:
-        """Columns of a recurrence, and rows that they need."""
-        since = len(self.made)
-        found: list[list[tuple[int, int, int]]] = []
-        prefix = self._prefix(part.part)
-        for c, column in enumerate(self.columns):
-            terms = [
-                list(self._terms(part, by_result.get(f"state.{path}", {}), c, group.states))
-                for path in group.states
-            ]
-            own = column.removeprefix(prefix) if column.startswith(prefix) else ""
-            starts = any(
-                path in started_by(self.model, part.part, column) or (path, own) in part.started
-                for path in group.states
-            )
-            if not (any(terms) or starts):
-                continue
-            each = []
-            for i, path in enumerate(group.states):
-                result = self._row() if group.stored[i] else self.idle
-                made = self._made(terms[i], whole=True)
-                place = self.tangents
-                self.tangents += 1
-                self.places[part.part, path, c] = place
-                each.append((made.row if made else self._constant(0.0), result, place))
-                if group.stored[i]:
-                    rows = self.references.setdefault(("state", part.part, path), {})
-                    rows[c] = Reference(result, 1.0)
-            found.append(each)
-        if not found:
-            return False
-        k = len(group.states)
-        found += [[(self._constant(0.0), self.idle, 0)] * k] * (-len(found) % ABREAST)
-        states = group.states
-        numbers = [
-            self._factor(by_result, path, other) * STRIDE for path in states for other in states
-        ]
-        for i, after in enumerate(group.after):
-            numbers += [each[i][0] * STRIDE for each in found]
-            numbers += [each[i][1] * STRIDE for each in found]
-            numbers += [each[i][2] for each in found]
-            numbers += [int(after) for _ in found]
-        begin = sum(each.size for each in self.columns_of)
-        self.columns_of.append(np.array(numbers, dtype=np.int64))
-        self.states = max(self.states, k)
-        self._combine(since)
-        self.todo.append((RECUR, k, begin, begin + len(numbers)))
-        return True
-
-    def _factor(self, by_result: Mapping[str, Mapping[By, Entry]], path: str, other: str) -> int:
-        """Row of the derivative of a state behind the sample by another one at it."""
-        entry = by_result.get(f"state.{path}", {}).get(By("state", other))
-        if entry is None:
-            return self._constant(0.0)
-        return entry.row if entry.row >= 0 else self._constant(entry.value)
-
-    def _signals(self, part: PartGraph, by_result: Mapping[str, Mapping[By, Entry]]) -> None:
-        """Derivatives of the signals of a part that others need."""
-        since = len(self.made)
-        for signal, path in part.aliases.items():
-            rows = self.references.get(("state", part.part, path), {})
-            self.references["signal", part.part, signal] = rows
-        for source in self.linked:
-            node = ("signal", source.part, source.signal)
-            if source.part != part.part or node in self.references:
-                continue
-            entries = by_result.get(f"signals.{source.signal}")
-            if entries is None:
-                rows = self.references.get(("state", source.part, source.signal), {})
-                self.references[node] = rows
-                continue
-            found = self.references.setdefault(node, {})
-            for c in range(len(self.columns)):
-                made = self._made(list(self._terms(part, entries, c)))
-                if made is not None:
-                    found[c] = made
-        self._combine(since)
-
-    def _observed(self, number: int, c: int) -> list[Term]:
-        """What an observed signal's derivative by a column is."""
-        place, _ = self.graph.observed[number]
-        if place.kind == "link":
-            terms = []
-            for source in self.model.links[place.path].sources:
-                known = self.references.get(("signal", *source), {}).get(c)
-                factor = self.graph.links[place.path].get(source.signal, 0.0)
-                if known is not None and factor != 0.0:
-                    terms.append(Term(known.row, -1, factor * known.scale))
-            return terms
-        kind = "state" if place.kind == "state" else "signal"
-        node = (kind, place.part, place.path)
-        if node in self.references:
-            known = self.references[node].get(c)
-            return [] if known is None else [Term(known.row, -1, known.scale)]
-        part = next(each for each in self.graph.parts if each.part == place.part)
-        return list(self._terms(part, _by_result(part).get(f"signals.{place.path}", {}), c))
-
-    def _value_row(self, number: int) -> int:
-        place, _ = self.graph.observed[number]
-        if place in self.graph.stored:
-            return self.graph.stored[place]
-        return self.graph.values[place.part, place.path]
-
-
-def _by_result(part: PartGraph) -> dict[str, dict[By, Entry]]:
-    found: dict[str, dict[By, Entry]] = {}
-    for (out, by), entry in part.entries.items():
-        found.setdefault(out, {})[by] = entry
-    return found
 
 
 # --- numbers --------------------------------------------------------------------------------------
@@ -424,22 +112,17 @@ def tangents_of(
     tangent = np.zeros(layout.tangents)
     several = len(model.parts) > 1
     free = set(own)
-    for (part, path, c), at in layout.places.items():
+    for (part, path), found in layout.places.items():
         full = f"{model.parts[part].name}.{path}" if several else path
         if full in free:
-            tangent[at] = 1.0 if path in started_by(model, part, columns[c]) else 0.0
+            for c, at in found.items():
+                tangent[at] = 1.0 if path in started_by(model, part, columns[c]) else 0.0
         else:
-            tangent[at] = slopes.states.get((part, path), {}).get(columns[c], 0.0)
+            known = slopes.states.get((part, path), {})
+            for column in known.keys() & layout.columns.keys():
+                at = found.get(layout.columns[column], 0)
+                tangent[at] = known[column] if at else 0.0
     return tangent
-
-
-def started_by(model: Model, part: int, column: str) -> tuple[str, ...]:
-    """Paths of a part's states that a column such as ``start.pump.pressure`` sets."""
-    prefix = f"start.{model.parts[part].name}." if len(model.parts) > 1 else "start."
-    if not column.startswith(prefix):
-        return ()
-    name = column.removeprefix(prefix)
-    return model.parts[part].free_start.get(name, (name,))
 
 
 # --- what a fit asks for --------------------------------------------------------------------------
@@ -623,12 +306,10 @@ def _march(
     records, h = observed.records, observed.record.step
     signals, seen = tuple(records), tuple(dict.fromkeys(o.signal for o in observed.observations))
     graph = graph_of(instance.model, signals, instance.options, seen)
-    layout = layout_of(
-        graph,
-        instance.model,
-        columns,
-        tuple(seen.index(each.signal) for each in observed.observations),
-    )
+    plan = observed.plan(own, len(columns) if first_own is None else first_own)
+    numbers = tuple(seen.index(each.signal) for each in observed.observations)
+    whole = _whole(graph, plan, numbers, observed, sink)
+    layout = layout_of(graph, instance.model, columns, numbers, whole)
     first = {name: float(values[0]) for name, values in records.items()}
     started = instance.start(first, h, observed.start)
     missing = [c for c in columns if c.startswith("start.") and c[6:] not in own.start]
@@ -646,15 +327,30 @@ def _march(
         slopes = start_slopes(graph, instance, first, h, observed.start)
     tangent = tangents_of(layout, slopes, instance.model, columns, own.start)
     places = instance.places(signals, h)
-    plan = observed.plan(own, len(columns) if first_own is None else first_own)
+    plan = plan._replace(way=layout.way)
     program = _with_numbers(layout, slopes.constants, places)
     marched = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
     met = np.array([np.inf])
-    room = room_for(layout.rows, layout.constant, layout.states, len(columns), plan)
+    room = room_for(layout.rows, layout.constant, len(columns), plan)
     arrays = arrays_of(instance, marched, started, places, states, met, room.flat)
     pieces, grid = addresses(graph.pieces, layout.pieces), (marched[0].size, block, h)
     march_observed(pieces, arrays, grid, tangent, program, plan, sink, room)
     check_domain(instance, states, float(met[0]), observed.driven_by)
+
+
+def _whole(
+    graph: Graph, plan: Plan, numbers: Sequence[int], observed: ObservedRecord, sink: Sink
+) -> tuple[bool, ...]:
+    """Which observations see every sample of the record as it is, if all rows are kept."""
+    return tuple(
+        not sink.factor.size
+        and bool(plan.regular[r])
+        and plan.clock_column[r] < 0
+        and not plan.kept[r].any()
+        and not graph.observed[number][1]
+        and plan.first[r + 1] - plan.first[r] == observed.record.values.size
+        for r, number in enumerate(numbers)
+    )
 
 
 def _with_numbers(layout: Layout, constants: Mapping[Slot, float], places: Places) -> Program:

@@ -15,16 +15,19 @@ Arithmetic is strict and in the order of the equations, so that all of them give
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property, lru_cache
+from itertools import chain
 from typing import Any, NamedTuple, get_type_hints
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.code import Code, Flag, Tuple, Value, fixed, leaves, rebuilt
+from swashplate.equations.code import Code, Flag, Let, Tuple, Value, fixed, leaves, rebuilt
 from swashplate.equations.equation import inlined
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.fields import floats_of
 from swashplate.equations.marching.pieces import PIECE
+from swashplate.equations.marching.straight import GUESSED, Guessed
 from swashplate.equations.model import (
     Equation,
     Link,
@@ -396,7 +399,7 @@ class Sampler:
     @property
     def names(self) -> dict[str, Any]:
         """What the text refers to."""
-        found: dict[str, Any] = {"sample_at": sample_at}
+        found: dict[str, Any] = {"sample_at": sample_at, **GUESSED}
         for part in self.parts:
             found |= part.code.names | part.prologue.names
         return found
@@ -471,9 +474,22 @@ class Sampler:
                 lines.append(f"x_{signal} = {signal}[n]")
         return lines
 
-    def body(self, part: PartCode) -> list[str]:
+    def guessed(self, part: PartCode) -> Guessed:
+        """A part's sample as the march of one set has it."""
+        following, carried = dict(leaves(part.following)), self.carried[part.part]
+        still = {node.value for _, node in (*leaves(part.p), *leaves(part.given))}
+        still |= {*self.constants(part), *map(part.fraction, part.taps)}
+        return Guessed(
+            part.code,
+            self.ends[part.part],
+            [node.value for path, node in leaves(part.state) if path in carried],
+            [following[path] for path in carried],
+            still,
+        )
+
+    def body(self, part: PartCode, code: Code | None = None) -> list[str]:
         """Lines of a part's sample, and of the signals that other parts need of it."""
-        lines = lines_of(part.code, self.ends[part.part])
+        lines = lines_of(code or part.code, self.ends[part.part])
         for source, node in self.sources.items():
             if source.part == part.part:
                 lines.append(f"{part.source(source)} = {text(node)}")
@@ -572,21 +588,44 @@ def march_source(
     sampler = Sampler(model, signals, options, stored)
     parts = sampler.used()
     lines = ["last = first + count", *sampler.places(), *sampler.ahead()]
+    samples: list[list[str]] = []
     for part in parts:
+        code = part.code
+        if (
+            part is parts[-1]
+        ):  # the longest chain from sample to sample; others need not wait for it
+            guessed = sampler.guessed(part)
+            made = [ex.name(each.name) for each in guessed.ahead.items if isinstance(each, Let)]
+            lines += lines_of(guessed.ahead, made)
+            code = guessed.code
         lines += sampler.load(part)
-    lines += ["worst = inf", "for n in range(first, last):"]
-    inner: list[str] = []
-    for part in parts:
-        inner += sampler.fetched(part)
-        inner += sampler.body(part)
+        inner = [*sampler.fetched(part), *sampler.body(part, code)]
         inner += sampler.stored(part, stored, lambda row: places[row])
-        inner += sampler.margin(part)
-    for part in parts:
-        inner += sampler.step(part)
-    lines += indented(inner)
+        if part.margin is not None:
+            margin = text(part.margin)
+            inner += [f"worst = {margin} if {margin} < worst else worst", f"total += {margin}"]
+        samples.append([*inner, *sampler.step(part)])
+    margins = any(part.margin is not None for part in parts)
+    lines += ["worst, total = inf, 0.0"] if margins else []
+    passed = [parts[-1].source(each) for each in sampler.sources if each.part != parts[-1].part]
+    if passed and any(sampler.carried[part.part] for part in parts[:-1]):
+        # the last part is a sample behind the others, so that neither waits for the other
+        late = re.compile(rf"\b({'|'.join(passed)})\b")
+        lines += [*(f"{name} = 0.0" for name in passed), "for m in range(first, last + 1):"]
+        lines += indented([f"late_{name} = {name}" for name in passed])
+        lines += indented(["if m < last:", "    n = m", *indented(chain(*samples[:-1]))])
+        following = [late.sub(r"late_\1", line) for line in samples[-1]]
+        lines += indented(["if m > first:", "    n = m - 1", *indented(following)])
+    else:
+        lines += ["for n in range(first, last):", *indented(chain(*samples))]
     for part in parts:
         lines += sampler.save(part)
-    lines.append("met[0] = worst if worst < met[0] or worst != worst else met[0]")
+    if margins:
+        # a sum is no number once a margin was none
+        lines += [
+            "worst = worst if total == total or worst <= 0.0 else total",
+            "met[0] = worst if worst < met[0] or worst != worst else met[0]",
+        ]
     says = f"March {model.name} over its inputs."
     return function_source(f"march({PIECE})", says, lines, "@piece"), sampler.names
 

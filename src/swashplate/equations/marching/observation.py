@@ -63,14 +63,18 @@ class Observation:
                 f"{what}: the weight must be one number or {time.size} of them, not of shape "
                 f"{np.shape(self.weight)}."
             ) from None
-        if not np.isfinite(time).all() or (np.diff(time) < 0.0).any():
+        # a sum is no finite number if one of its summands is not
+        if not np.isfinite(time.sum()) or (time[1:] < time[:-1]).any():
             bad = ~np.isfinite(time)
             bad[1:] |= np.diff(time) < 0.0
             raise InputError(
                 f"{what}: the time must be finite and never fall, but is {time[bad][0]:g} s at "
                 f"sample {int(np.argmax(bad))}."
             )
-        bad = ~np.isfinite(weight) | (weight < 0.0) | ((weight > 0.0) & ~np.isfinite(values))
+        if not np.isfinite(weight.sum() + values.sum()) or weight.min() < 0.0:
+            bad = ~np.isfinite(weight) | (weight < 0.0) | ((weight > 0.0) & ~np.isfinite(values))
+        else:
+            bad = np.zeros(1, dtype=bool)
         if bad.any():
             raise InputError(
                 f"{what}: value or weight is not finite, or the weight negative, at sample "
@@ -203,13 +207,14 @@ class ObservedRecord:
 
     def _placed(self, clocks: Sequence[float]) -> Plan:
         cells, fractions, slopes = [], [], []
+        moving = any("clock_offset" in each.unknown for each in self.observations)
         for each, clock in zip(self.observations, clocks, strict=True):
-            cell, fraction, slope = _cells(self.record, np.asarray(each.time) + clock - each.delay)
+            time = np.asarray(each.time) + (clock - each.delay)
+            cell, fraction, slope = _cells(self.record, time, moving)
             cells.append(cell)
             fractions.append(fraction)
             slopes.append(slope)
-        moving = any("clock_offset" in each.unknown for each in self.observations)
-        back, ahead = np.concatenate(slopes, axis=1) if moving else np.zeros((2, 0))
+        back, ahead = np.concatenate(slopes, axis=1)
         weight = np.concatenate([np.asarray(each.weight) for each in self.observations])
         measured = np.concatenate([np.asarray(each.values) for each in self.observations])
         poles = max(len(each.poles) for each in self.observations)
@@ -234,11 +239,17 @@ class ObservedRecord:
             kept=kept,
             offset_column=none,
             clock_column=none,
+            way=np.zeros((len(self.observations), 0), dtype=np.int64),
         )
 
 
-def _cells(record: Record, time: Array) -> tuple[NDArray[np.int64], Array, Array]:
+def _cells(record: Record, time: Array, moving: bool) -> tuple[NDArray[np.int64], Array, Array]:
     """Where stamps lie on the grid.
+
+    Parameters
+    ----------
+    moving : bool
+        Whether the slopes are wanted.
 
     Returns
     -------
@@ -246,16 +257,21 @@ def _cells(record: Record, time: Array) -> tuple[NDArray[np.int64], Array, Array
         Point of the grid at or before a stamp, and how far behind it the stamp lies, in steps.
     slopes : (2, m) array
         Weights of the slopes before and behind that point in the derivative by time: on a grid
-        point the mean of both sides, as a central difference has it. [1/s]
+        point the mean of both sides, as a central difference has it; (2, 0) if not wanted. [1/s]
     """
     last = record.values.size - 1
     at = (time - record.start) * (record.rate * record.substeps)
     nearest = np.rint(at)
-    at = np.where(np.abs(at - nearest) < ON_GRID, nearest, at)
+    if (np.abs(at - nearest) < ON_GRID).all():
+        at = nearest
+    else:
+        at = np.where(np.abs(at - nearest) < ON_GRID, nearest, at)
     held = (at < 0.0) | (at > last)
     at = np.clip(at, 0.0, last)
-    cell = np.floor(at).astype(np.int64)
+    cell = at.astype(np.int64)
     fraction = at - cell
+    if not moving:
+        return cell, fraction, np.zeros((2, 0))
     on_grid = fraction == 0.0
     ahead = np.where(held | (cell == last), 0.0, np.where(on_grid, 0.5, 1.0))
     back = np.where(held | (cell == 0) | ~on_grid, 0.0, 0.5)

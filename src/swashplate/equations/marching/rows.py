@@ -26,6 +26,8 @@ CARRIED = 8
 others only keep the block's first sample at the beginning of a cache line."""
 ABREAST = 4
 """Columns of a recurrence side by side: they fill the time that each waits for its last number."""
+OUTWARDS = 8
+"""The same, where results go out at once."""
 
 
 class Terms(NamedTuple):
@@ -53,21 +55,26 @@ class Program(NamedTuple):
 
     - CALL, number of a piece: call it;
     - COMBINE, first and end of the terms' targets: make rows of the block;
-    - RECUR, number k of states, first place and end in `columns`: run a recurrence.
+    - RECUR, number k of states, first place and end in `columns`: run a recurrence;
+    - CHAIN, number of a piece, first place and end in `columns`: run one that was generated;
+    - FOLLOW, an observation, first place and end in `columns`: run a recurrence of one state whose
+      weighted results are that observation's derivatives.
     """
     terms: Terms
     """Of all rows that are made, those of the observations behind the others."""
     seen: int
     """First target that is a row of the observations."""
     columns: Indices
-    """For each recurrence what `follow_each_other` takes: its `places`, then its `columns`."""
+    """For each recurrence what runs it takes: k² places of its factors, then the `columns` of
+    `follow`; the number of columns, then theirs; what `follow_out` takes."""
     value: Indices
     """(r,) row of each observation's signal."""
     integral: NDArray[np.bool_]
     """(r,) whether an observation is its signal's integral."""
 
 
-CALL, COMBINE, RECUR = 0, 1, 2
+CALL, COMBINE, RECUR, FOLLOW, CHAIN = 0, 1, 2, 3, 4
+SET, ADD, DONE = 0, 1, 2
 
 
 class Plan(NamedTuple):
@@ -95,6 +102,8 @@ class Plan(NamedTuple):
     """(r,) column of the derivative by the offset, -1 if not wanted."""
     clock_column: Indices
     """(r,) column of the derivative by the clock offset, -1 if not wanted."""
+    way: Indices
+    """(r, d) how the derivatives that the march gives get to the sink, one of SET, ADD and DONE."""
 
 
 class Sink(NamedTuple):
@@ -133,16 +142,12 @@ class Room(NamedTuple):
     """(STRIDE,) room for a row that is needed for a moment."""
     products: Array
     """Room for `absorb`."""
-    waiting: Array
-    """(2, k, ABREAST) room for `follow_each_other`."""
     progress: Indices
     """(r,) first stamp of each observation that is not yet dealt with."""
 
 
-def room_for(
-    rows: int, constant: Mapping[int, float], states: int, derived: int, plan: Plan
-) -> Room:
-    """Memory for a march with so many rows, states in a recurrence, columns and observations.
+def room_for(rows: int, constant: Mapping[int, float], derived: int, plan: Plan) -> Room:
+    """Memory for a march with so many rows, columns and observations.
 
     `constant` are numbers of rows that hold just one value.
     """
@@ -162,7 +167,6 @@ def room_for(
         np.zeros((observations, derived + 1, 3)),
         np.empty(STRIDE),
         aligned(EIGHTH),
-        np.empty((2, states, ABREAST)),
         plan.first[:-1].copy(),
     )
 
@@ -238,8 +242,51 @@ def follow(a: Array, columns: Indices, flat: Array, count: int, tangent: Array) 
 
 
 @subroutine
+def follow_out(
+    columns: Indices, flat: Array, tangent: Array, q: Array, sink: Sink, at: int, count: int
+) -> None:
+    """Run y[n+1] = a[n] y[n] + g[n] as `follow`, and put q[n] y[n] into the sink.
+
+    Parameters
+    ----------
+    columns : array
+        Place of a in `flat`, then for each OUTWARDS columns the place of the first g, the others
+        in the rows behind it; their places in `tangent`; and their numbers among the derivatives.
+        A column may stand there several times.
+    q : (m,) array
+        What the result is multiplied by.
+    at, count : int
+        First place in the sink, and how many.
+    """
+    a, out, size = flat[columns[0] :], sink.rows.reshape(-1), sink.rows.shape[1]
+    for c in range(1, columns.size, 1 + 2 * OUTWARDS):
+        g, p, to = flat[columns[c] :], columns[c + 1 :], columns[c + 1 + OUTWARDS :]
+        d0 = out[sink.to[to[0]] * size + at :]
+        d1 = out[sink.to[to[1]] * size + at :]
+        d2 = out[sink.to[to[2]] * size + at :]
+        d3 = out[sink.to[to[3]] * size + at :]
+        d4 = out[sink.to[to[4]] * size + at :]
+        d5 = out[sink.to[to[5]] * size + at :]
+        d6 = out[sink.to[to[6]] * size + at :]
+        d7 = out[sink.to[to[7]] * size + at :]
+        y0, y1, y2, y3 = tangent[p[0]], tangent[p[1]], tangent[p[2]], tangent[p[3]]
+        y4, y5, y6, y7 = tangent[p[4]], tangent[p[5]], tangent[p[6]], tangent[p[7]]
+        for m in range(count):
+            f, s = a[m], q[m]
+            n0, n1 = f * y0 + g[m], f * y1 + g[STRIDE + m]
+            n2, n3 = f * y2 + g[2 * STRIDE + m], f * y3 + g[3 * STRIDE + m]
+            n4, n5 = f * y4 + g[4 * STRIDE + m], f * y5 + g[5 * STRIDE + m]
+            n6, n7 = f * y6 + g[6 * STRIDE + m], f * y7 + g[7 * STRIDE + m]
+            d0[m], d1[m], d2[m], d3[m] = s * y0, s * y1, s * y2, s * y3
+            d4[m], d5[m], d6[m], d7[m] = s * y4, s * y5, s * y6, s * y7
+            y0, y1, y2, y3, y4, y5, y6, y7 = n0, n1, n2, n3, n4, n5, n6, n7
+        tangent[p[0]], tangent[p[1]], tangent[p[2]], tangent[p[3]] = y0, y1, y2, y3
+        tangent[p[4]], tangent[p[5]], tangent[p[6]], tangent[p[7]] = y4, y5, y6, y7
+
+
+@subroutine
 def follow_pair(places: Indices, columns: Indices, flat: Array, count: int, tangent: Array) -> None:
-    """`follow_each_other` for two states, which most filters have."""
+    """`follow` for two states that move each other, which most filters have: places of A first."""
     a00, a01 = flat[places[0] :], flat[places[1] :]
     a10, a11 = flat[places[2] :], flat[places[3] :]
     behind, other_behind = columns[3, 0] != 0, columns[7, 0] != 0
@@ -258,58 +305,6 @@ def follow_pair(places: Indices, columns: Indices, flat: Array, count: int, tang
             e0[m], e1[m] = o0 if other_behind else z0, o1 if other_behind else z1
             y0, y1, z0, z1 = n0, n1, o0, o1
         tangent[p0], tangent[p1], tangent[q0], tangent[q1] = y0, y1, z0, z1
-
-
-@subroutine
-def follow_each_other(
-    k: int, places: Indices, columns: Indices, flat: Array, count: int, tangent: Array, y: Array
-) -> None:
-    """Run y[n+1] = A[n] y[n] + g[n] of k states, several columns side by side.
-
-    Parameters
-    ----------
-    places : (k²,) array
-        Places of A in `flat`, state by state.
-    columns : (4 k, j) array
-        Of each state what `follow` takes.
-    y : (2, k, ABREAST) array
-        Room for the states and for those behind the sample.
-    """
-    for c in range(0, columns.shape[1], ABREAST):
-        for i in range(k):
-            for j in range(ABREAST):
-                y[0, i, j] = tangent[columns[4 * i + 2, c + j]]
-        for m in range(count):
-            for i in range(k):
-                for j in range(ABREAST):
-                    y[1, i, j] = flat[columns[4 * i, c + j] + m]
-                for l in range(k):
-                    a = flat[places[i * k + l] + m]
-                    for j in range(ABREAST):
-                        y[1, i, j] += a * y[0, l, j]
-            for i in range(k):
-                behind = columns[4 * i + 3, 0]
-                for j in range(ABREAST):
-                    flat[columns[4 * i + 1, c + j] + m] = y[behind, i, j]
-            for i in range(k):
-                for j in range(ABREAST):
-                    y[0, i, j] = y[1, i, j]
-        for i in range(k):
-            for j in range(ABREAST):
-                tangent[columns[4 * i + 2, c + j]] = y[0, i, j]
-
-
-@subroutine
-def recur(k: int, columns: Indices, flat: Array, count: int, tangent: Array, y: Array) -> None:
-    """Run a recurrence of k states, as laid down in `Program.columns`."""
-    places, rest = columns[: k * k], columns[k * k :]
-    chosen = rest.reshape(4 * k, rest.size // (4 * k))
-    if k == 1:
-        follow(flat[places[0] :], chosen, flat, count, tangent)
-    elif k == 2:
-        follow_pair(places, chosen, flat, count, tangent)
-    else:
-        follow_each_other(k, places, chosen, flat, count, tangent, y)
 
 
 @subroutine
@@ -370,7 +365,14 @@ def low_pass(
 
 @subroutine
 def place(
-    seen: Array, base: int, plan: Plan, r: int, at: int, count: int, sink: Sink, to: int
+    seen: Array,
+    base: int,
+    plan: Plan,
+    r: int,
+    at: int,
+    count: int,
+    sink: Sink,
+    to: int,
 ) -> None:
     """Weighted rows of the problem at some stamps of an observation, from its rows on the grid.
 
@@ -391,10 +393,16 @@ def place(
     begin = cell[0] - base
     for c in range(derived):
         column = sink.rows[sink.to[c], to : to + count]
+        if plan.way[r, c] == DONE:
+            continue
         if plan.regular[r]:
             row = seen[c, begin : begin + count]
-            for i in range(count):
-                column[i] = weight[i] * row[i]
+            if plan.way[r, c] == ADD:
+                for i in range(count):
+                    column[i] += weight[i] * row[i]
+            else:
+                for i in range(count):
+                    column[i] = weight[i] * row[i]
         else:
             row = seen[c]
             for i in range(count):
@@ -588,7 +596,20 @@ def march_observed(
                 call(pieces[a], count, first, h, arrays)
             elif what == COMBINE:
                 combine(flat, program.terms, a, b, count, flat)
+            elif what == RECUR:
+                places = program.columns[b : b + a * a]
+                chosen = program.columns[b + a * a : c].reshape(4 * a, (c - b - a * a) // (4 * a))
+                if a == 1:
+                    follow(flat[places[0] :], chosen, flat, count, tangent)
+                else:
+                    follow_pair(places, chosen, flat, count, tangent)
+            elif what == CHAIN:
+                taken = (program.columns[b + 1 : c], arrays[3], tangent, *arrays[5:])
+                call(pieces[a], count, program.columns[b], h, (arrays[0], arrays[1], *taken))
             else:
-                recur(a, program.columns[b:c], flat, count, tangent, room.waiting)
+                at, through = plan.first[a] + first, flat[program.columns[b] :]
+                for m in range(count):
+                    room.aside[m] = plan.weight[at + m] * through[m]
+                follow_out(program.columns[b + 1 : c], flat, tangent, room.aside, sink, at, count)
         used = deliver(program, plan, sink, room, used, (first, count, size), h)
     finish(sink, room, used)

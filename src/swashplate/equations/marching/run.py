@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Flags = NDArray[np.uint8]
 Start = Literal["rest", "steady"]
+
+T = TypeVar("T")
 
 STARTS = ("rest", "steady")
 
@@ -92,6 +94,9 @@ class Instance:
 
     def places(self, signals: Sequence[str], h: float) -> Places:
         """Where every tap reads at a step of `h`."""
+        key = (tuple(signals), h)
+        if key in self._lately:
+            return self._lately[key]  # type: ignore[no-any-return]
         found: list[Place] = []
         for each in taps_of(self.model, signals):
             name, p = each.tap.delay, self.parts[each.part].p
@@ -99,11 +104,12 @@ class Instance:
             if not 0.0 <= delay < math.inf:
                 raise InputError(f"{self.name}: {name} is {delay:g} s, but a delay is at least 0.")
             found.append(place(each.tap, delay, h))
-        return Places(
+        places = Places(
             np.array([each.whole for each in found], dtype=np.int64),
             np.array([each.fraction for each in found]),
             np.array([each.slope for each in found]),
         )
+        return self._remembered(key, places)
 
     def check_inputs(self, signals: Collection[str]) -> None:
         """Refuse external signals that the model does not know, and the lack of those it needs."""
@@ -147,8 +153,8 @@ class Instance:
             If constants or the state cannot be computed for these numbers.
         """
         key = (tuple(first.items()), h, start)
-        if chosen is None and key in self._starts:
-            return self._starts[key]
+        if chosen is None and key in self._lately:
+            return self._lately[key]  # type: ignore[no-any-return]
         check_start(start)
         self.check_inputs(first)
         before = {name: value if start == "steady" else 0.0 for name, value in first.items()}
@@ -169,16 +175,18 @@ class Instance:
                 known["signals"] = _sampled(part, known)
             found.append(known)
         made_now = Started(tuple(states), before, tuple(found))
-        if chosen is None:
-            if len(self._starts) > 64:
-                self._starts.clear()
-            self._starts[key] = made_now
-        return made_now
+        return self._remembered(key, made_now) if chosen is None else made_now
 
     @cached_property
-    def _starts(self) -> dict[Any, Started]:
-        """What `start` found lately: a fit asks for the same ones with every set."""
+    def _lately(self) -> dict[Any, Any]:
+        """What `places` and `start` found: a fit asks for the same with every set."""
         return {}
+
+    def _remembered(self, key: Any, value: T) -> T:
+        if len(self._lately) > 64:
+            self._lately.clear()
+        self._lately[key] = value
+        return value
 
     def _state(self, part: Model, known: Mapping[str, Any], start: Start) -> Any:
         equation = part.rest if start == "rest" else part.settled

@@ -1,0 +1,121 @@
+"""A drive with an equation of one's own has all that a drive has."""
+
+import pickle
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import pytest
+
+from swashplate import Drive, InputError, ParameterError, maneuvers
+from swashplate.analysis.envelope import envelope
+from swashplate.equations import Definition, equation
+from swashplate.models.card import channel_level
+from swashplate.models.pump import Pump, shaft_speed, spool_balance
+
+RATE = 512.0
+COMMAND = maneuvers.sine(4.0, 0.8, start=0.05, length=1.5, settle=0.3).sample(RATE)
+WIDTH = 1e-4
+
+
+class Seal(NamedTuple):
+    """A seal on the spool."""
+
+    test_seal: Annotated[
+        float, Definition("what the seal takes from the spool's displacement", "m", lower=0.0)
+    ] = 0.0
+
+
+@equation
+def sealed_balance(force: float, arm_sine: float, p: Pump, test_seal: float) -> float:
+    """The spool's balance less the drag, which grows softly over 0.1 mm."""
+    free = spool_balance(force, arm_sine, p)
+    return free - test_seal * free / (abs(free) + 1e-4)
+
+
+@equation
+def faster(swash_angle: float, leakage: float, Z10: float, Z11: float) -> float:
+    """Twice the speed of the package's equation."""
+    return 2.0 * (Z10 * swash_angle - Z11 - leakage)
+
+
+PLAIN = Drive.preset("hoist")
+SEALED = PLAIN.with_equation(spool_balance, sealed_balance, Seal)
+DRAGGED = SEALED.replace(test_seal=2e-5)
+
+
+def test_its_parameter_is_one_of_the_drive() -> None:
+    assert SEALED["test_seal"].value == 0.0
+    assert DRAGGED["test_seal"].value == 2e-5
+    assert DRAGGED["test_seal"].definition.unit == "m"
+    assert "test_seal" not in PLAIN.parameters
+    assert DRAGGED.plain.parameters == PLAIN.parameters.plain
+    with pytest.raises(ParameterError, match="test_seal.* at least 0"):
+        SEALED.replace(test_seal=-1.0)
+    with pytest.raises(ParameterError, match="hoist: test_seal belongs to an equation of your own"):
+        PLAIN.replace(test_seal=1e-5)
+
+
+def test_march_stepper_and_lanes_give_the_same_bits() -> None:
+    assert np.array_equal(SEALED.simulate(COMMAND).shaft_speed, PLAIN.simulate(COMMAND).shaft_speed)
+    run = DRAGGED.simulate(COMMAND)
+    assert run.shaft_speed.max() < PLAIN.simulate(COMMAND).shaft_speed.max() - 1e-3
+    stepper = DRAGGED.stepper(1.0 / RATE)
+    assert [stepper.step(volts).shaft_speed for volts in COMMAND] == run.shaft_speed.tolist()
+    batch = SEALED.simulate_many({"test_seal": np.array([0.0, 2e-5])}, voltage=COMMAND)
+    assert np.array_equal(batch.output[1], run.shaft_speed)
+
+
+def test_derivatives_are_those_of_differences() -> None:
+    by = DRAGGED.sensitivities(COMMAND, parameters=["test_seal"]).shaft_speed[:, 0]
+    step = 1e-9
+    up, down = (
+        SEALED.replace(test_seal=2e-5 + each).simulate(COMMAND).shaft_speed
+        for each in (step, -step)
+    )
+    assert np.abs(by - (up - down) / (2.0 * step)).max() < 1e-6 * np.abs(by).max()
+
+
+def test_steady_states_are_those_that_a_march_comes_to() -> None:
+    held = DRAGGED.simulate(np.full(8000, 5.0)).shaft_speed[-1]
+    assert DRAGGED.steady_speed(5.0) == pytest.approx(held, rel=1e-9)
+    settled = DRAGGED.simulate(np.full(300, 5.0), start="steady").shaft_speed
+    assert settled == pytest.approx(held, rel=1e-9)
+    twice = PLAIN.with_equation(shaft_speed, faster)
+    assert twice.steady_speed(5.0) == pytest.approx(2.0 * PLAIN.steady_speed(5.0), rel=1e-9)
+    assert envelope(twice).plus.top_speed == pytest.approx(
+        2.0 * envelope(PLAIN).plus.top_speed, rel=1e-9
+    )
+
+
+def test_linear_models_follow() -> None:
+    """Next to a closed spool the drag takes a share of every displacement."""
+    share = 1.0 - 2e-5 / WIDTH
+    was, now = (each.linearize(5.0).poles.real.max() for each in (PLAIN, DRAGGED))
+    assert now == pytest.approx(share * was, rel=1e-6)
+
+
+def test_another_process_finds_the_equation() -> None:
+    again = pickle.loads(pickle.dumps(DRAGGED))
+    assert again == DRAGGED
+    assert np.array_equal(
+        again.simulate(COMMAND).shaft_speed, DRAGGED.simulate(COMMAND).shaft_speed
+    )
+
+
+class Unnamed(NamedTuple):
+    another: float = 0.0
+
+
+class Taken(NamedTuple):
+    Z6: Annotated[float, Definition("something else", "m")] = 0.0
+
+
+def test_what_does_not_fit_is_refused() -> None:
+    with pytest.raises(InputError, match="channel_level is no equation of the pump"):
+        PLAIN.with_equation(channel_level, channel_level)
+    with pytest.raises(InputError, match="must begin with the arguments of spool_balance"):
+        PLAIN.with_equation(spool_balance, faster)
+    with pytest.raises(InputError, match="has a parameter Z6 already"):
+        PLAIN.with_equation(spool_balance, sealed_balance, Taken)
+    with pytest.raises(ParameterError, match="Unnamed.another needs a Definition"):
+        PLAIN.with_equation(shaft_speed, faster, Unnamed)
