@@ -365,7 +365,7 @@ SHALLOW = 0.25
 MOST_POINTS = 8
 """Most points of the profile on such a side."""
 LEAST_STEP = 1e-3
-"""First step of that profile, in parts of the bounds: where the derivative is that of a switch which
+"""First step of that profile, in parts of the bounds: where the derivative is that of a switch that
 one sample just passes, the linearised interval is next to nothing."""
 TRIES, LOOK = 20, 4
 """Evaluations of a fit without a limit, and after how many it is seen whether it gets there: one
