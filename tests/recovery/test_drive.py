@@ -88,7 +88,7 @@ def test_counts_and_noise_leave_small_errors(tmp_path: Path) -> None:
         assert fitted.steady_speed(volts) == pytest.approx(true.steady_speed(volts), rel=2e-3)
 
 
-@pytest.mark.parametrize("seed", [1, 39])
+@pytest.mark.parametrize("seed", [1, 39, 77])
 def test_a_stop_that_the_search_loses_is_found_again(seed: int, tmp_path: Path) -> None:
     """From the published values a descent leaves these machines' stop, and finds none back."""
     axis, setup = "slew", load_setup("slew")

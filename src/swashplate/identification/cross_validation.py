@@ -14,7 +14,7 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Measures, RunQuality
-from swashplate.identification.fitting import Fit, fit, smooth
+from swashplate.identification.fitting import Fit, Search, fit, smooth
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Loss
 from swashplate.identification.staging import Parameters, stage_problem
@@ -288,7 +288,7 @@ def _fold(
     others = [each for place, each in enumerate(experiments) if place not in part]
     names = tuple(each.name for each in held)
     try:
-        result = fit(nominal, others, setup, loss=loss, threads=threads)
+        result = fit(nominal, others, setup, loss=loss, threads=threads, search=Search(0))
         if result.stages[-1].solution.interrupted:
             raise KeyboardInterrupt
         runs = tuple(HeldRun.of(each) for each in with_speeds(predict(result.parameters, held)))

@@ -21,7 +21,8 @@ from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.data_checks import check_sound, refuse_unsound
 from swashplate.identification.drive_model import DriveModel, at_rate_of
-from swashplate.identification.model import Model
+from swashplate.identification.lack_of_fit import measurement_error
+from swashplate.identification.model import Model, OwnModel
 from swashplate.identification.own_model import ModelParameters, ModelSetup, Range
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Setup, Stage
@@ -119,7 +120,7 @@ def fit(
     fixed: Mapping[str, float] | None = None,
     loss: Loss = "linear",
     tolerance: float = 1e-10,
-    max_evaluations: int = 300,
+    max_evaluations: int = 600,
     threads: int | None = None,
     search: Search | None = None,
     watch: Callable[[str, Progress], None] | None = None,
@@ -144,8 +145,9 @@ def fit(
     threads : int, optional
         Threads over experiments; all cores by default. The result does not depend on it.
     search : Search, optional
-        More starts than the nominal one; the best is refined. Ctrl-C during them ends the whole
-        fit, with the best start of that stage as its last result.
+        More starts than the nominal one; the best is refined. Without, six more are tried where
+        residuals are five times as large as their known measurement error; `Search(0)` tries none.
+        Ctrl-C during them ends the whole fit, with the best start of that stage as its last result.
     watch : callable, optional
         Told the stage's name and each of its iterations.
 
@@ -209,6 +211,14 @@ def fit(
             watch=None if watch is None else partial(watch, stage.name),
         )
         solution = solved(problem, begin)
+        if search is None and loss == "linear" and unexplained(problem, solution):
+            results = _from_elsewhere(problem, solution, tolerance, max_evaluations)
+            best = min(results, key=lambda each: each.cost)
+            if len(results) <= OTHERS:
+                solution = _stopped(best, len(results), 1 + OTHERS)
+            elif best.number and best.cost < solution.cost:
+                again = solved(problem, np.array(best.vector))
+                solution = replace(again, start_cost=solution.start_cost)
         if any(each.prior is not None for each in problem.unknowns) and not solution.interrupted:
             # what the residuals are worth is known only now
             problem = weighed(problem, solution.vector)
@@ -218,6 +228,51 @@ def fit(
         if solution.interrupted:
             break
     return Fit(setup, nominal, tuple(stages), doubts)
+
+
+OTHERS = 6
+"""Starts besides the nominal one where that ends far from what was measured: of 700 sound campaigns
+six did, and of seven starts of theirs two to six reached the best."""
+UNEXPLAINED = 5.0
+"""Residuals over their known measurement error from which another optimum is looked for."""
+
+
+def unexplained(problem: Problem, solution: Solution) -> bool:
+    """Whether residuals of a channel are far larger than its known measurement error."""
+    if solution.interrupted or not isinstance(problem.model, DriveModel | OwnModel):
+        return False  # any object with simulate may take minutes
+    squares: dict[str, list[float]] = {}
+    for number, experiment in enumerate(problem.experiments):
+        for name, output in problem.outputs(solution.vector, number).items():
+            channel = experiment[name]
+            error = measurement_error(channel)
+            if error is not None and channel.used.any():
+                left = (output - channel.values)[channel.used] / error
+                squares.setdefault(name, []).extend((float(left @ left), left.size))
+    return any(sum(each[::2]) > UNEXPLAINED**2 * sum(each[1::2]) for each in squares.values())
+
+
+def _from_elsewhere(
+    problem: Problem, found: Solution, tolerance: float, max_evaluations: int
+) -> tuple[StartResult, ...]:
+    """The nominal start's result, and those of others over the bounds."""
+    starts = [*sobol_starts(problem, OTHERS, 0)]
+    try:
+        others = solve_from(problem, starts, tolerance=tolerance, max_evaluations=max_evaluations)
+    except KeyboardInterrupt:  # before the first of them ended
+        others = ()
+    nominal = StartResult(
+        0,
+        tuple(map(float, problem.start)),
+        tuple(map(float, found.vector)),
+        found.start_cost,
+        found.cost,
+        found.evaluations,
+        found.converged,
+        found.message,
+        found.seconds,
+    )
+    return nominal, *(replace(each, number=each.number + 1) for each in others)
 
 
 def refined(staged: Fit, experiments: Sequence[Experiment], **settings: Any) -> Fit:

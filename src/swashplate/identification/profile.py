@@ -364,6 +364,9 @@ SHALLOW = 0.25
 """Part of the linearised rise of the cost below which an interval's end is looked for anew."""
 MOST_POINTS = 8
 """Most points of the profile on such a side."""
+LEAST_STEP = 1e-3
+"""First step of that profile, in parts of the bounds: where the derivative is that of a switch that
+one sample just passes, the linearised interval is next to nothing."""
 TRIES, LOOK = 20, 4
 """Evaluations of a fit without a limit, and after how many it is seen whether it gets there: one
 that is not needed is let go of in ten."""
@@ -433,7 +436,7 @@ def checked_ends(
                 int(index),
                 rise,
                 sign,
-                float(reach[index]),
+                max(float(reach[index]), LEAST_STEP * float(high[index] - low[index])),
                 bound,
                 MOST_POINTS,
             )

@@ -559,7 +559,7 @@ class _Builder:
         inner += [f"y{i}_{j} = n{i}_{j}" for i in states for j in abreast]
         head = PIECE.replace("first", "width").replace("whole", "columns")
         return self._piece(
-            f"recur_{name}",
+            f"recur_{name.replace('.', '_')}",
             f"Derivatives of {', '.join(group.states)}.",
             [
                 f"for c in range(0, width, {PAIR}):",
