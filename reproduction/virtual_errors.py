@@ -16,7 +16,7 @@ from swashplate.campaign import Experiment
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.assessment import RunQuality
-from swashplate.identification.fitting import fit
+from swashplate.identification.fitting import Search, fit
 from swashplate.identification.setup import load_setup
 from swashplate.identification.staging import drawn
 from swashplate.identification.validation import (
@@ -120,7 +120,7 @@ def _fitted(nominal: Drive, axis: str, runs: Sequence[Experiment], seed: int) ->
     starts = [
         drawn(nominal, setup, STARTS * seed + number, spread=SPREAD) for number in range(STARTS)
     ]
-    fits = [fit(start.parameters, runs, setup) for start in starts]
+    fits = [fit(start.parameters, runs, setup, search=Search(0)) for start in starts]
     return min(fits, key=lambda each: each.stages[-1].solution.cost).drive.parameters
 
 
