@@ -326,7 +326,6 @@ def _shown(
     from swashplate.report.fit_report import write_fit_report
 
     what, lines = (found.result, found.campaign), []
-    shared = {"assessments": found.assessments, "validation": found.predicted}
     if report:
         with working("Writing the report"):
             write_fit_report(
@@ -337,12 +336,19 @@ def _shown(
                 truth=truth,
                 judged=found.verdict,
                 notes=found.notes,
-                **shared,  # type: ignore[arg-type]
+                assessments=found.assessments,
+                validation=found.predicted,
             )
         lines.append(f"Report:    {out / 'report.html'}")
     if figures is not None:
         with working("Drawing"):
-            paths = save_fit_figures(*what, out / "figures", figures, **shared)  # type: ignore[arg-type]
+            paths = save_fit_figures(
+                *what,
+                out / "figures",
+                figures,
+                assessments=found.assessments,
+                validation=found.predicted,
+            )
         lines.append(f"Figures:   {len(paths)} in {out / 'figures'}")
     return lines
 

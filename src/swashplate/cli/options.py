@@ -159,8 +159,15 @@ class Sampling:
     time_column: Annotated[str, option("Column of the time in FILE.", metavar="NAME")] = "time"
     column: Annotated[str, option("Column of the voltage in FILE.", metavar="NAME")] = "voltage"
 
-    start = "rest"
-    clip = False
+    @property
+    def start(self) -> Start:
+        """How a run begins where no option says it."""
+        return "rest"
+
+    @property
+    def clip(self) -> bool:
+        """Whether a voltage out of range is clipped, where no option says it."""
+        return False
 
 
 @dataclass(frozen=True)
@@ -214,6 +221,7 @@ def command(
                 function(**words)
 
         run.__doc__ = function.__doc__
+        # Typer reads the options off the signature, which functions have without declaring it
         run.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
         run.__annotations__ = {each.name: each.annotation for each in flat}
         app.command(name, epilog=examples, rich_help_panel=panel)(run)

@@ -186,8 +186,13 @@ def _say_shares(
 
         name, run = simulated(drive.chosen, command, sampling)
         assert run.voltage is not None  # the command line simulates voltages only
-        how = {"interpolation": sampling.interpolation, "start": sampling.start}
-        found = limit_shares(drive.chosen, run.voltage, run.record.rate, **how)  # type: ignore[arg-type]
+        found = limit_shares(
+            drive.chosen,
+            run.voltage,
+            run.record.rate,
+            interpolation=sampling.interpolation,
+            start=sampling.start,
+        )
     title = f"{drive.title}, {name}"
     files.write(out, "Shares of each limit, in SI", found.write)
     files.draw(plot, "plot_limit_timeline", run, wanted=found.wanted, title=title)
@@ -443,8 +448,9 @@ def sensitivity(
         ranges = ranges_of(levers or PULLED, (1.0 - span, 1.0 + span))
         single = analysis.one_at_a_time(drive.chosen, ranges, trial, outcomes=wanted)
         if samples is not None:
-            how = {"outcomes": wanted, "samples": samples, "seed": seed}
-            indices = analysis.sobol(drive.chosen, ranges, trial, **how)  # type: ignore[arg-type]
+            indices = analysis.sobol(
+                drive.chosen, ranges, trial, outcomes=wanted, samples=samples, seed=seed
+            )
     title = f"{drive.title}, {name}"
     files.write(out, "All numbers, in SI", analysis.sensitivity_table(single, indices).write)
     if indices is None:

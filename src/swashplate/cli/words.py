@@ -187,11 +187,14 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
     if len(own) < len(scaled):
         from swashplate.analysis.whatif import pulled
 
-        pulls = {name: change for name, change in scaled.items() if name not in own}
-        for name, change in pulls.items():
+        pulls = dict[str, float]()
+        for name, change in scaled.items():
+            if name in own:
+                continue
             if not isinstance(change, float):
                 raise InputError(f"--scale {name} takes one factor, not two.")
-        drive = pulled(drive, {name: float(change) for name, change in pulls.items()})  # type: ignore[arg-type]
+            pulls[name] = change
+        drive = pulled(drive, pulls)
     return drive
 
 
@@ -363,10 +366,15 @@ def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simul
     from swashplate.logs import read_series
 
     least_substeps(options.rate)  # a rate out of range is refused before anything is sampled
-    how = {"interpolation": options.interpolation, "start": options.start, "clip": options.clip}
     if not _is_file(command):
         maneuver = maneuver_of(command, drive)
-        run = drive.simulate(maneuver.sample(options.rate), options.rate, **how)  # type: ignore[arg-type]
+        run = drive.simulate(
+            maneuver.sample(options.rate),
+            options.rate,
+            interpolation=options.interpolation,
+            start=options.start,
+            clip=options.clip,
+        )
         return maneuver.name, run
     _check_columns(command, options)
     series = read_series(command, options.column, "V", time_column=options.time_column)
@@ -376,7 +384,14 @@ def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simul
             "--interpolation previous (each row held until the next)."
         )
     try:
-        run = drive.simulate(series.values, options.rate, time=series.time, **how)  # type: ignore[arg-type]
+        run = drive.simulate(
+            series.values,
+            options.rate,
+            time=series.time,
+            interpolation=options.interpolation,
+            start=options.start,
+            clip=options.clip,
+        )
     except InputError as error:
         raise InputError(f"{command}: {error}") from None
     return Path(command).name, run

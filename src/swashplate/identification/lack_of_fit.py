@@ -48,7 +48,7 @@ FAR = 100.0
 UNTOLD = 1e-4
 """Part of a fixed parameter's effect outside the estimates' below which it is a unit of them."""
 
-DOUBTED = "fixed: "
+UNCERTAIN = "fixed: "
 """What the name of a fixed parameter with a standard uncertainty begins with: an estimate that its
 value, as a measurement, is part of."""
 
@@ -195,8 +195,8 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
             count = len(places)
         elif group == "fixed":
             constants = list(places)[count:]
-    doubted = [place for name, place in places.items() if name.startswith(DOUBTED)]
-    triangle = np.eye(len(places) + 1)[doubted]
+    uncertain = [place for name, place in places.items() if name.startswith(UNCERTAIN)]
+    triangle = np.eye(len(places) + 1)[uncertain]
     for block in blocks:
         triangle = triangular_factor(np.vstack([triangle, block.placed(places)]))
     basis, inverse = _span(triangle[:, :count])
@@ -343,7 +343,7 @@ class _StageBlocks:
         self.earlier: list[Assessment] = []
         self.fixed: list[str] = []
         if not isinstance(model, DriveModel):
-            self.fixed = [name for doubt in self.problem.doubts for name in doubt]
+            self.fixed = [name for together in self.problem.uncertain for name in together]
             return
         part = model.part
         simulated_currents = self.stage.stage.current == "simulated"
@@ -397,11 +397,11 @@ class _StageBlocks:
                 for label, column in by_others.get(name, {}).items():
                     target = held if label in self.fixed else estimates
                     target[label] = weight * column[used]
-                for doubt in self.problem.doubts:
-                    known = [column for column in doubt if column in held]
+                for together in self.problem.uncertain:
+                    known = [column for column in together if column in held]
                     if known:
-                        estimates[f"{DOUBTED}{', '.join(known)}"] = sum(
-                            (held.pop(c) * (doubt[c] / abs(self.numbers[c])) for c in known),
+                        estimates[f"{UNCERTAIN}{', '.join(known)}"] = sum(
+                            (held.pop(c) * (together[c] / abs(self.numbers[c])) for c in known),
                             np.zeros(run.residual.size),
                         )
                 place = number / max(len(self.problem.experiments) - 1, 1) - 0.5

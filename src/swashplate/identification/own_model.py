@@ -15,7 +15,14 @@ from swashplate.equations import Model as Equations
 from swashplate.errors import FileError, InputError
 from swashplate.identification.model import OFFSET, Model, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
-from swashplate.identification.setup import Doubt, Free, GivenPrior, Setup, Stage, deviation
+from swashplate.identification.setup import (
+    Free,
+    GivenPrior,
+    Setup,
+    Stage,
+    StandardUncertainty,
+    deviation,
+)
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
 
@@ -58,7 +65,7 @@ class ModelSetup:
     channels: tuple[str, ...] = ()
     noise: Mapping[str, float] = field(default_factory=dict)
     fixed: Mapping[str, float] = field(default_factory=dict)
-    standard_uncertainty: Mapping[str, Doubt] = field(default_factory=dict)
+    standard_uncertainty: Mapping[str, StandardUncertainty] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         model = self.model
@@ -179,8 +186,8 @@ class ModelSetup:
             noise_scales(runs, channels),
             dict(self.fixed),
             tuple(
-                {name: deviation(doubt, self.fixed[name])}
-                for name, doubt in self.standard_uncertainty.items()
+                {name: deviation(uncertainty, self.fixed[name])}
+                for name, uncertainty in self.standard_uncertainty.items()
             ),
             threads if isinstance(self.model, OwnModel) else 1,
         )

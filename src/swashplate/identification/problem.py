@@ -46,7 +46,7 @@ class Problem:
     """What one unit of residual is, by channel: its noise, in its unit."""
     fixed: Mapping[str, float] = field(default_factory=dict)
     """Values of the model's names that are not unknown but differ from the model's own."""
-    doubts: tuple[Mapping[str, float], ...] = ()
+    uncertain: tuple[Mapping[str, float], ...] = ()
     """Standard uncertainties of fixed numbers, by the model's names; those of one mapping are off
     together. [unit]"""
     threads: int = 1

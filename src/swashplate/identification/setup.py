@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
 Pair = tuple[Finite, Finite]
-Doubt = (
+StandardUncertainty = (
     Annotated[PositiveFloat, Field(strict=True, allow_inf_nan=False)]
     | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")]
 )
@@ -134,7 +134,7 @@ class Setup(Entry):
 
     title: str = ""
     stages: tuple[Stage, ...] = Field(min_length=1)
-    standard_uncertainty: dict[str, Doubt] = Field(
+    standard_uncertainty: dict[str, StandardUncertainty] = Field(
         {},
         description="Of parameters that stay fixed: a standard deviation of what their values may "
         "be off by, in SI units or as '5 %' of the value; the intervals of all estimates take it "
@@ -197,11 +197,11 @@ def _symbol(name: str) -> str:
     return name.removesuffix("_plus").removesuffix("_minus")
 
 
-def deviation(doubt: float | str, value: float) -> float:
+def deviation(uncertainty: float | str, value: float) -> float:
     """A standard uncertainty as a number: in the value's unit, or ``"5 %"`` of its size."""
-    if isinstance(doubt, str):
-        return 0.01 * float(doubt.removesuffix("%")) * abs(value)
-    return float(doubt)
+    if isinstance(uncertainty, str):
+        return 0.01 * float(uncertainty.removesuffix("%")) * abs(value)
+    return float(uncertainty)
 
 
 def setup_names() -> tuple[str, ...]:

@@ -23,12 +23,12 @@ LEG = 30
 as a step that just reaches the swash plate's stop, it shrinks to nothing."""
 GAINED = 1e-6
 """Relative gain of a leg from which another one is worth it."""
-WAKINGS = 3
+RETURNS = 3
 """How often a search is taken back from where it lost an unknown."""
 NO_EFFECT = 1e-12
 """Share of its nominal effect that rounding may leave of none."""
-AWAKE = 0.05
-"""Share of its nominal effect at which an unknown counts as awake again."""
+SOME_EFFECT = 0.05
+"""Share of its nominal effect at which an unknown counts as having one again."""
 VALUES = 25
 """Within its bounds that are tried for one."""
 UNCHANGED = 2
@@ -230,15 +230,15 @@ def solve(
         return Solution(np.asarray(vector, dtype=np.float64), float(cost), start_cost, *how)
 
     best = begin = vector
-    lowest, spent, unwoken, wakings = np.inf, 0, np.inf, 0
-    # what was woken is held for a leg, in which the others learn to live with it
-    held = np.zeros(vector.size, dtype=bool)
+    lowest, spent, before, returns = np.inf, 0, np.inf, 0
+    # an unknown that got its effect back is fixed for a leg, in which the others follow
+    fixed = np.zeros(vector.size, dtype=bool)
     try:
         while True:
             found = least_squares(
                 lambda vector: memory(vector).residuals,
                 begin,
-                jac=lambda vector, held=held: np.where(held, 0.0, memory(vector).jacobian),
+                jac=lambda vector, fixed=fixed: np.where(fixed, 0.0, memory(vector).jacobian),
                 bounds=objective.bounds,
                 x_scale="jac",
                 loss=loss,
@@ -257,11 +257,11 @@ def solve(
             spent = max(spent, memory.evaluations)
             if spent >= max_evaluations:
                 break
-            point, released = None, held.any()
-            held = np.zeros_like(held)
-            if not released and wakings < WAKINGS and lowest < unwoken * (1.0 - GAINED):
-                point, held = _woken(memory, best)
-                unwoken, wakings = lowest, wakings + int(held.any())
+            point, released = None, fixed.any()
+            fixed = np.zeros_like(fixed)
+            if not released and returns < RETURNS and lowest < before * (1.0 - GAINED):
+                point, fixed = _returned(memory, best)
+                before, returns = lowest, returns + int(fixed.any())
             if point is None and (released or (ending == 0 and gained)):
                 begin = found.x
                 continue
@@ -278,7 +278,7 @@ def solve(
     return ended(best, lowest, _ENDINGS.get(ending, message), ending)
 
 
-def _woken(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.bool_]]:
+def _returned(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.bool_]]:
     """A point where unknowns that had lost their effect have one, and (K,) which those are.
 
     A stop that the swash plate no longer reaches has no derivative, and no descent finds back to
@@ -295,9 +295,9 @@ def _woken(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.boo
         return np.asarray(np.linalg.norm(jacobian, axis=0))
 
     present = np.linalg.norm(memory(vector).jacobian, axis=0)
-    asleep, point = np.zeros(present.size, dtype=bool), vector.copy()
+    lost, point = np.zeros(present.size, dtype=bool), vector.copy()
     if present.min(initial=np.inf) > NO_EFFECT * present.max(initial=0.0):
-        return None, asleep
+        return None, lost
     nominal = effects(memory.objective.start)
     for k in np.flatnonzero(present < NO_EFFECT * nominal):
         values = np.linspace(low[k], high[k], VALUES)
@@ -306,7 +306,7 @@ def _woken(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.boo
         for value in values[np.lexsort((away, far))]:
             trial = point.copy()
             trial[k] = value
-            if effects(trial)[k] > AWAKE * nominal[k]:
-                point, asleep[k] = trial, True
+            if effects(trial)[k] > SOME_EFFECT * nominal[k]:
+                point, lost[k] = trial, True
                 break
-    return (point if asleep.any() else None), asleep
+    return (point if lost.any() else None), lost

@@ -100,7 +100,7 @@ def stage_problem(
     experiments: Sequence[Experiment],
     *,
     threads: int | None = None,
-    doubts: Mapping[str, float | str] = MappingProxyType({}),
+    uncertain: Mapping[str, float | str] = MappingProxyType({}),
 ) -> Problem:
     """The problem of a stage.
 
@@ -114,7 +114,7 @@ def stage_problem(
         The runs to fit.
     threads : int, optional
         Threads over experiments; all cores by default.
-    doubts : mapping of str to float or str, optional
+    uncertain : mapping of str to float or str, optional
         Standard uncertainties of what stays fixed, as of `Setup`.
 
     Raises
@@ -156,15 +156,15 @@ def stage_problem(
         Unknowns(unknowns),
         channels,
         noise_scales(runs, channels),
-        doubts=doubts_of_columns(doubts, parameters),
+        uncertain=uncertain_columns(uncertain, parameters),
         threads=threads or available_cores(),
     )
 
 
-def doubts_of_columns(
-    doubts: Mapping[str, float | str], parameters: ParameterSet
+def uncertain_columns(
+    uncertain: Mapping[str, float | str], parameters: ParameterSet
 ) -> tuple[Mapping[str, float], ...]:
-    """Standard uncertainties of a drive's fixed parameters, by columns; see `Problem.doubts`.
+    """Standard uncertainties of a drive's fixed parameters, by columns; see `Problem.uncertain`.
 
     Raises
     ------
@@ -172,9 +172,9 @@ def doubts_of_columns(
         If there is no parameter of a name.
     """
     made = []
-    for name, doubt in doubts.items():
+    for name, each in uncertain.items():
         columns = columns_of([name])
-        made.append({each: deviation(doubt, _nominal(parameters, each)) for each in columns})
+        made.append({c: deviation(each, _nominal(parameters, c)) for c in columns})
     return tuple(made)
 
 

@@ -186,8 +186,10 @@ def load_fit(
         raise InputError(f"{path} is the fit of another model, or of other bounds: fit again.")
     parameters, stages = smooth(nominal), list[StageFit]()
     for stage, entry in zip(file.setup.stages, file.stages, strict=False):
-        doubts = file.setup.standard_uncertainty
-        problem = stage_problem(stage, parameters, experiments, threads=threads, doubts=doubts)
+        uncertain = file.setup.standard_uncertainty
+        problem = stage_problem(
+            stage, parameters, experiments, threads=threads, uncertain=uncertain
+        )
         known, theirs = problem.unknowns.items, entry.unknowns
         if (stage.name, [(each.name, each.run) for each in known]) != (
             entry.name,

@@ -224,9 +224,9 @@ def slopes_by_earlier(
 
 def slopes_by_fixed(stage: StageFit, linearised: LinearisedFit) -> Array:
     """(K, F) changes of a stage's estimates for a standard uncertainty of each fixed number."""
-    doubts = stage.problem.doubts
-    names = [name for doubt in doubts for name in doubt]
-    deviations = np.array([[doubt.get(name, 0.0) for doubt in doubts] for name in names])
+    uncertain = stage.problem.uncertain
+    names = [name for together in uncertain for name in together]
+    deviations = np.array([[each.get(name, 0.0) for each in uncertain] for name in names])
     if not names:
         return np.zeros((linearised.variables.count, 0))
     return _slopes(stage, linearised, names, deviations)

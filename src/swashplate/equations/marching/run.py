@@ -26,6 +26,7 @@ Indices = NDArray[np.int64]
 Flags = NDArray[np.uint8]
 Start = Literal["rest", "steady"]
 
+K = TypeVar("K")
 T = TypeVar("T")
 
 STARTS = ("rest", "steady")
@@ -95,8 +96,8 @@ class Instance:
     def places(self, signals: Sequence[str], h: float) -> Places:
         """Where every tap reads at a step of `h`."""
         key = (tuple(signals), h)
-        if key in self._lately:
-            return self._lately[key]  # type: ignore[no-any-return]
+        if key in self._places:
+            return self._places[key]
         found: list[Place] = []
         for each in taps_of(self.model, signals):
             name, p = each.tap.delay, self.parts[each.part].p
@@ -109,7 +110,7 @@ class Instance:
             np.array([each.fraction for each in found]),
             np.array([each.slope for each in found]),
         )
-        return self._remembered(key, places)
+        return _remembered(self._places, key, places)
 
     def check_inputs(self, signals: Collection[str]) -> None:
         """Refuse external signals that the model does not know, and the lack of those it needs."""
@@ -153,8 +154,8 @@ class Instance:
             If constants or the state cannot be computed for these numbers.
         """
         key = (tuple(first.items()), h, start)
-        if chosen is None and key in self._lately:
-            return self._lately[key]  # type: ignore[no-any-return]
+        if chosen is None and key in self._starts:
+            return self._starts[key]
         check_start(start)
         self.check_inputs(first)
         before = {name: value if start == "steady" else 0.0 for name, value in first.items()}
@@ -175,18 +176,16 @@ class Instance:
                 known["signals"] = _sampled(part, known)
             found.append(known)
         made_now = Started(tuple(states), before, tuple(found))
-        return self._remembered(key, made_now) if chosen is None else made_now
+        return made_now if chosen is not None else _remembered(self._starts, key, made_now)
 
+    # what was found lately: a fit asks for the same with every set
     @cached_property
-    def _lately(self) -> dict[Any, Any]:
-        """What `places` and `start` found: a fit asks for the same with every set."""
+    def _places(self) -> dict[tuple[tuple[str, ...], float], Places]:
         return {}
 
-    def _remembered(self, key: Any, value: T) -> T:
-        if len(self._lately) > 64:
-            self._lately.clear()
-        self._lately[key] = value
-        return value
+    @cached_property
+    def _starts(self) -> dict[tuple[tuple[tuple[str, float], ...], float, Start], Started]:
+        return {}
 
     def _state(self, part: Model, known: Mapping[str, Any], start: Start) -> Any:
         equation = part.rest if start == "rest" else part.settled
@@ -240,6 +239,14 @@ class Instance:
 def called(equation: Callable[..., Any], known: Mapping[str, Any]) -> Any:
     """What an equation gives for what is known by the names of its arguments."""
     return interpreted(equation)(*(known[name] for name in arguments_of(equation)))
+
+
+def _remembered(known: dict[K, T], key: K, value: T) -> T:
+    """Keep a value, of few at a time."""
+    if len(known) > 64:
+        known.clear()
+    known[key] = value
+    return value
 
 
 def _sampled(part: Model, known: Mapping[str, Any]) -> Any:

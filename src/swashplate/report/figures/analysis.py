@@ -116,10 +116,10 @@ def plot_envelope(envelope: Envelope, *, title: str | None = None) -> Figure:
             ax.fill_between(across, up, color=color, alpha=0.08, linewidth=0.0)
         most.append(float(np.abs(up).max()))
         # part of the grey line lies under another, and is wider
-        how = {"linewidth": LINE, "zorder": 2.0} if sign else {"linewidth": 3.0, "zorder": 1.7}
+        width, above = (LINE, 2.0) if sign else (3.0, 1.7)
         for by, start, stop in _causes(curve):
             part = slice(start, stop)
-            ax.plot(across[part], up[part], color=color, linestyle=DASHES[by], **how)  # type: ignore[arg-type]
+            ax.plot(across[part], up[part], color=color, ls=DASHES[by], lw=width, zorder=above)
     height = 1.3 * max(most[:2]) or 1.0
     ax.set_ylim(-height, height)
     for way, color in ((envelope.plus, BLUE), (envelope.minus, VERMILION)):
@@ -233,8 +233,15 @@ def _bars(ax: Axes, timeline: LimitTimeline, length: float) -> None:
             linewidth=0.4,
         )
     for row, share in enumerate(timeline.shares):
-        how = {"coords": ax.get_yaxis_transform(), "va": "center", "annotation_clip": False}
-        write(ax, f"{100.0 * share:.1f} %", (1.0, row), (5.0, 0.0), **how)  # type: ignore[arg-type]
+        write(
+            ax,
+            f"{100.0 * share:.1f} %",
+            (1.0, row),
+            (5.0, 0.0),
+            coords=ax.get_yaxis_transform(),
+            va="center",
+            annotation_clip=False,
+        )
     if not count:
         ax.text(0.5, 0.5, "no limit acts", transform=ax.transAxes, fontsize=SMALL, ha="center")
 
@@ -341,8 +348,9 @@ def shade_band(ax: Axes, band: Bands, color: ColorType, *, about: Array | float 
     """Shade a band of speeds; a long one by every so many samples."""
     step, factor = max(-(-band.time.size // MOST_POINTS), 1), display_unit("rad/s").factor
     lower, upper = (factor * (each - about)[::step] for each in (band.lower, band.upper))
-    how = {"alpha": 0.25, "linewidth": 0.0, "zorder": 1.6}
-    ax.fill_between(band.time[::step], lower, upper, color=color, **how)  # type: ignore[arg-type]
+    ax.fill_between(
+        band.time[::step], lower, upper, color=color, alpha=0.25, linewidth=0.0, zorder=1.6
+    )
 
 
 # --- sensitivities --------------------------------------------------------------------------------
@@ -427,8 +435,16 @@ def plot_sobol(result: SobolIndices, *, title: str | None = None) -> Figure:
         places = np.arange(order.size)
         ax.barh(places, total, THICK, color=SKY, zorder=2.0)
         ax.barh(places, np.maximum(result.first[order, k], 0.0), 0.4, color=BLUE, zorder=2.1)
-        how = {"fmt": "none", "ecolor": INK, "elinewidth": 0.8, "capsize": 2.0, "zorder": 3.0}
-        ax.errorbar(total, places, xerr=error, **how)  # type: ignore[arg-type]
+        ax.errorbar(
+            total,
+            places,
+            xerr=error,
+            fmt="none",
+            ecolor=INK,
+            elinewidth=0.8,
+            capsize=2.0,
+            zorder=3.0,
+        )
         ax.set_xlim(0.0, max(1.0, 1.03 * float((total + error).max())))
         _name_levers(ax, [result.levers[lever] for lever in order])
         outcome = result.outcomes[k]
@@ -545,8 +561,15 @@ def _draw_map(whole: Axes, close: Axes, inverse: InverseMap) -> None:
     whole.set_ylabel("voltage (V)", fontsize=NORMAL, color=INK)
     below, above = (unit.factor * each for each in inverse.gap)
     close.axvspan(below, above, color="#ededed", linewidth=0.0, zorder=0.5)
-    how = {"coords": close.get_xaxis_transform(), "color": GREY, "ha": "center"}
-    write(close, "cannot be held", (0.5 * (below + above), 0.0), (0.0, 4.0), **how)  # type: ignore[arg-type]
+    write(
+        close,
+        "cannot be held",
+        (0.5 * (below + above), 0.0),
+        (0.0, 4.0),
+        coords=close.get_xaxis_transform(),
+        color=GREY,
+        ha="center",
+    )
     write(close, "close-up around standstill", (0.0, 1.0), (4.0, -10.0), color=GREY)
     for end, height, side, shift in zip(
         (low, high), volts, ("left", "right"), (-10.0, 10.0), strict=True

@@ -286,8 +286,15 @@ def _write_factors(
         words = f"×{factors[index]:.3g}"
         letters = _LETTER * SMALL / POINTS_PER_INCH * (len(words) + 1)
         if following - ends[index] > letters * inch:
-            how = {"coords": ax.get_xaxis_transform(), "color": FACTOR, "va": "bottom"}
-            write(ax, words, (float(ends[index]), height), (2.0, 0.0), **how)  # type: ignore[arg-type]
+            write(
+                ax,
+                words,
+                (float(ends[index]), height),
+                (2.0, 0.0),
+                coords=ax.get_xaxis_transform(),
+                color=FACTOR,
+                va="bottom",
+            )
 
 
 # --- pages of a campaign --------------------------------------------------------------------------
@@ -472,8 +479,15 @@ def fill_row(
         signal = signals.get(column.key)
         if signal is None:
             ax.set_yticks([])
-            how = {"transform": ax.transAxes, "fontsize": SMALL, "ha": "center", "va": "center"}
-            ax.text(0.5, 0.5, "not measured", **how)  # type: ignore[arg-type]
+            ax.text(
+                0.5,
+                0.5,
+                "not measured",
+                transform=ax.transAxes,
+                fontsize=SMALL,
+                ha="center",
+                va="center",
+            )
             continue
         _fill(ax, column, signal, experiment, wide)
     row[0].add_artist(_heading(row[0], experiment))
@@ -650,8 +664,15 @@ def plot_current(
         shade(ax, widened(run.time, spans_of(run.time, run.masked)), MASKED)
         mark_gaps(ax, run.time)
     draw_broken(upper, run.time, unit.factor * run.measured, BLUE, width=THIN, label="measured")
-    how = {"dashes": "dashed", "zorder": 2.5, "label": "simulated"}
-    draw_broken(upper, run.time, unit.factor * run.simulated, VERMILION, **how)  # type: ignore[arg-type]
+    draw_broken(
+        upper,
+        run.time,
+        unit.factor * run.simulated,
+        VERMILION,
+        dashes="dashed",
+        zorder=2.5,
+        label="simulated",
+    )
     label_below(lower, "time (s)")
     return figure
 
@@ -790,8 +811,16 @@ def reach_of(speeds: Mapping[Method, Speed]) -> tuple[float, float]:
 def draw_speed(ax: Axes, method: Method, speed: Speed, unit: DisplayUnit) -> None:
     """Draw a speed."""
     color, dashes, width, zorder, _ = LOOKS[method]
-    how = {"dashes": dashes, "width": width, "zorder": zorder, "label": method}
-    draw_broken(ax, speed.time, unit.factor * speed.speed, color, **how)  # type: ignore[arg-type]
+    draw_broken(
+        ax,
+        speed.time,
+        unit.factor * speed.speed,
+        color,
+        dashes=dashes,
+        width=width,
+        zorder=zorder,
+        label=method,
+    )
 
 
 def speed_handles(

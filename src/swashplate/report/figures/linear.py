@@ -88,8 +88,16 @@ def plot_bode(
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
         for ax in axes:
             ax.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
-        how = {"coords": ("data", "axes fraction"), "color": GREY, "ha": "left", "va": "bottom"}
-        write(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), **how)  # type: ignore[arg-type]
+        write(
+            axes[0],
+            f"{mark:g} Hz",
+            (mark, 0.0),
+            (3.0, 3.0),
+            coords=("data", "axes fraction"),
+            color=GREY,
+            ha="left",
+            va="bottom",
+        )
     return figure
 
 

@@ -203,12 +203,25 @@ def _write_table(ax: Axes, values: Values, looks: Mapping[str, Stroke]) -> None:
     for number, row in enumerate(rows):
         height = 1.0 - (number + 0.5) / len(rows)
         for place, words in zip(places, row, strict=True):
-            how = {"fontsize": SMALL, "color": INK if number else GREY, "va": "center"}
-            ax.text(place, height, words, transform=ax.transAxes, **how)  # type: ignore[arg-type]
+            ax.text(
+                place,
+                height,
+                words,
+                transform=ax.transAxes,
+                fontsize=SMALL,
+                color=INK if number else GREY,
+                va="center",
+            )
         if number:
             look = looks[list(values)[number - 1]]
-            line = {"color": look.color, "linestyle": look.dashes, "linewidth": 2.0}
-            ax.plot([0.0, 0.03], [height] * 2, transform=ax.transAxes, **line)  # type: ignore[arg-type]
+            ax.plot(
+                [0.0, 0.03],
+                [height] * 2,
+                transform=ax.transAxes,
+                color=look.color,
+                linestyle=look.dashes,
+                linewidth=2.0,
+            )
 
 
 def _cells(name: str, values: SteadyValues) -> tuple[str, ...]:
@@ -291,8 +304,16 @@ def _name_dead_zones(ax: Axes, values: Iterable[SteadyValues]) -> None:
     widest = max(high for _, high in zones)
     if any(low < high for low, high in zones) and widest < 0.5 * CLOSE_UP:
         box = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
-        how = {"coords": ax.get_xaxis_transform(), "color": GREY, "va": "center", "bbox": box}
-        write(ax, "dead zone", (widest, 0.04), (5.0, 0.0), **how)  # type: ignore[arg-type]
+        write(
+            ax,
+            "dead zone",
+            (widest, 0.04),
+            (5.0, 0.0),
+            coords=ax.get_xaxis_transform(),
+            color=GREY,
+            va="center",
+            bbox=box,
+        )
 
 
 def _mark_speeds(
