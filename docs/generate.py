@@ -65,7 +65,7 @@ def api_pages() -> Iterator[tuple[str, str]]:
             short = name.rpartition(".")[2]
             lines += [f"## {short}", "", "```{eval-rst}", f".. {kind}:: {name}"]
             if kind == "autoclass":
-                lines += ["   :members:"]
+                lines += ["   :members:", "   :exclude-members: model_config"]
             lines += ["```", ""]
         yield page["name"], "\n".join(lines)
 
