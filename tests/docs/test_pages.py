@@ -39,7 +39,6 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PATTERNS = ("README.md", "CONTRIBUTING.md", "docs/*.md", "docs/how-to/*.md", "docs/theory/*.md")
 PAGES = sorted(path for pattern in PATTERNS for path in ROOT.glob(pattern))
-LONG = {"start.md", "README.md"}
 ELSEWHERE = {"examples.md"}
 """What tests/examples runs."""
 each_page = pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
@@ -188,11 +187,7 @@ def change_file(content: str) -> None:
 
 @pytest.mark.parametrize(
     "page",
-    [
-        pytest.param(path, marks=[pytest.mark.slow] if path.name in LONG else [])
-        for path in PAGES
-        if path.name not in ELSEWHERE
-    ],
+    [path for path in PAGES if path.name not in ELSEWHERE],
     ids=lambda path: str(path.relative_to(ROOT)),
 )
 def test_a_page_does_what_it_shows(

@@ -40,7 +40,6 @@ def scripts(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return importlib
 
 
-@pytest.mark.slow
 def test_the_site_builds(tmp_path: Path) -> None:
     """A broken link, a page that none leads to, a wrong docstring: each is a warning, and fails."""
     done = subprocess.run(
@@ -124,7 +123,6 @@ def test_every_figure_can_be_made_again(scripts: ModuleType) -> None:
     assert {each.name for each in figures.IMAGES.iterdir()} == shown
 
 
-@pytest.mark.slow
 def test_figures_have_the_size_of_those_that_are_kept(
     scripts: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
