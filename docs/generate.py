@@ -43,8 +43,8 @@ def pages(folder: Path) -> None:
 
 
 CAMPAIGN = """\
-A campaign says where the logs of a machine are and what their columns mean. `swashplate campaign init`
-writes a draft from your logs, `swashplate campaign schema` prints this page as a JSON Schema that
+A campaign says where the logs of a machine are and what their columns mean.
+`swashplate campaign init` writes a draft from your logs, `swashplate campaign schema` prints this page as a JSON Schema that
 editors complete from. An introduction: [campaigns](../campaign.md)."""
 PARAMETERS = """\
 A drive in numbers. `swashplate show hoist --toml > mine.toml` writes one to start from; symbols,
@@ -208,7 +208,7 @@ def nomenclature(text: str) -> str:
     Parameters
     ----------
     text : str
-        The page; a table begins with a row ``| symbol | name | unit | per direction | range | ...``.
+        The page; a table begins with a row ``| symbol | name | unit | per direction | ...``.
     """
     tables = iter(HEADS)
 
