@@ -44,8 +44,9 @@ def pages(folder: Path) -> None:
 
 CAMPAIGN = """\
 A campaign says where the logs of a machine are and what their columns mean.
-`swashplate campaign init` writes a draft from your logs, `swashplate
-campaign schema` prints this page as a JSON Schema that editors complete from. An introduction: [campaigns](../campaign.md)."""
+`swashplate campaign init` writes a draft from your logs, `swashplate campaign schema` prints this
+page as a JSON Schema with which editors complete entries. An introduction:
+[campaigns](../campaign.md)."""
 PARAMETERS = """\
 A drive in numbers. `swashplate show hoist --toml > mine.toml` writes one to start from; symbols,
 units and ranges: [nomenclature](../nomenclature.md)."""
