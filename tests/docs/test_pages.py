@@ -45,7 +45,7 @@ each_page = pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.rel
 
 BLOCK = re.compile(r"^```([^\n`]*)\n(.*?)^```[ \t]*$", re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"(?<![\w.+−-])[-+−]?\d+(?:,\d{3})*(\.\d+)?(e[-+]?\d+)?(?![\w.]*_)")
-TARGETS = set(re.findall(r"^([.a-z]+):.*##", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
+TARGETS = set(re.findall(r"^([.a-z-]+):.*##", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE))
 NOT_RUN = (
     r"(cd|mkdir) \S+",
     r"source \.venv/bin/activate",
