@@ -131,7 +131,7 @@
       const left = x(from);
       if (to > start && from < end) put(box, "rect", { class: "ignored", x: left, y: 0, width: Math.max(x(to) - left, 1), height });
     }
-    for (const [value, words] of ticks(low, high, height < 100 ? 3 : 5)) {
+    for (const [value, words] of ticks(low, high, height < 100 ? 4 : 5)) {
       put(box, "line", { class: value === 0 ? "zero" : "grid", x1: 0, x2: inner, y1: y(value), y2: y(value) });
       put(axis, "text", { x: -7, y: y(value) + 4, "text-anchor": "end" }, words);
     }

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.resources import files
+from pathlib import Path
+from shutil import which
+from subprocess import TimeoutExpired, run
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from swashplate.tables import UNIT, Row, Table
+from swashplate.errors import FileError
+from swashplate.tables import UNIT, Form, Row, Table, ending, write_whole
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -131,3 +138,60 @@ def _script_json(content: Any) -> Markup:
     """JSON that can stand in a script element: no text in it can end the element."""
     words = json.dumps(content, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return Markup(words.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+
+
+# --- on paper -------------------------------------------------------------------------------------
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "msedge")
+PATIENCE = 180.0
+"""After which a browser that has not printed is stopped. [s]"""
+
+
+def find_browser() -> str:
+    """Path of a Chromium, which prints pages.
+
+    Raises
+    ------
+    FileError
+        If none is found.
+    """
+    found = next((place for each in BROWSERS if (place := which(each)) is not None), None)
+    if found is None:
+        raise FileError(
+            f"No browser was found that prints a PDF ({', '.join(BROWSERS)}): install Chromium, or "
+            "open report.html in any browser and print it there."
+        )
+    return found
+
+
+def print_report(page: str | Path, path: str | Path) -> None:
+    """Print a report's page as PDF, whole or not at all, by a Chromium without a window.
+
+    Parameters
+    ----------
+    page : path
+        As `write_fit_report` writes it.
+    path : path
+        The PDF, which replaces an older one.
+
+    Raises
+    ------
+    FileError
+        If there is no Chromium, it prints nothing, or the file cannot be written or does not end
+        in ``.pdf``.
+    """
+    ending(path, Form("a printed report", (".pdf",)))
+    browser, address = find_browser(), Path(page).absolute().as_uri()
+
+    def write(beside: Path) -> None:
+        with TemporaryDirectory() as profile:
+            words = [browser, "--headless", "--disable-gpu", "--no-pdf-header-footer"]
+            if hasattr(os, "geteuid") and os.geteuid() == 0:
+                words.append("--no-sandbox")  # Chromium has none for the superuser
+            words += [f"--user-data-dir={profile}", f"--print-to-pdf={beside.absolute()}", address]
+            with suppress(TimeoutExpired):
+                run(words, capture_output=True, timeout=PATIENCE, check=False)
+        if not beside.stat().st_size:
+            raise OSError(0, f"{browser} printed nothing")
+
+    write_whole(path, write)

@@ -20,6 +20,7 @@ from swashplate.tables import quantity
 from swashplate.units import DisplayUnit, display_unit
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 MOST_ROWS = 16_384
 """A longer run is shown by the extremes of its signals: five or more for each dot of a screen."""
 LEVELS = 65_535
@@ -142,14 +143,14 @@ def _gathered(found: Sequence[tuple[RunQuality, str, bool]]) -> tuple[ShownRun, 
     return tuple(runs)
 
 
-def off_scale(channel: Channel, values: Array) -> NDArray[np.bool_]:
+def off_scale(channel: Channel, values: Array) -> Mask:
     """(m,) ignored samples so far from those that count that they would press these flat."""
     used = channel.used
     if not used.any():
         return np.zeros(values.size, dtype=np.bool_)
     low, high = float(values[used].min()), float(values[used].max())
     room = 0.5 * (high - low)
-    far: NDArray[np.bool_] = ~used & ((values < low - room) | (values > high + room))
+    far: Mask = ~used & ((values < low - room) | (values > high + room))
     return far
 
 
@@ -202,7 +203,7 @@ def _channel(shown: Shown) -> dict[str, Any]:
 
 
 def _signals(
-    time: Array, signals: Sequence[tuple[Array, float | None]], hidden: Array | None = None
+    time: Array, signals: Sequence[tuple[Array, float | None]], hidden: Mask | None = None
 ) -> dict[str, Any]:
     """Signals of one clock, each with the step that it is rounded to if that is known."""
     breaks = gap_rows(time)
