@@ -268,12 +268,13 @@
       figures.get(each.target).draw();
     }
   }, { rootMargin: "600px" });
-  const sized = new ResizeObserver((seen) => {
+  // in a frame of its own: drawing changes the height, which is observed, too
+  const sized = new ResizeObserver((seen) => requestAnimationFrame(() => {
     for (const { target } of seen) {
       const figure = figures.get(target);
       if (figure.width && figure.width !== target.clientWidth && !matchMedia("print").matches) figure.draw();
     }
-  });
+  }));
   for (const each of figures.keys()) {
     near.observe(each);
     sized.observe(each);
