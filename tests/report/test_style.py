@@ -122,3 +122,15 @@ assert "matplotlib.pyplot" not in sys.modules
 assert {name: matplotlib.rcParams[name] for name in settings} == before
 """
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("format", ["svg", "png", "pdf"])
+def test_names_are_drawn_as_they_are(tmp_path: Path, format: str) -> None:
+    """A dollar in a name is no formula, and a control character no part of an SVG."""
+    figure, (ax,) = sheet([1.0], "$\\frac{1}{$ <b>\x1b]0;x\x07 ${1}", legend=[handle("a$b$", BLUE)])
+    dress(ax, "speed $\\x$ (V)", "$t")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        save_figure(figure, tmp_path / f"a.{format}")
+    if format == "svg":
+        ElementTree.parse(tmp_path / "a.svg")

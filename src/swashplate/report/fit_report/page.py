@@ -69,7 +69,8 @@ def page(sections: Sequence[Section], content: Mapping[str, Any]) -> str:
         css=Markup(resource("page.css")),
         js=Markup(resource("page.js")),
     )
-    return made
+    # control characters of a name, and what turns the direction of writing, are no part of HTML
+    return re.sub("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]", "\ufffd", made)
 
 
 def resource(name: str) -> str:
