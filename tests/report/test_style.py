@@ -1,7 +1,9 @@
 import subprocess
 import sys
+import warnings
 from itertools import pairwise
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from hypothesis import given
@@ -9,7 +11,17 @@ from hypothesis import strategies as st
 
 from swashplate import FileError, Simulation
 from swashplate.report.figures import plot_simulation, save_figure
-from swashplate.report.style import handle, in_lines, legend_columns, legend_rows, signed, spread
+from swashplate.report.style import (
+    BLUE,
+    dress,
+    handle,
+    in_lines,
+    legend_columns,
+    legend_rows,
+    sheet,
+    signed,
+    spread,
+)
 
 GAP = 0.1
 
