@@ -15,3 +15,5 @@ from swashplate.logs.log import check_stamps as check_stamps
 from swashplate.logs.log import open_log as open_log
 from swashplate.logs.log import read_series as read_series
 from swashplate.logs.log import unit_of as unit_of
+from swashplate.logs.long import LONG as LONG
+from swashplate.logs.long import in_parts as in_parts

@@ -55,9 +55,13 @@ class Log:
     part : callable, optional
         Given such positions, a first row and the one behind the last, reads these rows.
     rows : int, optional
-        How many there are, where that is known without reading.
+        How many there are, where that is known without reading; of text, about.
     first : int
         Rows of the file that come before those of `load`.
+    cut : str
+        Of a part of a file, which one it is; else empty.
+    resumes : bool
+        Of a part, whether it begins in the midst of a motion.
     """
 
     path: Path
@@ -75,6 +79,8 @@ class Log:
     )
     rows: int | None = None
     first: int = 0
+    cut: str = ""
+    resumes: bool = False
 
     def __post_init__(self) -> None:
         """Make all that may get into a sentence printable: names are what a file says they are."""
@@ -136,7 +142,7 @@ class Log:
     def between(self, first: int, last: int) -> Log:
         """The log of a part of the rows, from the first (counted from 0) to before the last.
 
-        Only of a log that has `part`.
+        Only of a log that has `part`, which goes on to count from the file's first row.
         """
         part = self.part
         assert part is not None
@@ -144,9 +150,9 @@ class Log:
             self,
             load=lambda positions: part(positions, first, last),
             stream=None,
-            part=None,
             rows=last - first,
             first=first,
+            cut=f"rows {first + 1} to {last} of {self.rows}",
         )
 
     def _position(self, wanted: str) -> int:

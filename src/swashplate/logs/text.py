@@ -97,8 +97,16 @@ def open_text(path: Path, options: TextOptions) -> Log:
             for _ in positions
         ]
 
+    length = 1.0 + sum(map(len, head[start:])) / max(len(head) - start, 1)
     return Log(
-        path, f"{layout}{form}", heading.columns, load, heading.comments, notes, stream=table.read
+        path,
+        f"{layout}{form}",
+        heading.columns,
+        load,
+        heading.comments,
+        notes,
+        stream=table.read,
+        rows=round(path.stat().st_size / length),
     )
 
 
