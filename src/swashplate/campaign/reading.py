@@ -161,9 +161,9 @@ MOVES = 0.02
 """Share of its largest excursion from rest beyond which an input moves."""
 BEFORE, AFTER = 2.0, 5.0
 """What belongs to a window with motion before the input moves and after it has stopped. [s]"""
-HELD = 500_000
+HELD = 300_000
 """Rows of one log that a campaign takes at most."""
-PIECE = 100_000
+PIECE = 60_000
 """A longer motion is cut into pieces of so many rows, of which the later ones begin in motion."""
 
 
@@ -181,6 +181,7 @@ def windows(axes: Iterable[schema.Axis], log: Log, span: schema.Window | None) -
     """
     tested = list(axes)
     wanted = [each for axis in tested for each in wanted_columns(axis)]
+    told = len(log.notes)
     log = in_parts(log, list(Columns.find(log, wanted)))
     rows = log.rows or 0
     if rows <= LONG or log.part is None:
@@ -208,9 +209,10 @@ def windows(axes: Iterable[schema.Axis], log: Log, span: schema.Window | None) -
         moving |= _moves(ends)
     if not moving.any():
         raise InputError(
-            f"{log.path} has {rows} rows in which the input never moves: leave it out."
+            f"{log.path} has {rows} rows, in none of which the input moves: leave the run out with "
+            'role = "ignore".'
         )
-    return _cut(log, moving, period)
+    return _cut(log, moving, period, log.notes[told:])
 
 
 def _moves(ends: Array) -> NDArray[np.bool_]:
@@ -227,7 +229,7 @@ def _moves(ends: Array) -> NDArray[np.bool_]:
     return moves
 
 
-def _cut(log: Log, moving: NDArray[np.bool_], period: float) -> list[Log]:
+def _cut(log: Log, moving: NDArray[np.bool_], period: float, notes: tuple[str, ...]) -> list[Log]:
     """Parts of a log about its motion, so many that all can be held."""
     rows = log.rows or 0
     changes = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]])))
@@ -241,13 +243,14 @@ def _cut(log: Log, moving: NDArray[np.bool_], period: float) -> list[Log]:
         for place in range(begin, end, PIECE)
     ]
     total = sum(end - begin for begin, end, _ in pieces)
-    every = -(-total // HELD)
-    taken = pieces[:: int(every)]
-    said = f"{len(pieces)} windows with motion, of which 1 in {every} is taken"
-    said = said if every > 1 else f"{len(pieces)} windows with motion"
+    every = int(-(-total // HELD))
+    taken = pieces[::every]
+    said = f"the log has {len(pieces)} windows with motion"
+    said += f", of which 1 in {every} is taken" * (every > 1)
+    said += "".join(f"; {each[0].lower()}{each[1:].rstrip('.')}" for each in notes)
     found = []
     for number, (begin, end, within) in enumerate(taken, 1):
         part = log.between(begin, end)
-        why = f"window {number} of {len(taken)}: {part.cut}; the log has {said}"
-        found.append(replace(part, cut=why, resumes=within))
+        cut = f"window {number} of {len(taken)}: {part.cut}"
+        found.append(replace(part, cut=f"{cut}; {said}" if number == 1 else cut, resumes=within))
     return found

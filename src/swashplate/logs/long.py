@@ -52,7 +52,7 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
         _convert(log, columns, table, json.dumps([*stamp, columns]))
         held = [*stamp, columns]
     stored = open_apart("channels.PARQUET", table)
-    note = f"It has {stored.rows} rows and is read from {table.name}, written beside it."
+    note = f"Its {stored.rows} rows are read from {table.name}, written beside it."
     kept = tuple(log.columns[position] for position in held[3])
     return replace(
         stored, path=log.path, columns=kept, comments=log.comments, notes=(*log.notes, note)
