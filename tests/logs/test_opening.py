@@ -99,6 +99,9 @@ def test_what_is_no_file(tmp_path):
     os.mkfifo(tmp_path / "pipe.csv")
     with pytest.raises(FileError, match="pipe.csv is no ordinary file"):
         open_log(tmp_path / "pipe.csv")
+    (tmp_path / "zero.csv").symlink_to("/dev/zero")
+    with pytest.raises(FileError, match="zero.csv is no ordinary file"):
+        open_log(tmp_path / "zero.csv")
     with pytest.raises(FileError, match="cannot be read"):
         open_log(tmp_path / ("a" * 300 + ".csv"))
 

@@ -13,13 +13,15 @@ from swashplate.campaign import schema
 from swashplate.campaign.experiment import Source
 from swashplate.campaign.schema import conversion, inside
 from swashplate.errors import FileError, InputError
-from swashplate.logs import LONG, Column, Log, check_stamps, in_parts, unit_of
+from swashplate.logs import LONG, Column, Log, check_duration, check_stamps, in_parts, unit_of
 from swashplate.units import to_si
 
 Array = NDArray[np.float64]
 
 SINCE_1970 = 1e8
 """Stamps that begin beyond this are seconds of a calendar and are counted from the first. [s]"""
+LARGEST = 1e30
+"""No signal of a machine has so much of any SI unit."""
 
 
 class Columns:
@@ -114,12 +116,16 @@ def read_signal(
     si, factor, zero = conversion(signal.kind, unit, said)
     # an encoder's sign belongs to the scale of its counts, see `Encoder`
     sign = 1 if signal.kind == "encoder_counts" else signal.sign
-    written = sign * (signal.scale * numbers[kept] + signal.offset)
+    with np.errstate(over="ignore"):
+        values = factor * sign * (signal.scale * numbers[kept] + signal.offset) + zero
+        largest = float(np.max(np.abs(values)))
+    if not largest < LARGEST:
+        raise InputError(f"{said} reaches {largest:.3g} {si}; check its unit, scale and offset.")
     limits = signal.limits
     return Reading(
         si,
         np.ascontiguousarray(time[kept]),
-        factor * written + zero,
+        values,
         Source(columns.log.path, column.name),
         factor,
         None if limits is None else (factor * limits[0] + zero, factor * limits[1] + zero),
@@ -129,17 +135,18 @@ def read_signal(
 
 def stamps_in(clock: schema.Clock, main: schema.Clock, columns: Columns, size: int) -> Array:
     """Increasing time stamps of a signal; those of a calendar from the axis's first one on. [s]"""
-    if clock.rate is not None:
-        return clock.offset + (columns.log.first + np.arange(size)) / clock.rate
-    numbers, factor = _clock(clock, columns)
-    check_stamps(columns.log, columns.found[clock.column or ""].name, numbers)
-    of_main = _clock(main, columns)[1] if main.column is not None else factor
-    begin = of_main * float(columns.begins[main.column or clock.column or ""][0])
-    if begin < SINCE_1970:
-        return factor * numbers + clock.offset
-    # the difference first: a float64 keeps a thousandth of a millisecond of such a stamp
-    since: Array = numbers - begin / factor
-    return factor * since + clock.offset
+    with np.errstate(over="ignore"):
+        if clock.rate is not None:
+            time = clock.offset + (columns.log.first + np.arange(size)) / clock.rate
+            return check_duration(columns.log, "the rate", time)
+        numbers, factor = _clock(clock, columns)
+        name = columns.found[clock.column or ""].name
+        check_stamps(columns.log, name, numbers)
+        of_main = _clock(main, columns)[1] if main.column is not None else factor
+        begin = of_main * float(columns.begins[main.column or clock.column or ""][0])
+        # the difference first: a float64 keeps a thousandth of a millisecond of a calendar's stamp
+        since = numbers if begin < SINCE_1970 else numbers - begin / factor
+        return check_duration(columns.log, f"column '{name}'", factor * since + clock.offset)
 
 
 def _clock(clock: schema.Clock, columns: Columns) -> tuple[Array, float]:

@@ -443,7 +443,8 @@ def read_series(
         )
     check_stamps(log, time_column, time)
     check_finite(log, column, values)
-    return Series(_si(log, time_column, "s", time), _si(log, column, unit, values))
+    stamps = check_duration(log, f"column '{time_column}'", _si(log, time_column, "s", time))
+    return Series(stamps, _si(log, column, unit, values))
 
 
 def _si(log: Log, wanted: str, si: str, values: Array) -> Array:
@@ -582,6 +583,27 @@ def check_stamps(log: Log, column: str, stamps: Array) -> None:
     )
     others = f", the first of {late.size} such rows" if late.size > 1 else ""
     raise FileError(f"{log.path}: column '{column}' {what}{others}; time stamps must increase.")
+
+
+SHORTEST, LONGEST = 1e-6, 1e10
+"""A record lasts longer than the one and less than the other, three centuries. [s]"""
+
+
+def check_duration(log: Log, source: str, time: Array) -> Array:
+    """Increasing time stamps [s], which must span what a record may last.
+
+    Raises
+    ------
+    FileError
+        The sentence names the file, and the source as it is given.
+    """
+    span = float(time[-1]) - float(time[0]) if time.size > 1 else 1.0
+    if not SHORTEST < span < LONGEST:
+        raise FileError(
+            f"{log.path}: its {time.size} rows last {span:.3g} s by {source}; check the unit or "
+            "the rate."
+        )
+    return time
 
 
 def check_finite(log: Log, column: str, values: Array) -> None:
