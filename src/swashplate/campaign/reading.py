@@ -160,7 +160,7 @@ def _clock(clock: schema.Clock, columns: Columns) -> tuple[Array, float]:
 
 # --- long logs ------------------------------------------------------------------------------------
 
-BLOCK = 1_000_000
+BLOCK = 250_000
 """Rows that are looked at together."""
 GRAIN = 256
 """Rows of which the largest and the smallest input are kept."""
