@@ -8,9 +8,9 @@ digits in SI.
 from __future__ import annotations
 
 import os
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from math import floor, isfinite, isnan, log10
 from pathlib import Path
 from secrets import token_hex
@@ -168,6 +168,27 @@ class Table:
         """Write the table of `to_polars` as CSV or Parquet, by the path's ending."""
         write_table(self.to_polars(), path)
 
+    def __str__(self) -> str:
+        """The table as plain text, numbers to the right."""
+        shown = self.of("t")
+        lines = [shown.heads(), *map(shown.texts, shown.rows)]
+        sizes = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
+        right = [">" if each.spec else "<" for each in shown.columns]
+        text = [
+            "  ".join(f"{c:{r}{s}}" for c, r, s in zip(line, right, sizes, strict=True)).rstrip()
+            for line in lines
+        ]
+        return "\n".join([*([self.title] * bool(self.title)), *text])
+
+    def _repr_html_(self) -> str:
+        shown = self.of("t")
+        rows = [("th", shown.heads()), *(("td", shown.texts(row)) for row in shown.rows)]
+        body = "".join(
+            f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells)}</tr>"
+            for tag, cells in rows
+        )
+        return f"<table><caption>{escape(self.title)}</caption>{body}</table>"
+
 
 def joined(tables: Sequence[Table]) -> Table:
     """One table of the rows of several that have the same columns."""
@@ -253,26 +274,6 @@ def count(number: int, what: str, several: str = "") -> str:
 
 
 # --- files ----------------------------------------------------------------------------------------
-
-
-class Tabular(ABC):
-    """A result that is a table."""
-
-    @abstractmethod
-    def to_polars(self) -> polars.DataFrame:
-        """The table, SI."""
-
-    def write(self, path: str | Path) -> None:
-        """Write the table of `to_polars` as CSV or Parquet, by the path's ending.
-
-        The file appears whole or not at all: it is written beside and renamed.
-
-        Raises
-        ------
-        FileError
-            For another ending, or a folder that cannot be written.
-        """
-        write_table(self.to_polars(), path)
 
 
 TABLE = Form("a table", (".csv", ".parquet"), (".pq",))
