@@ -7,8 +7,7 @@ import polars as pl
 import pytest
 
 from swashplate import Drive, FileError, InputError
-from swashplate.analysis.compensation import inverse_map
-from swashplate.analysis.envelope import (
+from swashplate.analysis.capability import (
     Edge,
     Envelope,
     acceleration_curve,
@@ -16,6 +15,7 @@ from swashplate.analysis.envelope import (
     envelope,
     speed_limits,
 )
+from swashplate.analysis.compensation import inverse_map
 from swashplate.analysis.tracking import largest_sine, sine_errors
 
 

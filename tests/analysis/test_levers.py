@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError, ParameterError
-from swashplate.analysis.whatif import LEVERS, column_factors, find_lever, pulled, pulled_columns
+from swashplate.analysis.whatif import LEVERS, find_lever, pulled, pulled_columns
 from swashplate.parameters.definitions import columns_of
 
 HOIST_Z16 = (1.1634e-04, 1.5126e-04)
@@ -28,7 +28,7 @@ HOIST_Z16 = (1.1634e-04, 1.5126e-04)
 def test_what_a_lever_multiplies(hoist, factors, expected):
     numbers = pulled(hoist, factors).parameters.numbers
     assert {name: numbers[name] for name in expected} == pytest.approx(expected, rel=1e-12)
-    others = set(hoist.parameters.numbers) - set(column_factors(factors))
+    others = set(hoist.parameters.numbers) - set(pulled_columns(hoist.parameters.numbers, factors))
     assert all(numbers[name] == hoist.parameters.numbers[name] for name in others)
 
 

@@ -114,7 +114,7 @@ def test_a_speed_that_was_wanted(hoist: Drive) -> None:
     assert still.error == pytest.approx(rms(wanted))
     assert still.unlimited_error is not None
     assert still.unlimited_error > still.error
-    with pytest.raises(InputError, match="both must be one row"):
+    with pytest.raises(InputError, match="finite numbers, one a sample"):
         limit_shares(hoist, SINE, wanted=np.zeros(3))
 
 

@@ -12,7 +12,6 @@ from swashplate.analysis.outcomes import (
     proportional_speed,
     speed_per_volt,
     trial,
-    undefined_sentences,
 )
 
 RATE = 10.0
@@ -92,7 +91,7 @@ def test_a_batch_is_what_single_runs_are(hoist, monkeypatch):
         # the march side by side agrees to 1e-12; an acceleration is a difference of its speeds
         np.testing.assert_allclose(found.values[k], single, rtol=1e-8, atol=1e-8)
     assert not found.failures
-    assert list(undefined_sentences(found)) == []
+    assert list(found.sentences()) == []
 
 
 def test_variants_that_cannot_run_and_outcomes_that_are_not(hoist):
@@ -102,7 +101,7 @@ def test_variants_that_cannot_run_and_outcomes_that_are_not(hoist):
     assert list(found.failures) == [1]
     assert "Z10" in found.failures[1]
     assert np.isnan(found.values[1]).all()
-    (sentence,) = undefined_sentences(found)
+    (sentence,) = found.sentences()
     assert sentence == (
         "1 of 2 variants have no creep: the command does not rest at 0 V long enough at its start."
     )
