@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class LimitTimeline(Tabular):
+class LimitTimeline:
     """Stretches of time in which limits act; several can act at once."""
 
     limits: tuple[Limit, ...]
@@ -39,20 +39,6 @@ class LimitTimeline(Tabular):
     """For each of them beginning and end of every stretch, (m, 2). [s]"""
     shares: tuple[float, ...]
     """For each of them the share of the samples at which it acts."""
-    free: float
-    """Share of the samples at which none acts."""
-
-    def to_polars(self) -> polars.DataFrame:
-        """Table of the stretches by their beginning: ``limit``, ``begin`` [s], ``end`` [s]."""
-        import polars as pl
-
-        rows = [
-            (str(limit.name).lower(), *span)
-            for limit, spans in zip(self.limits, self.spans, strict=True)
-            for span in spans.tolist()
-        ]
-        schema = {"limit": pl.String, "begin": pl.Float64, "end": pl.Float64}
-        return pl.DataFrame(rows, schema=schema, orient="row").sort("begin", maintain_order=True)
 
 
 def limit_timeline(run: Simulation) -> LimitTimeline:
@@ -66,7 +52,6 @@ def limit_timeline(run: Simulation) -> LimitTimeline:
         tuple(acting),
         tuple(_spans(run.active(limit), run.time) for limit in acting),
         tuple(float(run.active(limit).mean()) for limit in acting),
-        float((run.limits == 0).mean()),
     )
 
 

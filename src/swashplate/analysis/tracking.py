@@ -16,11 +16,9 @@ from swashplate.drive import Drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import InputError
 from swashplate.linear import FEWEST_STEPS, SLOWEST_CYCLE, slowest_lag
-from swashplate.tables import Cell, Column, Table, Tabular
+from swashplate.tables import Cell, Column, Table
 
 if TYPE_CHECKING:
-    import polars
-
     from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
@@ -46,7 +44,7 @@ class Tracked:
 
 
 @dataclass(frozen=True, eq=False)
-class Improvement(Tabular):
+class Improvement:
     """A wanted speed commanded in several ways, the plainest first."""
 
     name: str
@@ -56,18 +54,6 @@ class Improvement(Tabular):
     wanted: Array
     """(n,). [rad/s]"""
     ways: tuple[Tracked, ...]
-
-    def to_polars(self) -> polars.DataFrame:
-        """Table of time, wanted speed, and voltage and speed of each way, SI."""
-        import polars as pl
-
-        columns = {"time": self.time, "wanted_speed": self.wanted}
-        for way in self.ways:
-            assert way.run.voltage is not None
-            label = way.name.replace(" ", "_")
-            columns[f"voltage_{label}"] = way.run.voltage
-            columns[f"speed_{label}"] = way.run.shaft_speed
-        return pl.DataFrame(columns)
 
 
 def proportional_command(inverse: InverseMap, wanted: ArrayLike) -> Array:
@@ -148,7 +134,7 @@ FORGOTTEN = 8.0
 
 
 @dataclass(frozen=True, eq=False)
-class LargestSine(Tabular):
+class LargestSine:
     """Largest amplitude of speed followed at each frequency, (f,); 0 where none is.
 
     The error is the rms of speed less wanted speed over a cycle, by the rms of the wanted sine.
@@ -165,14 +151,6 @@ class LargestSine(Tabular):
     the drive best. For a command that is known ahead, or where being late does no harm. [rad/s]"""
     in_time: Array
     """Amplitude with the lag counted: against the wanted sine itself. [rad/s]"""
-
-    def to_polars(self) -> polars.DataFrame:
-        """Table in SI, a row a frequency."""
-        import polars as pl
-
-        return pl.DataFrame(
-            {"frequency": self.frequencies, "shifted": self.shifted, "in_time": self.in_time}
-        )
 
 
 def largest_sine(drive: Drive, frequencies: ArrayLike, error: float = 0.1) -> LargestSine:
