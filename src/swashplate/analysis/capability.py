@@ -27,10 +27,8 @@ Mask = NDArray[np.bool_]
 
 # --- steady edges ---------------------------------------------------------------------------------
 
-GRID = 200
-"""Parts into which an interval is cut at each refinement."""
-CLOSE = 1e-12
-"""Width at which an edge counts as found. [V]"""
+GRID = 200  # Parts into which an interval is cut at each refinement.
+CLOSE = 1e-12  # Width at which an edge counts as found. [V]
 NEARLY_FULL = (1.0 - 1e-9) * FULL_VOLTAGE
 """An edge beyond is none: the speed grows up to full voltage. [V]"""
 
@@ -38,10 +36,8 @@ NEARLY_FULL = (1.0 - 1e-9) * FULL_VOLTAGE
 class Edge(NamedTuple):
     """A voltage up to which something holds on the way from 0 V, and the next one beyond it."""
 
-    inside: float
-    """[V]"""
-    outside: float | None
-    """None where it holds up to full voltage. [V]"""
+    inside: float  # [V]
+    outside: float | None  # None where it holds up to full voltage. [V]
 
 
 def edge(holds: Callable[[Array], Mask], end: float) -> Edge:
@@ -88,19 +84,15 @@ CODES: tuple[AcceleratedBy, ...] = ("valve", "spool stop", "orifice")
 """What sets the flow to the stroking piston: the opening that the solenoids can give, the spool's
 stop Z14, or the in-line orifice Z16."""
 
-INSIDE = 1e-9
-"""Part of the range of pressure by which a curve ends before it."""
+INSIDE = 1e-9  # Part of the range of pressure by which a curve ends before it.
 
 
 class AccelerationCurve(NamedTuple):
     """Acceleration over the speed under one held command, (n,) each."""
 
-    speed: Array
-    """Rising. [rad/s]"""
-    acceleration: Array
-    """With its sign. [rad/s²]"""
-    by: tuple[AcceleratedBy, ...]
-    """What sets it."""
+    speed: Array  # Rising. [rad/s]
+    acceleration: Array  # With its sign. [rad/s²]
+    by: tuple[AcceleratedBy, ...]  # What sets it.
 
 
 def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> AccelerationCurve:
@@ -175,10 +167,8 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
 
 # --- envelope -------------------------------------------------------------------------------------
 
-GAIN_POINTS = 401
-"""Commands between dead zone and saturation at which the gain is taken."""
-LOW, HIGH = 0.1, 0.9
-"""Parts of the change of speed between which a rise time counts."""
+GAIN_POINTS = 401  # Commands between dead zone and saturation at which the gain is taken.
+LOW, HIGH = 0.1, 0.9  # Parts of the change of speed between which a rise time counts.
 SHORTEST, LONGEST = 8.0, 256.0
 """A step lasts so long at first, and at most, until the speed has come to stay. [s]"""
 
@@ -186,38 +176,29 @@ SHORTEST, LONGEST = 8.0, 256.0
 class Times(NamedTuple):
     """How fast a full step is answered. [s]"""
 
-    rise: float
-    """From 10 % to 90 % of the change of speed."""
-    reach: float
-    """From the command to 90 % of the change."""
+    rise: float  # From 10 % to 90 % of the change of speed.
+    reach: float  # From the command to 90 % of the change.
 
 
 @dataclass(frozen=True)
 class Way:
     """What a drive can do one way; everything carries that way's sign, gains are positive. SI."""
 
-    dead_zone: float
-    """Largest command that moves nothing. [V]"""
+    dead_zone: float  # Largest command that moves nothing. [V]
     smallest_speed: float
     """Steady speed just beyond it: nothing slower can be held, save the creep. [rad/s]"""
     gain: float | None
     """Mean slope of the steady map from the dead zone to saturation or ±10 V. [rad/(s V)]"""
-    gain_range: tuple[float, float] | None
-    """Smallest and largest slope there. [rad/(s V)]"""
+    gain_range: tuple[float, float] | None  # Smallest and largest slope there. [rad/(s V)]
     saturation_voltage: float | None
     """Command beyond which the speed stays; None where it grows up to ±10 V. [V]"""
-    top_speed: float
-    """Steady speed at ±10 V. [rad/s]"""
+    top_speed: float  # Steady speed at ±10 V. [rad/s]
     speed_limit: float
     """Speed with the swash plate at its stop, or where Z15 holds the pressure. [rad/s]"""
-    acceleration: float
-    """At rest, under ±10 V. [rad/s²]"""
-    accelerated_by: AcceleratedBy
-    """What sets it."""
-    starting: Times | None
-    """From rest under a step to ±10 V; None where nothing moves."""
-    stopping: Times | None
-    """From there after the command is gone."""
+    acceleration: float  # At rest, under ±10 V. [rad/s²]
+    accelerated_by: AcceleratedBy  # What sets it.
+    starting: Times | None  # From rest under a step to ±10 V; None where nothing moves.
+    stopping: Times | None  # From there after the command is gone.
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,8 +26,7 @@ Array = NDArray[np.float64]
 
 # --- the map --------------------------------------------------------------------------------------
 
-FEWEST, MOST = 2, 10_001
-"""Points each way."""
+FEWEST, MOST = 2, 10_001  # Points each way.
 INVERSE_MAP = Form("an inverse map", (".toml", ".csv", ".parquet"), (".pq",))
 COMMENTS = """\
 # swashplate inverse steady-state map: the voltage for a wanted speed; SI units
@@ -41,10 +40,8 @@ ROUNDING = 1e-9
 class Branch(NamedTuple):
     """One way's part of the map, both rising, straight lines between the points."""
 
-    speed: Array
-    """[rad/s]"""
-    voltage: Array
-    """[V]"""
+    speed: Array  # [rad/s]
+    voltage: Array  # [V]
 
 
 @dataclass(frozen=True, eq=False)

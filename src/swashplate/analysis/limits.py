@@ -33,12 +33,9 @@ Array = NDArray[np.float64]
 class LimitTimeline:
     """Stretches of time in which limits act; several can act at once."""
 
-    limits: tuple[Limit, ...]
-    """Those that act anywhere, in the order of the chain."""
-    spans: tuple[Array, ...]
-    """For each of them beginning and end of every stretch, (m, 2). [s]"""
-    shares: tuple[float, ...]
-    """For each of them the share of the samples at which it acts."""
+    limits: tuple[Limit, ...]  # Those that act anywhere, in the order of the chain.
+    spans: tuple[Array, ...]  # For each of them beginning and end of every stretch, (m, 2). [s]
+    shares: tuple[float, ...]  # For each of them the share of the samples at which it acts.
 
 
 def limit_timeline(run: Simulation) -> LimitTimeline:
@@ -66,18 +63,15 @@ def _spans(active: NDArray[np.bool_], time: Array) -> Array:
 FEEDBACK_ARM = 0.98
 """Sine of the feedback arm's angle at which a plate without a stop is still held: at 1 the closed
 form of the spool ends."""
-WIDEST = 1.5
-"""Largest angle of a plate without a stop; the model ends at a right angle. [rad]"""
+WIDEST = 1.5  # Largest angle of a plate without a stop; the model ends at a right angle. [rad]
 
 
 @dataclass(frozen=True)
 class Removal:
     """A limit, the component behind it, and the changes that take it away."""
 
-    limit: str
-    """In words."""
-    component: str
-    """What would have to change in the machine."""
+    limit: str  # In words.
+    component: str  # What would have to change in the machine.
     changes: Callable[[Drive], Mapping[str, Change]]
     eased_by: Callable[[Drive], dict[str, float]]
     """Factors on levers that ease the limit under the same command; none where that needs another
@@ -166,12 +160,9 @@ the creep that it makes is an error, too."""
 class LimitShare:
     """What one limit costs."""
 
-    limit: str
-    """In words."""
-    component: str
-    """What would have to change in the machine."""
-    changes: dict[str, Change]
-    """The changes that took it away, SI."""
+    limit: str  # In words.
+    component: str  # What would have to change in the machine.
+    changes: dict[str, Change]  # The changes that took it away, SI.
     time_share: float | None
     """Share of the record's samples at which it acts, of the dead zone only those with a command
     other than 0 V; None for what no flag marks."""
@@ -179,15 +170,12 @@ class LimitShare:
     """Rms tracking error without it; None where there is none to be had, see `failure`. [rad/s]"""
     error_share: float | None
     """By how much of itself the rms error falls without it; negative if it grows. [1]"""
-    alone: float | None
-    """Rms tracking error with this limit and none of the others. [rad/s]"""
+    alone: float | None  # Rms tracking error with this limit and none of the others. [rad/s]
     eased_by: Mapping[str, float]
     """Factors on levers (`whatif.LEVERS`) that ease it, to try; none where that needs another
     command."""
-    eased_error: float | None
-    """Rms tracking error with these; None without any. [rad/s]"""
-    failure: str = ""
-    """Why a drive without it cannot be simulated."""
+    eased_error: float | None  # Rms tracking error with these; None without any. [rad/s]
+    failure: str = ""  # Why a drive without it cannot be simulated.
 
 
 @dataclass(frozen=True, eq=False)

@@ -149,8 +149,7 @@ def independent_drives(
 class Deviations(NamedTuple):
     """Errors of one stage's vector."""
 
-    own: Array
-    """(K, K) covariance of its own noise."""
+    own: Array  # (K, K) covariance of its own noise.
     slopes: Mapping[int, Array] = MappingProxyType({})
     """By the number of an earlier stage (K, K_earlier): by how much its errors move this one's."""
 
@@ -242,8 +241,7 @@ def _deviations(assessments: Sequence[Assessment], number: int) -> Deviations:
     return Deviations(found.own.matrix, slopes)
 
 
-STORED = "fit.json"
-"""File of a fit, in the folder that it wrote."""
+STORED = "fit.json"  # File of a fit, in the folder that it wrote.
 
 
 def stored_draws(
@@ -302,26 +300,19 @@ def _campaign_of(path: Path) -> Path:
 
 # --- bands ----------------------------------------------------------------------------------------
 
-MOST_SAMPLES = 150_000_000
-"""Samples of speed that a band may take: 1.2 GB."""
+MOST_SAMPLES = 150_000_000  # Samples of speed that a band may take: 1.2 GB.
 
 
 @dataclass(frozen=True, eq=False)
 class Bands:
     """Where the speed lies at each instant."""
 
-    time: Array
-    """(n,) [s]"""
-    lower: Array
-    """(n,) [rad/s]"""
-    median: Array
-    """(n,) [rad/s]"""
-    upper: Array
-    """(n,) [rad/s]"""
-    level: float
-    """Part of the drives between lower and upper, instant by instant."""
-    draws: int
-    """Drives that it is taken from."""
+    time: Array  # (n,) [s]
+    lower: Array  # (n,) [rad/s]
+    median: Array  # (n,) [rad/s]
+    upper: Array  # (n,) [rad/s]
+    level: float  # Part of the drives between lower and upper, instant by instant.
+    draws: int  # Drives that it is taken from.
 
     @property
     def widest(self) -> tuple[float, float]:

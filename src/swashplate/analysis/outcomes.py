@@ -26,12 +26,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-REST = 0.5
-"""A command that rests at 0 V this long lets the drive settle at its creep. [s]"""
-STOPPED = 1.0 - 1e-9
-"""Part of the speed limit from which the plate counts as at its stop."""
-REACHED = 0.9
-"""Part of the settled speed that counts as reached."""
+REST = 0.5  # A command that rests at 0 V this long lets the drive settle at its creep. [s]
+STOPPED = 1.0 - 1e-9  # Part of the speed limit from which the plate counts as at its stop.
+REACHED = 0.9  # Part of the settled speed that counts as reached.
 
 # --- a command to judge drives by -----------------------------------------------------------------
 
@@ -40,12 +37,9 @@ REACHED = 0.9
 class Trial:
     """A command, and the speed that a perfect drive would make of it. Make it with `trial`."""
 
-    voltage: Array
-    """(n,) [V]"""
-    rate: float
-    """Samples a second. [Hz]"""
-    wanted: Array
-    """(n,) speed of the shaft. [rad/s]"""
+    voltage: Array  # (n,) [V]
+    rate: float  # Samples a second. [Hz]
+    wanted: Array  # (n,) speed of the shaft. [rad/s]
 
     @property
     def time(self) -> Array:
@@ -141,8 +135,7 @@ class Outcome:
     meaning: str
     compute: Callable[[Array, Trial], Array]
     """From (m, n) speeds [rad/s] and the command to (m,) numbers, NaN where there is none."""
-    undefined: str = ""
-    """Why there may be none, as a half sentence."""
+    undefined: str = ""  # Why there may be none, as a half sentence.
 
     @property
     def words(self) -> str:
@@ -256,8 +249,7 @@ _ALL = (
     Outcome("travel", "rad", "How far the shaft has gone at the end.", _travel),
 )
 
-OUTCOMES: Mapping[str, Outcome] = {each.name: each for each in _ALL}
-"""Outcomes by name."""
+OUTCOMES: Mapping[str, Outcome] = {each.name: each for each in _ALL}  # Outcomes by name.
 
 
 # --- what a drive can do --------------------------------------------------------------------------
@@ -268,17 +260,14 @@ SIGNS: Mapping[Direction, tuple[float, ...]] = {
     "positive": (1.0,),
     "negative": (-1.0,),
 }
-STEP_LENGTH, STEP_RATE = 2.0, 512.0
-"""Of the full step that shows the largest acceleration. [s, Hz]"""
+STEP_LENGTH, STEP_RATE = 2.0, 512.0  # Of the full step that shows the largest acceleration. [s, Hz]
 
 
 class Performance(NamedTuple):
     """What a drive can do; of two directions the worse one."""
 
-    speed: float
-    """That the largest command settles at. [rad/s]"""
-    acceleration: float
-    """Largest one after a full step from rest. [rad/s²]"""
+    speed: float  # That the largest command settles at. [rad/s]
+    acceleration: float  # Largest one after a full step from rest. [rad/s²]
     tracking_error: float | None
     """RMS difference from the wanted speed, None where none is wanted. [rad/s]"""
 
@@ -346,8 +335,7 @@ class BatchOutcomes:
     outcomes: tuple[Outcome, ...]
     values: Array
     """(m, K); NaN where a drive has no such outcome, and in all of a drive that failed."""
-    failures: Mapping[int, str]
-    """Why a drive could not be simulated, by its number."""
+    failures: Mapping[int, str]  # Why a drive could not be simulated, by its number.
 
     def sentences(self) -> Iterator[str]:
         """What some of the drives that ran have not, and why."""

@@ -50,16 +50,11 @@ class OneAtATime:
 
     levers: tuple[str, ...]
     outcomes: tuple[Outcome, ...]
-    ranges: Mapping[str, Range]
-    """Factors down and up by lever."""
-    base: Array
-    """(K,) outcomes of the drive as it is; NaN where there is none."""
-    low: Array
-    """(L, K) with each lever at its lower factor."""
-    high: Array
-    """(L, K) with each lever at its upper factor."""
-    sentences: tuple[str, ...]
-    """What could not be simulated, or has no such outcome."""
+    ranges: Mapping[str, Range]  # Factors down and up by lever.
+    base: Array  # (K,) outcomes of the drive as it is; NaN where there is none.
+    low: Array  # (L, K) with each lever at its lower factor.
+    high: Array  # (L, K) with each lever at its upper factor.
+    sentences: tuple[str, ...]  # What could not be simulated, or has no such outcome.
 
     @property
     def swings(self) -> Array:
@@ -113,8 +108,7 @@ def one_at_a_time(
 
 # --- all at once ----------------------------------------------------------------------------------
 
-FEWEST, MOST = 16, 2**20
-"""Base samples of Sobol's sequence."""
+FEWEST, MOST = 16, 2**20  # Base samples of Sobol's sequence.
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,24 +117,15 @@ class SobolIndices:
 
     levers: tuple[str, ...]
     outcomes: tuple[Outcome, ...]
-    ranges: Mapping[str, Range]
-    """Factors by lever; all values between are equally likely."""
-    first: Array
-    """(L, K) share that a lever causes by itself; NaN where an outcome has no indices."""
-    total: Array
-    """(L, K) share with all that it does together with others."""
-    first_error: Array
-    """(L, K) half width of the 95 % interval, from resampling."""
-    total_error: Array
-    """(L, K) as `first_error`."""
-    mean: Array
-    """(K,) of the outcomes. [their units]"""
-    deviation: Array
-    """(K,) standard deviation of the outcomes. [their units]"""
-    runs: int
-    """Simulations in all."""
-    sentences: tuple[str, ...]
-    """Which outcomes have no indices, and why."""
+    ranges: Mapping[str, Range]  # Factors by lever; all values between are equally likely.
+    first: Array  # (L, K) share that a lever causes by itself; NaN where an outcome has no indices.
+    total: Array  # (L, K) share with all that it does together with others.
+    first_error: Array  # (L, K) half width of the 95 % interval, from resampling.
+    total_error: Array  # (L, K) as `first_error`.
+    mean: Array  # (K,) of the outcomes. [their units]
+    deviation: Array  # (K,) standard deviation of the outcomes. [their units]
+    runs: int  # Simulations in all.
+    sentences: tuple[str, ...]  # Which outcomes have no indices, and why.
 
     @property
     def largest_error(self) -> float:
@@ -241,8 +226,7 @@ def _indices(
 
 # --- tables ---------------------------------------------------------------------------------------
 
-FAINTEST = 5e-4
-"""A lever that moves an outcome by less than this part has no row of its own."""
+FAINTEST = 5e-4  # A lever that moves an outcome by less than this part has no row of its own.
 
 
 def outcome_table(single: OneAtATime, indices: SobolIndices | None, number: int) -> Table:

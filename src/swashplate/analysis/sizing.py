@@ -23,13 +23,10 @@ Slack = Callable[[Array], Array]
 
 # --- search ---------------------------------------------------------------------------------------
 
-SCANNED = 5
-"""ln₂ of the points of a Sobol sequence that are tried besides the corners."""
+SCANNED = 5  # ln₂ of the points of a Sobol sequence that are tried besides the corners.
 MOST_CORNERS = 64
-FINEST = 1e-9
-"""Part of the way to which an end is bisected."""
-ALONG = 33
-"""Points along a single factor's range."""
+FINEST = 1e-9  # Part of the way to which an end is bisected.
+ALONG = 33  # Points along a single factor's range.
 
 
 def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
@@ -180,8 +177,7 @@ def _change(point: Array) -> float:
 
 # --- sizing ---------------------------------------------------------------------------------------
 
-WIDEST: Range = (0.5, 2.0)
-"""Factors that a lever may take unless others are given."""
+WIDEST: Range = (0.5, 2.0)  # Factors that a lever may take unless others are given.
 REQUIRED = {
     "speed": ("a speed of", "rad/s", ">="),
     "acceleration": ("an acceleration of", "rad/s^2", ">="),
@@ -233,10 +229,8 @@ class Requirements:
 class Sizing:
     """The smallest change that meets the requirements."""
 
-    factors: Mapping[str, float]
-    """By lever; 1 leaves it alone."""
-    drive: Drive
-    """The changed drive."""
+    factors: Mapping[str, float]  # By lever; 1 leaves it alone.
+    drive: Drive  # The changed drive.
     before: Performance
     after: Performance
     alone: Mapping[str, float | None]

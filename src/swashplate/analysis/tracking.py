@@ -30,8 +30,7 @@ class TrackingError(NamedTuple):
     """Speed less the wanted speed over a record. [rad/s]"""
 
     rms: float
-    largest: float
-    """Magnitude."""
+    largest: float  # Magnitude.
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +46,9 @@ class Tracked:
 class Improvement:
     """A wanted speed commanded in several ways, the plainest first."""
 
-    name: str
-    """Name of the drive."""
-    time: Array
-    """(n,). [s]"""
-    wanted: Array
-    """(n,). [rad/s]"""
+    name: str  # Name of the drive.
+    time: Array  # (n,). [s]
+    wanted: Array  # (n,). [rad/s]
     ways: tuple[Tracked, ...]
 
 
@@ -123,14 +119,10 @@ def improvement(
 
 # --- largest sine ---------------------------------------------------------------------------------
 
-AMPLITUDES = 40
-"""Amplitudes that are tried from the top speed down before one is refined."""
-SMALLEST = 1e-2
-"""Smallest amplitude tried, as part of the top speed."""
-CLOSE = 1e-3
-"""Relative width at which an amplitude counts as found."""
-FORGOTTEN = 8.0
-"""Lags that a simulation lasts before the cycle that is looked at."""
+AMPLITUDES = 40  # Amplitudes that are tried from the top speed down before one is refined.
+SMALLEST = 1e-2  # Smallest amplitude tried, as part of the top speed.
+CLOSE = 1e-3  # Relative width at which an amplitude counts as found.
+FORGOTTEN = 8.0  # Lags that a simulation lasts before the cycle that is looked at.
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,17 +132,13 @@ class LargestSine:
     The error is the rms of speed less wanted speed over a cycle, by the rms of the wanted sine.
     """
 
-    name: str
-    """Name of the drive."""
-    error: float
-    """The chosen error. [1]"""
-    frequencies: Array
-    """[Hz]"""
+    name: str  # Name of the drive.
+    error: float  # The chosen error. [1]
+    frequencies: Array  # [Hz]
     shifted: Array
     """Amplitude with the lag forgiven: against the wanted sine shifted in time by as much as suits
     the drive best. For a command that is known ahead, or where being late does no harm. [rad/s]"""
-    in_time: Array
-    """Amplitude with the lag counted: against the wanted sine itself. [rad/s]"""
+    in_time: Array  # Amplitude with the lag counted: against the wanted sine itself. [rad/s]
 
 
 def largest_sine(drive: Drive, frequencies: ArrayLike, error: float = 0.1) -> LargestSine:

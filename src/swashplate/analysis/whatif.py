@@ -18,8 +18,7 @@ from swashplate.simulation.result import Simulation
 from swashplate.tables import UNIT, Column, Table
 
 Array = NDArray[np.float64]
-Range = tuple[float, float]
-"""Lowest and highest factor on a lever. [1]"""
+Range = tuple[float, float]  # Lowest and highest factor on a lever. [1]
 
 # --- levers ---------------------------------------------------------------------------------------
 
@@ -31,8 +30,7 @@ class Lever:
     name: str
     powers: Mapping[str, float]
     """By symbol or column: the parameter is multiplied by the factor to this power."""
-    meaning: str
-    """What it is, and what the model takes it for."""
+    meaning: str  # What it is, and what the model takes it for.
 
 
 def _both_ways(name: str, symbols: Mapping[str, float], meaning: str) -> list[Lever]:
@@ -87,8 +85,7 @@ _LEVERS = (
     ),
 )
 
-LEVERS: Mapping[str, Lever] = {each.name: each for each in _LEVERS}
-"""Levers by name."""
+LEVERS: Mapping[str, Lever] = {each.name: each for each in _LEVERS}  # Levers by name.
 
 
 def find_lever(name: str) -> Lever:
@@ -190,8 +187,7 @@ class Variant:
 
     drive: Drive
     run: Simulation
-    values: Array
-    """(K,) its outcomes, NaN where there is none."""
+    values: Array  # (K,) its outcomes, NaN where there is none.
 
     @property
     def speed_limits(self) -> tuple[float, float]:
@@ -203,8 +199,7 @@ class Variant:
 class WhatIf:
     """A drive before and after."""
 
-    factors: Mapping[str, float]
-    """By lever."""
+    factors: Mapping[str, float]  # By lever.
     trial: Trial
     outcomes: tuple[Outcome, ...]
     variants: Mapping[str, Variant]

@@ -42,14 +42,11 @@ SweptOutput = Literal[
 
 SWEPT_OUTPUTS: tuple[SweptOutput, ...] = get_args(SweptOutput)
 
-SLOWEST_CYCLE = 1e-3
-"""Lowest frequency. [Hz]"""
+SLOWEST_CYCLE = 1e-3  # Lowest frequency. [Hz]
 FEWEST_STEPS, MOST_STEPS = 8, 1_000_000
 """Steps of a cycle, which bound the frequencies from both sides."""
-MOST_BLOCKS = 96
-"""Blocks of cycles after which an answer that still changes is given up."""
-STILL = 1e-12
-"""Answers below this part of the output's size are none."""
+MOST_BLOCKS = 96  # Blocks of cycles after which an answer that still changes is given up.
+STILL = 1e-12  # Answers below this part of the output's size are none.
 
 
 @dataclass(frozen=True, eq=False)

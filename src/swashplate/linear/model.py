@@ -62,26 +62,19 @@ class LinearModel:
     the inputs u comes late by `delay`.
     """
 
-    A: Array
-    """(n, n)"""
-    B: Array
-    """(n, k)"""
-    C: Array
-    """(m, n)"""
-    D: Array
-    """(m, k)"""
+    A: Array  # (n, n)
+    B: Array  # (n, k)
+    C: Array  # (m, n)
+    D: Array  # (m, k)
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     """The first is the one that loops, gains and responses are about unless told otherwise."""
     outputs: tuple[str, ...]
     delay: float
     """What stands exactly before the first input; of a sampled model whole samples. [s]"""
-    sample_time: float | None
-    """Interval of a sampled model, None of a continuous one. [s]"""
-    name: str
-    """Name of the machine."""
-    memory: tuple[str, ...]
-    """States that are inputs of earlier samples."""
+    sample_time: float | None  # Interval of a sampled model, None of a continuous one. [s]
+    name: str  # Name of the machine.
+    memory: tuple[str, ...]  # States that are inputs of earlier samples.
 
     def __repr__(self) -> str:
         time = "continuous" if self.sample_time is None else f"sampled at {self.sample_time:g} s"
