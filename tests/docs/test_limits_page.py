@@ -8,8 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from swashplate import Drive, maneuvers
-from swashplate.analysis.compensation import inverse_map
-from swashplate.analysis.limits import limit_shares
+from swashplate.analysis import inverse_map, limit_shares
 from swashplate.cli import app
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -9,8 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from swashplate import Drive
-from swashplate.analysis.outcomes import OUTCOMES, speed_per_volt
-from swashplate.analysis.whatif import LEVERS
+from swashplate.analysis import LEVERS, OUTCOMES, speed_per_volt
 from swashplate.cli import app
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -13,7 +13,7 @@ from swashplate.errors import FileError, InputError
 
 if TYPE_CHECKING:
     from swashplate.analysis.outcomes import Trial
-    from swashplate.analysis.sensitivity import Range
+    from swashplate.analysis.whatif import Range
     from swashplate.campaign import Campaign, Experiment
     from swashplate.cli.options import Sampling
     from swashplate.drive import Drive

@@ -33,15 +33,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FINE_STEPS = 64
-"""Steps a sample of the reduced model, whose march is of first order."""
+FINE_STEPS = 64  # Steps a sample of the reduced model, whose march is of first order.
 LEAST_FINE_STEPS = 4
 MOST_STEPS = 20_000_000
 """Steps of a whole record, beyond which a sample gets fewer than `FINE_STEPS`."""
-STILL = 1e-6
-"""Top speed up to which a drive does not move. [rad/s]"""
-BANDS = (0.001, 0.01)
-"""Differences, over the largest speed, that the table sorts by."""
+STILL = 1e-6  # Top speed up to which a drive does not move. [rad/s]
+BANDS = (0.001, 0.01)  # Differences, over the largest speed, that the table sorts by.
 TABLE_MANEUVERS: tuple[tuple[str, Maneuver], ...] = (
     ("step 1 V", maneuvers.step(1.0, start=1.0, length=10.0)),
     ("step 2 V", maneuvers.step(2.0, start=1.0, length=10.0)),
@@ -246,8 +243,7 @@ def validity(
 
 # --- tables and verdicts --------------------------------------------------------------------------
 
-LAG_SHARE = 0.5
-"""Share of the difference from which a lag explains it."""
+LAG_SHARE = 0.5  # Share of the difference from which a lag explains it.
 
 
 def usual_rate(rate: float) -> float:

@@ -69,8 +69,7 @@ IN_PLACE_OF: Mapping[str, str] = {
     "piston_damping": "swash_damping_ratio",
 }
 """Quantities that may be chosen in place of a frequency or a damping ratio."""
-AGREES = 1e-9
-"""Relative difference up to which a given value agrees with the one that follows."""
+AGREES = 1e-9  # Relative difference up to which a given value agrees with the one that follows.
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,7 @@ NEAR = 1e-9
 Decimal durations do not add up exactly (0.1 + 0.2 > 0.3), and a step must not miss the sample meant
 for it.
 """
-HALVINGS = 60
-"""Of the slope of a return until it is found, to the last bits."""
+HALVINGS = 60  # Of the slope of a return until it is found, to the last bits.
 
 
 def interval(starts: npt.ArrayLike, time: Array) -> npt.NDArray[np.intp]:
