@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import pkgutil
+import re
 import sys
 import tomllib
 import types
@@ -16,6 +17,18 @@ from matplotlib.figure import Figure
 
 import swashplate
 from swashplate import Campaign, Drive, FullOrderDrive, InputError, SquaredError, maneuvers
+from swashplate.analysis import (
+    Requirements,
+    envelope,
+    inverse_map,
+    largest_sine,
+    limit_shares,
+    one_at_a_time,
+    ranges_of,
+    size,
+    trial,
+    what_if,
+)
 from swashplate.campaign import examine, guess_drive, rig
 from swashplate.full_order import compare
 from swashplate.identification import (
@@ -93,6 +106,21 @@ def reached(roots: Iterable[object]) -> dict[type, int]:
     return longest
 
 
+def analyses(drive: Drive) -> list[Any]:
+    """What the package of analyses finds out about a drive."""
+    voltage = TESTS[0].sample()
+    once = trial(drive, voltage)
+    return [
+        envelope(drive),
+        limit_shares(drive, voltage),
+        what_if(drive, {"orifice": 1.5}, once),
+        size(drive, Requirements(speed=3.5), {"pump": (1.0, 2.0)}),
+        inverse_map(drive),
+        largest_sine(drive, (0.1,)),
+        one_at_a_time(drive, ranges_of(["orifice"]), once, outcomes=["final_speed", "rise_time"]),
+    ]
+
+
 def test_every_public_class_has_a_short_repr(work: Work) -> None:
     hoist = Drive.preset("hoist")
     voltage = TESTS[0].sample()
@@ -115,6 +143,7 @@ def test_every_public_class_has_a_short_repr(work: Work) -> None:
             compare(five, five.drive.simulate(voltage)),
             outlook(work.fitted.setup.stages[0], hoist, runs),
             guess_drive(runs),
+            *analyses(hoist),
             examine(runs[0]),
             swashplate.Threads(),
             swashplate.Processes(),
@@ -126,8 +155,10 @@ def test_every_public_class_has_a_short_repr(work: Work) -> None:
     own = {kind: n for kind, n in own.items() if ".equations" not in kind.__module__}
     assert {kind: n for kind, n in own.items() if n > LONGEST + 40} == {}
     for name, kind in public_classes().items():
-        written_by_dataclass = hasattr(kind.__repr__, "__wrapped__")
-        assert not written_by_dataclass or kind in sizes, name
+        # a dataclass's own repr will do where there is nothing but numbers and words
+        if hasattr(kind.__repr__, "__wrapped__") and kind not in sizes:
+            kinds = {str(each) for each in getattr(kind, "__annotations__", {}).values()}
+            assert all(re.fullmatch(r"((float|int|str|bool|None)( \| )?)+", k) for k in kinds), name
 
 
 def test_a_run_is_read_by_its_signals_names() -> None:
@@ -215,6 +246,16 @@ def test_summaries_and_tables_of_a_notebook(work: Work) -> None:
     assert frame.height == run.input.time.size + sum(c.time.size for c in run.channels.values())
     assert isinstance(run.plot(), Figure)
     assert isinstance(work.campaign.plot()[0], Figure)
+
+
+def test_analyses_show_their_tables_and_figures() -> None:
+    found = analyses(Drive.preset("hoist"))
+    assert all(each.summary().count("\n") > 2 for each in found)
+    drawn = [each for each in found if each.figure and not hasattr(each, "single")]
+    assert len(drawn) >= 3
+    assert all(isinstance(each.plot(), Figure) for each in drawn)
+    with pytest.raises(InputError, match="no figure of a Sizing"):
+        next(each for each in found if type(each).__name__ == "Sizing").plot()
 
 
 def test_a_drive_stands_where_a_set_does(work: Work) -> None:
