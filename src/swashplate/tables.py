@@ -373,6 +373,8 @@ def write_whole(path: str | Path, write: Callable[[Path], None]) -> None:
         try:
             beside.touch(exist_ok=False)
             write(beside)
+            with beside.open("rb") as written:  # a power cut leaves the old file or the new one
+                os.fsync(written.fileno())
             beside.replace(target)
         finally:
             try:
@@ -383,6 +385,21 @@ def write_whole(path: str | Path, write: Callable[[Path], None]) -> None:
                 raise
     except OSError as error:
         raise FileError(f"{target} cannot be written: {error.strerror or error}.") from None
+    except Exception as error:
+        reason = _of_the_disk(error)
+        if reason is None:
+            raise
+        raise FileError(f"{target} cannot be written: {reason}.") from None
+
+
+def _of_the_disk(error: BaseException) -> str | None:
+    """What a disk said, where a library says it in an error of its own or stumbles over it."""
+    if "(os error " in str(error):
+        return str(error).partition(" (os error ")[0].rpartition(": ")[2]
+    before = error.__cause__ or error.__context__
+    if isinstance(before, OSError):
+        return before.strerror or str(before)
+    return None if before is None else _of_the_disk(before)
 
 
 def write_text(text: str, path: str | Path) -> None:
@@ -403,6 +420,18 @@ def write_table(table: polars.DataFrame, path: str | Path) -> None:
         For another ending or a place that cannot be written.
     """
     if ending(path, TABLE) == ".csv":
-        write_whole(path, lambda beside: table.write_csv(beside))
+        import polars as pl
+
+        # a spreadsheet would compute a name that begins like a formula
+        texts = [name for name, kind in table.schema.items() if kind == pl.String]
+        formula = r"^[=@\t\r]|^[+-][^0-9. ]"
+        safe = [
+            pl.when(pl.col(each).str.contains(formula)).then("'" + pl.col(each)).otherwise(each)
+            for each in texts
+        ]
+        quoted = table.with_columns(
+            cells.alias(name) for name, cells in zip(texts, safe, strict=True)
+        )
+        write_whole(path, lambda beside: quoted.write_csv(beside))
     else:
         write_whole(path, lambda beside: table.write_parquet(beside))
