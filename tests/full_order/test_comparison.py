@@ -41,7 +41,7 @@ def test_without_damping_the_spool_rings() -> None:
 
 
 def test_documented_table_is_what_the_function_gives() -> None:
-    table = pl.concat([validity(FullOrderDrive.preset(name)) for name in AXES])
+    table = pl.concat([validity(FullOrderDrive.preset(name)).to_polars() for name in AXES])
     assert table.height == 3 * len(TABLE_MANEUVERS)
     lines = DOCUMENT.read_text("utf-8").split("<!-- validity: begin -->")[1]
     lines = lines.split("<!-- validity: end -->")[0].strip().splitlines()[2:]
@@ -126,7 +126,7 @@ def test_without_motion_there_is_nothing_to_tell() -> None:
     assert not found.difference.moves
     assert found.lag is None
     begun: list[str] = []
-    table = validity(full, begin=begun.append)
+    table = validity(full, begin=begun.append).to_polars()
     assert begun == [title for title, _ in TABLE_MANEUVERS]
     assert table["largest_percent"].null_count() == table.height
     assert table["within_1_percent"].null_count() == table.height
