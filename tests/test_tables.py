@@ -20,6 +20,7 @@ from swashplate.tables import (
     plain,
     quantity,
     spread,
+    write_table,
 )
 from swashplate.units import chosen_unit, display_unit, shown_in, unit_text, units_of_choice
 
@@ -148,3 +149,13 @@ def test_an_interval_is_shown_to_two_digits_of_its_half_width(value: float, shar
     shown = spread(value, value - half, value + half)
     for text, exact in zip(shown, (value, value - half, value + half), strict=True):
         assert float(text) == pytest.approx(exact, abs=0.06 * half)
+
+
+@pytest.mark.parametrize("text", ["=1+1", "@sum(a)", "+cmd|' /C calc'!A0", "-a"])
+def test_no_text_of_a_csv_is_a_formula_to_a_spreadsheet(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "runs.csv"
+    write_table(pl.DataFrame({"run": [text, "-4 V", "a=b"], text: [-1.5, 0.0, 1.0]}), path)
+    read = pl.read_csv(path)
+    assert read.columns == ["run", f"'{text}"]
+    assert read["run"].to_list() == [f"'{text}", "-4 V", "a=b"]
+    assert read[f"'{text}"].to_list() == [-1.5, 0.0, 1.0]

@@ -8,6 +8,7 @@ import tomllib
 from difflib import get_close_matches
 from pathlib import Path
 from reprlib import Repr
+from stat import S_ISDIR, S_ISREG
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from swashplate.errors import FileError, ParameterError
@@ -19,24 +20,41 @@ if TYPE_CHECKING:
     Model = TypeVar("Model", bound=BaseModel)
 
 
+_LARGEST = 1 << 28
+"""Bytes of a document; what holds more was written by no one. [byte]"""
+
+
 def read_text(path: str | Path) -> str:
-    """The text of a UTF-8 file.
+    """The text of a UTF-8 file, without the byte-order mark that some editors begin it with.
 
     Raises
     ------
     FileError
-        If there is none or it cannot be read.
+        If there is none, it cannot be read, or is no ordinary file of up to 268 MB.
     """
     try:
-        return Path(path).read_text("utf-8")
+        stat = Path(path).stat()
+        if not S_ISREG(stat.st_mode):
+            what = "is a folder, not a file" if S_ISDIR(stat.st_mode) else "is no ordinary file"
+            raise FileError(f"{path} {what}.")
+        if stat.st_size > _LARGEST:
+            raise FileError(f"{path} has {stat.st_size / 1e6:.0f} MB; no such document is so long.")
+        return Path(path).read_text("utf-8-sig")
+    except FileError:
+        raise
     except FileNotFoundError:
         raise FileError(f"There is no file {path}.") from None
     except UnicodeDecodeError as error:
         raise FileError(
             f"{path} is not UTF-8 text: byte {error.start} is {error.object[error.start]:#04x}."
         ) from None
-    except OSError as error:
-        raise FileError(f"{path} cannot be read: {error.strerror or error}.") from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise FileError(f"{path} cannot be read: {why}.") from None
+
+
+_DOTTED = re.compile(r"(?:[\w-]+[ \t]*\.[ \t]*){100}")
+"""A key of a hundred parts, whose tables within tables would take minutes."""
 
 
 def parse_toml(text: str, origin: str) -> dict[str, Any]:
@@ -48,9 +66,15 @@ def parse_toml(text: str, origin: str) -> dict[str, Any]:
         If it is not TOML, with line and column.
     """
     try:
+        if _DOTTED.search(text):
+            raise RecursionError
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise FileError(f"{origin} is not TOML: {error}.") from None
+    except RecursionError:
+        raise FileError(f"{origin} has tables or arrays in more levels than are read.") from None
+    except ValueError:  # of Python, which limits the digits that it turns into a number
+        raise FileError(f"{origin} has a number of thousands of digits.") from None
 
 
 def toml_key(name: str) -> str:

@@ -8,6 +8,7 @@ digits in SI.
 from __future__ import annotations
 
 import os
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -289,7 +290,7 @@ def ending(path: str | Path, form: Form) -> str:
     """
     suffix = Path(path).suffix
     if suffix.lower() not in (*form.endings, *form.also):
-        known = f"{', '.join(form.endings[:-1])} or {form.endings[-1]}"
+        known = " or ".join(filter(None, (", ".join(form.endings[:-1]), form.endings[-1])))
         raise FileError(f"{path} ends in '{suffix}'; {form.what} is written as {known}.")
     return suffix.lower()
 
@@ -396,12 +397,20 @@ def write_text(text: str, path: str | Path) -> None:
 def write_table(table: polars.DataFrame, path: str | Path) -> None:
     """Write a table as CSV or Parquet, by the path's ending.
 
+    A text that a spreadsheet would take for a formula, such as a run called ``=1+1``, has an
+    apostrophe before it in CSV.
+
     Raises
     ------
     FileError
         For another ending or a place that cannot be written.
     """
+    import polars as pl
+
     if ending(path, TABLE) == ".csv":
-        write_whole(path, lambda beside: table.write_csv(beside))
+        formula = r"^([=@\t\r]|[+-][^\d.])"
+        plain = table.with_columns(pl.col(pl.String).str.replace(formula, "'${1}"))
+        plain = plain.rename({name: re.sub(formula, r"'\1", name) for name in table.columns})
+        write_whole(path, lambda beside: plain.write_csv(beside))
     else:
         write_whole(path, lambda beside: table.write_parquet(beside))

@@ -1,5 +1,6 @@
 """Units at the edge: what comes in is turned into SI or refused, what goes out is for people."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -27,7 +28,18 @@ _A_SECOND = frozenset("1/s s-1 s**-1 u/s r/s rev/s rps tr/s turn/s turns/s".spli
 """Turns a minute and a second, as nameplates and loggers write them; folded by `_folded`."""
 
 
+_LONGEST = 80
+_POWER = r"(?:\*\*|\^)"
+_TOWER = re.compile(
+    rf"{_POWER}[\s()+\-.\d]*{_POWER}|{_POWER}[\s(+-]*\d{{3}}|{_POWER}\s*\([^)]*[*^]"
+    rf"|\)\s*{_POWER}.*\)\s*{_POWER}|[⁰¹²³⁴⁵⁶⁷⁸⁹]{{3}}"
+)
+"""Powers of powers and huge exponents, which pint would compute however long it takes."""
+
+
 def _written_out(unit: str) -> str:
+    if len(unit) > _LONGEST or _TOWER.search(unit):
+        raise ValueError
     return unit.replace("sqrt(Pa)", "Pa^0.5")
 
 
@@ -89,14 +101,19 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
         ) from None
     except (
         DefinitionSyntaxError,
+        ArithmeticError,
         AssertionError,
         AttributeError,
+        RecursionError,
         TokenError,
         TypeError,
         ValueError,
     ):
         # pint's parser meets unreadable text with any of these
-        raise InputError(f"{what} has the unreadable unit '{unit}'; give it in {wanted}.") from None
+        shown = unit if len(unit) <= _LONGEST else f"{unit[:40]}..."
+        raise InputError(
+            f"{what} has the unreadable unit '{shown}'; give it in {wanted}."
+        ) from None
 
 
 # --- units that people read -----------------------------------------------------------------------
@@ -167,6 +184,10 @@ def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str
         if turns is not None:
             for si, (name, factor) in zip(("rad/s", "rad", "rad/s^2"), turns, strict=True):
                 chosen[si] = DisplayUnit(name, factor)
+            continue
+        usual = [(si, each) for si, units in _USUAL.items() for _, each in units]
+        if word and word in (each.name for _, each in usual):
+            chosen.update((si, each) for si, each in usual if each.name == word)
             continue
         for si in ("Pa", "m", "m/s", "A", "rad"):
             try:
