@@ -15,9 +15,10 @@ from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Instance, Part, observe_kernel
 from swashplate.models.pump import PumpOptions
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result, Tabular, short
 from swashplate.simulation.instance import instance_of
 from swashplate.simulation.run import pressure_limits, settled_state
-from swashplate.tables import UNIT, Cell, Column, Table, Tabular
+from swashplate.tables import UNIT, Cell, Column, Table
 
 if TYPE_CHECKING:
     import polars
@@ -89,6 +90,9 @@ INSIDE = 1e-9  # Part of the range of pressure by which a curve ends before it.
 
 class AccelerationCurve(NamedTuple):
     """Acceleration over the speed under one held command, (n,) each."""
+
+    def __repr__(self) -> str:
+        return short(self)
 
     speed: Array  # Rising. [rad/s]
     acceleration: Array  # With its sign. [rad/s²]
@@ -181,7 +185,7 @@ class Times(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Way:
+class Way(Result):
     """What a drive can do one way; everything carries that way's sign, gains are positive. SI."""
 
     dead_zone: float  # Largest command that moves nothing. [V]
@@ -204,6 +208,8 @@ class Way:
 @dataclass(frozen=True, eq=False)
 class Envelope(Tabular):
     """What a drive can do."""
+
+    figure = "plot_envelope"
 
     name: str
     """Name of the drive."""

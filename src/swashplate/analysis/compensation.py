@@ -17,6 +17,7 @@ from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result, short
 from swashplate.tables import UNIT, Column, Form, Table, ending, write_table, write_text
 
 if TYPE_CHECKING:
@@ -40,17 +41,22 @@ ROUNDING = 1e-9
 class Branch(NamedTuple):
     """One way's part of the map, both rising, straight lines between the points."""
 
+    def __repr__(self) -> str:
+        return short(self)
+
     speed: Array  # [rad/s]
     voltage: Array  # [V]
 
 
 @dataclass(frozen=True, eq=False)
-class InverseMap:
+class InverseMap(Result):
     """Voltage for a wanted speed; positive voltage and positive speed go together.
 
     Between the slowest speeds that can be held each way there is nothing but the creep at 0 V. A
     wanted speed in this gap gets whichever of the three is nearest, 0 V if two are.
     """
+
+    figure = "plot_compensation"
 
     name: str
     """Name of the drive."""
@@ -242,6 +248,10 @@ class InverseMap:
             self.to_toml(path)
         else:
             write_table(self.to_polars(), path)
+
+    def tables(self) -> list[Table]:
+        """The map, at a few points each way, and between which limits it holds."""
+        return [map_table(self), map_limits_table(self)]
 
 
 def _finite(speed: ArrayLike) -> Array:

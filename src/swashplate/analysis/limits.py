@@ -17,9 +17,10 @@ from swashplate.equations.marching.record import SOURCE_RATE, Interpolation
 from swashplate.equations.marching.run import Start
 from swashplate.errors import DomainError, InputError, SwashplateError
 from swashplate.parameters.parameter_set import Change
+from swashplate.results import Result, Tabular
 from swashplate.simulation.result import Limit, Simulation
 from swashplate.simulation.run import simulate_drive
-from swashplate.tables import Cell, Column, Table, Tabular, quantity
+from swashplate.tables import Cell, Column, Table, quantity
 
 if TYPE_CHECKING:
     import polars
@@ -30,7 +31,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class LimitTimeline:
+class LimitTimeline(Result):
     """Stretches of time in which limits act; several can act at once."""
 
     limits: tuple[Limit, ...]  # Those that act anywhere, in the order of the chain.
@@ -67,7 +68,7 @@ WIDEST = 1.5  # Largest angle of a plate without a stop; the model ends at a rig
 
 
 @dataclass(frozen=True)
-class Removal:
+class Removal(Result):
     """A limit, the component behind it, and the changes that take it away."""
 
     limit: str  # In words.
@@ -157,7 +158,7 @@ the creep that it makes is an error, too."""
 
 
 @dataclass(frozen=True)
-class LimitShare:
+class LimitShare(Result):
     """What one limit costs."""
 
     limit: str  # In words.

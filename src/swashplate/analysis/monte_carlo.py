@@ -23,6 +23,7 @@ from swashplate.identification.storing import load_fit
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ MOST_REDRAWN = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Draws:
+class Draws(Result):
     """Drives that the tests allow."""
 
     drives: tuple[Drive, ...]
@@ -310,8 +311,10 @@ MOST_SAMPLES = 150_000_000  # Samples of speed that a band may take: 1.2 GB.
 
 
 @dataclass(frozen=True, eq=False)
-class Bands:
+class Bands(Result):
     """Where the speed lies at each instant."""
+
+    figure = "plot_bands"
 
     time: Array  # (n,) [s]
     lower: Array  # (n,) [rad/s]

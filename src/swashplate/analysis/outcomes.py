@@ -17,6 +17,7 @@ from swashplate.equations.marching.lanes import LANES
 from swashplate.errors import InputError
 from swashplate.executors import Serial, available_cores
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result
 from swashplate.simulation.result import Limit
 from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import DisplayUnit, display_unit
@@ -34,7 +35,7 @@ REACHED = 0.9  # Part of the settled speed that counts as reached.
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class Trial(Result):
     """A command, and the speed that a perfect drive would make of it. Make it with `trial`."""
 
     voltage: Array  # (n,) [V]
@@ -127,7 +128,7 @@ def speed_per_volt(drive: Drive, sign: float) -> float:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(Result):
     """One number that says what a drive made of a command."""
 
     name: str
@@ -329,7 +330,7 @@ SAMPLES_AT_ONCE = 2**20
 
 
 @dataclass(frozen=True, eq=False)
-class BatchOutcomes:
+class BatchOutcomes(Result):
     """Outcomes of many drives over one command."""
 
     outcomes: tuple[Outcome, ...]

@@ -21,6 +21,7 @@ from swashplate.analysis.outcomes import (
 from swashplate.analysis.whatif import Range, check_ranges, find_lever, pulled_columns
 from swashplate.drive import Drive
 from swashplate.errors import InputError
+from swashplate.results import Result
 from swashplate.tables import Cell, Column, Table
 
 Array = NDArray[np.float64]
@@ -45,8 +46,10 @@ def ranges_of(levers: Sequence[str], span: float = 0.1) -> dict[str, Range]:
 
 
 @dataclass(frozen=True, eq=False)
-class OneAtATime:
+class OneAtATime(Result):
     """Outcomes with each lever moved down and up by itself."""
+
+    figure = "plot_tornado"
 
     levers: tuple[str, ...]
     outcomes: tuple[Outcome, ...]
@@ -60,6 +63,10 @@ class OneAtATime:
     def swings(self) -> Array:
         """(L, K) how far apart the two are, NaN where one of them is missing."""
         return np.abs(self.high - self.low)
+
+    def table(self) -> Table:
+        """Every number, a row for each outcome and lever."""
+        return sensitivity_table(self, None)
 
 
 def one_at_a_time(
@@ -112,8 +119,10 @@ FEWEST, MOST = 16, 2**20  # Base samples of Sobol's sequence.
 
 
 @dataclass(frozen=True, eq=False)
-class SobolIndices:
+class SobolIndices(Result):
     """Shares of the outcomes' variances that levers are the cause of."""
+
+    figure = "plot_sobol"
 
     levers: tuple[str, ...]
     outcomes: tuple[Outcome, ...]

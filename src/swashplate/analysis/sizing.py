@@ -14,6 +14,7 @@ from swashplate.analysis.outcomes import Direction, Performance, Trial, performa
 from swashplate.analysis.whatif import Range, check_ranges, pulled
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.results import Result
 from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import display_unit
 
@@ -187,7 +188,7 @@ REQUIRED = {
 
 
 @dataclass(frozen=True)
-class Requirements:
+class Requirements(Result):
     """What is required; None is not."""
 
     speed: float | None = None
@@ -226,7 +227,7 @@ class Requirements:
 
 
 @dataclass(frozen=True, eq=False)
-class Sizing:
+class Sizing(Result):
     """The smallest change that meets the requirements."""
 
     factors: Mapping[str, float]  # By lever; 1 leaves it alone.
@@ -240,6 +241,10 @@ class Sizing:
     def change(self) -> float:
         """Root of the summed squares of (factor - 1). [1]"""
         return float(np.sqrt(sum((factor - 1.0) ** 2 for factor in self.factors.values())))
+
+    def table(self) -> Table:
+        """How far each lever moves, and how far it would have to by itself."""
+        return levers_table(self)
 
 
 def size(

@@ -16,6 +16,7 @@ from swashplate.drive import Drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import InputError
 from swashplate.linear import FEWEST_STEPS, SLOWEST_CYCLE, slowest_lag
+from swashplate.results import Result
 from swashplate.tables import Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ class TrackingError(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Tracked:
+class Tracked(Result):
     """One way to command a wanted speed, and how the drive then follows."""
 
     name: str
@@ -43,7 +44,7 @@ class Tracked:
 
 
 @dataclass(frozen=True, eq=False)
-class Improvement:
+class Improvement(Result):
     """A wanted speed commanded in several ways, the plainest first."""
 
     name: str  # Name of the drive.
@@ -126,7 +127,7 @@ FORGOTTEN = 8.0  # Lags that a simulation lasts before the cycle that is looked 
 
 
 @dataclass(frozen=True, eq=False)
-class LargestSine:
+class LargestSine(Result):
     """Largest amplitude of speed followed at each frequency, (f,); 0 where none is.
 
     The error is the rms of speed less wanted speed over a cycle, by the rms of the wanted sine.
@@ -139,6 +140,10 @@ class LargestSine:
     """Amplitude with the lag forgiven: against the wanted sine shifted in time by as much as suits
     the drive best. For a command that is known ahead, or where being late does no harm. [rad/s]"""
     in_time: Array  # Amplitude with the lag counted: against the wanted sine itself. [rad/s]
+
+    def table(self) -> Table:
+        """The largest sine at each frequency."""
+        return sine_table(self)
 
 
 def largest_sine(drive: Drive, frequencies: ArrayLike, error: float = 0.1) -> LargestSine:

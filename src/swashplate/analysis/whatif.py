@@ -14,6 +14,7 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result
 from swashplate.simulation.result import Simulation
 from swashplate.tables import UNIT, Column, Table
 
@@ -182,7 +183,7 @@ AS_IS, CHANGED = "as it is", "changed"
 
 
 @dataclass(frozen=True, eq=False)
-class Variant:
+class Variant(Result):
     """A drive over the trial's command."""
 
     drive: Drive
@@ -196,8 +197,10 @@ class Variant:
 
 
 @dataclass(frozen=True, eq=False)
-class WhatIf:
+class WhatIf(Result):
     """A drive before and after."""
+
+    figure = "plot_whatif"
 
     factors: Mapping[str, float]  # By lever.
     trial: Trial
@@ -224,6 +227,10 @@ class WhatIf:
             for outcome, value in zip(self.outcomes, variant.values, strict=True)
             if np.isnan(value)
         )
+
+    def table(self) -> Table:
+        """Speed limits and outcomes of the drive as it is and changed."""
+        return before_and_after(self)
 
 
 def what_if(

@@ -20,8 +20,9 @@ from swashplate import maneuvers
 from swashplate.equations.marching.record import SOURCE_RATE, least_substeps
 from swashplate.equations.marching.run import Start
 from swashplate.full_order.drive import FullOrderDrive, FullOrderSimulation, Method
+from swashplate.results import Result, Tabular
 from swashplate.simulation.result import read_only
-from swashplate.tables import Cell, Column, Table, Tabular
+from swashplate.tables import Cell, Column, Table
 from swashplate.units import display_unit
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ TABLE_MANEUVERS: tuple[tuple[str, Maneuver], ...] = (
 
 
 @dataclass(frozen=True)
-class Difference:
+class Difference(Result):
     """Difference in shaft speed of the reduced model to the full-order one."""
 
     largest: float
@@ -97,6 +98,8 @@ class Lag(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Comparison(Tabular):
     """Both models over one command, driven by the same current."""
+
+    figure = "plot_full_order"
 
     full: FullOrderSimulation
     reduced_speed: Array

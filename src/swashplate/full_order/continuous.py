@@ -31,6 +31,7 @@ from swashplate.models.full_order import (
 )
 from swashplate.models.machine import Machine
 from swashplate.models.pump import solenoid_force
+from swashplate.results import Result, short
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -80,7 +81,7 @@ def state_matrix(state: Array, force: float, p: Machine, options: PlantOptions) 
 
 
 @dataclass(frozen=True)
-class Modes:
+class Modes(Result):
     """Eigenvalues of the linearised model, told apart by the states that take part in them."""
 
     eigenvalues: Complex
@@ -147,6 +148,9 @@ class Feed(NamedTuple):
 
 class Case(NamedTuple):
     """What is integrated."""
+
+    def __repr__(self) -> str:
+        return short(self)
 
     p: Plant
     k: PlantConstants

@@ -115,6 +115,11 @@ class FullOrderSimulation(Signals):
     states: Array
     """(n, 5) the states on that grid, in the order of `swashplate.models.full_order.Motion`."""
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The signals that it has: ``"time"`` and `SIGNALS`."""
+        return ("time", *SIGNALS)
+
     def __repr__(self) -> str:
         return f"FullOrderSimulation({self.name!r}, {self.time.size} samples, {self.method})"
 

@@ -30,10 +30,12 @@ from swashplate.parameters.files import AXES, Entry, parameter_of, written
 from swashplate.parameters.files import load_preset as load_parameters
 from swashplate.parameters.parameter_set import (
     Change,
+    HasParameters,
     Pair,
     Parameter,
     ParameterSet,
     Value,
+    set_of,
     value_of,
 )
 from swashplate.parameters.rules import out_of_range, range_sentence
@@ -308,7 +310,7 @@ def chosen_quantity(name: str) -> Definition:
 
 
 def from_lumped(
-    parameters: ParameterSet,
+    lumped: ParameterSet | HasParameters,
     like: str | None = None,
     *,
     name: str | None = None,
@@ -320,7 +322,7 @@ def from_lumped(
 
     Parameters
     ----------
-    parameters : ParameterSet
+    lumped : ParameterSet or Drive
         The lumped parameters that the set shall have, Z6 apart.
     like : str, optional
         Packaged set whose assumed values count where nothing is chosen; by default see
@@ -344,6 +346,7 @@ def from_lumped(
     ParameterError
         If lumps contradict each other or a chosen value; the sentence names them.
     """
+    parameters = set_of(lumped)
     owner = parameters.name if name is None else name
     assumed = load_choices(nearest_set(parameters.name) if like is None else like)
     given = chosen_over(assumed, {**(entries or {}), **chosen})

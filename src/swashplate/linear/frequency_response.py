@@ -20,8 +20,9 @@ from swashplate.linear.drive import slowest_lag
 from swashplate.models.pump import Pump
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Tabular
 from swashplate.simulation.instance import check_filter_stability, instance_of, without_ripple
-from swashplate.tables import Column, Table, Tabular
+from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
     import polars
@@ -55,6 +56,8 @@ class FrequencyResponse(Tabular):
 
     A row for each amplitude, a column for each frequency.
     """
+
+    figure = "plot_bode"
 
     name: str
     """Name of the drive."""
