@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError, ParameterError, maneuvers
-from swashplate.analysis.monte_carlo import (
+from swashplate.analysis import (
     Deviations,
     bands,
     draw_deviations,

@@ -9,8 +9,15 @@ import polars as pl
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.full_order import Comparison, FullOrderDrive, compare, convergence, validity
-from swashplate.full_order.comparison import TABLE_MANEUVERS, fine_steps
+from swashplate.full_order import (
+    TABLE_MANEUVERS,
+    Comparison,
+    FullOrderDrive,
+    compare,
+    convergence,
+    fine_steps,
+    validity,
+)
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "full-order.md"
 

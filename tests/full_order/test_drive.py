@@ -7,8 +7,7 @@ import polars as pl
 import pytest
 
 from swashplate import DomainError, InputError, maneuvers
-from swashplate.full_order import FullOrderDrive, FullOrderSimulation
-from swashplate.full_order.drive import SIGNALS
+from swashplate.full_order import SIGNALS, FullOrderDrive, FullOrderSimulation
 
 
 @pytest.fixture(scope="module")

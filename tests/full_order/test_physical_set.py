@@ -17,8 +17,7 @@ from swashplate import (
     ParameterError,
     PhysicalSet,
 )
-from swashplate.full_order import from_lumped
-from swashplate.full_order.physical_set import QUANTITIES
+from swashplate.full_order import QUANTITIES, from_lumped
 
 AXES = ("hoist", "slew", "luff")
 SCALED = ("Z1", "Z3", "Z4", "Z5", "Z6", "Z8", "Z9", "Z10", "Z13", "Z14", "Z15", "Z16", "Z18")
