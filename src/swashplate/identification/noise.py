@@ -201,11 +201,13 @@ def correlation_length(autocovariance: Array, counts: Array) -> int:
     before = np.concatenate([[0.0], np.cumsum(rho[1:-1] ** 2)]) if rho.size > 1 else np.zeros(0)
     band = 2.0 * np.sqrt((1.0 + 2.0 * before) / np.maximum(counts[1:], 1.0))
     outside = np.abs(rho[1:]) > band  # of lag k at k - 1
-    for length in (0, *(np.flatnonzero(outside) + 1)):
-        after = outside[length : length + max(20, length // 4)]
-        if not after[:IN_A_ROW].any() and after.sum() <= STRAY * max(after.size, 1):
-            return int(length)
-    return int(rho.size - 1)
+    lengths = np.concatenate([[0], np.flatnonzero(outside) + 1])
+    ends = np.minimum(lengths + np.maximum(20, lengths // 4), outside.size)
+    so_far = np.concatenate([[0], np.cumsum(outside)])
+    near = so_far[np.minimum(lengths + IN_A_ROW, outside.size)] - so_far[lengths]
+    stray = so_far[ends] - so_far[lengths]
+    stays = (near == 0) & (stray <= STRAY * np.maximum(ends - lengths, 1))
+    return int(lengths[np.argmax(stays)]) if stays.any() else int(rho.size - 1)
 
 
 def flat_top(lags: Array, length: float) -> Array:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TypeVar
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,9 @@ from swashplate.identification.model import (
 )
 from swashplate.identification.solving import Evaluation
 from swashplate.identification.unknowns import Unknowns
+
+if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
 
 Array = NDArray[np.float64]
 Part = TypeVar("Part")
@@ -200,13 +203,26 @@ class Problem:
         return outputs[name]
 
     def _each(self, work: Callable[[int], Part]) -> list[Part]:
-        numbers = range(len(self.experiments))
-        if self.threads == 1:
-            return [work(number) for number in numbers]
-        from concurrent.futures import ThreadPoolExecutor
+        """What is found for each experiment; each thread has a lot of them, dealt in turn."""
+        count = len(self.experiments)
+        lots = [range(k, count, self.threads) for k in range(min(self.threads, count))]
+        if len(lots) == 1:
+            return [work(number) for number in lots[0]]
+        done = _pool(self.threads).map(lambda lot: [work(number) for number in lot], lots)
+        found = {
+            k: part
+            for lot, parts in zip(lots, done, strict=True)
+            for k, part in zip(lot, parts, strict=True)
+        }
+        return [found[number] for number in range(count)]
 
-        with ThreadPoolExecutor(self.threads) as pool:
-            return list(pool.map(work, numbers))
+
+@lru_cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    """Threads that stay: a fit evaluates hundreds of times, and to start them takes as long."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    return ThreadPoolExecutor(threads)
 
 
 def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> dict[str, float]:
