@@ -18,16 +18,12 @@ then the shorter code.
 """
 
 import argparse
-import csv
 import math
 import os
-import sys
 import tempfile
 import time
 from collections import defaultdict
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 
@@ -35,6 +31,7 @@ from statistics import median
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import numpy as np
+from campaigns import read, run_missing
 from faults import true_error
 
 NOISES = {
@@ -72,8 +69,9 @@ FIELDS = (
 )
 
 
-def campaign(axis, case, seed, compared):
+def campaign(_, item):
     """Rows of one campaign: an unknown and a method each, with truth, estimate and interval."""
+    axis, case, seed, compared = item
     return own_campaign(seed) if axis == "own" else drive_campaign(axis, case, seed, compared)
 
 
@@ -534,31 +532,9 @@ def main():
         if axis != "own" or case == "realistic"
     ]
     begun = time.perf_counter()
-    with (
-        wanted.out.open("a", newline="") as stream,
-        ProcessPoolExecutor(wanted.jobs, mp_context=get_context("spawn")) as pool,
-    ):
-        writer = csv.writer(stream)
-        if not kept:
-            writer.writerow(FIELDS)
-        futures = [pool.submit(campaign, *each) for each in todo]
-        for number, future in enumerate(as_completed(futures), 1):
-            writer.writerows(future.result())
-            stream.flush()
-            spent = time.perf_counter() - begun
-            left = spent / number * (len(todo) - number)
-            print(f"\r{number} of {len(todo)}, {left:.0f} s left ", end="", file=sys.stderr)
-    print(file=sys.stderr)
+    run_missing(campaign, todo, wanted.jobs, wanted.out, FIELDS)
     report(read(wanted.out))
     print(f"\n{len(todo)} campaigns in {time.perf_counter() - begun:.0f} s.")
-
-
-def read(path):
-    """Rows that were written before."""
-    if not path.exists():
-        return []
-    with path.open(newline="") as stream:
-        return list(csv.DictReader(stream))
 
 
 if __name__ == "__main__":
