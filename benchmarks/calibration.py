@@ -79,12 +79,12 @@ def drive_campaign(axis, case, seed, compared):
     """Rows of a campaign of a drive."""
     from swashplate import Campaign, Drive
     from swashplate.campaign import rig
+    from swashplate.identification.acceptance import verdict
     from swashplate.identification.assessment import assess
     from swashplate.identification.fitting import fit
     from swashplate.identification.setup import load_setup
     from swashplate.identification.staging import drawn, true_value
     from swashplate.identification.validation import predict
-    from swashplate.identification.verdict import verdict
 
     setup, nominal = load_setup(axis), Drive.preset(axis)
     # campaigns of two cells share neither machine nor noise
@@ -196,7 +196,7 @@ VALVE_FREE = {
 
 def candidates(assessments):
     """Methods beside the product's: name, drive, and for each stage its estimates."""
-    from swashplate.identification.uncertainty import estimates, with_handed
+    from swashplate.identification.intervals import estimates, with_handed
 
     made = []
     for method in METHODS:
@@ -260,7 +260,7 @@ def autocovariance(fit):
 
 def autocovariance_without_lines(fit):
     """The same with spectral lines removed from the residuals beforehand."""
-    from swashplate.identification.spectral_lines import without_lines
+    from swashplate.identification.noise import without_lines
 
     return autocovariance(without_lines(fit)[0])
 
@@ -359,8 +359,8 @@ def autoregression(colour, samples):
 
 def generalised(fit):
     """Generalised least squares: one Gauss-Newton step on residuals whitened by an AR model."""
-    from swashplate.identification.linearised import triangular_factor, whitening
     from swashplate.identification.noise import covariance_of, grid_of, noise_colours, unweighted
+    from swashplate.identification.problem import triangular_factor, whitening
 
     rows, count = [], fit.variables.count
     for colour in noise_colours(fit):

@@ -15,7 +15,6 @@ from reproduction.content import Cell, Table
 from swashplate.campaign import Experiment
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.identification.assessment import RunQuality
 from swashplate.identification.fitting import Search, fit
 from swashplate.identification.setup import load_setup
 from swashplate.identification.staging import drawn
@@ -23,6 +22,7 @@ from swashplate.identification.validation import (
     SOURCE_RULES,
     ComparedRun,
     LargestError,
+    RunQuality,
     compared_run,
     error_tables,
     kept_by,

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from swashplate.errors import InputError
-from swashplate.identification.assessment import measures, pooled_measures, residual_test
+from swashplate.identification.validation import measures, pooled_measures, residual_test
 
 MEASURED = np.array([0.0, 2.0, 4.0, 6.0])
 SIMULATED = np.array([1.0, 2.0, 4.0, 5.0])

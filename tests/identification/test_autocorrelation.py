@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import (
     NoiseColour,
     correlation_length,
@@ -15,6 +14,7 @@ from swashplate.identification.noise import (
     noise_colours,
     pair_sums,
 )
+from swashplate.identification.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.unknowns import Unknowns
 
 

@@ -10,12 +10,11 @@ from swashplate import Experiment
 from swashplate.errors import InputError
 from swashplate.executors import Serial
 from swashplate.identification.assessment import Assessment
-from swashplate.identification.bootstrap import Bootstrap, NoiseDraws, bootstraps_of
 from swashplate.identification.fitting import StageFit
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import spectral_covariance
-from swashplate.identification.problem import Problem
+from swashplate.identification.problem import LinearisedFit, LinearisedRun, Problem
 from swashplate.identification.profile import profiles_of
+from swashplate.identification.resampling import Bootstrap, NoiseDraws, bootstraps_of
 from swashplate.identification.setup import Free, Stage
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from swashplate.errors import InputError
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import white_noise_covariance
+from swashplate.identification.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.unknowns import Unknowns
 
 RNG = np.random.default_rng(3)

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from swashplate import Campaign, Channel, Drive, Experiment, InputError, maneuvers
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.identification.assessment import Measures
-from swashplate.identification.cross_validation import (
+from swashplate.identification.fitting import fit
+from swashplate.identification.resampling import (
     CrossValidation,
     Fold,
     FoldEstimate,
@@ -23,9 +23,8 @@ from swashplate.identification.cross_validation import (
     cross_validate,
     deal,
 )
-from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Setup
-from swashplate.identification.validation import pooled, predict
+from swashplate.identification.validation import Measures, pooled, predict
 
 SOURCE = Source(Path("log.csv"), "column")
 SETUP = Setup.model_validate(

@@ -22,7 +22,7 @@ from swashplate.identification.excitation import (
     proposed_setup,
 )
 from swashplate.identification.fitting import smooth
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
+from swashplate.identification.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.setup import Free, GivenForces, Setup, Stage, load_setup, setup_text
 from swashplate.identification.unknowns import Unknown, Unknowns
 

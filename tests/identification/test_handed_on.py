@@ -10,11 +10,11 @@ from swashplate.campaign import rig
 from swashplate.campaign.campaign import Campaign
 from swashplate.identification.assessment import assess
 from swashplate.identification.fitting import Fit, fit
+from swashplate.identification.intervals import Handed, slopes_by_earlier, with_handed
 from swashplate.identification.noise import Covariance
 from swashplate.identification.setup import load_setup
 from swashplate.identification.solving import solve
 from swashplate.identification.staging import stage_problem
-from swashplate.identification.uncertainty import Handed, slopes_by_earlier, with_handed
 from swashplate.identification.unknowns import Unknowns
 from swashplate.maneuvers import source_tests
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swashplate.errors import InputError
+from swashplate.identification.intervals import Estimate, estimates
 from swashplate.identification.noise import Covariance
-from swashplate.identification.uncertainty import Estimate, estimates
 from swashplate.identification.unknowns import Unknowns
 
 

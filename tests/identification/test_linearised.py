@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate.errors import InputError
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun, whitening
+from swashplate.identification.problem import LinearisedFit, LinearisedRun, whitening
 from swashplate.identification.unknowns import Unknowns
 
 RNG = np.random.default_rng(1)

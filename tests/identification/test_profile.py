@@ -9,11 +9,10 @@ from scipy.stats import t as student
 
 from swashplate import Experiment
 from swashplate.errors import DomainError, InputError
-from swashplate.identification.linearised import linearised_fit
-from swashplate.identification.problem import Problem
+from swashplate.identification.intervals import estimates, reach, uncertainty
+from swashplate.identification.problem import Problem, linearised_fit
 from swashplate.identification.profile import Profile, checked_ends, minimiser, profile, threshold
 from swashplate.identification.solving import solve
-from swashplate.identification.uncertainty import estimates, reach, uncertainty
 from swashplate.identification.unknowns import Unknown, Unknowns
 
 RNG = np.random.default_rng(6)

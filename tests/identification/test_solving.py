@@ -14,9 +14,8 @@ from swashplate.executors import Processes, Serial, Threads
 from swashplate.identification.model import Linearised
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import Free, Stage
-from swashplate.identification.solving import Progress, solve
+from swashplate.identification.solving import Progress, StartResult, sobol_starts, solve, solve_from
 from swashplate.identification.staging import stage_problem
-from swashplate.identification.starts import StartResult, sobol_starts, solve_from
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
 
 GAIN, LAG = 3.0, 0.7

@@ -3,13 +3,9 @@
 import numpy as np
 import pytest
 
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
-from swashplate.identification.spectral_lines import (
-    SpectralLine,
-    line_sentences,
-    without_lines,
-)
-from swashplate.identification.uncertainty import uncertainty
+from swashplate.identification.intervals import uncertainty
+from swashplate.identification.noise import SpectralLine, line_sentences, without_lines
+from swashplate.identification.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.unknowns import Unknowns
 
 RUNS, N, RATE = 4, 4096, 512.0

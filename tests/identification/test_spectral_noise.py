@@ -5,13 +5,13 @@ import pytest
 from scipy.signal import lfilter
 
 from swashplate.errors import InputError
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import (
     band_score_covariance,
     coloured_noise_covariance,
     spectral_covariance,
     white_noise_covariance,
 )
+from swashplate.identification.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.unknowns import Unknowns
 
 N, RUNS = 4096, 4

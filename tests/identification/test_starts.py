@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from swashplate.errors import DomainError, InputError
-from swashplate.identification.solving import Evaluation, Progress, longest_left
-from swashplate.identification.starts import sobol_starts, solve_from, time_left
+from swashplate.identification.solving import (
+    Evaluation,
+    Progress,
+    longest_left,
+    sobol_starts,
+    solve_from,
+    time_left,
+)
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import Covariance, band_score_covariance
+from swashplate.identification.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.unknowns import Unknowns
 
 RUNS, N = 6, 5120

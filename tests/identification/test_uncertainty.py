@@ -6,9 +6,9 @@ from scipy.signal import lfilter
 from scipy.stats import t as student
 
 from swashplate.errors import InputError
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
+from swashplate.identification.intervals import Uncertainty, uncertainty
 from swashplate.identification.noise import Covariance
-from swashplate.identification.uncertainty import Uncertainty, uncertainty
+from swashplate.identification.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.unknowns import Unknowns
 
 RHO, RUNS, N = 0.98, 4, 2048

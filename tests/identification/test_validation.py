@@ -11,11 +11,11 @@ from swashplate import Campaign, Channel, Drive, Experiment, maneuvers
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.errors import InputError
-from swashplate.identification.assessment import compared
 from swashplate.identification.validation import (
     SOURCE_RULES,
     ComparedRun,
     ErrorTable,
+    compared,
     edges,
     error_table,
     error_tables,

@@ -14,18 +14,17 @@ import pytest
 
 from swashplate import Campaign, Channel, Drive, FileError, InputError, maneuvers
 from swashplate.campaign import Source, rig
-from swashplate.identification.assessment import Measures, assess, run_qualities
-from swashplate.identification.cross_validation import CrossValidation, Fold, FoldEstimate, HeldRun
+from swashplate.identification.acceptance import verdict
+from swashplate.identification.assessment import StageProfile, assess
 from swashplate.identification.fitting import Fit, fit
+from swashplate.identification.identifiability import in_the_fits_scales
 from swashplate.identification.profile import Point, Profile
+from swashplate.identification.resampling import CrossValidation, Fold, FoldEstimate, HeldRun
 from swashplate.identification.setup import Setup
+from swashplate.identification.solving import StartResult
 from swashplate.identification.staging import stage_problem
-from swashplate.identification.starts import StartResult
-from swashplate.identification.storing import StageProfile
 from swashplate.identification.tables import ignored_words
-from swashplate.identification.truth import in_the_fits_scales
-from swashplate.identification.validation import predict
-from swashplate.identification.verdict import verdict
+from swashplate.identification.validation import Measures, predict, run_qualities
 from swashplate.report.figures import plot_overlay, save_fit_figures, save_run_figures
 from swashplate.report.fit_report import (
     write_fit_report,

@@ -21,15 +21,22 @@ from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.data_checks import check_sound, refuse_unsound
 from swashplate.identification.drive_model import DriveModel, at_rate_of
+from swashplate.identification.intervals import weighed
 from swashplate.identification.lack_of_fit import measurement_error
 from swashplate.identification.model import Model, OwnModel
 from swashplate.identification.own_model import ModelParameters, ModelSetup, Range
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Setup, Stage
-from swashplate.identification.solving import Loss, Progress, Solution, solve
+from swashplate.identification.solving import (
+    Loss,
+    Progress,
+    Solution,
+    StartResult,
+    sobol_starts,
+    solve,
+    solve_from,
+)
 from swashplate.identification.staging import Parameters, stage_problem, with_estimates
-from swashplate.identification.starts import StartResult, sobol_starts, solve_from
-from swashplate.identification.uncertainty import weighed
 from swashplate.identification.unknowns import Unknown
 from swashplate.parameters.parameter_set import ParameterSet
 

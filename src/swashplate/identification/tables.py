@@ -14,10 +14,9 @@ import numpy as np
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.experiment_design import Advice, Gain, SensorAdvice
-from swashplate.identification.identifiability import GAUGES
+from swashplate.identification.identifiability import GAUGES, SCALES, moved_columns, true_values
+from swashplate.identification.intervals import Estimate, estimates
 from swashplate.identification.own_model import ModelParameters
-from swashplate.identification.truth import SCALES, moved_columns, true_values
-from swashplate.identification.uncertainty import Estimate, estimates
 from swashplate.identification.validation import ignored_windows, pooled, with_speeds
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.simulation.instance import START_PRESSURE
@@ -37,14 +36,13 @@ from swashplate.units import chosen_unit, display_unit
 
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Channel, Experiment
-    from swashplate.identification.assessment import Assessment, Measures, RunQuality
-    from swashplate.identification.bootstrap import Bootstrap
-    from swashplate.identification.cross_validation import CrossValidation
+    from swashplate.identification.acceptance import Verdict
+    from swashplate.identification.assessment import Assessment
     from swashplate.identification.excitation import Outlook
     from swashplate.identification.fitting import Fit, StageFit
+    from swashplate.identification.resampling import Bootstrap, CrossValidation
     from swashplate.identification.unknowns import Unknown
-    from swashplate.identification.validation import ErrorTable
-    from swashplate.identification.verdict import Verdict
+    from swashplate.identification.validation import ErrorTable, Measures, RunQuality
     from swashplate.parameters.parameter_set import ParameterSet
 
 # --- estimates ------------------------------------------------------------------------------------
@@ -64,7 +62,7 @@ def estimates_table(
     assessment : Assessment
         Of the stage.
     truth : ParameterSet, optional
-        Of virtual tests, in the scales that the fit kept fixed (`truth.in_the_fits_scales`).
+        Of virtual tests, in the scales that the fit kept fixed, see `in_the_fits_scales`.
     bootstrap : Bootstrap, optional
         Whose intervals stand beside.
     own : bool

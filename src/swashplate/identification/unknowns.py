@@ -40,7 +40,7 @@ class Prior:
     """Standard deviation, positive; of a logarithmic unknown that of its logarithm."""
     worth: float = 1.0
     """Squared residuals of the data's cost that stand for one independent one of variance 1: so
-    often the prior counts, see `uncertainty.weighed`."""
+    often the prior counts, see `intervals.weighed`."""
 
 
 @dataclass(frozen=True)

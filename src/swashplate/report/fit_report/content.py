@@ -10,17 +10,16 @@ from typing import Any, Literal, get_args
 from swashplate.campaign import Campaign, examine, quality_table
 from swashplate.errors import InputError
 from swashplate.identification import tables
-from swashplate.identification.assessment import Assessment, RunQuality, assess
-from swashplate.identification.cross_validation import CrossValidation
+from swashplate.identification.acceptance import Statement, Verdict, Weight, starts_of, verdict
+from swashplate.identification.assessment import Assessment, StageProfile, assess
 from swashplate.identification.fitting import Fit, StageFit
+from swashplate.identification.identifiability import in_the_fits_scales
+from swashplate.identification.noise import SpectralLine
 from swashplate.identification.own_model import ModelParameters
-from swashplate.identification.spectral_lines import SpectralLine
+from swashplate.identification.resampling import CrossValidation
+from swashplate.identification.solving import StartResult
 from swashplate.identification.staging import Parameters
-from swashplate.identification.starts import StartResult
-from swashplate.identification.storing import StageProfile
-from swashplate.identification.truth import in_the_fits_scales
-from swashplate.identification.validation import error_tables, pooled, source_rules
-from swashplate.identification.verdict import Statement, Verdict, Weight, starts_of, verdict
+from swashplate.identification.validation import RunQuality, error_tables, pooled, source_rules
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import plots
 from swashplate.report.fit_report.page import Block, Section, listed_block, page, text

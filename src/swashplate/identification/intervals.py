@@ -13,23 +13,20 @@ from numpy.typing import NDArray
 
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.linearised import LinearisedFit, linearised_fit
 from swashplate.identification.model import linearised as linearised_model
 from swashplate.identification.noise import (
     Covariance,
     NoiseColour,
+    SpectralLine,
     coloured_noise_covariance,
+    line_sentences,
     noise_colours,
     spectral_covariance,
     white_noise_covariance,
-)
-from swashplate.identification.problem import Problem
-from swashplate.identification.profile import CheckedEnd
-from swashplate.identification.spectral_lines import (
-    SpectralLine,
-    line_sentences,
     without_lines,
 )
+from swashplate.identification.problem import LinearisedFit, Problem, linearised_fit
+from swashplate.identification.profile import CheckedEnd
 from swashplate.identification.unknowns import Unknowns
 
 if TYPE_CHECKING:
