@@ -12,25 +12,23 @@ import numpy as np
 
 from reproduction.bench import SEVERITY, Bench
 from reproduction.content import Cell, Table
+from reproduction.source_errors import (
+    SOURCE_RULES,
+    ComparedRun,
+    LargestError,
+    compared_run,
+    error_tables,
+    kept_by,
+    kind_of,
+    source_rules,
+)
 from swashplate.campaign import Experiment
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.fitting import Search, fit
 from swashplate.identification.setup import load_setup
 from swashplate.identification.staging import drawn
-from swashplate.identification.validation import (
-    SOURCE_RULES,
-    ComparedRun,
-    LargestError,
-    RunQuality,
-    compared_run,
-    error_tables,
-    kept_by,
-    kind_of,
-    predict,
-    source_rules,
-    with_speeds,
-)
+from swashplate.identification.validation import RunQuality, predict, with_speeds
 from swashplate.parameters.parameter_set import ParameterSet
 
 SPREAD = 0.02

@@ -392,18 +392,12 @@ def validate(
 ) -> None:
     """Predict runs from their command alone and judge the drive by them.
 
-    Prints errors run by run, the error tables of Kruse (2001) with what they
-    leave out, what is left in the residuals, and a verdict. The exit code is 1
-    if the drive is not usable for these runs.
+    Prints errors run by run, what is left in the residuals, and a verdict. The
+    exit code is 1 if the drive is not usable for these runs.
     """
     from swashplate.identification import tables
     from swashplate.identification.acceptance import verdict
-    from swashplate.identification.validation import (
-        error_tables,
-        predict,
-        source_rules,
-        with_speeds,
-    )
+    from swashplate.identification.validation import predict, with_speeds
 
     if figures is not None and out is None:
         raise InputError("--figures needs a folder to write them to: give --out DIR.")
@@ -426,7 +420,6 @@ def validate(
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
         judged = verdict((), predicted, required=require / 100.0)
         qualities = with_speeds(predicted)
-        errors = error_tables(qualities, source_rules(parameters.name))
     lines = []
     if out is not None:
         with working("Writing the report"):
@@ -437,8 +430,6 @@ def validate(
     note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
     show(*tables.runs_tables(qualities))
     say(MEASURES)
-    show(*(tables.errors_table(each) for each in errors))
-    _listed(tables.left_out(errors))
     show(tables.residual_table(predicted))
     say(RESIDUALS)
     _listed(judged.sentences)

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from swashplate.identification.fitting import Fit, StageFit
     from swashplate.identification.resampling import Bootstrap, CrossValidation
     from swashplate.identification.unknowns import Unknown
-    from swashplate.identification.validation import ErrorTable, Measures, RunQuality
+    from swashplate.identification.validation import Measures, RunQuality
     from swashplate.parameters.parameter_set import ParameterSet
 
 # --- estimates ------------------------------------------------------------------------------------
@@ -427,47 +427,6 @@ def residual_table(qualities: Sequence[RunQuality]) -> Table:
         start = (run.name, run.role, each.channel, test.duration, value, star)
         made.add(*start, test.cross_band, lag, test.verdict)
     return made
-
-
-def errors_table(found: ErrorTable) -> Table:
-    """The thesis's error table of one channel: the largest error of each kind of test."""
-    made = Table(
-        f"Largest per cent error of {found.channel}, by kind of test",
-        (
-            Column("kind"),
-            Column("error", ".2f", none="-"),
-            Column(""),
-            Column("in", wrap=True),
-            Column("at", ".2f", "s", none="-"),
-            Column("samples", ",d"),
-            Column("runs", "d"),
-        ),
-    )
-    for row in found.rows:
-        where = row.run or "no sample is left"
-        sign = "" if row.percent is None else "%"
-        made.add(row.kind, row.percent, sign, where, row.time, row.samples, row.runs)
-    return made
-
-
-def left_out(errors: Sequence[ErrorTable]) -> list[str]:
-    """What error tables leave out, each rule that acted once, and what else belongs to them."""
-    said = ["Per cent of what is measured at that instant."] if errors else []
-    acted = {rule for each in errors for rule in each.acted}
-    for rule in dict.fromkeys(rule for each in errors for rule in each.rules):
-        if rule not in acted:
-            continue
-        runs = dict.fromkeys(run for each in errors for run, by in each.left_out if by == rule.name)
-        whole = f" All of: {', '.join(runs)}." if runs else ""
-        said.append(f"Left out ({rule.name}): {rule.why}{whole}")
-    averages = {each.average for each in errors if each.average}
-    said += [f"Differences of currents are averaged over {a:g} s: they dither." for a in averages]
-    if any(each.channel.startswith("speed from ") for each in errors):
-        said.append("Measured and simulated positions are filtered alike to become speeds.")
-    unjudged = dict.fromkeys(run for each in errors for run in each.unjudged)
-    if unjudged:
-        said.append(f"Neither ramp, step nor sine, or too short: {listed([*unjudged])}.")
-    return said
 
 
 def criteria_table(verdict: Verdict) -> Table:

@@ -19,7 +19,7 @@ from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.resampling import CrossValidation
 from swashplate.identification.solving import StartResult
 from swashplate.identification.staging import Parameters
-from swashplate.identification.validation import RunQuality, error_tables, pooled, source_rules
+from swashplate.identification.validation import RunQuality, pooled
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import plots
 from swashplate.report.fit_report.page import Block, Section, listed_block, page, text
@@ -115,13 +115,13 @@ def write_fit_report(
     sections = [
         _verdict_section(judged, assessed, runs, head["findings"]),
         _parameter_section(fit, assessed, truth),
-        *shared[:4],
+        *shared[:3],
         _excitation_section(assessed),
         _identifiability_section(assessed, items),
         _starts_section(several, items),
         _profile_section(fit, profiles, items),
         _folds_section(folds, assessed),
-        shared[4],
+        shared[3],
         _setup_section(campaign, fit.nominal, fit.setup.title, notes, fit.stages),
     ]
     content = {**head, "what": "Fit", "facts": f"{head['drive']} · {facts}"}
@@ -181,7 +181,7 @@ def write_validation_report(
 def _shared(
     campaign: Campaign, runs: Sequence[ShownRun], drive: Parameters, items: dict[str, Any]
 ) -> tuple[dict[str, Any], list[Section]]:
-    """Head of a page, and its sections on runs, errors, residuals and data; figures to `items`."""
+    """Head of a page, and its sections on runs, residuals and data; figures to `items`."""
     stacks = {stack_of(run): "" for run in runs}
     for number, stack in enumerate(stacks):
         stacks[stack] = f"stack-{number}"
@@ -217,7 +217,6 @@ def _shared(
     sections = [
         _agreement_section(runs),
         _runs_section(runs, stacks, campaign.virtual),
-        _errors_section(runs, drive.name),
         _residual_section(runs),
         Section("data", "Data quality", data),
     ]
@@ -266,28 +265,6 @@ def _runs_section(runs: Sequence[ShownRun], stacks: Mapping[Any, str], virtual: 
         }
         blocks.append(Block("run", content))
     return Section("runs", "Overlays", blocks)
-
-
-def _errors_section(runs: Sequence[ShownRun], drive: str) -> Section:
-    words = (
-        "The largest per cent error of each kind of test, of what is measured at that instant. "
-        "What is left out is listed with each table."
-    )
-    blocks = [text(words)]
-    keys = dict.fromkeys((run.role, each.stage) for run in runs for each in run.channels)
-    for role, stage in keys:
-        alike = [
-            each.quality for run in runs if run.role == role for each in run.channels
-            if each.stage == stage
-        ]  # fmt: skip
-        for found in error_tables(alike, source_rules(drive)):
-            blocks.append(Block("heading", f"{found.channel} ({role})", "h3"))
-            blocks.append(Block("table", tables.errors_table(found), "errors"))
-            said = tables.left_out([found])[1:]
-            if said:
-                rules = ", ".join(rule.name for rule in found.acted) or "remarks"
-                blocks.append(Block("details", listed_block(said), f"Left out: {rules}"))
-    return Section("errors", "Errors by kind of test", blocks)
 
 
 def _residual_section(runs: Sequence[ShownRun]) -> Section:
