@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
+from tests.identification.linear import linear_fit, unknowns_of
 
 from swashplate.identification.noise import (
     NoiseColour,
@@ -14,8 +15,7 @@ from swashplate.identification.noise import (
     noise_colours,
     pair_sums,
 )
-from swashplate.identification.problem import LinearisedFit, LinearisedRun
-from swashplate.identification.unknowns import Unknowns
+from swashplate.identification.problem import LinearisedRun
 
 
 def first_order(n: int, rho: float, seed: int) -> np.ndarray:
@@ -34,7 +34,7 @@ def colour(*residuals: np.ndarray, time: np.ndarray | None = None) -> NoiseColou
         )
         for k, each in enumerate(residuals)
     ]
-    return noise_colours(LinearisedFit.of(runs, Unknowns.of(["p"], [1.0])))[0]
+    return noise_colours(linear_fit(runs, unknowns_of(["p"], [1.0])))[0]
 
 
 def test_a_gap_stays_empty_on_the_grid() -> None:
@@ -143,7 +143,7 @@ def test_channels_and_steps_have_their_own_colours() -> None:
         LinearisedRun("b", "speed", np.arange(100) / 100.0, residual, jacobian),
         LinearisedRun("c", "speed", np.arange(100) / 512.0, residual, jacobian),
     ]
-    found = noise_colours(LinearisedFit.of(runs, Unknowns.of(["p"], [1.0])))
+    found = noise_colours(linear_fit(runs, unknowns_of(["p"], [1.0])))
     assert [(each.channel, each.members) for each in found] == [
         ("speed", (0, 3)),
         ("current", (1,)),
@@ -155,5 +155,5 @@ def test_weights_do_not_colour_the_noise() -> None:
     noise = first_order(4000, 0.8, 2)
     weight = np.where(np.arange(4000) < 400, 10.0, 1.0)
     run = LinearisedRun("a", "v", np.arange(4000.0), weight * noise, np.ones((4000, 1)), weight)
-    found = noise_colours(LinearisedFit.of([run], Unknowns.of(["p"], [1.0])))[0]
+    found = noise_colours(linear_fit([run], unknowns_of(["p"], [1.0])))[0]
     np.testing.assert_allclose(found.correlation, colour(noise).correlation, rtol=1e-12)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from tests.identification.linear import linear_fit, unknowns_of
 
 from swashplate.errors import InputError
 from swashplate.identification.noise import white_noise_covariance
 from swashplate.identification.problem import LinearisedFit, LinearisedRun
-from swashplate.identification.unknowns import Unknowns
 
 RNG = np.random.default_rng(3)
 
@@ -18,9 +18,7 @@ def run(name: str, n: int, columns: int = 2, time: np.ndarray | None = None) -> 
 
 def fit(*runs: LinearisedRun, **more: object) -> LinearisedFit:
     count = runs[0].jacobian.shape[1]
-    return LinearisedFit.of(
-        runs, Unknowns.of([f"p{k}" for k in range(count)], np.ones(count)), **more
-    )
+    return linear_fit(runs, unknowns_of([f"p{k}" for k in range(count)], np.ones(count)), **more)
 
 
 def test_white_noise_errors_are_the_textbooks() -> None:
@@ -39,8 +37,8 @@ def test_white_noise_errors_are_the_textbooks() -> None:
 def test_undetermined_and_bounded_unknowns_have_no_number() -> None:
     base = run("a", 60, columns=4)
     base.jacobian[:, 1] = base.jacobian[:, 0]
-    variables = Unknowns.of("abcd", np.ones(4), at_bound=[0, 0, 1, 0])
-    found = white_noise_covariance(LinearisedFit.of([base], variables))
+    variables = unknowns_of("abcd", np.ones(4), at_bound=[0, 0, 1, 0])
+    found = white_noise_covariance(linear_fit([base], variables))
     assert np.isinf(found.standard_errors[:2]).all()
     assert found.standard_errors[2] == 0.0
     assert 0.0 < found.standard_errors[3] < 1.0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.identification.linear import unknowns_of
 
 from swashplate import Drive, maneuvers
 from swashplate.errors import InputError
@@ -13,7 +14,6 @@ from swashplate.identification.identifiability import (
     identifiability,
     symbol_of,
 )
-from swashplate.identification.unknowns import Unknowns
 from swashplate.maneuvers import sine, step
 
 RNG = np.random.default_rng(4)
@@ -28,7 +28,7 @@ def columns(*null: tuple[float, ...], rows: int = 50) -> np.ndarray:
 
 
 def judged(derivatives: np.ndarray, names: str | list[str], **more: object) -> Identifiability:
-    return identifiability(derivatives, Unknowns.of(list(names), np.ones(len(names))), **more)
+    return identifiability(derivatives, unknowns_of(list(names), np.ones(len(names))), **more)
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def hoist(parts: tuple, leave: set[str], **more: object) -> Identifiability:
     names, values, derivatives = parts
     kept = [k for k, name in enumerate(names) if name not in leave]
     scales = np.where(values == 0.0, 1.0, np.abs(values))[kept]
-    variables = Unknowns.of([names[k] for k in kept], values[kept], scales=scales)
+    variables = unknowns_of([names[k] for k in kept], values[kept], scales=scales)
     return identifiability(derivatives[:, kept] * scales, variables, **more)
 
 
@@ -115,7 +115,7 @@ def test_nothing_at_all_is_a_verdict() -> None:
 
 
 def test_all_at_bounds_is_a_verdict() -> None:
-    variables = Unknowns.of("ab", np.ones(2), at_bound=[1, -1])
+    variables = unknowns_of("ab", np.ones(2), at_bound=[1, -1])
     found = identifiability(RNG.normal(size=(5, 2)), variables)
     assert found.sentences()[0].startswith("All unknowns stand at a bound")
 
@@ -176,7 +176,7 @@ def test_the_largest_change_is_one_per_cent() -> None:
 
 
 def test_an_unknown_at_its_bound_is_flagged_and_held() -> None:
-    variables = Unknowns.of(["Z17", "Z18"], [0.25, 1.0], at_bound=[-1, 0])
+    variables = unknowns_of(["Z17", "Z18"], [0.25, 1.0], at_bound=[-1, 0])
     found = identifiability(np.ones((5, 2)), variables)
     assert found.at_bounds == {"Z17": "lower"}
     assert found.complete  # the two columns are alike, but one is held
@@ -272,7 +272,7 @@ def test_speeds_hardly_tell_the_others(hoist: Drive, name: str) -> None:
 def test_tangents_by_hand() -> None:
     names = ["Z1", "Z8", "Z9", "Z6", "Z2", "Z16_plus", "force_minus_2"]
     values = np.array([4e-7, 1.6e6, 1e7, 0.25, 0.0, 1e-4, 2.0])
-    variables = Unknowns.of(
+    variables = unknowns_of(
         names, values, scales=[1e-7, 1.0, 1e7, 0.5, 0.1, 1e-4, 4.0],
         logarithmic=[False, True, False, False, False, False, False],
     )  # fmt: skip
@@ -288,7 +288,7 @@ def test_tangents_by_hand() -> None:
 
 
 def test_a_gauge_that_needs_a_held_value_is_told_it() -> None:
-    variables = Unknowns.of(["Z2", "Z9"], [0.0, 2.0], scales=[1.0, 2.0])
+    variables = unknowns_of(["Z2", "Z9"], [0.0, 2.0], scales=[1.0, 2.0])
     gauge = BY_NAME["zero of pressure"]
     assert not gauge.tangent(variables).any()
     np.testing.assert_allclose(gauge.tangent(variables, {"Z1": 0.5}), [1.0, 1.0], atol=1e-11)

@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.identification.linear import unknowns_of
 
 from swashplate.errors import InputError
 from swashplate.identification.intervals import Estimate, estimates
 from swashplate.identification.noise import Covariance
-from swashplate.identification.unknowns import Unknowns
 
 
 def covariance(freedom: float = np.inf, **more: object) -> Covariance:
-    variables = Unknowns.of(
+    variables = unknowns_of(
         ["plain", "positive"], [3.0, 2.0], scales=[10.0, 1.0], logarithmic=[False, True], **more
     )
     matrix = np.diag([0.01, 0.04])

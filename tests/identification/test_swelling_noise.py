@@ -1,10 +1,10 @@
 """Noise that differs along the runs: what a stationary estimate misses."""
 
 import numpy as np
+from tests.identification.linear import linear_fit, unknowns_of
 
 from swashplate.identification.noise import Covariance, band_score_covariance
 from swashplate.identification.problem import LinearisedFit, LinearisedRun
-from swashplate.identification.unknowns import Unknowns
 
 RUNS, N = 6, 5120
 TIME = np.arange(N) / 512.0
@@ -21,7 +21,7 @@ def fitted(noise: np.ndarray, pulses: np.ndarray) -> tuple[LinearisedFit, np.nda
         LinearisedRun(f"run {k}", "current", TIME, e + design @ estimate, design)
         for k, e in enumerate(noise)
     ]
-    return LinearisedFit.of(runs, Unknowns.of("ab", np.ones(2))), estimate
+    return linear_fit(runs, unknowns_of("ab", np.ones(2))), estimate
 
 
 def scattered(

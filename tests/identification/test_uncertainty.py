@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 from scipy.stats import t as student
+from tests.identification.linear import linear_fit, unknowns_of
 
 from swashplate.errors import InputError
 from swashplate.identification.intervals import Uncertainty, uncertainty
 from swashplate.identification.noise import Covariance
 from swashplate.identification.problem import LinearisedFit, LinearisedRun
-from swashplate.identification.unknowns import Unknowns
 
 RHO, RUNS, N = 0.98, 4, 2048
 TIME = np.arange(N) / 512.0
@@ -40,7 +40,7 @@ def fitted(designs: list[np.ndarray], noise: np.ndarray) -> tuple[LinearisedFit,
         LinearisedRun(f"run {k}", "speed", TIME, e + J @ estimate, J)
         for k, (J, e) in enumerate(zip(designs, noise, strict=True))
     ]
-    return LinearisedFit.of(runs, Unknowns.of("abc", np.ones(3))), estimate
+    return linear_fit(runs, unknowns_of("abc", np.ones(3))), estimate
 
 
 def covers(covariance: Covariance, error: np.ndarray) -> np.ndarray:
@@ -111,7 +111,7 @@ def test_noise_that_differs_within_runs_gets_the_wider_interval() -> None:
         LinearisedRun(f"run {k}", "speed", TIME, e + design @ estimate, design)
         for k, e in enumerate(noise)
     ]
-    found = uncertainty(LinearisedFit.of(runs, Unknowns.of("abc", np.ones(3))))
+    found = uncertainty(linear_fit(runs, unknowns_of("abc", np.ones(3))))
     assert found.quoted.standard_errors[0] > 1.5 * found.white.standard_errors[0]
 
 
@@ -144,7 +144,7 @@ def test_a_model_error_is_not_called_noise() -> None:
 def test_what_is_not_determined_has_no_number(jacobian: np.ndarray, more: dict) -> None:
     noise = np.random.default_rng(15).normal(size=50)
     run = LinearisedRun("a", "speed", TIME[:50], noise, jacobian)
-    found = uncertainty(LinearisedFit.of([run], Unknowns.of("ab", np.ones(2), **more)))
+    found = uncertainty(linear_fit([run], unknowns_of("ab", np.ones(2), **more)))
     assert all(each.standard_error is None for each in found.estimates)
     assert {each.status for each in found.estimates} <= {
         "undetermined",
@@ -156,7 +156,7 @@ def test_what_is_not_determined_has_no_number(jacobian: np.ndarray, more: dict) 
 def test_one_sample_is_refused() -> None:
     run = LinearisedRun("a", "speed", np.zeros(1), np.ones(1), np.ones((1, 1)))
     with pytest.raises(InputError, match="1 sample for 1 unknown leave nothing"):
-        uncertainty(LinearisedFit.of([run], Unknowns.of(["p"], [1.0])))
+        uncertainty(linear_fit([run], unknowns_of(["p"], [1.0])))
 
 
 def test_an_estimate_at_its_bound_is_released_in_its_partners_intervals() -> None:
@@ -167,8 +167,8 @@ def test_an_estimate_at_its_bound_is_released_in_its_partners_intervals() -> Non
     run = LinearisedRun("run", "y", time, generator.normal(0.0, 1.0, 400), jacobian)
 
     def half(at_bound: list[int]) -> float:
-        names = Unknowns.of(["a", "b"], [1.0, 1.0], at_bound=at_bound)
-        found = uncertainty(LinearisedFit.of([run], names)).estimates
+        names = unknowns_of(["a", "b"], [1.0, 1.0], at_bound=at_bound)
+        found = uncertainty(linear_fit([run], names)).estimates
         assert (found[0].status == "at its upper bound") == bool(at_bound[0])
         assert found[1].lower is not None
         assert found[1].upper is not None
@@ -176,7 +176,7 @@ def test_an_estimate_at_its_bound_is_released_in_its_partners_intervals() -> Non
 
     assert half([1, 0]) == pytest.approx(half([0, 0]))
     alone = LinearisedRun("run", "y", time, run.residual, jacobian[:, 1:])
-    one = uncertainty(LinearisedFit.of([alone], Unknowns.of(["b"], [1.0]))).estimates[0]
+    one = uncertainty(linear_fit([alone], unknowns_of(["b"], [1.0]))).estimates[0]
     assert one.lower is not None
     assert one.upper is not None
     # conditioned on the bound it would be far narrower

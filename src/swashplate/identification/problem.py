@@ -289,7 +289,7 @@ class LinearisedRun(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LinearisedFit:
-    """All runs of a fit at its optimum. Make it with `of`, which checks and cleans."""
+    """All runs of a fit at its optimum that have a sample which counts; see `linearised_fit`."""
 
     runs: tuple[LinearisedRun, ...]
     variables: Unknowns
@@ -299,37 +299,6 @@ class LinearisedFit:
     tolerance: float = TOLERANCE
     prior_noise: Array = field(default_factory=lambda: np.ones(0))
     """(p,) variance of each prior's residual, which counts as that many of the data's."""
-
-    @classmethod
-    def of(
-        cls,
-        runs: Sequence[LinearisedRun],
-        variables: Unknowns,
-        *,
-        prior: Array | None = None,
-        prior_noise: Array | None = None,
-        tolerance: float = TOLERANCE,
-    ) -> LinearisedFit:
-        """Check the runs, drop samples of weight 0 and runs without samples.
-
-        Raises
-        ------
-        InputError
-            If shapes do not fit, stamps do not increase, a number is not finite, or no sample is
-            left; the sentence names the run.
-        """
-        count = variables.count
-        kept = [_checked(run, count) for run in runs]
-        kept = [run for run in kept if run.time.size]
-        if not kept:
-            raise InputError(
-                "No sample counts: every run is empty or has weight 0; give a window a weight."
-            )
-        rows = np.zeros((0, count)) if prior is None else np.asarray(prior, dtype=np.float64)
-        if rows.ndim != 2 or rows.shape[1] != count or not np.isfinite(rows).all():
-            raise InputError(f"The rows of the priors need {count} finite columns each.")
-        noise = np.ones(len(rows)) if prior_noise is None else np.asarray(prior_noise)
-        return cls(tuple(kept), variables, rows, tolerance, noise)
 
     @property
     def prior_middle(self) -> Array:
@@ -444,34 +413,6 @@ def whitening(
     return inverse, determined
 
 
-def _checked(run: LinearisedRun, count: int) -> LinearisedRun:
-    samples = run.time.shape
-    shapes = {"residual": (run.residual, samples), "jacobian": (run.jacobian, (*samples, count))}
-    if run.weight is not None:
-        shapes["weight"] = (run.weight, samples)
-    for what, (array, wanted) in shapes.items():
-        if array.shape != wanted:
-            raise InputError(f"{run.label}: {what} has the shape {array.shape}, needs {wanted}.")
-        if not np.isfinite(array).all():
-            row = int(np.argwhere(~np.isfinite(array))[0][0])
-            raise InputError(
-                f"{run.label}: {what} is not finite at {run.time[row]:g} s; leave the sample out."
-            )
-    if not (np.diff(run.time) > 0.0).all() or not np.isfinite(run.time).all():
-        raise InputError(f"{run.label}: the time stamps must be finite and increase.")
-    if run.weight is None or (run.weight > 0.0).all():
-        return run
-    if (run.weight < 0.0).any():
-        raise InputError(f"{run.label}: a weight is negative; a factor on a residual is not.")
-    used = run.weight > 0.0
-    return run._replace(
-        time=run.time[used],
-        residual=run.residual[used],
-        jacobian=run.jacobian[used],
-        weight=run.weight[used],
-    )
-
-
 BY_DIFFERENCES = 1e-6
 """Singular values of difference derivatives below this part of the largest count as zero."""
 
@@ -503,16 +444,9 @@ def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> Li
         weights = problem.weights[number]
         for name, part in problem.linearised(vector, number).items():
             used = weights[name] > 0.0
-            runs.append(
-                LinearisedRun(
-                    experiment.name,
-                    name,
-                    experiment[name].time[used],
-                    part.values[used],
-                    part.by[used],
-                    weights[name][used],
-                )
-            )
+            if used.any():
+                columns = experiment[name].time, part.values, part.by, weights[name]
+                runs.append(LinearisedRun(experiment.name, name, *(each[used] for each in columns)))
     if loss != "linear":
         for name in problem.channels:
             mine = [k for k, run in enumerate(runs) if run.channel == name]
@@ -528,10 +462,6 @@ def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> Li
     _, prior = problem.unknowns.prior_rows(vector)
     worths = [each.prior.worth for each in problem.unknowns if each.prior is not None]
     exact = isinstance(problem.model, Differentiable)
-    return LinearisedFit.of(
-        runs,
-        problem.unknowns.at(vector),
-        prior=prior,
-        prior_noise=np.array(worths),
-        tolerance=TOLERANCE if exact else BY_DIFFERENCES,
-    )
+    tolerance = TOLERANCE if exact else BY_DIFFERENCES
+    variables = problem.unknowns.at(vector)
+    return LinearisedFit(tuple(runs), variables, prior, tolerance, np.array(worths))
