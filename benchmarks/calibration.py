@@ -255,7 +255,7 @@ def autocovariance(fit):
             middle += level * columns.T @ filtered
     matrix = fit.whitening @ (0.5 * (middle + middle.T)) @ fit.whitening.T
     free = np.full(fit.variables.count, float(fit.spare_samples))
-    return covariance_of("coloured", fit, matrix, free), np.zeros(fit.variables.count)
+    return covariance_of(fit, matrix, free), np.zeros(fit.variables.count)
 
 
 def autocovariance_without_lines(fit):
@@ -294,7 +294,7 @@ def leverage_corrected(power):
             squares += np.sum(seen**2, axis=0)
         free = np.divide(2.0 * total**2, squares, out=np.ones_like(total), where=squares > 0.0)
         matrix = fit.whitening @ middle @ fit.whitening.T
-        found = covariance_of("coloured", fit, matrix, np.maximum(free, 1.0))
+        found = covariance_of(fit, matrix, np.maximum(free, 1.0))
         return found, np.zeros(fit.variables.count)
 
     return method
@@ -322,7 +322,7 @@ def prewhitened_scores(fit):
         middle += recolour[:, None] * total * recolour
     matrix = fit.whitening @ middle @ fit.whitening.T
     free = np.full(fit.variables.count, float(fit.spare_samples))
-    return covariance_of("coloured", fit, matrix, free), np.zeros(fit.variables.count)
+    return covariance_of(fit, matrix, free), np.zeros(fit.variables.count)
 
 
 def autoregression(colour, samples):
@@ -386,7 +386,7 @@ def generalised(fit):
     inverse, _ = whitening(triangle[:, :count], fit.variables.free, fit.tolerance)
     shift = -inverse @ (inverse.T @ (triangle[:, :count].T @ triangle[:, -1]))
     free = np.full(count, float(fit.spare_samples))
-    return covariance_of("white", fit, inverse @ inverse.T, free), shift
+    return covariance_of(fit, inverse @ inverse.T, free), shift
 
 
 def smoothed_spectrum(fit):

@@ -103,10 +103,10 @@ def test_taper_keeps_the_length_and_ends_at_twice_that() -> None:
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.5, 0.9, 0.98])
-def test_effective_samples_of_first_order_noise(rho: float) -> None:
+def test_inflation_by_first_order_noise(rho: float) -> None:
     n = 100_000
     found = colour(*[first_order(n, rho, seed) for seed in range(2)])
-    assert found.effective_samples(n) == pytest.approx(n * (1.0 - rho) / (1.0 + rho), rel=0.1)
+    assert found.inflation == pytest.approx((1.0 + rho) / (1.0 - rho), rel=0.1)
 
 
 def test_a_gap_does_not_change_the_colour() -> None:
@@ -131,8 +131,8 @@ def test_a_drift_is_called_so() -> None:
 
 
 def test_one_sample_and_no_residual_are_worth_what_they_are() -> None:
-    assert colour(np.array([0.3])).effective_samples(1) == 1.0
-    assert colour(np.zeros(100)).effective_samples(100) == 100.0
+    assert colour(np.array([0.3])).inflation == 1.0
+    assert colour(np.zeros(100)).inflation == 1.0
 
 
 def test_channels_and_steps_have_their_own_colours() -> None:

@@ -75,11 +75,8 @@ def test_quoted_intervals_take_it_in(staged: tuple[Campaign, Fit]) -> None:
 def test_variances_add_up_and_so_do_degrees_of_freedom() -> None:
     """By hand: 4 + (0.5² 9 + 1² 1) = 7.25, each part with 8 degrees of freedom."""
     known = np.ones(1, dtype=bool)
-    own = Covariance(
-        "coloured", unknowns_of(["p"], [1.0]), np.array([[4.0]]), known, np.array([8.0])
-    )
+    own = Covariance(unknowns_of(["p"], [1.0]), np.array([[4.0]]), known, np.array([8.0]))
     earlier = Covariance(
-        "coloured",
         unknowns_of(["a", "b"], [1.0, 1.0]),
         np.diag([9.0, 1.0]),
         np.ones(2, dtype=bool),

@@ -16,7 +16,7 @@ def covariance(freedom: float = np.inf, **more: object) -> Covariance:
         ["plain", "positive"], [3.0, 2.0], scales=[10.0, 1.0], logarithmic=[False, True], **more
     )
     matrix = np.diag([0.01, 0.04])
-    return Covariance("coloured", variables, matrix, np.ones(2, bool), np.full(2, freedom))
+    return Covariance(variables, matrix, np.ones(2, bool), np.full(2, freedom))
 
 
 def test_intervals_by_hand() -> None:
@@ -46,9 +46,7 @@ def test_at_a_bound_there_is_no_interval() -> None:
 
 def test_undetermined_there_is_none_either() -> None:
     base = covariance()
-    found = estimates(
-        Covariance("coloured", base.variables, base.matrix, np.array([False, True]), np.ones(2))
-    )
+    found = estimates(Covariance(base.variables, base.matrix, np.array([False, True]), np.ones(2)))
     assert found[0].status == "undetermined"
     assert found[0].standard_error is None
     assert found[1].status == "estimated"

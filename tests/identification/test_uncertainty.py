@@ -91,12 +91,7 @@ def test_the_sentences_say_so(campaigns: list) -> None:
     first = campaigns[0][0]
     said = " ".join(first.sentences())
     assert "Residuals of speed stay correlated over 0." in said
-    assert "White-noise errors would be" in said
-    assert "times too small; the report shows them for comparison only." in said
     assert first.inflation.min() > 30.0
-    label, samples, worth = first.samples[0]
-    assert (label, samples) == ("run 0, speed", N)
-    assert worth == pytest.approx(N / 99.0, rel=0.5)
 
 
 def test_noise_that_differs_within_runs_gets_the_wider_interval() -> None:

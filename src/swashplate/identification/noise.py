@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,19 +17,11 @@ from swashplate.identification.unknowns import Unknowns
 
 Array = NDArray[np.float64]
 
-Noise = Literal["white", "coloured"]
-
-LABELS: Mapping[Noise, str] = {
-    "white": "white noise (too small for coloured residuals)",
-    "coloured": "coloured noise that may swell and fade along the runs",
-}
-
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
     """Covariance of the solver's vector under one assumption on the noise."""
 
-    noise: Noise
     variables: Unknowns
     matrix: Array
     """(K, K); rows and columns of unknowns at a bound or undetermined are 0."""
@@ -37,11 +29,6 @@ class Covariance:
     """(K,) unknowns that have a variance."""
     degrees_of_freedom: Array
     """(K,) of Student's distribution for each interval; inf is the normal one."""
-
-    @property
-    def label(self) -> str:
-        """The assumption in words."""
-        return LABELS[self.noise]
 
     @property
     def standard_errors(self) -> Array:
@@ -62,7 +49,7 @@ class Covariance:
 
 
 def white_noise_covariance(fit: LinearisedFit) -> Covariance:
-    """Covariance if the residuals were white: s²(JᵀJ)⁻¹. To stand next to the others, labelled.
+    """Covariance if the residuals were white: s²(JᵀJ)⁻¹.
 
     Raises
     ------
@@ -71,16 +58,14 @@ def white_noise_covariance(fit: LinearisedFit) -> Covariance:
     """
     spare = fit.spare_samples
     matrix = fit.squares / spare * (fit.whitening @ fit.whitening.T)
-    return covariance_of("white", fit, matrix, np.full(fit.variables.count, float(spare)))
+    return covariance_of(fit, matrix, np.full(fit.variables.count, float(spare)))
 
 
-def covariance_of(noise: Noise, fit: LinearisedFit, matrix: Array, freedom: Array) -> Covariance:
+def covariance_of(fit: LinearisedFit, matrix: Array, freedom: Array) -> Covariance:
     """A covariance from a matrix, cleared of what the fit does not determine."""
     known = np.outer(fit.determined, fit.determined)
     symmetric = 0.5 * (matrix + matrix.T)
-    return Covariance(
-        noise, fit.variables, np.where(known, symmetric, 0.0), fit.determined, freedom
-    )
+    return Covariance(fit.variables, np.where(known, symmetric, 0.0), fit.determined, freedom)
 
 
 Places = NDArray[np.intp]
@@ -253,15 +238,6 @@ class NoiseColour:
         """Whether the runs are only a few correlation lengths long: no noise does that."""
         return self.length > max(DRIFTING * self.longest, 5.0)
 
-    def effective_samples(self, samples: int) -> float:
-        """Independent samples that `samples` correlated ones are worth.
-
-        Notes
-        -----
-        n/(1 + 2 Σ ρ_k), for noise of first order n (1 - ρ)/(1 + ρ).
-        """
-        return max(samples / self.inflation, min(1.0, float(samples)))
-
 
 def unweighted(run: LinearisedRun) -> Array:
     """(n,) differences simulated less measured, without the weights if those are known."""
@@ -401,7 +377,7 @@ class _Sums:
         some = self.squares > 0.0
         np.divide(each * self.total**2, self.squares, out=freedom, where=some)
         matrix = self.fit.whitening @ self.middle @ self.fit.whitening.T
-        return covariance_of("coloured", self.fit, matrix, np.maximum(freedom, 1.0))
+        return covariance_of(self.fit, matrix, np.maximum(freedom, 1.0))
 
 
 class _Spectrum:

@@ -15,7 +15,7 @@ from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.experiment_design import Advice, Gain, SensorAdvice
 from swashplate.identification.identifiability import GAUGES, SCALES, moved_columns, true_values
-from swashplate.identification.intervals import Estimate, estimates
+from swashplate.identification.intervals import Estimate
 from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.validation import ignored_windows, pooled, with_speeds
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
@@ -72,9 +72,8 @@ def estimates_table(
     unknowns = stage.problem.unknowns
     true = {} if truth is None else true_values(stage, truth)
     refitted = None if bootstrap is None else bootstrap.intervals()
-    level, quoted, white = _intervals(assessment)
+    level, quoted = _intervals(assessment)
     ends = f"{100.0 * level:g} %"
-    head = " white noise," if _alternating(quoted, white) else " white noise, too small,"
     number = ".5g"
     made = Table(
         f"Stage {stage.stage.name}",
@@ -91,8 +90,6 @@ def estimates_table(
             Column(f"lower {ends}", number, none=NONE),
             Column(f"upper {ends}", number, none=NONE),
             Column("half width", "s", of="p"),
-            Column(f"{ends}{head} from", number, of="p", none=NONE),
-            Column("to", number, of="p", none=NONE),
             Column(f"bootstrap lower {ends}", number, none="-", of="tpf" if refitted else ""),
             Column(f"bootstrap upper {ends}", number, none="-", of="tpf" if refitted else ""),
             Column("standard error", number, of="f"),
@@ -104,7 +101,7 @@ def estimates_table(
     for k, (name, unknown) in enumerate(zip(unknowns.names, unknowns, strict=True)):
         if (unknown.run is None) == own:
             continue
-        estimate, narrow = quoted[k], white[k]
+        estimate = quoted[k]
         value, factor = stage.values[name], chosen_unit(unknown.unit).factor
         status = at_bounds.get(name, "estimated") if estimate is None else estimate.status
         low, high = (None, None) if estimate is None else (estimate.lower, estimate.upper)
@@ -129,7 +126,6 @@ def estimates_table(
             lower,
             upper,
             NONE if low is None or high is None else f"±{percent(0.5 * (high - low), value)}",
-            *((None, None) if narrow is None else (narrow.lower, narrow.upper)),
             *redrawn,
             None if estimate is None else estimate.standard_error,
             status,
@@ -145,27 +141,13 @@ def _end(value: float | None, shown: str, factor: float, side: str) -> Cell:
     return Cell(value, shown or f"{factor * value:.5g}")
 
 
-def _intervals(
-    assessment: Assessment,
-) -> tuple[float, Sequence[Estimate | None], Sequence[Estimate | None]]:
-    """Level, intervals and those for white noise; none where the verdict says why."""
+def _intervals(assessment: Assessment) -> tuple[float, Sequence[Estimate | None]]:
+    """Level and intervals; none where the verdict says why."""
     try:
         found = assessment.uncertainty
-        return found.level, found.estimates, estimates(found.white, level=found.level)
+        return found.level, found.estimates
     except InputError:
-        nothing = [None] * len(assessment.stage.problem.unknowns)
-        return 0.95, nothing, nothing
-
-
-def _alternating(quoted: Sequence[Estimate | None], white: Sequence[Estimate | None]) -> bool:
-    """Whether white noise would give the wider intervals, as for residuals that alternate."""
-    pairs = [
-        (wide.standard_error, narrow.standard_error)
-        for wide, narrow in zip(quoted, white, strict=True)
-        if wide is not None and narrow is not None
-    ]
-    ratios = sorted(narrow / wide for wide, narrow in pairs if wide and narrow)
-    return bool(ratios) and ratios[len(ratios) // 2] > 1.0
+        return 0.95, [None] * len(assessment.stage.problem.unknowns)
 
 
 def _at_bounds(stage: StageFit) -> dict[str, str]:
@@ -630,10 +612,6 @@ def best_tests_table(gains: Sequence[Gain], best: Mapping[str, tuple[str, Gain]]
         test, after = best.get(gain.name, ("none tells more", gain))
         made.add(gain.name, _error(gain.before), _error(after.after), test)
     return made
-
-
-def _gained(gain: Gain) -> str:
-    return f"{gain.name} {_error(gain.before)} to {_error(gain.after)}"
 
 
 def _error(error: float) -> str:
