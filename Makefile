@@ -13,7 +13,7 @@ export PIP_BUILD_CONSTRAINT := constraints.txt
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test golden lint docs figures reproduce bench cluster fuzz tools browser calibration coverage dist \
+.PHONY: help .venv demo test test-slow golden lint docs figures reproduce bench cluster fuzz tools browser calibration coverage dist \
   format clean
 
 help: ## list the targets
@@ -33,9 +33,13 @@ $(STAMP): pyproject.toml constraints.txt
 demo: $(STAMP) ## identify a virtual hoist from its tests, with a report, into demo/
 	@$(BIN)/swashplate demo --out demo
 
-test: lint ## lint, then all tests: compiled, and a part of them interpreted
-	@echo; echo "== Tests, compiled"
-	@$(BIN)/pytest -n 2 --dist loadgroup --durations=40
+test: lint ## lint, then the quick tests
+	@echo; echo "== Tests"
+	@$(BIN)/pytest -n 2 --dist loadgroup --durations=40 -m "not slow"
+
+test-slow: $(STAMP) ## the slow tests: pages, examples, reproduction, searches, without the JIT
+	@echo "== Slow tests"
+	@$(BIN)/pytest -n 2 --dist loadgroup --durations=40 -m slow
 	@echo; echo "== Tests marked 'interpreted', without the JIT"
 	@NUMBA_DISABLE_JIT=1 $(BIN)/pytest -n 2 -m interpreted
 

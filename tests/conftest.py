@@ -19,6 +19,17 @@ settings.register_profile(
 settings.load_profile("swashplate")
 
 
+SLOW = {"docs", "examples", "reproduction"}
+"""Folders whose tests run whole pages, notebooks and figures: `make test-slow`."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what lies in a slow folder as slow."""
+    for item in items:
+        if item.path.parent.name in SLOW:
+            item.add_marker(pytest.mark.slow)
+
+
 def richardson(function: Callable[..., float], at: Sequence[float], index: int, h: float) -> float:
     """Central difference by one argument, extrapolated once: error O(h⁴)."""
 
