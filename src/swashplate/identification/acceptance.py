@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Literal, NamedTuple
@@ -200,29 +201,38 @@ def required_accuracy(held: Sequence[RunQuality], required: float) -> Criterion:
     )
 
 
-def carried_over(fitted: Sequence[RunQuality], held: Sequence[RunQuality]) -> list[Criterion]:
+def held_over_fitted(
+    fitted: Sequence[RunQuality], held: Sequence[RunQuality]
+) -> dict[str, tuple[float, float]]:
+    """RMSE of held-out over that of fitted runs, and NRMSE of held-out ones, by channel."""
+    reference = pooled(fitted)
+    return {
+        name: (found.rmse / reference[name].rmse, found.nrmse)
+        for name, found in pooled(held).items()
+        if name in reference and reference[name].rmse > 0.0 and found.nrmse is not None
+    }
+
+
+def carried_over(fitted: Sequence[RunQuality], held: Sequence[RunQuality]) -> Criterion:
     """That runs that were held out are simulated about as well as those that were fitted."""
-    reference, clauses, largest = pooled(fitted), list[str](), 0.0
-    for name, found in pooled(held).items():
-        if name not in reference or reference[name].rmse == 0.0 or found.nrmse is None:
-            continue
-        ratio = found.rmse / reference[name].rmse
-        if found.nrmse >= SERIOUS:
-            largest = max(largest, ratio)
-        if ratio > FAR and found.nrmse >= SERIOUS:
-            clauses.append(f"held-out {name} has {ratio:.1f} times the RMSE of the fitted runs")
-    if not held:
-        return []
-    return [
-        Criterion(
-            "RMSE, held-out / fitted",
-            f"{largest:.2g}" if largest else "small",
-            f"{FAR:g}",
-            "twice what manoeuvres differ by anyway",
-            "use",
-            "; ".join(clauses),
-        )
-    ]
+    serious = {
+        name: ratio
+        for name, (ratio, nrmse) in held_over_fitted(fitted, held).items()
+        if nrmse >= SERIOUS
+    }
+    largest = max(serious.values(), default=0.0)
+    return Criterion(
+        "RMSE, held-out / fitted",
+        f"{largest:.2g}" if largest else "small",
+        f"{FAR:g}",
+        "twice what manoeuvres differ by anyway",
+        "use",
+        "; ".join(
+            f"held-out {name} has {ratio:.1f} times the RMSE of the fitted runs"
+            for name, ratio in serious.items()
+            if ratio > FAR
+        ),
+    )
 
 
 def consistent(assessments: Sequence[Assessment]) -> Criterion:
@@ -266,8 +276,8 @@ def bounded_predictions(
     assessments: Sequence[Assessment], predicted: Sequence[RunQuality]
 ) -> Criterion:
     """That what is predicted depends on nothing that the fitted runs leave open."""
-    runs = {each.experiment.name: each.experiment for each in predicted}
-    names = unbounded_predictions(assessments, list(runs.values()))
+    runs = {each.experiment.name: each.experiment for each in predicted}.values()
+    names = unbounded_predictions(assessments, list(runs))
     return Criterion(
         "predictions left open",
         listed(names) or "none",
@@ -276,14 +286,6 @@ def bounded_predictions(
         "use",
         f"predictions depend on {listed(names)}, which the fitted runs leave open" if names else "",
     )
-
-
-def misfit_of(assessments: Sequence[Assessment]) -> LackOfFit | None:
-    """The test for lack of fit; None where there is nothing to tell noise from."""
-    try:
-        return lack_of_fit(assessments) if assessments else None
-    except InputError:
-        return None
 
 
 def misfit_criteria(misfit: LackOfFit, judged: Sequence[RunQuality]) -> list[Criterion]:
@@ -467,7 +469,10 @@ def verdict(
     fitted = _judged([each for assessment in assessments for each in assessment.runs])
     held = _judged(predicted)
     own = [each for assessment in assessments for each in assessment.runs] or predicted
-    misfit = misfit_of(assessments)
+    misfit = None
+    if assessments:
+        with suppress(InputError):  # nothing to tell noise from
+            misfit = lack_of_fit(assessments)
     criteria = [*convergence(assessments, planned)]
     for which, qualities in (
         ("fitted", fitted),
@@ -479,7 +484,7 @@ def verdict(
         criteria.append(required_accuracy(held, required))
     if assessments:
         criteria += [
-            *carried_over(fitted, held),
+            *([carried_over(fitted, held)] if held else []),
             consistent(assessments),
             determined(assessments),
             bounded_predictions(assessments, predicted),
@@ -606,15 +611,11 @@ def _carrying_over(fitted: Sequence[RunQuality], held: Sequence[RunQuality]) -> 
         words = "No run was held out: how the fit carries over to other tests was not tried."
         return Statement("Validation", "look", (words,))
     said, look = list[str](), False
-    reference = pooled(fitted)
-    for name, found in pooled(held).items():
-        if name not in reference or reference[name].rmse == 0.0 or found.nrmse is None:
-            continue
-        ratio = found.rmse / reference[name].rmse
+    for name, (ratio, nrmse) in held_over_fitted(fitted, held).items():
         words = "the fit carries over"
         if ratio > CARRIES_OVER:
             look = True
-            near = ratio <= FAR or found.nrmse < SERIOUS
+            near = ratio <= FAR or nrmse < SERIOUS
             words = (
                 f"the fit {'carries over with a larger error' if near else 'does not carry over'}"
             )
@@ -756,15 +757,19 @@ def _validity(assessments: Sequence[Assessment]) -> str:
                     longest[name] = max(longest.get(name, 0.0), seconds)
         except (DomainError, InputError):
             return f"{said}."
-        never = [words for prefix, words in LIMITS.items() if not _any(longest, prefix)]
-        one_way = [
+        reached = {
+            prefix: any(s > 0.0 for name, s in longest.items() if name.startswith(prefix))
+            for prefix in LIMITS
+        }
+        never = [words for prefix, words in LIMITS.items() if not reached[prefix]]
+        never += [
             f"{words} in {'negative' if sign == 'minus' else 'positive'} direction"
             for prefix, words in LIMITS.items()
             for sign in ("plus", "minus")
-            if _any(longest, prefix) and longest.get(f"{prefix}_{sign}", 1.0) == 0.0
+            if reached[prefix] and longest.get(f"{prefix}_{sign}", 1.0) == 0.0
         ]
-        if never or one_way:
-            said += f"; never reached: {listed([*never, *one_way])}"
+        if never:
+            said += f"; never reached: {listed(never)}"
     return f"{said}."
 
 
@@ -777,15 +782,9 @@ LIMITS: Mapping[str, str] = {
 """What a drive may never have reached in the fitted runs, by symbol."""
 
 
-def _any(longest: Mapping[str, float], symbol: str) -> bool:
-    return any(seconds > 0.0 for name, seconds in longest.items() if name.startswith(symbol))
-
-
 def _assumptions(misfit: LackOfFit | None) -> tuple[str, ...]:
     """What cannot be checked, in sentences."""
     if misfit is None:
         return ()
-    said = [f"{each.assumption}." for each in misfit.assumed]
-    if misfit.units:
-        said.insert(0, f"The estimates are in units of the fixed {listed(misfit.units)}.")
-    return tuple(said)
+    units = [f"The estimates are in units of the fixed {listed(misfit.units)}."]
+    return (*(units if misfit.units else ()), *(f"{each.assumption}." for each in misfit.assumed))
