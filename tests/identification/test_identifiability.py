@@ -57,19 +57,6 @@ def test_a_full_set_is_called_so() -> None:
     assert found.sentences()[0].startswith("The tests determine all 3 free unknowns")
 
 
-def test_sensitivities_are_per_cent() -> None:
-    found = judged(np.array([[3.0, 0.0], [4.0, 2.0]]), "ab")
-    np.testing.assert_allclose(found.sensitivity, [0.05, 0.02])
-
-
-def test_the_triangle_says_the_same_as_the_derivatives() -> None:
-    derivatives = columns((1.0, -1.0, 0.0, 0.5))
-    whole = judged(derivatives, "abcd")
-    reduced = judged(np.linalg.qr(derivatives, mode="r"), "abcd")
-    assert whole.rank == reduced.rank == 3
-    assert whole.sentences()[1] == reduced.sentences()[1]
-
-
 def test_a_null_direction_is_written_by_name() -> None:
     found = judged(columns((0.0, -0.7, 0.0, 0.7)), ["Z1", "Z3", "Z8", "Z9"])
     (direction,) = found.null
@@ -292,17 +279,3 @@ def test_a_gauge_that_needs_a_held_value_is_told_it() -> None:
     gauge = BY_NAME["zero of pressure"]
     assert not gauge.tangent(variables).any()
     np.testing.assert_allclose(gauge.tangent(variables, {"Z1": 0.5}), [1.0, 1.0], atol=1e-11)
-
-
-@pytest.mark.parametrize(
-    ("name", "symbol"),
-    [
-        ("Z4", "Z4"),
-        ("Z16_minus", "Z16"),
-        ("force_plus_2", "force"),
-        ("initial pressure (hoistr6)", "initial pressure"),
-        ("pump.Z1", "Z1"),
-    ],
-)
-def test_symbols(name: str, symbol: str) -> None:
-    assert symbol_of(name) == symbol

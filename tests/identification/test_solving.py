@@ -199,13 +199,6 @@ def test_starts_are_spread_seeded_and_inside(problem: Problem) -> None:
     assert not np.array_equal(starts[0], next(iter(sobol_starts(problem, 1, seed=6))))
 
 
-def test_starts_outside_the_domain_are_drawn_again(experiment: Make) -> None:
-    run = experiment("run", 1.0, np.full(81, 3.9))
-    made = Problem(Fragile(), (run,), UNKNOWNS, ("y",), {"y": 0.1})
-    for start in sobol_starts(made, 6, seed=1):
-        assert UNKNOWNS.values(start)["gain"] <= 4.0
-
-
 def card_problem(tests: rig.VirtualTests) -> Problem:
     (run,) = tests.runs.values()
     source = Source(Path(run.stem), "")

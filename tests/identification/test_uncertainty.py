@@ -66,15 +66,6 @@ def test_intervals_for_coloured_noise_cover_the_truth(campaigns: list) -> None:
     assert 0.915 <= share <= 0.985
 
 
-def test_white_noise_intervals_do_not(campaigns: list) -> None:
-    """They are nine times too narrow and cover a sixth."""
-    share = np.mean([covers(each.white, error) for each, error in campaigns])
-    assert share < 0.3
-    spread = np.std([error for _, error in campaigns], axis=0)
-    white = np.mean([each.white.standard_errors for each, _ in campaigns], axis=0)
-    assert ((spread / white > 6.0) & (spread / white < 11.0)).all()
-
-
 def test_correlations_that_cancel_cost_no_samples() -> None:
     """A resonance swings: its correlations are of both signs, and their sum is next to nothing."""
     rng = np.random.default_rng(11)
@@ -92,22 +83,6 @@ def test_the_sentences_say_so(campaigns: list) -> None:
     said = " ".join(first.sentences())
     assert "Residuals of speed stay correlated over 0." in said
     assert first.inflation.min() > 30.0
-
-
-def test_noise_that_differs_within_runs_gets_the_wider_interval() -> None:
-    """Ten times the noise where the third shape is alone: an error of white noise misses it."""
-    rng = np.random.default_rng(11)
-    bump = np.exp(-((TIME - 2.0) ** 2) / 0.02)
-    design = np.column_stack([bump, np.ones(N), np.sin(3.0 * TIME)])
-    noise = rng.normal(size=(12, N)) * np.where(bump > 0.01, 10.0, 1.0)
-    total = 12 * design.T @ design
-    estimate = -np.linalg.solve(total, sum(design.T @ e for e in noise))
-    runs = [
-        LinearisedRun(f"run {k}", "speed", TIME, e + design @ estimate, design)
-        for k, e in enumerate(noise)
-    ]
-    found = uncertainty(linear_fit(runs, unknowns_of("abc", np.ones(3))))
-    assert found.quoted.standard_errors[0] > 1.5 * found.white.standard_errors[0]
 
 
 def test_white_residuals_are_called_white() -> None:

@@ -68,12 +68,6 @@ def test_bounds_that_are_reached() -> None:
     assert unknowns.at(np.array([0.1, 1.9])).at_bound.tolist() == [0, 0]
 
 
-def test_values_never_leave_the_bounds() -> None:
-    unknown = bounded("b", 0.3, relative=(0.1, 3.0), log=True)
-    for bound in Unknowns((unknown,)).bounds:
-        assert unknown.low <= unknown.to_value(float(bound[0])) <= unknown.high
-
-
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
@@ -93,21 +87,6 @@ def test_values_never_leave_the_bounds() -> None:
 def test_what_is_refused(make, sentence: str) -> None:
     with pytest.raises(ParameterError, match=sentence):
         make()
-
-
-def test_vector_and_values_are_inverses() -> None:
-    variables = unknowns_of(
-        ["Z8", "Z18", "offset"], [2.0, 0.0, -3.0], scales=[1.0, 5.0, 2.0],
-        logarithmic=[True, False, False],
-    )  # fmt: skip
-    np.testing.assert_allclose(variables.vector, [np.log(2.0), 0.0, -1.5])
-    np.testing.assert_allclose(variables.to_values(variables.vector), [2.0, 0.0, -3.0])
-    # d exp(u)/du is the value, d (u scale)/du the scale
-    np.testing.assert_allclose(variables.slopes, [2.0, 5.0, 2.0])
-
-
-def test_scales_default_to_the_values_sizes() -> None:
-    np.testing.assert_array_equal(unknowns_of(["a", "b"], [-4.0, 0.0]).scales, [4.0, 1.0])
 
 
 def test_unbounded_vectors_give_no_nan() -> None:

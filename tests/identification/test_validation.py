@@ -98,12 +98,6 @@ def test_windows_that_do_not_count() -> None:
     assert ignored_windows(run["current"]) == ()
 
 
-def test_a_position_has_a_speed_beside_it(campaign: Campaign) -> None:
-    (run,) = campaign
-    qualities = with_speeds(predict(Drive.preset("hoist").parameters, [run]))
-    assert [each.channel for each in qualities] == ["current", "counts", "speed from counts"]
-
-
 def test_a_run_that_no_drive_simulates_is_refused(experiment: Callable[..., Experiment]) -> None:
     run = experiment("bench", 1.0, np.zeros(81))
     with pytest.raises(InputError, match="bench has no channel that a drive has"):

@@ -19,7 +19,7 @@ from swashplate.drive import Drive
 from swashplate.equations import Model as Equations
 from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial
-from swashplate.identification.data_checks import check_sound, refuse_unsound
+from swashplate.identification.data_checks import check_model, check_sound, refuse_unsound
 from swashplate.identification.drive_model import DriveModel, at_rate_of
 from swashplate.identification.intervals import weighed
 from swashplate.identification.lack_of_fit import measurement_error
@@ -191,6 +191,7 @@ def fit(
             entries = free if isinstance(free, Mapping) else {}
             named = tuple(channels), dict(noise or {}), dict(fixed or {})
             own = ModelSetup(own, entries, "", *named)
+        doubts = refuse_unsound(check_model(experiments, own))
         nominal = own.nominal(experiments)
         setup = own.setup
     else:
