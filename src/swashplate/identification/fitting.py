@@ -269,17 +269,7 @@ def _from_elsewhere(
         others = solve_from(problem, starts, tolerance=tolerance, max_evaluations=max_evaluations)
     except KeyboardInterrupt:  # before the first of them ended
         others = ()
-    nominal = StartResult(
-        0,
-        tuple(map(float, problem.start)),
-        tuple(map(float, found.vector)),
-        found.start_cost,
-        found.cost,
-        found.evaluations,
-        found.converged,
-        found.message,
-        found.seconds,
-    )
+    nominal = StartResult.of(0, problem.start, found)
     return nominal, *(replace(each, number=each.number + 1) for each in others)
 
 

@@ -315,14 +315,9 @@ def identifiability(
     Raises
     ------
     InputError
-        If the shape is wrong or a number is not finite.
+        If a derivative is not finite.
     """
     triangle = np.asarray(derivatives, dtype=np.float64)
-    if triangle.ndim != 2 or triangle.shape[1] != variables.count:
-        raise InputError(
-            f"The derivatives have the shape {triangle.shape}; {variables.count} unknowns need as "
-            "many columns."
-        )
     if not np.isfinite(triangle).all():
         column = int(np.argwhere(~np.isfinite(triangle))[0][1])
         raise InputError(f"The derivatives by {variables.names[column]} are not all finite.")

@@ -433,17 +433,7 @@ def _smoothed(values: Array) -> Array:
 def band_score_covariance(
     fit: LinearisedFit, spectra: Sequence[_Spectrum] | None = None
 ) -> Covariance:
-    """Covariance of the least-squares estimate under noise that may differ along the runs.
-
-    Parameters
-    ----------
-    fit : LinearisedFit
-        The fit. Its runs, and channels of a run, are taken as independent of each other.
-
-    Raises
-    ------
-    InputError
-        If there are no more samples than unknowns.
+    """Covariance under noise that may differ along the runs; otherwise as `spectral_covariance`.
 
     Notes
     -----
@@ -470,16 +460,6 @@ def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
     A smoothed spectrum knows the noise well but takes it as alike all along a run; scores by bands
     take in noise that is not, but are few. On the bench neither alone holds 93 to 97 % on every
     axis, both together do (docs/calibration.md).
-
-    Parameters
-    ----------
-    fit : LinearisedFit
-        The fit.
-
-    Raises
-    ------
-    InputError
-        If there are no more samples than unknowns.
     """
     spectra = spectra_of(fit)
     first, second = spectral_covariance(fit, spectra), band_score_covariance(fit, spectra)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Literal, NamedTuple, Protocol
@@ -383,6 +384,13 @@ class StartResult:
     message: str
     seconds: Finite
 
+    @classmethod
+    def of(cls, number: int, start: Array, found: Solution) -> StartResult:
+        """What a solver found from a start."""
+        ends = (tuple(map(float, each)) for each in (start, found.vector))
+        spent = found.evaluations, found.converged, found.message, found.seconds
+        return cls(number, *ends, found.start_cost, found.cost, *spent)
+
 
 class _StartFile(BaseModel):
     """A result on disk, and what it depends on."""
@@ -391,13 +399,6 @@ class _StartFile(BaseModel):
 
     origin: dict[str, str]
     result: StartResult
-
-
-class _Task(NamedTuple):
-    number: int
-    start: tuple[float, ...]
-    tolerance: float
-    max_evaluations: int
 
 
 def time_left(finished: int, left: int, seconds: float) -> float | None:
@@ -465,12 +466,9 @@ def solve_from(
     """
     origin = dict(origin or {})
     done = _stored(store, origin, starts, resume) if store is not None else {}
-    tasks = [
-        _Task(number, tuple(float(x) for x in start), tolerance, max_evaluations)
-        for number, start in enumerate(starts)
-        if number not in done
-    ]
-    running = (executor or Serial()).run(_solve_one, objective, tasks)
+    solved = partial(solve, tolerance=tolerance, max_evaluations=max_evaluations)
+    tasks = [(number, start) for number, start in enumerate(starts) if number not in done]
+    running = (executor or Serial()).run(_solve_one, (objective, solved), tasks)
     try:
         for _, result in running:
             done[result.number] = result
@@ -484,27 +482,17 @@ def solve_from(
     return tuple(done[number] for number in sorted(done) if number < len(starts))
 
 
-def _solve_one(objective: Objective, task: _Task) -> StartResult:
-    start = np.array(task.start)
+def _solve_one(
+    shared: tuple[Objective, Callable[..., Solution]], task: tuple[int, Array]
+) -> StartResult:
+    (objective, solved), (number, start) = shared, task
     try:
-        solution = solve(
-            objective, start, tolerance=task.tolerance, max_evaluations=task.max_evaluations
-        )
+        solution = solved(objective, start)
     except DomainError as error:
         solution = Solution(start, np.inf, np.inf, 1, False, False, str(error), 0.0)
     if solution.interrupted:
         raise KeyboardInterrupt
-    return StartResult(
-        task.number,
-        task.start,
-        tuple(float(x) for x in solution.vector),
-        solution.start_cost,
-        solution.cost,
-        solution.evaluations,
-        solution.converged,
-        solution.message,
-        solution.seconds,
-    )
+    return StartResult.of(number, start, solution)
 
 
 def _keep(store: Path, origin: dict[str, str], result: StartResult) -> None:

@@ -112,27 +112,14 @@ def bounded(
 ) -> Unknown:
     """An unknown with bounds that are multiples of its nominal value, or numbers.
 
-    Parameters
-    ----------
-    name : str
-        Its name.
-    nominal : float
-        Where the fit begins.
-    relative, absolute : (float, float)
-        One of the two: factors on the nominal value, in either order, or bounds as they are.
-    least : float, optional
-        Value that it must not fall below, whatever the bounds: it begins there at the lowest.
-    **more :
-        Other fields of `Unknown`.
+    `relative` are factors on the nominal value, in either order, `absolute` the bounds as they are;
+    it never falls below `least`, and begins there at the lowest. `more` are fields of `Unknown`.
 
     Raises
     ------
     ParameterError
-        If both or none are given, or `relative` is given for a nominal value of 0, which no
-        factor moves.
+        If `relative` is given for a nominal value of 0, which no factor moves.
     """
-    if (relative is None) == (absolute is None):
-        raise ParameterError(f"{name} needs bounds: give relative or absolute ones, one of them.")
     if relative is not None:
         if nominal == 0.0:
             raise ParameterError(
