@@ -24,10 +24,12 @@ from swashplate.identification.lack_of_fit import (
 )
 from swashplate.identification.solving import StartResult
 from swashplate.identification.validation import pooled, with_speeds
+from swashplate.results import Result, short
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Assessment
     from swashplate.identification.validation import Measures, RunQuality
+    from swashplate.tables import Table
 
 Rules = Literal["use", "values"]
 
@@ -400,6 +402,9 @@ Grade = Literal["Usable", "Usable for prediction", "Not usable"]
 class Statement(NamedTuple):
     """One subject of a verdict."""
 
+    def __repr__(self) -> str:
+        return short(self)
+
     subject: str
     weight: Weight
     """``"bad"`` where it rules out the use, ``"look"`` where something asks for attention."""
@@ -407,7 +412,7 @@ class Statement(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(Result):
     """The judgement on a fit, or on a drive over some runs."""
 
     headline: str
@@ -420,6 +425,12 @@ class Verdict:
     reach; empty for a drive that was not fitted."""
     assumed: tuple[str, ...] = ()
     """What is assumed and cannot be checked from these logs."""
+
+    def table(self) -> Table:
+        """Its criteria."""
+        from swashplate.identification.tables import criteria_table
+
+        return criteria_table(self)
 
     @property
     def usable(self) -> bool:

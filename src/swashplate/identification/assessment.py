@@ -50,6 +50,7 @@ from swashplate.identification.validation import RunQuality, predict, run_qualit
 from swashplate.parameters.definitions import find
 from swashplate.parameters.files import dump_set, read_set
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.results import Result
 from swashplate.tables import write_text
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     from swashplate.executors import Executor
     from swashplate.identification.intervals import Estimate
     from swashplate.identification.solving import Loss
+    from swashplate.tables import Table
 
 Array = NDArray[np.float64]
 
@@ -65,12 +67,18 @@ LIMITS = ("Z13", "Z14", "Z15", "Z16")
 
 
 @dataclass(frozen=True, eq=False)
-class Assessment:
+class Assessment(Result):
     """What a stage's data tell of its unknowns, and how good the fit is."""
 
     stage: StageFit
     earlier: tuple[Assessment, ...] = ()
     """Of the stages before, whose results this one takes for granted."""
+
+    def tables(self) -> list[Table]:
+        """Estimates with their intervals, then the errors of each run."""
+        from swashplate.identification.tables import estimates_table, runs_tables
+
+        return [estimates_table(self), *runs_tables(self.runs)]
 
     @property
     def _vector(self) -> Array:
@@ -155,7 +163,7 @@ class Wanted:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class Judged(Result):
     """A fit and all that was found out about it."""
 
     campaign: Campaign
@@ -170,6 +178,21 @@ class Judged:
     folds: CrossValidation | None = None
     notes: Mapping[str, str] = field(default_factory=dict)
     """Versions, seed, campaign."""
+
+    def tables(self) -> list[Table]:
+        """Criteria of the verdict, then the fit's tables and the errors of held-out runs."""
+        from swashplate.identification.tables import criteria_table, runs_tables
+
+        return [
+            criteria_table(self.verdict),
+            *self.result.tables(),
+            *(runs_tables(self.predicted) if self.predicted else ()),
+        ]
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The verdict's headline and all that it says."""
+        return (self.verdict.headline, *self.verdict.sentences)
 
     def name_of(self, profile: StageProfile) -> str:
         """The unknown that a profile is of."""
@@ -404,7 +427,7 @@ class FitFile(Entry):
 
 
 @dataclass(frozen=True, eq=False)
-class StoredFit:
+class StoredFit(Result):
     """A fit as it was, and what was computed with it."""
 
     fit: Fit

@@ -20,6 +20,7 @@ from swashplate.identification.unknowns import Unknowns
 from swashplate.models.pump import ANGLE, FORCE, MOTION, PRESSURE, TILT, TRAVEL, ZERO
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.results import Result
 
 if TYPE_CHECKING:
     from swashplate.identification.fitting import Fit, StageFit
@@ -221,7 +222,7 @@ def _in_order(name: str) -> tuple[str | int, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Identifiability:
+class Identifiability(Result):
     """Verdict on a fit's unknowns, before a fit or after."""
 
     variables: Unknowns

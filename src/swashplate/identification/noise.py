@@ -14,12 +14,13 @@ from scipy.linalg import eigh_tridiagonal
 
 from swashplate.identification.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.unknowns import Unknowns
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Covariance:
+class Covariance(Result):
     """Covariance of the solver's vector under one assumption on the noise."""
 
     variables: Unknowns
@@ -208,7 +209,7 @@ def flat_top(lags: Array, length: float) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class NoiseColour:
+class NoiseColour(Result):
     """How the residuals of one channel are correlated, from all its runs of one sampling step."""
 
     channel: str

@@ -25,6 +25,7 @@ from swashplate.identification.model import (
 )
 from swashplate.identification.solving import Evaluation, Loss, influence
 from swashplate.identification.unknowns import Unknowns
+from swashplate.results import Result, short
 
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor
@@ -34,7 +35,7 @@ Part = TypeVar("Part")
 
 
 @dataclass(frozen=True)
-class Problem:
+class Problem(Result):
     """Half the weighted sum of squares of all experiments, as a function of the unknowns.
 
     The residual of a sample is sqrt(weight)/scale times (simulated less measured).
@@ -269,6 +270,9 @@ tests do tell at 2e-5. Derivatives by central differences are good to about 1e-9
 class LinearisedRun(NamedTuple):
     """One channel of one experiment at the optimum; only the samples that count."""
 
+    def __repr__(self) -> str:
+        return short(self)
+
     name: str
     """The experiment's."""
     channel: str
@@ -288,7 +292,7 @@ class LinearisedRun(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class LinearisedFit:
+class LinearisedFit(Result):
     """All runs of a fit at its optimum that have a sample which counts; see `linearised_fit`."""
 
     runs: tuple[LinearisedRun, ...]

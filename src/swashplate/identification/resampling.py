@@ -25,6 +25,7 @@ from swashplate.identification.staging import Parameters, stage_problem
 from swashplate.identification.unknowns import Unknowns
 from swashplate.identification.validation import Measures, predict, with_speeds
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.results import Result
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Assessment
@@ -71,7 +72,7 @@ class FoldEstimate(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Fold:
+class Fold(Result):
     """One part of the runs, and the fit to the others."""
 
     number: int
@@ -103,7 +104,7 @@ class Spread(NamedTuple):
 
 
 @dataclass(frozen=True)
-class CrossValidation:
+class CrossValidation(Result):
     """The folds of a campaign."""
 
     seed: int
@@ -397,7 +398,7 @@ class NoiseDraws:
 
 
 @dataclass(frozen=True, eq=False)
-class Bootstrap:
+class Bootstrap(Result):
     """Estimates from other noise."""
 
     variables: Unknowns

@@ -17,6 +17,7 @@ from swashplate.documents import read_json
 from swashplate.errors import DomainError, FileError, InputError, SwashplateError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.unknowns import Vector
+from swashplate.results import Result, short
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
@@ -66,6 +67,9 @@ def influence(residuals: Array, loss: Loss) -> tuple[Array, Array]:
 
 class Evaluation(NamedTuple):
     """Residuals and their derivatives by the solver's vector at one point."""
+
+    def __repr__(self) -> str:
+        return short(self)
 
     residuals: Array
     """(m,) residuals, or any vector of which sum of squares and gradient are the same."""
@@ -131,7 +135,7 @@ def longest_left(progress: Progress) -> float | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Result):
     """The optimum that a solver reached."""
 
     vector: Vector
@@ -368,7 +372,7 @@ def sobol_starts(objective: Objective, count: int, seed: int) -> Iterator[Array]
 
 
 @dataclass(frozen=True)
-class StartResult:
+class StartResult(Result):
     """How one start ended."""
 
     number: int
@@ -387,9 +391,9 @@ class StartResult:
     @classmethod
     def of(cls, number: int, start: Array, found: Solution) -> StartResult:
         """What a solver found from a start."""
-        ends = (tuple(map(float, each)) for each in (start, found.vector))
         spent = found.evaluations, found.converged, found.message, found.seconds
-        return cls(number, *ends, found.start_cost, found.cost, *spent)
+        begun, ended = tuple(map(float, start)), tuple(map(float, found.vector))
+        return cls(number, begun, ended, found.start_cost, found.cost, *spent)
 
 
 class _StartFile(BaseModel):

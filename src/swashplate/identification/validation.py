@@ -18,6 +18,8 @@ from swashplate.identification.noise import LONGEST, Grid, correlation_length, g
 from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.problem import Problem
 from swashplate.identification.staging import Parameters
+from swashplate.parameters.parameter_set import HasParameters, set_of
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
@@ -33,7 +35,7 @@ CHANCE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class ResidualTest:
+class ResidualTest(Result):
     """Whiteness of the residuals of one channel of one run, and independence of the input."""
 
     lags: Array
@@ -244,7 +246,7 @@ def _counting(measured: Array, simulated: Array, weight: Array | None) -> tuple[
 
 
 @dataclass(frozen=True, eq=False)
-class RunQuality:
+class RunQuality(Result):
     """How well one channel of one run is simulated."""
 
     experiment: Experiment
@@ -282,12 +284,14 @@ def compared(experiment: Experiment, name: str, simulated: Array) -> RunQuality:
     return RunQuality(experiment, name, simulated, found, test)
 
 
-def predict(parameters: Parameters, experiments: Sequence[Experiment]) -> tuple[RunQuality, ...]:
+def predict(
+    model: Parameters | HasParameters, experiments: Sequence[Experiment]
+) -> tuple[RunQuality, ...]:
     """Predict runs from their input alone and compare every channel that the drive has.
 
     Parameters
     ----------
-    parameters : ParameterSet or ModelParameters
+    model : Drive, ParameterSet or ModelParameters
         The drive, or a model of one's own with its numbers.
     experiments : sequence of Experiment
         Runs that it was not fitted to. A voltage goes through the whole chain, a current through
@@ -305,6 +309,7 @@ def predict(parameters: Parameters, experiments: Sequence[Experiment]) -> tuple[
     DomainError
         If the model does not hold under a run's input.
     """
+    parameters = model if isinstance(model, ModelParameters) else set_of(model)
     if isinstance(parameters, ModelParameters):
         return tuple(
             compared(each, name, simulated)

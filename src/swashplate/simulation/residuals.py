@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.marching import jacobian as engine
 from swashplate.equations.marching.jacobian import Jacobian as Jacobian
 from swashplate.equations.marching.jacobian import Triangle as Triangle
-from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.observation import ObservedRecord, every_sample
 from swashplate.equations.marching.observation import Own as EngineOwn
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.rows import BLOCK
@@ -21,6 +21,7 @@ from swashplate.equations.marching.run import Instance, Start
 from swashplate.errors import InputError
 from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.results import Result
 from swashplate.simulation.instance import (
     PATHS,
     START_PRESSURE,
@@ -30,6 +31,7 @@ from swashplate.simulation.instance import (
 )
 from swashplate.simulation.result import Named, Simulation
 from swashplate.simulation.run import Driver, simulate_drive, start_states, started_at
+from swashplate.tables import count
 
 Array = NDArray[np.float64]
 
@@ -135,14 +137,12 @@ def moved_by(
     parameters: ParameterSet, observed: ObservedRecord, names: Sequence[str]
 ) -> list[bool]:
     """Whether anything observed can depend on each column: on a driven channel, on the pump."""
-    low, high = observed.extremes
-    by_voltage = observed.driven_by == "voltage"
-    driven = {
-        "plus": by_voltage and high > parameters.numbers["V_dz_plus"],
-        "minus": by_voltage and -low > parameters.numbers["V_dz_minus"],
+    low, high = observed.extremes if observed.driven_by == "voltage" else (0.0, 0.0)
+    moved = {
+        "card.plus": high > parameters.numbers["V_dz_plus"],
+        "card.minus": -low > parameters.numbers["V_dz_minus"],
     }
-    moved = {"card.plus": driven["plus"], "card.minus": driven["minus"]}
-    moved["card"] = any(driven.values())
+    moved["card"] = any(moved.values())
     moved["pump"] = any(each.signal not in CURRENTS for each in observed.observations)
     return [moved[part] for part in _parts(tuple(names))]
 
@@ -214,14 +214,12 @@ ALL_COLUMNS = (
 
 def _columns(found: Sensitivities, signal: str) -> Array:
     """The Jacobian of unit weights: every sample observed as zero."""
-    time = found.record.time
-    seen = Observation(signal, time, np.zeros(time.size))
-    observed = ObservedRecord(found.record, [seen], found.driven_by, found.start)
+    observed = every_sample(found.record, signal, found.driven_by, found.start)
     return jacobian(found.parameters, observed, found.names).columns
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivities:
+class Sensitivities(Result):
     """Derivatives of the outputs by parameters, one column for each of `names`.
 
     The unit of a column is the output's over the parameter's, both SI. At a switch (the edge of a
@@ -237,7 +235,7 @@ class Sensitivities:
     """Columns such as ``Z16_plus``, in the order asked for."""
 
     def __repr__(self) -> str:
-        return f"Sensitivities({self.simulation!r}, by {', '.join(self.names)})"
+        return f"Sensitivities({self.simulation!r}, by {count(len(self.names), 'parameter')})"
 
     @cached_property
     def simulation(self) -> Simulation:
