@@ -79,8 +79,8 @@ def _best(run: Callable[[], object]) -> float:
 
 
 def validity() -> Iterator[str]:
-    """For which manoeuvres the one-state model will do."""
-    yield "| axis | manoeuvre | largest, % | rms, % | step error at 512 Hz, % | within |"
+    """For which maneuvers the one-state model will do."""
+    yield "| axis | maneuver | largest, % | rms, % | step error at 512 Hz, % | within |"
     yield "|---|---|--:|--:|--:|---|"
     found = pl.concat([validity_of(FullOrderDrive.preset(name)).to_polars() for name in AXES])
     for row in found.iter_rows(named=True):

@@ -70,7 +70,7 @@ def differences(counts: Array) -> Array:
 
 
 def source(counts: Array) -> Array:
-    """The source's path [rad/s]."""
+    """Kruse's path [rad/s]."""
     return speed_from_counts(TIME, counts, counts_per_turn=TURN)
 
 

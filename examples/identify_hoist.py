@@ -32,7 +32,7 @@ options = parser.parse_args([] if "ipykernel" in sys.modules else None)
 
 # %% [markdown]
 # ## Virtual tests
-# The source's 13 tests: ramps, steps and sines, logged at 512 Hz through a 12-bit command, an
+# Kruse's 13 tests: ramps, steps and sines, logged at 512 Hz through a 12-bit command, an
 # ammeter that does not know the sign, and an encoder. The same seed gives the same logs.
 
 # %%

@@ -136,11 +136,11 @@ def test_windows_that_are_taken(edited: Edit) -> None:
     assert sentences(path) == ()
 
 
-def test_a_misspelt_manoeuvre(edited: Edit) -> None:
+def test_a_misspelt_maneuver(edited: Edit) -> None:
     path = edited(GEAR, f'{GEAR}ignore = [{{ maneuver = "setp *" }}]\n')
     (said,) = sentences(path)
     assert said == (
-        "axes.winch.channels.counts.ignore: no run has the manoeuvre 'setp *', so that its window "
+        "axes.winch.channels.counts.ignore: no run has the maneuver 'setp *', so that its window "
         "does nothing; there are 'step +4 V', 'step -4 V'"
     )
 

@@ -1,4 +1,4 @@
-"""Every expected number is the manoeuvre's own: what was put in has to be found again."""
+"""Every expected number is the maneuver's own: what was put in has to be found again."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -88,7 +88,7 @@ FREE = {
 
 
 @pytest.mark.parametrize("name", FREE)
-def test_what_is_no_manoeuvre_is_free(name: str) -> None:
+def test_what_is_no_maneuver_is_free(name: str) -> None:
     time = grid(FREE[name].length, 512.0)
     found = recognise(time, readback(FREE[name](time)))
     assert found.kind == found.name == "free"
@@ -103,7 +103,7 @@ def test_noise_alone_is_free_unless_it_is_small() -> None:
     assert recognise(time, 0.02 * noise, unit="%").kind == "free"
 
 
-def test_a_glitch_is_no_part_of_a_manoeuvre() -> None:
+def test_a_glitch_is_no_part_of_a_maneuver() -> None:
     run = maneuvers.sine(6.5, 0.1)
     voltage = readback(run.sample())
     voltage[5000:5040] = 0.0
@@ -125,7 +125,7 @@ def test_samples_on_the_jump_do_not_hide_a_step() -> None:
     assert recognise(time, voltage).name == "step +4 V"
 
 
-def test_returns_other_than_the_packages_leave_the_manoeuvre_what_it_is() -> None:
+def test_returns_other_than_the_packages_leave_the_maneuver_what_it_is() -> None:
     time = grid(14.0, 512.0)
     eased = np.interp(time, [0.0, 1.0, 10.0, 11.0], [0.0, 0.0, 9.0, 0.0])
     found = recognise(time, readback(eased))

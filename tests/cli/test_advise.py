@@ -70,7 +70,7 @@ def test_small_positive_steps_want_large_and_negative_ones(
 def test_a_fresh_plan_needs_a_drive_alone(done: Words) -> None:
     said = done("advise", "hoist", "--setup", "hoist", *TRIALS, *PRESSURE, "--top", "2")
     assert len(section(said, "Tests, with the sensors at hand")) >= 2
-    assert "encoder_counts: noise 0.000718 rad (rounding of the source's encoder)" in said
+    assert "encoder_counts: noise 0.000718 rad (rounding of Kruse's encoder)" in said
     assert "Sensors to add, beside the plan" in said
 
 
@@ -95,6 +95,6 @@ def test_refusals(refused: Words, campaign: str) -> None:
     assert "--axis belongs to a campaign" in refused("advise", "hoist", "--axis", "hoist")
     assert "Z10 is free" in refused("advise", campaign, "--setup", "setup.toml", "--free", "Z10")
     assert "no parameter 'Z99'" in refused("advise", "hoist", "--free", "Z99")
-    assert "no manoeuvre" in refused("advise", "hoist", "--maneuver", "wobble:3")
+    assert "no maneuver" in refused("advise", "hoist", "--maneuver", "wobble:3")
     assert ".txt" in refused("advise", campaign, "--setup", "setup.toml", *TRIALS, "--out", "a.txt")
     assert "no packaged" in refused("advise", "boom")

@@ -60,7 +60,7 @@ def test_out_and_plot(done, tmp_path):
     ("words", "said"),
     [
         (("hoist", "crane"), "no packaged set, file or folder 'crane'"),
-        (("hoist", "slew", "--maneuver", "hop:9"), "'hop' is no manoeuvre"),
+        (("hoist", "slew", "--maneuver", "hop:9"), "'hop' is no maneuver"),
         (("hoist", "slew", "--maneuver", "hop"), "one of the tests of hoist"),
         (("hoist", "slew", "--maneuver", "step:11"), "the card takes ±10 V"),
         (("hoist", "slew", "--maneuver", "rest:1e20"), "simulated at once"),

@@ -42,7 +42,7 @@ def test_a_run(done, number):
 def test_modes(done):
     text = done("full-order", "hoist", "rest:1")
     hertz, ratio = cells(text, "spool")[:2]
-    # section 6.2.4 of the source, and what is assumed
+    # section 6.2.4 of Kruse (2001), and what is assumed
     assert float(hertz) == pytest.approx(40.0, rel=0.02)
     assert float(ratio) == pytest.approx(0.3, abs=0.02)
     assert float(cells(text, "swash plate, held pressure")[0]) == pytest.approx(40.0, rel=0.02)
@@ -94,7 +94,7 @@ def test_nothing_moves(done):
 
 def test_the_table_is_the_documented_one(done):
     text = done("full-order", "luff")
-    assert text.startswith("luff, five states against one: 11 manoeuvres\n")
+    assert text.startswith("luff, five states against one: 11 maneuvers\n")
     documented = re.findall(r"^\| luff \| (.*?) \|$", PAGE.read_text("utf-8"), re.MULTILINE)
     rows = [[cell.strip() for cell in row.split("|")] for row in documented]
     rows = [row for row in rows if re.match("step|ramp|sine", row[0])]
@@ -146,14 +146,14 @@ def test_a_solver_agrees_with_the_march(done, number):
         (("crane",), "no packaged set, file or folder 'crane'"),
         (("none.toml", "step:9"), "There is no file none.toml"),
         (("neutral",), "neutral: spool_stroke (stroke of the spool, both ways) is inf m"),
-        (("hoist", "stepp:9"), "'stepp' is no manoeuvre"),
+        (("hoist", "stepp:9"), "'stepp' is no maneuver"),
         (("hoist", "step:11"), "the card takes ±10 V"),
         (("hoist", "--rate", "1"), "must be between 10 and 100000 Hz"),
         (("hoist", "step:9", "--rate", "1"), "must be between 10 and 100000 Hz"),
         (("hoist", "--like", "crane"), "no packaged physical set 'crane'; there are hoist"),
         (("slew", "--like", "hoist"), "slew: spool_mass on spool_arm alone has"),
-        (("hoist", "--plot", "run.png"), "--plot draws one run; name a manoeuvre"),
-        (("hoist", "--method", "radau"), "--method radau checks one run; name a manoeuvre"),
+        (("hoist", "--plot", "run.png"), "--plot draws one run; name a maneuver"),
+        (("hoist", "--method", "radau"), "--method radau checks one run; name a maneuver"),
         (("hoist", "step:9", "--out", "run.doc"), "run.doc ends in '.doc'"),
         (("hoist", "--out", "none/table.csv"), "cannot be written"),
         (("hoist", "step:9", "--plot", "run.gif"), "a figure is written as .png"),

@@ -104,7 +104,7 @@ def test_the_units_of_the_errors(done):
         (("hoist", "sine:4,0.2", "--frequency", "-1"), "leave them out, or 'sine:4,0.2'"),
         (("hoist", "step:9", "--error", "0.1"), "--error and --frequency belong to the sines"),
         (("hoist", "step:11"), "The voltage is 11 V"),
-        (("hoist", "stepp:1"), "is no manoeuvre"),
+        (("hoist", "stepp:1"), "is no maneuver"),
         (("hoist", "none.csv"), "none.csv"),
         (("crane",), "no packaged set, file or folder 'crane'"),
         (("hoist", "--out", "e.txt"), "a table is written as .csv or .parquet"),

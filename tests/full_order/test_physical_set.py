@@ -27,7 +27,7 @@ LIGHT = {"spool_mass": 1e-3, "piston_mass": 0.05}
 
 @pytest.mark.parametrize("name", AXES)
 def test_preset_lands_on_the_published_lumps(name: str, source_parameters: dict) -> None:
-    """Against the source's tables, all but the gauge Z6↔Z8."""
+    """Against Kruse's tables, all but the gauge Z6↔Z8."""
     published = source_parameters["pump_motor"][name]
     lumps = PhysicalSet.preset(name).to_lumped()
     for symbol, value in lumps.items():
@@ -89,7 +89,7 @@ def test_gravity_moves_the_pressures_reference_and_nothing_else() -> None:
 
 
 def lumps_by_hand(n: dict, Z6: float) -> dict[str, float]:
-    """Kruse eqs. 6.56 to 6.70, written out from the symbols of the source."""
+    """Kruse eqs. 6.56 to 6.70, written out from the symbols of Kruse (2001)."""
     A, d4, k_r, V, B = (
         n[each]
         for each in ("piston_area", "swash_arm", "return_spring_rate", "oil_volume", "bulk_modulus")

@@ -140,7 +140,7 @@ SPEED = Sensor("shaft_speed", 0.01)
 
 @pytest.fixture(scope="module")
 def hoist_tests(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
-    """The source's tests of a hoist near the published one, with instruments."""
+    """Kruse's tests of a hoist near the published one, with instruments."""
     tests = rig.run("hoist", seed=4, perturb=0.02)
     return Campaign.from_toml(rig.write(tests, tmp_path_factory.mktemp("rig") / "tests"))
 

@@ -111,7 +111,7 @@ def _lasting(steps: Array, intervals: Array) -> float:
 
 
 def interpolate_counts(time: ArrayLike, counts: ArrayLike) -> Array:
-    """Fill the samples that share a count: the source's smoothing of an encoder's staircase.
+    """Fill the samples that share a count: Kruse's smoothing of an encoder's staircase.
 
     Parameters
     ----------

@@ -115,7 +115,7 @@ class Window(Entry):
     stop: Finite | None = Field(None, alias="to", description="Last instant [s].")
     maneuver: str | None = Field(
         None,
-        description="Only in runs of this manoeuvre, as recognised: 'step +4 V' or, with a "
+        description="Only in runs of this maneuver, as recognised: 'step +4 V' or, with a "
         "pattern, 'step *' or 'sine * 0.1 Hz'.",
     )
     why: str = Field("", description="The reason; it stands in the report.")
@@ -128,7 +128,7 @@ class Window(Entry):
 
 
 def applying(windows: Iterable[AnyWindow], maneuver: str) -> tuple[AnyWindow, ...]:
-    """The windows that hold in runs of a manoeuvre, such as ``"step +4 V"``."""
+    """The windows that hold in runs of a maneuver, such as ``"step +4 V"``."""
     return tuple(
         each for each in windows if each.maneuver is None or fnmatchcase(maneuver, each.maneuver)
     )
@@ -274,7 +274,7 @@ class Run(Entry):
     ignore: tuple[Window, ...] = Field((), description="Windows left out of every channel.")
     weights: tuple[Weight, ...] = Field((), description="Windows that count more or less.")
     weight: NotNegative = Field(1.0, description="Factor on the run's squared errors.")
-    maneuver: str | None = Field(None, description="Name of the manoeuvre, if not recognised.")
+    maneuver: str | None = Field(None, description="Name of the maneuver, if not recognised.")
     axes: dict[str, dict[str, Any]] = Field(
         {},
         description="Entries of an axis that differ in this run, as in [axes.NAME]; "

@@ -34,10 +34,10 @@ Hydrostatic drives: from a joystick's voltage to the speed of the shaft.
 
 A drive is a control card, a pump and a motor. Packaged are three measured
 ones, the hoist, slew and luff axes of a crane, and a neutral one to start
-your own from. A command is a file of measured voltages or a manoeuvre: a
+your own from. A command is a file of measured voltages or a maneuver: a
 name and its numbers in V, s and Hz.
 
-Manoeuvres, and some of the options that may follow their numbers:
+Maneuvers, and some of the options that may follow their numbers:
   step:9                  9 V from 1 s to 6 s         start, stop, length
   ramp:1                  1 V/s up to 10 V            limit, settle
   sine:6.5,0.1            6.5 V at 0.1 Hz             start, settle, length

@@ -104,9 +104,9 @@ def excitation(
         note(f"run {number}: {name}")
     say(LEGEND)
     if not changed:
-        note("The set-up can stay as it is.")
+        note("The fit configuration can stay as it is.")
     elif write is None and any(each.proposed is not None for each in proposals):
-        note("With the starred lines (*) taken, the set-up is (--write FILE keeps it):")
+        note("With the starred lines (*) taken, the fit configuration is (--write FILE keeps it):")
         note("")
         note(proposed.rstrip())
     files.say()

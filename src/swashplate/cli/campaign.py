@@ -180,7 +180,7 @@ def check(
     """Read a campaign with all its logs and say what the measurements are like.
 
     Each signal's rate, jitter, longest interval, range, clipping and lost
-    counts, the manoeuvre recognised from the voltage, and below the table
+    counts, the maneuver recognised from the voltage, and below the table
     whatever someone should look into: also windows that no run takes, and runs
     that are far from what the axis's drive would do.
     """
@@ -360,7 +360,7 @@ def rig(
     with working("Writing"):
         path = bench.write(tests, out, overwrite=force)
     numbers = (Column("rows", "d"), Column("s", ".4g"))
-    words = (Column("log"), Column("manoeuvre", wrap=True), Column("role"))
+    words = (Column("log"), Column("maneuver", wrap=True), Column("role"))
     made = Table("", (*words, *numbers))
     for run in tests.runs.values():
         time = run.columns["time"]

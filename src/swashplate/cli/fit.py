@@ -123,7 +123,7 @@ def fit(
     setup: SetupWord = None,
     model: OwnModel = None,
     joint: Annotated[
-        bool, option("After the stages all unknowns at once, through the chain.", "--joint")
+        bool, option("After the stages all parameters at once, through the chain.", "--joint")
     ] = False,
     begin: StartWord = None,
     starts: Annotated[int, option("More starts, spread over the bounds.", min=0)] = 0,
@@ -133,7 +133,7 @@ def fit(
     bootstrap: Annotated[int, option("Fit again to so many draws of the noise.", min=0)] = 0,
     profile: Annotated[
         list[str] | None,
-        option("Follow the cost along this unknown, or 'all'; may be repeated.", metavar="NAME"),
+        option("Follow the cost along this parameter, or 'all'; may be repeated.", metavar="NAME"),
     ] = None,
     seed: Seed = 0,
     jobs: Annotated[int, option("Processes for all of these; 0 = all cores.", min=0)] = 0,
@@ -610,7 +610,7 @@ def demo(
     note(f"Campaign:  {path}")
     show(*tables)
     inside, counted = truth_count(tables)
-    say(f"The truth lies within the 95 % interval for {inside} of {counted} unknowns.")
+    say(f"The truth lies within the 95 % interval for {inside} of {counted} parameters.")
     note("")
     note("Held out of the fit, and predicted")
     show(*runs_tables(found.predicted))

@@ -46,7 +46,7 @@ CommandWord = Annotated[
     str,
     argument(
         "MANEUVER|FILE",
-        'A manoeuvre such as step:9 or "step +9 V", or a log with columns of time and voltage: '
+        'A maneuver such as step:9 or "step +9 V", or a log with columns of time and voltage: '
         "text such as .csv, .parquet, .mat, .h5, .tdms or .mf4; a column may carry its unit: "
         "'time \\[ms]'.",
     ),

@@ -18,7 +18,7 @@ from swashplate.tables import UNIT, Column, Form, Table, check_place, ending
 BEGUN = perf_counter()
 LINE, BETWEEN = 80, 2
 """Characters of a line, and those between two columns."""
-# names of files and manoeuvres are printed as they are, whatever brackets and colons they hold
+# names of files and maneuvers are printed as they are, whatever brackets and colons they hold
 output = Console(markup=False, highlight=False, emoji=False)
 side = Console(stderr=True, markup=False, highlight=False, emoji=False)
 """Standard error: what a pipe must not carry."""

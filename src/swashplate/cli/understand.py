@@ -98,7 +98,7 @@ def limits(
         str | None,
         argument(
             "MANEUVER|FILE",
-            "A manoeuvre or a log, as in 'swashplate simulate': what limits the drive under it. "
+            "A maneuver or a log, as in 'swashplate simulate': what limits the drive under it. "
             "Without one, what the drive can do at all.",
         ),
     ] = None,
@@ -253,7 +253,7 @@ def whatif(
     maneuver: Annotated[
         str,
         option(
-            'Command for both: a manoeuvre such as step:9 or "step +9 V", or a log.',
+            'Command for both: a maneuver such as step:9 or "step +9 V", or a log.',
             metavar="NAME|FILE",
         ),
     ] = "sine:9,0.1",
@@ -345,12 +345,12 @@ def size(
     ] = None,
     tracking_deg_s: Annotated[
         float | None,
-        option("Largest RMS error that is allowed while following the manoeuvre.", metavar="DEG/S"),
+        option("Largest RMS error that is allowed while following the maneuver.", metavar="DEG/S"),
     ] = None,
     maneuver: Annotated[
         str | None,
         option(
-            "What is to be followed: the speed in proportion to this manoeuvre's voltage, at the "
+            "What is to be followed: the speed in proportion to this maneuver's voltage, at the "
             "ratio of the drive as it is. Each candidate is commanded in proportion to it, at its "
             "own ratio.",
             metavar="NAME",
@@ -411,9 +411,7 @@ def sensitivity(
     ] = None,
     maneuver: Annotated[
         str,
-        option(
-            'Command: a manoeuvre such as step:9 or "step +9 V", or a log.', metavar="NAME|FILE"
-        ),
+        option('Command: a maneuver such as step:9 or "step +9 V", or a log.', metavar="NAME|FILE"),
     ] = "step:9",
     samples: Annotated[
         int | None,
@@ -475,7 +473,7 @@ def compensate(
         argument(
             "MANEUVER|FILE",
             "What the stick does: ±10 V asks for the full speed of that way, in proportion. A "
-            "manoeuvre or a log as in 'swashplate simulate'. Says what the map buys under it.",
+            "maneuver or a log as in 'swashplate simulate'. Says what the map buys under it.",
         ),
     ] = None,
     speeds_deg_s: Annotated[
@@ -486,7 +484,9 @@ def compensate(
             metavar="DEG/S",
         ),
     ] = None,
-    points: Annotated[int, option("Points of the map each way, 2 to 10001.", metavar="N")] = 101,
+    points: Annotated[
+        int, option("Points of the map per direction, 2 to 10001.", metavar="N")
+    ] = 101,
     out: Annotated[
         Path | None,
         option(

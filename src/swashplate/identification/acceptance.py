@@ -37,12 +37,12 @@ POOR = 0.5
 """NRMSE from which a drive is not usable: a constant gain misses less of a step's record."""
 SERIOUS = 0.2
 """NRMSE below which held-out runs that are simulated less well than fitted ones are still of use:
-80 % of the movement is followed, about what the source reached on its worst kind of test."""
+80 % of the movement is followed, about what Kruse (2001) reached on its worst kind of test."""
 CARRIES_OVER = 1.5
-"""Factor on the fitted runs' RMSE up to which held-out runs count as simulated alike: manoeuvres
+"""Factor on the fitted runs' RMSE up to which held-out runs count as simulated alike: maneuvers
 differ that much among the fitted ones."""
 FAR = 3.0
-"""Factor from which the fit does not carry over: twice what manoeuvres differ by anyway."""
+"""Factor from which the fit does not carry over: twice what maneuvers differ by anyway."""
 REQUIRED = 0.10
 """Largest error of held-out runs over their range, where the user requires nothing else."""
 MOST = 0.5
@@ -55,7 +55,7 @@ MISFIT = 1.2
 campaigns of slew lay between 0.97 and 1.02; in two the search ended in another optimum."""
 MODEL_ERROR = 0.01
 """Error of held-out runs over their range from which lack of fit rules out prediction: what is
-wrong is not small on known manoeuvres, and larger on others."""
+wrong is not small on known maneuvers, and larger on others."""
 DRIFTS, DRIFTS_AWAY = 0.01, 0.03
 """Change of a channel over the campaign from which values are those of a mean machine, and from
 which no one set of parameters holds."""
@@ -227,7 +227,7 @@ def carried_over(fitted: Sequence[RunQuality], held: Sequence[RunQuality]) -> Cr
         "RMSE, held-out / fitted",
         f"{largest:.2g}" if largest else "small",
         f"{FAR:g}",
-        "twice what manoeuvres differ by anyway",
+        "twice what maneuvers differ by anyway",
         "use",
         "; ".join(
             f"held-out {name} has {ratio:.1f} times the RMSE of the fitted runs"
@@ -263,9 +263,9 @@ def determined(assessments: Sequence[Assessment]) -> Criterion:
         found = each.identifiability
         lost += len(shared & {*found.at_bounds, *found.to_fix})
         total += len(shared)
-    words = f"{lost} of {total} unknowns stand at a bound or are not determined"
+    words = f"{lost} of {total} parameters are at a bound or are not determined"
     return Criterion(
-        "unknowns without a value",
+        "parameters without a value",
         f"{lost} of {total}",
         f"{MOST:.0%}",
         "a fit that leaves most open has found nothing",
@@ -284,7 +284,7 @@ def bounded_predictions(
         "predictions left open",
         listed(names) or "none",
         "none",
-        "the prediction is then as open as the unknown",
+        "the prediction is then as open as the parameter",
         "use",
         f"predictions depend on {listed(names)}, which the fitted runs leave open" if names else "",
     )
@@ -421,7 +421,7 @@ class Verdict(Result):
     criteria: tuple[Criterion, ...] = ()
     grade: Grade = "Usable"
     validity: str = ""
-    """Sentence that names the manoeuvres and the range that it holds for, and what they never
+    """Sentence that names the maneuvers and the range that it holds for, and what they never
     reach; empty for a drive that was not fitted."""
     assumed: tuple[str, ...] = ()
     """What is assumed and cannot be checked from these logs."""
@@ -722,7 +722,7 @@ def _headline(
     if untrusted:
         accuracy = f"{'held-out ' if held else 'fitted '}{_accuracy(held or fitted)}"
         return (
-            f"Usable for prediction of {_manoeuvres(experiments)} ({accuracy}); parameter values "
+            f"Usable for prediction of {_maneuvers(experiments)} ({accuracy}); parameter values "
             f"not to be trusted because {'; '.join(each.failure for each in untrusted)}."
         )
     if held:
@@ -740,7 +740,7 @@ def _accuracy(qualities: Sequence[RunQuality]) -> str:
     return listed(parts) or "channels that never move"
 
 
-def _manoeuvres(experiments: Sequence[Experiment]) -> str:
+def _maneuvers(experiments: Sequence[Experiment]) -> str:
     """``ramps, steps and sines of up to 0.3 Hz from -9 to 9 V``."""
     kinds, fastest = dict[str, None](), 0.0
     for each in experiments:
@@ -759,7 +759,7 @@ def _validity(assessments: Sequence[Assessment]) -> str:
     from swashplate.identification.excitation import acting, simulated_run
 
     experiments = fitted_runs(assessments)
-    said = f"Holds for {_manoeuvres(experiments)}"
+    said = f"Holds for {_maneuvers(experiments)}"
     if isinstance(assessments[-1].stage.problem.model, DriveModel):
         parameters, longest = assessments[-1].stage.drive.parameters, dict[str, float]()
         try:

@@ -553,7 +553,8 @@ def load_fit(
             [(each.name, each.run) for each in theirs],
         ) or entry.solution.vector.size != len(known):
             raise FileError(
-                f"{path}: stage {entry.name} has other unknowns than its set-up makes: fit again."
+                f"{path}: stage {entry.name} has other unknowns than its fit configuration "
+                "makes: fit again."
             )
         problem = replace(problem, unknowns=Unknowns(theirs))
         parameters = with_estimates(parameters, problem, entry.solution.vector)

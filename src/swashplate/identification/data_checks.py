@@ -244,7 +244,7 @@ def _of_channel(run: str, channel: Channel) -> list[Finding]:
         )
     elif samples < 2:
         said = (
-            f"has {_count(samples)} that can count, which tells nothing of motion; leave the run "
+            f"has {_count(samples)} that can count, which does not show any motion; leave the run "
             'out with role = "ignore".'
         )
     else:
@@ -637,7 +637,7 @@ def _rank(where: str, problem: Problem) -> list[Finding]:
     """Fewer samples than unknowns, or unknowns on which nothing depends."""
     unknowns = problem.unknowns
     if problem.samples < len(unknowns):
-        said = f"{_count(problem.samples)} cannot determine {len(unknowns)} unknowns; "
+        said = f"{_count(problem.samples)} cannot determine {len(unknowns)} parameters; "
         return [refusal(None, None, f"{where}: {said}record longer runs, or free less.")]
     exact = isinstance(problem.model, EquationModel)  # any other may take minutes
     if exact and not problem.evaluate(problem.start).jacobian.any():

@@ -496,7 +496,8 @@ def proposed_setup(setup: Setup, proposals: Sequence[Proposal]) -> Setup:
     stages = tuple(each.proposed for each in proposals if each.proposed is not None)
     if not stages:
         raise InputError(
-            "The runs determine none of the unknowns, so that there is no set-up to propose: test "
+            "The runs determine none of the unknowns, so that there is no fit configuration to "
+            "propose: test "
             "what exercises them first."
         )
     return setup.model_copy(update={"stages": stages})

@@ -261,13 +261,13 @@ class Identifiability(Result):
         free = int(np.count_nonzero(self.variables.free))
         noun = "combination" if self.rank == 1 else "combinations"
         said = [
-            "All unknowns stand at a bound: there is nothing left to determine."
+            "All parameters are at a bound: there is nothing left to determine."
             if not free
             else "The tests determine none of the unknowns."
             if not self.rank
-            else f"The tests determine {self.rank} {noun} of {free} free unknowns."
+            else f"The tests determine {self.rank} {noun} of {free} free parameters."
             if self.rank < free
-            else f"The tests determine all {free} free unknowns."
+            else f"The tests determine all {free} free parameters."
         ]
         if self.unexcited:
             said.append(

@@ -364,7 +364,7 @@ class Uncertainty(Result):
         for colour in self.colours:
             if colour.length:
                 worth = (
-                    f"{colour.inflation:.3g} samples are worth one"
+                    f"{colour.inflation:.3g} samples count as one independent sample"
                     if colour.inflation > 1.05
                     else "positive and negative correlations cancel, and the samples tell as much "
                     "as independent ones"
@@ -397,7 +397,7 @@ class Uncertainty(Result):
         known = self.own.determined & (np.diag(self.own.matrix) > 0.0)
         if known.any() and (self.handed or self.fixed.any()):
             what = [
-                *(["what the stages before do not know"] if self.handed else []),
+                *(["the uncertainty of the previous stages"] if self.handed else []),
                 *(["the standard uncertainty of fixed parameters"] if self.fixed.any() else []),
             ]
             wider = np.where(known, self.quoted.standard_errors, 1.0) / np.where(
@@ -406,7 +406,7 @@ class Uncertainty(Result):
             most = int(np.argmax(wider))
             said.append(
                 f"Intervals take in {' and '.join(what)}, which widens them by a factor of "
-                f"{float(np.median(wider[known])):.2f} in the middle and of {wider[most]:.2f} for "
+                f"{float(np.median(wider[known])):.2f} in the median and of {wider[most]:.2f} for "
                 f"{self.own.variables.names[most]}."
             )
         return tuple(said)

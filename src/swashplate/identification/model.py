@@ -478,7 +478,7 @@ class OwnModel(Result, EquationModel):
             p = made(model.parameters, numbers)
         except KeyError as error:
             raise InputError(
-                f"{model.name} has no value of {error.args[0]}: let it be an unknown, fix it, or "
+                f"{model.name} has no value of {error.args[0]}: let it be a parameter, fix it, or "
                 "give p."
             ) from None
         given = self.given

@@ -278,13 +278,13 @@ def threshold(
     if not inflation >= 1.0 or not np.isfinite(inflation):
         raise InputError(f"{inflation:g} samples cannot stand for one; 1 is the least.")
     if samples <= unknowns:
-        raise InputError(f"{samples} samples for {unknowns} unknowns tell nothing of the noise.")
+        raise InputError(f"{samples} samples for {unknowns} parameters tell nothing of the noise.")
     if freedom is None:
         freedom = samples / inflation - unknowns
     if not freedom > 0.0:
         raise InputError(
             f"{samples} samples are worth {samples / inflation:.1f} independent ones, no more than "
-            f"the {unknowns} unknowns: no interval follows from them."
+            f"the {unknowns} parameters: no interval follows from them."
         )
     from scipy.special import stdtrit
 
@@ -334,7 +334,7 @@ def profile(
             "The residuals are exactly zero: there is no noise that a profile could weigh against."
         )
     if not bounds[0] <= vector[index] <= bounds[1]:
-        raise InputError("The optimum of a profile lies outside the bounds of its unknown.")
+        raise InputError("The optimum of a profile lies outside the bounds of its parameter.")
     optimum = Point(float(vector[index]), cost, vector)
     sides = [
         ProfileSide(minimise, optimum, index, rise, direction, step, bound, most)

@@ -307,7 +307,7 @@ def runs_tables(
             name,
             (
                 Column("run", wrap=True),
-                Column("manoeuvre", of="pf"),
+                Column("maneuver", of="pf"),
                 Column("role", of="pf"),
                 Column("channel", of="pf"),
                 Column("start", key="initial_state"),
@@ -607,7 +607,7 @@ def advice_table(title: str, judged: Sequence[Advice | SensorAdvice]) -> Table:
 def best_tests_table(gains: Sequence[Gain], best: Mapping[str, tuple[str, Gain]]) -> Table:
     """What is known of each unknown, and which test would tell most of it."""
     errors = (Column("error now", "s"), Column("then", "s"))
-    made = Table("For each unknown", (Column("unknown"), *errors, Column("best test", wrap=True)))
+    made = Table("For each parameter", (Column("unknown"), *errors, Column("best test", wrap=True)))
     for gain in gains:
         test, after = best.get(gain.name, ("none tells more", gain))
         made.add(gain.name, _error(gain.before), _error(after.after), test)

@@ -380,7 +380,7 @@ def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> C
 def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None) -> list[Figure]:
     """Figures of everything that was measured: a page for each axis and eight of its runs.
 
-    A row is a run: over it its name, manoeuvre, role, rate and gaps; its input and channels side by
+    A row is a run: over it its name, maneuver, role, rate and gaps; its input and channels side by
     side. A column has one unit and one scale; positions, whose zero is free, have it about the
     middle of each run. What is ignored is shaded and hatched, weights that differ stand along the
     foot with their factors, samples at the end of their instrument's range are barred, gaps in the
@@ -750,7 +750,7 @@ def _handles(run: Compared) -> list[Line2D | Patch]:
 # --- an encoder or a position ---------------------------------------------------------------------
 
 SOURCE_RATE = 512.0
-"""Rate that the source's explicit filters are made for. [Hz]"""
+"""Rate that Kruse's explicit filters are made for. [Hz]"""
 WIDE = 2.0
 """Width of the line that lies under the staircase and must show on both sides of it. [pt]"""
 ROUGH = "#d2d2d2"
@@ -867,7 +867,7 @@ def plot_encoder(
         An encoder, or another position.
     methods : sequence of Method, optional
         How the speed is made (`campaign.speed_of`). By default all that the stamps and the
-        channel allow: the plain difference; the source's filters, in their exact form where the
+        channel allow: the plain difference; Kruse's filters, in their exact form where the
         stamps are uneven or not at 512 Hz; Savitzky and Golay's where they are even. The legend
         names them.
     window : (float, float), optional

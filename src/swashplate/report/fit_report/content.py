@@ -257,7 +257,7 @@ def _qualities(runs: Sequence[ShownRun], role: Role | None = None) -> list[RunQu
 
 def _agreement_section(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> Section:
     error = Column("error / range", ".1%", none=NONE)
-    columns = (Column(""), Column("run"), Column("role"), Column("manoeuvre"), Column("judged by"))
+    columns = (Column(""), Column("run"), Column("role"), Column("maneuver"), Column("judged by"))
     overview = Table("", (*columns, error, Column("why"), Column("findings")))
     for number, (run, (look, why)) in enumerate(zip(runs, run_lights(runs, findings), strict=True)):
         part = run_error(run)
@@ -367,7 +367,7 @@ def _stage_words(fit: StageFit) -> list[str]:
         words += [f"Weight on {kind.replace('_', ' ')}: {_window(each)}." for each in windows]
     own = sum(each.run is not None for each in problem.unknowns)
     if own:
-        words.append(f"Besides there are {own} unknowns of single runs, bounded out of reach.")
+        words.append(f"Besides there are {own} parameters of single runs, bounded out of reach.")
     return words
 
 
@@ -503,7 +503,7 @@ def _parameter_section(
 
 def _excitation_section(assessments: Sequence[Assessment]) -> Section:
     words = (
-        "Per cent of what is known of an unknown (its squared derivatives) that comes from each "
+        "Per cent of what is known of a parameter (its squared derivatives) that comes from each "
         "run, at the optimum. A row with one dark cell rests on one run."
     )
     blocks = [text(words)]
@@ -538,7 +538,7 @@ def _identifiability_section(assessments: Sequence[Assessment]) -> Section:
         blocks.append(Block("heading", "What the intervals rest on", "h4"))
         blocks += listed_block(uncertainty_sentences(each))
         without = f"; none: {', '.join(found.unexcited)}" if found.unexcited else ""
-        words = f"Change of all weighted residuals for 1 % of each unknown{without}"
+        words = f"Change of all weighted residuals for 1 % of each parameter{without}"
         drawn = [Block("figure", charts.sensitivity_chart(found, general), words)]
         blocks.append(Block("details", drawn, "Sensitivity"))
         blocks += _correlations(each, general)
