@@ -53,7 +53,7 @@ def speeds() -> Iterator[str]:
 
 def derivatives() -> Iterator[str]:
     """30 s of the hoist with exact derivatives of its speed, and with central differences."""
-    yield "| unknowns | exact | central differences | faster |"
+    yield "| parameters | exact | central differences | faster |"
     yield "|---|--:|--:|--:|"
     hoist = FullOrderDrive.preset("hoist")
     record = record_of(CASES["sine 6.5 V, 0.1 Hz"].sample(512.0), 512.0, what="voltage")

@@ -60,7 +60,7 @@ print(f"{len(runs)} runs to fit, {len(held_back)} held back")
 # %%
 for stage in setup.stages:
     look = outlook(stage, smooth(start), runs)
-    print(f"{stage.name}: {len(look.problem.unknowns.names)} unknowns")
+    print(f"{stage.name}: {len(look.problem.unknowns.names)} parameters")
     for sentence in look.sentences():
         print(f"  {sentence}")
 

@@ -1,6 +1,6 @@
 """Tables 4.1 to 4.4, 7.1 to 7.4 and 8.1 to 8.3 from the package's parameter sets.
 
-The sets store magnitudes; the tables carry Kruse's signs, in its order and notation. A cell
+The sets store magnitudes; the tables carry Kruse's signs, in his order and notation. A cell
 whose content differs from what Kruse (2001) prints bears the number of the erratum.
 """
 
@@ -20,7 +20,7 @@ MAGNITUDES = "Minus values are signed as Kruse (2001) prints them; the package s
 
 
 class Symbol(NamedTuple):
-    """A parameter as Kruse's tables write it."""
+    """A parameter as in Kruse's tables."""
 
     name: str
     """In the package's sets."""

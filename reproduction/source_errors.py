@@ -110,7 +110,7 @@ SOURCE_RULES: tuple[Rule, ...] = (
     Rule(
         "small values",
         f"Measured values below {100.0 * SMALL:.3g} % of the run's largest: a per cent of next to "
-        "nothing means nothing. Kruse (2001) does not state how it did this.",
+        "nothing means nothing. Kruse (2001) does not state how he did this.",
         lambda run: _small(run.measured, SMALL),
     ),
 )
@@ -124,7 +124,7 @@ STEPS = Rule(
 
 
 def source_rules(drive: str) -> tuple[Rule, ...]:
-    """What Kruse (2001) leaves out of its tables for a drive of that name: of slew all steps."""
+    """What Kruse (2001) leaves out of his tables for a drive of that name: of slew all steps."""
     return (*SOURCE_RULES, STEPS) if drive == "slew" else SOURCE_RULES
 
 

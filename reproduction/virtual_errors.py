@@ -1,4 +1,4 @@
-"""Kruse's error tables, recomputed on virtual campaigns: never its measurements."""
+"""Kruse's error tables, recomputed on virtual campaigns: never his measurements."""
 
 from __future__ import annotations
 

@@ -50,11 +50,11 @@ def test_small_positive_steps_want_large_and_negative_ones(
 ) -> None:
     words = ("--setup", "setup.toml", *TRIALS, *PRESSURE, "--tests", "2", "--out", "advice.csv")
     said = done("advise", campaign, *words)
-    best = section(said, "For each unknown")
+    best = section(said, "For each parameter")
     assert best["Z13_plus"].endswith("step 9 V")
     assert best["Z13_minus"].endswith("step -9 V")
     assert "step -" in best["Z19_minus"]
-    tests = section(said, "Tests, with the sensors at hand")
+    tests = section(said, "Tests with the present sensors")
     ranked = list(tests)
     # the large negative one tells of the negative force and the negative stop at once
     assert ranked[0] == "step -9 V"
@@ -62,14 +62,14 @@ def test_small_positive_steps_want_large_and_negative_ones(
     assert list(section(said, "A plan")) == ["step -9 V", "step 9 V"]
     assert "Z13_minus, Z19_minus" in tests["step -9 V"]
     table = pl.read_csv(tmp_path / "advice.csv")
-    stop = table.filter((pl.col("unknown") == "Z13_minus") & (pl.col("first to determine")))
+    stop = table.filter((pl.col("parameter") == "Z13_minus") & (pl.col("first to determine")))
     assert set(stop["test"]) == {"step -9 V"}
     assert stop["relative error before"].null_count() == stop.height
 
 
 def test_a_fresh_plan_needs_a_drive_alone(done: Words) -> None:
     said = done("advise", "hoist", "--setup", "hoist", *TRIALS, *PRESSURE, "--top", "2")
-    assert len(section(said, "Tests, with the sensors at hand")) >= 2
+    assert len(section(said, "Tests with the present sensors")) >= 2
     assert "encoder_counts: noise 0.000718 rad (rounding of Kruse's encoder)" in said
     assert "Sensors to add, beside the plan" in said
 
@@ -84,7 +84,7 @@ def test_a_stated_noise_and_a_parameter_more(done: Words, campaign: str) -> None
     words = ("--setup", "setup.toml", *TRIALS[:2], *PRESSURE, "--free", "Z9")
     said = done("advise", campaign, *words, "--noise", "stroker_pressure=0.2bar")
     assert "stroker_pressure: noise 2e+04 Pa (stated)" in said
-    assert "Z9" in section(said, "For each unknown")
+    assert "Z9" in section(said, "For each parameter")
 
 
 def test_refusals(refused: Words, campaign: str) -> None:

@@ -68,10 +68,10 @@ def test_the_proposal_can_be_written_and_fitted(done: Words, campaign: str, tmp_
     table = pl.read_csv(tmp_path / "runs.csv")
     assert set(table["stage"]) == {"card", "pump"}
     known = table.filter(pl.col("share") > 0.0)
-    shares = known.group_by("stage", "unknown").agg(pl.col("share").sum())
+    shares = known.group_by("stage", "parameter").agg(pl.col("share").sum())
     assert shares["share"].to_list() == pytest.approx([1.0] * shares.height)
     again = done("excitation", campaign, "--setup", "mine.toml")
-    assert "The set-up can stay as it is." in again
+    assert "The fit configuration can stay as it is." in again
     done("fit", campaign, "--setup", "mine.toml", "--out", "fitted", "--no-report")
 
 
@@ -90,5 +90,5 @@ def test_refusals(refused: Words, campaign: str, tmp_path: Path) -> None:
         '[[stages]]\nname = "pump"\npart = "pump"\nfree.Z14 = { relative = [0.5, 2.0] }\n', "utf-8"
     )
     said = refused("excitation", campaign, "--setup", "none.toml", "--write", "mine.toml")
-    assert "The runs determine none of the unknowns" in said
+    assert "The runs determine none of the parameters" in said
     assert ".txt" in refused("excitation", campaign, "--setup", "setup.toml", "--out", "t.txt")

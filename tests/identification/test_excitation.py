@@ -311,7 +311,7 @@ def test_nothing_left_is_said() -> None:
     assert found.proposed is None
     assert "Nothing is then left of the stage 'pump'" in found.sentences()[-1]
     setup = Setup(stages=(found.stage,))
-    with pytest.raises(InputError, match="determine none of the unknowns"):
+    with pytest.raises(InputError, match="determine none of the parameters"):
         proposed_setup(setup, [found])
 
 

@@ -277,7 +277,7 @@ def test_residuals_of_a_fit_tell_the_noise() -> None:
     assert fitted.sensors[0].noise == pytest.approx(0.04, rel=0.05)
     # white: each sample counts, or nearly, as the larger of two estimates of the error is quoted
     assert 1.0 / 512.0 <= fitted.sensors[0].memory < 2.0 / 512.0
-    with pytest.raises(InputError, match="residuals of 'speed' are as good as zero"):
+    with pytest.raises(InputError, match="residuals of 'speed' are practically zero"):
         bench(HOIST.parameters, setup("Z10"), [run("exact", 5.0)], fitted=True)
 
 

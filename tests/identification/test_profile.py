@@ -166,7 +166,7 @@ def test_the_root_of_a_kinked_cost_is_found() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"samples": 3}, "3 samples for 3 unknowns"),
+        ({"samples": 3}, "3 samples for 3 parameters"),
         ({"inflation": 0.5}, "cannot stand for one"),
         ({"inflation": 40.0}, "worth 1.5 independent ones"),
         ({"level": 1.0}, "between 0 and 1"),

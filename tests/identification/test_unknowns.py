@@ -96,7 +96,7 @@ def test_unbounded_vectors_give_no_nan() -> None:
 def test_an_unknown_is_found_by_name() -> None:
     variables = unknowns_of(["a", "b"], [1.0, 2.0])
     assert variables.index("b") == 1
-    with pytest.raises(InputError, match="no unknown c; there are a, b"):
+    with pytest.raises(InputError, match="no parameter c; there are a, b"):
         variables.index("c")
 
 

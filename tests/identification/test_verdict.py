@@ -194,7 +194,7 @@ def test_most_unknowns_at_bounds_is_hopeless(experiment, measured, stage) -> Non
     held = held_out(experiment, measured, 0.0 * TIME)
     found = verdict([Assessment(fitted)], [held])
     assert not found.usable
-    assert "2 of 2 unknowns stand at a bound or are not determined" in found.headline
+    assert "2 of 2 parameters are at a bound or not determined" in found.headline
 
 
 def test_an_interrupted_fit_is_not_usable(experiment, measured, stage) -> None:

@@ -102,7 +102,7 @@ STARTS = tuple(
     StartResult(number, (0.0,), (0.0,), 9.0, cost, 10, number != 2, "done", 0.1)
     for number, cost in enumerate((3.0, 3.0, 70.0, float("inf")))
 )
-HEADS = ("unknown", "run", "parameter", "channel", "fold", "quantity")
+HEADS = ("run", "parameter", "channel", "fold", "quantity")
 NOTES = {"command": HOSTILE, "seed": "4"}
 
 
@@ -217,8 +217,8 @@ def test_fixed_parameters_are_listed_and_free_ones_are_not(read: Page) -> None:
     fixed = {row["name"]: row for row in read.rows("held")}
     assert {"tau", "Z1", "Z18", "zeta_plus"} <= set(fixed)
     assert not set(fixed) & {"G1_plus", "G1_minus", "omega_plus", "omega_minus", "Z10"}
-    assert fixed["Z12"]["why, as far as can be told"] == "0: this effect is left out"
-    assert fixed["Z14"]["why, as far as can be told"] == "inactive: no test reaches it"
+    assert fixed["Z12"]["reason, where known"] == "0: this effect is left out"
+    assert fixed["Z14"]["reason, where known"] == "inactive: no test reaches it"
 
 
 def test_rmse_and_fit_of_a_run_are_recomputed(read: Page, fitted: Fit) -> None:
@@ -453,7 +453,7 @@ def test_each_run_has_a_light_and_links(read: Page, tmp_path, campaign, fitted, 
 
 
 def test_shares_of_the_runs_add_up(read: Page) -> None:
-    rows = [row for row in read.tables["excitation"] if row[0] != "unknown"]
+    rows = [row for row in read.tables["excitation"] if row[0] != "parameter"]
     assert {row[0] for row in rows} == {"G1_plus", "G1_minus", "omega", "Z10"}
     for row in rows:
         total = sum(int(cell) for cell in row[2:] if cell)

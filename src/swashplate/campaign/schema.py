@@ -294,7 +294,7 @@ class CampaignFile(Entry):
     title: str = Field("", description="For the report.")
     virtual: bool = Field(False, description="Whether the tests are simulated.")
     format: TextOptions = Field(
-        TextOptions(), description="How text logs are written, where that cannot be told."
+        TextOptions(), description="How text logs are written, where that cannot be recognised."
     )
     axes: dict[str, Axis] = Field(min_length=1, description="The drives, by name.")
     runs: tuple[Run, ...] = Field(min_length=1, description="Their tests, a log each.")

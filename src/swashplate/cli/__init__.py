@@ -112,8 +112,8 @@ def options(
 
 
 for name, panel, function, examples in (
-    ("demo", "Everything at once", fit.demo, fit.DEMO_EXAMPLES),
-    ("tour", "Everything at once", simulate.tour, simulate.TOUR_EXAMPLES),
+    ("demo", "Demonstrations", fit.demo, fit.DEMO_EXAMPLES),
+    ("tour", "Demonstrations", simulate.tour, simulate.TOUR_EXAMPLES),
     ("simulate", "Simulate", simulate.simulate, simulate.SIMULATE_EXAMPLES),
     ("compare", "Simulate", simulate.compare, simulate.COMPARE_EXAMPLES),
     ("axes", "Simulate", simulate.axes, simulate.AXES_EXAMPLES),
@@ -126,14 +126,14 @@ for name, panel, function, examples in (
     ("validate", "Identify", fit.validate, fit.VALIDATE_EXAMPLES),
     ("advise", "Identify", advise.advise, advise.ADVISE_EXAMPLES),
     ("report", "Identify", fit.report, fit.REPORT_EXAMPLES),
-    ("limits", "Understand", understand.limits, understand.LIMITS_EXAMPLES),
-    ("whatif", "Understand", understand.whatif, understand.WHATIF_EXAMPLES),
-    ("size", "Understand", understand.size, understand.SIZE_EXAMPLES),
-    ("sensitivity", "Understand", understand.sensitivity, understand.SENSITIVITY_EXAMPLES),
-    ("compensate", "Understand", understand.compensate, understand.COMPENSATE_EXAMPLES),
-    ("linearize", "Understand", linear.linearize, linear.LINEARIZE_EXAMPLES),
-    ("bode", "Understand", linear.bode, linear.BODE_EXAMPLES),
-    ("full-order", "Understand", full_order.full_order, full_order.EXAMPLES),
+    ("limits", "Analyse", understand.limits, understand.LIMITS_EXAMPLES),
+    ("whatif", "Analyse", understand.whatif, understand.WHATIF_EXAMPLES),
+    ("size", "Analyse", understand.size, understand.SIZE_EXAMPLES),
+    ("sensitivity", "Analyse", understand.sensitivity, understand.SENSITIVITY_EXAMPLES),
+    ("compensate", "Analyse", understand.compensate, understand.COMPENSATE_EXAMPLES),
+    ("linearize", "Analyse", linear.linearize, linear.LINEARIZE_EXAMPLES),
+    ("bode", "Analyse", linear.bode, linear.BODE_EXAMPLES),
+    ("full-order", "Analyse", full_order.full_order, full_order.EXAMPLES),
     ("doctor", "This installation", doctor.doctor, doctor.EXAMPLES),
 ):
     if isinstance(function, typer.Typer):

@@ -177,7 +177,7 @@ def check(
         bool, option("End with exit code 1 if there are findings.", "--strict")
     ] = False,
 ) -> None:
-    """Read a campaign with all its logs and say what the measurements are like.
+    """Check a campaign and the measurements in all its logs.
 
     Each signal's rate, jitter, longest interval, range, clipping and lost
     counts, the maneuver recognised from the voltage, and below the table
@@ -222,7 +222,7 @@ def check(
         note(f"Ignored, and not opened: {', '.join(campaign.ignored)}.")
     if not campaign.select(role="fit"):
         note("No run has the role 'fit'.")
-    note(f"{count(findings, 'finding')}, marked by '!'." if findings else "Nothing to look into.")
+    note(f"{count(findings, 'finding')}, marked by '!'." if findings else "No findings.")
     if strict and findings:
         raise typer.Exit(1)
 
@@ -367,7 +367,7 @@ def rig(
         made.add(f"{run.stem}.csv", run.name, run.role, time.size, float(time[-1] - time[0]))
     show(made)
     note(f"Campaign: {path}")
-    note(f"Truth:    {path.parent / 'truth'} (look only after the fit)")
+    note(f"Truth:    {path.parent / 'truth'} (open it only after the fit)")
 
 
 def guess(

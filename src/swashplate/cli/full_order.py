@@ -62,7 +62,7 @@ def full_order(
     *,
     sampling: Simulating,
 ) -> None:
-    """Say whether one state is enough for a drive and a command.
+    """Check whether one state is enough for a drive and a command.
 
     Gives spool and swash plate their mass back: a model with five states, whose
     physical values are completed from the drive's parameters and from assumed

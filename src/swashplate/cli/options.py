@@ -152,7 +152,7 @@ class Sampling:
     interpolation: Annotated[
         Interpolation | None,
         option(
-            "The voltage between rows or samples: a straight line, or the earlier one held. Must "
+            "The voltage between rows or samples: linear, or zero-order hold. Must "
             "be given with a FILE."
         ),
     ] = None

@@ -122,7 +122,7 @@ def limits(
     *,
     sampling: Simulating,
 ) -> None:
-    """Say what a drive can do, or what limits it under a command.
+    """Show what a drive can do, or what limits it under a command.
 
     Without a command: dead zone, gain, limits of speed and acceleration, rise
     times, and the largest sine that it follows at each frequency. With one: how
@@ -275,7 +275,7 @@ def whatif(
     *,
     sampling: Sampling,
 ) -> None:
-    """See what a change of the machine does.
+    """Predict what a change of the machine does.
 
     Simulates the drive as it is and with its levers moved, over one command.
     The speed that is wanted is in proportion to the voltage, at the ratio of
@@ -428,7 +428,7 @@ def sensitivity(
     *,
     sampling: Sampling,
 ) -> None:
-    """See which lever moves which outcome.
+    """Show which lever moves which outcome.
 
     Each lever is moved down and up by itself. With --sobol all are moved at once,
     and the variance of each outcome is shared out among them: by itself, and in
@@ -473,7 +473,7 @@ def compensate(
         argument(
             "MANEUVER|FILE",
             "What the stick does: ±10 V asks for the full speed of that way, in proportion. A "
-            "maneuver or a log as in 'swashplate simulate'. Says what the map buys under it.",
+            "maneuver or a log as in 'swashplate simulate'. Shows what the map gains under it.",
         ),
     ] = None,
     speeds_deg_s: Annotated[

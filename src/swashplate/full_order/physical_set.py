@@ -276,9 +276,8 @@ def _check_together(owner: str, numbers: Mapping[str, float]) -> None:
     if not abs(pressure) < ceiling:
         raise ParameterError(
             f"{owner}: the load holds a stroking pressure of {pressure:.4g} Pa at rest, but it "
-            "must "
-            f"stay below {ceiling:.4g} Pa, the smaller of supply_pressure and relief_pressure; "
-            "check load_torque, pumping_area and pumping_arm."
+            f"must stay below {ceiling:.4g} Pa, the smaller of supply_pressure and "
+            "relief_pressure; check load_torque, pumping_area and pumping_arm."
         )
 
 

@@ -146,7 +146,8 @@ def measured_sensors(
         deviation = float(np.sqrt(np.mean(np.concatenate([run.residual for run in runs]) ** 2)))
         if not deviation > NOISELESS:
             raise InputError(
-                f"The residuals of '{name}' are as good as zero: without noise any test is perfect."
+                f"The residuals of '{name}' are practically zero: without noise any test is "
+                "perfect."
             )
         noise = problem.scales[name] * deviation
         share = noise / max(float(np.ptp(each.values)) for each in measured)
@@ -275,7 +276,7 @@ def _together(setup: Setup, free: Sequence[str], parameters: ParameterSet) -> St
             raise InputError(f"{name} is free in the fit configuration already.")
         columns = CATALOGUE[symbol].columns if name == symbol else (name,)
         if any(not np.isfinite(parameters.numbers[column]) for column in columns):
-            raise InputError(f"{name} is off in the drive, so that no test can tell it.")
+            raise InputError(f"{name} is off in the drive, so no test can determine it.")
         positive = all(parameters.numbers[column] > 0.0 for column in columns)
         zero = any(parameters.numbers[column] == 0.0 for column in columns)
         more[name] = Free(bounds=(-1.0, 1.0)) if zero else Free(relative=(0.5, 2.0), log=positive)

@@ -370,7 +370,8 @@ class LinearisedFit(Result):
         if self.samples - self.rank < 1:
             raise InputError(
                 f"{self.samples} sample{'s' if self.samples > 1 else ''} for {self.rank} "
-                f"unknown{'s' if self.rank > 1 else ''} leave nothing to tell the noise from; take "
+                f"parameter{'s' if self.rank > 1 else ''} leave nothing to estimate the noise "
+                "from; take "
                 "more samples or fewer parameters."
             )
 

@@ -185,7 +185,7 @@ class Unknowns(Result, Sequence[Unknown]):
             If there is none of that name.
         """
         if name not in self.names:
-            raise InputError(f"There is no unknown {name}; there are {', '.join(self.names)}.")
+            raise InputError(f"There is no parameter {name}; there are {', '.join(self.names)}.")
         return self.names.index(name)
 
     @cached_property

@@ -345,7 +345,7 @@ def recorded_file(
     interpolation, length :
         As in `recorded`.
     options : TextOptions, optional
-        How a text file is written, where that cannot be told from it.
+        How a text file is written, where that cannot be recognised from it.
 
     Raises
     ------

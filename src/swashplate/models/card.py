@@ -259,7 +259,7 @@ def coulomb_sign(change: float, h: float, literal: Flag) -> float:
 def filtered_current(
     now: float, before: float, steady: float, p: Channel, h: float, literal: Flag
 ) -> float:
-    """I* at the next sample by Kruse's recursion, Kruse eq. 3.6. [A]
+    """I* at the next sample by Kruse's recursion, eq. 3.6. [A]
 
     Of I* at this sample and the one before and of I_ss [A]; `literal` takes the literal sign of the
     rate. Stable for ωh < 2ζ and ζωh < 1 + ω²h²/4 only (Jury).

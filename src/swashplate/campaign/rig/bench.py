@@ -350,7 +350,7 @@ def campaign_text(tests: VirtualTests) -> str:
     lines = [
         f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.",
         f"# Instruments: {tests.severity}; refinements: {refinements}; seed {tests.seed}.",
-        "# What was simulated stands in truth/truth.toml: look only after the fit.",
+        "# What was simulated stands in truth/truth.toml: open it only after the fit.",
         f"title = {toml_string(f'Virtual tests, {tests.axis}')}",
         "virtual = true",
         "",

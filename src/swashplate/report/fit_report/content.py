@@ -350,7 +350,7 @@ def _setup_section(
         bounds = tables.bounds_table(each)
         blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
         blocks += listed_block(_stage_words(each))
-        summary = f"Bounds of {count(len(bounds.rows), 'unknown')}"
+        summary = f"Bounds of {count(len(bounds.rows), 'parameter')}"
         blocks.append(Block("details", [Block("table", bounds, "bounds")], summary))
     return Section("setup", "Configuration", blocks)
 
@@ -367,7 +367,7 @@ def _stage_words(fit: StageFit) -> list[str]:
         words += [f"Weight on {kind.replace('_', ' ')}: {_window(each)}." for each in windows]
     own = sum(each.run is not None for each in problem.unknowns)
     if own:
-        words.append(f"Besides there are {own} parameters of single runs, bounded out of reach.")
+        words.append(f"Besides there are {own} parameters of single runs, with wide bounds.")
     return words
 
 
@@ -484,7 +484,7 @@ def _parameter_section(
         blocks.append(
             text(
                 "Truth is what was simulated, in the scales that the fit kept fixed: it was moved "
-                "to the fixed values along those directions that the tests cannot tell. Other "
+                "to the fixed values along those directions that the tests do not determine. Other "
                 "fixed parameters that are not true shift the estimates, and no interval covers "
                 f"that. {inside} of {counted} intervals hold it."
             )
@@ -493,7 +493,7 @@ def _parameter_section(
         blocks += [Block("heading", table.title, "h3"), Block("table", table, "parameters")]
         own = tables.estimates_table(each, own=True)
         if own.rows:
-            summary = f"{count(len(own.rows), 'unknown')} of single runs"
+            summary = f"{count(len(own.rows), 'parameter')} of single runs"
             blocks.append(Block("details", [Block("table", own, "parameters")], summary))
     fixed = tables.fixed_table(fit, truth)
     if fixed.rows:
@@ -503,7 +503,7 @@ def _parameter_section(
 
 def _excitation_section(assessments: Sequence[Assessment]) -> Section:
     words = (
-        "Per cent of what is known of a parameter (its squared derivatives) that comes from each "
+        "Per cent of the information on a parameter (its squared derivatives) that comes from each "
         "run, at the optimum. A row with one dark cell rests on one run."
     )
     blocks = [text(words)]
@@ -588,7 +588,7 @@ def _profile_section(fit: Fit, profiles: Sequence[StageProfile]) -> Section:
         said = [text(words, "remark") for words in given.profile.sentences(name)]
         tiles.append(Block("tile", [Block("figure", drawn, f"{name} ({given.stage})"), *said]))
     words = (
-        "The least cost with one unknown fixed, above that of the optimum; the dashed line ends "
+        "The lowest cost with one parameter fixed, above that of the optimum; the dashed line ends "
         "the interval."
     )
     blocks = [text(words), Block("tiles", tiles)] if tiles else []
