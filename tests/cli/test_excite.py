@@ -85,7 +85,9 @@ def test_doubts_are_said_first(done: Words, tmp_path: Path) -> None:
 
 def test_refusals(refused: Words, campaign: str, tmp_path: Path) -> None:
     assert "no axis 'boom'; it has hoist" in refused("excitation", campaign, "--axis", "boom")
-    assert "no packaged set-up 'boom'" in refused("excitation", campaign, "--setup", "boom")
+    assert "no packaged fit configuration 'boom'" in refused(
+        "excitation", campaign, "--setup", "boom"
+    )
     (tmp_path / "none.toml").write_text(
         '[[stages]]\nname = "pump"\npart = "pump"\nfree.Z14 = { relative = [0.5, 2.0] }\n', "utf-8"
     )

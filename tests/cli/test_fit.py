@@ -175,7 +175,7 @@ def test_a_result_that_is_of_no_use_ends_with_1(
 
 def test_refusals(refused: Words, campaign: Path, tmp_path: Path) -> None:
     fit = ("fit", "virtual/campaign.toml")
-    assert "no packaged set-up 'boom'" in refused(*fit, "--setup", "boom")
+    assert "no packaged fit configuration 'boom'" in refused(*fit, "--setup", "boom")
     assert "no axis 'boom'; it has hoist" in refused(*fit, "--axis", "boom")
     assert "20 draws do not reach the ends" in refused(*fit, "--bootstrap", "20")
     assert "no parameter 'Z99'" in refused(*fit, "--setup", "setup.toml", "--profile", "Z99")

@@ -200,7 +200,7 @@ def test_an_inertia_takes_the_place_of_its_frequency() -> None:
         ({}, {"spool_mass": 0.1}, "spool_mass on spool_arm alone has 6.331e-06 kg m², but spool_f"),
         ({}, {"piston_mass": 2.0}, "choose a smaller mass or a lower frequency"),
         ({}, {"control_arm": 0.2}, "control_arm is given as 0.2 m, but 0.127914042 follows from"),
-        ({}, {"load_torque": 1e8}, "the load holds a stroker pressure of .* Pa at rest"),
+        ({}, {"load_torque": 1e8}, "the load holds a stroking pressure of .* Pa at rest"),
         ({"Z2": 0.01}, {}, "mine: Z2 is 0.01, but a physical set has Z2 = 0"),
         ({"Z11": 0.01}, {}, "Z11 is 0.01, but without load_torque no speed is lost to it"),
         ({"Z12": 0.03}, {"load_inertia": 0.0}, "Z12 is 0.03, but without load_inertia"),

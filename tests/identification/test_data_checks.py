@@ -195,7 +195,7 @@ def test_fewer_samples_than_unknowns() -> None:
 def test_commands_within_the_dead_zone() -> None:
     said = refused(run("timid", held(0.1)), run("shy", held(-0.05)))
     assert said.startswith("timid: its command stays between 0 and 0.1 V, within the dead zone")
-    assert "and so it is in all other runs; a drive that is not moved tells nothing" in said
+    assert "and so it is in all other runs; a drive that does not move cannot be identified" in said
     assert "-0.0979 to 0.127 V" in said
     (said,) = warned(*GOOD, run("timid", held(0.1)))
     assert said.endswith("it shows the drive at rest only.")

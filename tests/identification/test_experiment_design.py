@@ -120,7 +120,7 @@ def test_a_candidate_that_moves_nothing() -> None:
     ("candidates", "said"),
     [
         ([], "no candidate"),
-        ([Candidate("c", np.ones((2, 3)))], "c: 2 unknowns need as many columns"),
+        ([Candidate("c", np.ones((2, 3)))], "c: 2 parameters need as many columns"),
         ([Candidate("c", np.full((2, 2), np.nan))], "c: the derivatives must be finite"),
     ],
 )
@@ -330,7 +330,7 @@ def test_the_usual_tests_differ() -> None:
 
 
 def test_wrong_wishes_are_refused() -> None:
-    with pytest.raises(InputError, match="Z10 is free in the set-up already"):
+    with pytest.raises(InputError, match="Z10 is free in the fit configuration already"):
         bench(HOIST.parameters, setup("Z10"), free=["Z10"])
     off = HOIST.replace(Z16=(np.inf, np.inf))
     with pytest.raises(InputError, match="Z16_plus is off in the drive"):

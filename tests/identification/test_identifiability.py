@@ -168,7 +168,7 @@ def test_an_unknown_at_its_bound_is_flagged_and_held() -> None:
     found = identifiability(np.ones((5, 2)), variables)
     assert found.at_bounds == {"Z17": "lower"}
     assert found.complete  # the two columns are alike, but one is held
-    assert any("Z17 = 0.25 stands at its lower bound" in each for each in found.sentences())
+    assert any("Z17 = 0.25 is at its lower bound" in each for each in found.sentences())
 
 
 def test_the_gauges_of_the_hoist(hoist_columns: tuple) -> None:

@@ -185,7 +185,7 @@ POISON = {
     ),
     "wrong length": (
         lambda text: re.sub(r'"vector": \[[^]]+\]', '"vector": [1.0]', text, count=1),
-        "stage card has other unknowns",
+        "stage card has other parameters",
     ),
     "a number for the drive": (
         lambda text: text.replace('"nominal": ', '"nominal": 3, "was": '),

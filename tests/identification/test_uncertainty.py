@@ -75,7 +75,7 @@ def test_correlations_that_cancel_cost_no_samples() -> None:
     fit, _ = fitted([shapes(rng) for _ in range(RUNS)], noise)
     said = " ".join(uncertainty(fit).sentences())
     assert "stay correlated over" in said
-    assert "positive and negative correlations cancel, and the samples tell as much as" in said
+    assert "positive and negative correlations cancel, and the samples count as" in said
 
 
 def test_the_sentences_say_so(campaigns: list) -> None:

@@ -78,7 +78,7 @@ def test_bounds_that_are_reached() -> None:
         (lambda: bounded("a", 1.0, absolute=(0.0, 2.0), prior=Prior(1.0, 0.0)), "positive"),
         (
             lambda: Unknowns((Unknown("a", 1, 0, 2), Unknown("b", 1, 0, 2, sets=("a",)))),
-            "a is set by two unknowns",
+            "a is set by two parameters",
         ),
     ],
 )

@@ -150,7 +150,7 @@ def test_a_fit_that_carries_over_is_usable(experiment, measured, stage) -> None:
     assert found.headline == "Usable: predicts held-out y to 0.66 % of its range."
     validation = statement(found, "Validation")
     assert validation.weight == "good"
-    assert "the fit carries over" in validation.sentences[0]
+    assert "no sign of overfitting" in validation.sentences[0]
 
 
 def test_what_is_required_decides(quality: Make) -> None:

@@ -263,7 +263,7 @@ def determined(assessments: Sequence[Assessment]) -> Criterion:
         found = each.identifiability
         lost += len(shared & {*found.at_bounds, *found.to_fix})
         total += len(shared)
-    words = f"{lost} of {total} parameters are at a bound or are not determined"
+    words = f"{lost} of {total} parameters are at a bound or not determined"
     return Criterion(
         "parameters without a value",
         f"{lost} of {total}",
