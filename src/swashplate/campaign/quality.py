@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import schema
 from swashplate.campaign.campaign import Campaign, read_campaign_file
-from swashplate.campaign.encoder import find_lost_counts, unwrap_counts
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.schema import applying, inside
+from swashplate.campaign.sensors import find_lost_counts, unwrap_counts
 from swashplate.campaign.stamps import StampStatistics, stamp_statistics
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.tables import Column, Table

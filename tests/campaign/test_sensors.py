@@ -1,4 +1,4 @@
-"""Counts: roll-overs out, staircases filled, jumps found, counters told from other columns."""
+"""Counts: roll-overs out, staircases filled, jumps found; one ammeter, its zeros and its sign."""
 
 import numpy as np
 import pytest
@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from swashplate.campaign import (
     find_lost_counts,
     interpolate_counts,
-    radians_per_count,
     rolls_over_at,
+    signed_by_command,
     unwrap_counts,
+    zero_crossings,
 )
 from swashplate.errors import InputError
 
@@ -65,25 +66,22 @@ def test_readings_that_no_such_counter_shows_are_refused(
         unwrap_counts(counts, modulus)
 
 
-def test_interpolation_by_hand() -> None:
-    counts = [5, 5, 6, 6, 6, 8, 8, 7, 7, 7]
-    # changes at rows 2, 5, 7; the first row begins the first line; after row 7 the count is held
-    #        0        2                         5      7
-    lines = [5, 5.5, 6, 6 + 2 / 3, 6 + 4 / 3, 8, 7.5, 7, 7, 7]
-    np.testing.assert_allclose(interpolate_counts(np.arange(10.0), counts), lines, rtol=1e-15)
-
-
-def test_interpolation_follows_uneven_stamps() -> None:
-    time = [0.0, 1.0, 3.0, 4.0, 10.0]
-    # changes at 3 s and 10 s
-    lines = [0.0, 1 / 3, 1.0, 1 + 1 / 7, 2.0]
-    np.testing.assert_allclose(interpolate_counts(time, [0, 0, 1, 1, 2]), lines, rtol=1e-15)
-
-
-def test_counts_that_never_change_or_always_do_stay() -> None:
-    time = np.arange(4.0)
-    np.testing.assert_array_equal(interpolate_counts(time, [3, 3, 3, 3]), [3, 3, 3, 3])
-    np.testing.assert_array_equal(interpolate_counts(time, [3, 9, 4, 5]), [3, 9, 4, 5])
+@pytest.mark.parametrize(
+    ("time", "counts", "lines"),
+    [
+        # changes at rows 2, 5, 7; the first row begins the first line; after row 7 it is held
+        (
+            range(10),
+            [5, 5, 6, 6, 6, 8, 8, 7, 7, 7],
+            [5, 5.5, 6, 6 + 2 / 3, 6 + 4 / 3, 8, 7.5, 7, 7, 7],
+        ),
+        ([0.0, 1.0, 3.0, 4.0, 10.0], [0, 0, 1, 1, 2], [0.0, 1 / 3, 1.0, 1 + 1 / 7, 2.0]),
+        (range(4), [3, 3, 3, 3], [3, 3, 3, 3]),
+        (range(4), [3, 9, 4, 5], [3, 9, 4, 5]),
+    ],
+)
+def test_interpolation_by_hand(time: list, counts: list, lines: list) -> None:
+    np.testing.assert_allclose(interpolate_counts(time, counts), lines, rtol=1e-15)
 
 
 @given(st.floats(0.02, 30.0), st.floats(0.0, 1.0), st.sampled_from([-1.0, 1.0]))
@@ -100,17 +98,6 @@ def test_steady_motion_is_found_to_the_motion_within_one_sample(
     behind = direction * (position - lines)[inside] + (1.0 if direction < 0.0 else 0.0)
     assert behind.min() >= -1e-9
     assert behind.max() <= min(1.0, speed) + 1e-9
-
-
-def test_angle_of_the_hoist_winch() -> None:
-    # 400 counts a turn geared 120/19 to 1: one turn of the winch is 400·120/19 = 2526.3 counts
-    angle = radians_per_count(400.0, 120.0 / 19.0)
-    assert angle * 400.0 * 120.0 / 19.0 == pytest.approx(2.0 * np.pi, rel=1e-15)
-    assert radians_per_count(400.0, 120.0 / 19.0, sign=-1) == -angle
-    with pytest.raises(InputError, match="sign must be 1 or -1, not 0"):
-        radians_per_count(400.0, sign=0)
-    with pytest.raises(InputError, match="counts_per_turn must be positive"):
-        radians_per_count(0.0)
 
 
 def test_lost_counts_are_found_where_they_are() -> None:
@@ -143,32 +130,66 @@ THERE_AND_BACK = np.floor(9000.0 * np.sin(0.6 * LONG))
 """Up to 9000 counts and back, at most 27 in a sample."""
 
 
-@pytest.mark.parametrize("size", [1000, 3600, 4096])
-def test_a_counter_that_begins_anew(size: int) -> None:
-    assert rolls_over_at(THERE_AND_BACK % size) == size
+@pytest.mark.parametrize(
+    ("values", "turn", "size"),
+    [
+        (THERE_AND_BACK % 1000, None, 1000),
+        (THERE_AND_BACK % 3600, None, 3600),
+        (THERE_AND_BACK % 4096, None, 4096),
+        (THERE_AND_BACK % 3990, None, 4000),
+        (THERE_AND_BACK % 3990, 3990.0, 3990),  # the counts of a turn are likely
+        ((THERE_AND_BACK + 2048) % 4096 - 2048, None, 4096),  # signed
+        (THERE_AND_BACK, None, None),  # never begins anew
+        (np.arange(2001.0) % 256, None, None),  # counts the samples
+        (THERE_AND_BACK % 4096 + 0.5, None, None),
+        (np.where(LONG % 2.0 < 1.0, 0.0, 1000.0), None, None),  # a switch
+        (np.where(LONG < 8.0, np.floor(400.0 * np.sin(0.3 * LONG)), 0.0), None, None),  # set to 0
+        (np.full(5, np.nan), None, None),
+        (np.zeros(0), None, None),
+    ],
+)
+def test_columns_that_are_counters(
+    values: np.ndarray, turn: float | None, size: int | None
+) -> None:
+    assert rolls_over_at(values, turn) == size
 
 
-def test_the_counts_of_a_turn_are_likely() -> None:
-    seen = THERE_AND_BACK % 3990
-    assert rolls_over_at(seen) == 4000
-    assert rolls_over_at(seen, 3990.0) == 3990
+# --- the ammeter ----------------------------------------------------------------------------------
 
 
-def test_a_signed_counter() -> None:
-    assert rolls_over_at((THERE_AND_BACK + 2048) % 4096 - 2048) == 4096
+TIME = np.arange(11) * 0.1
 
 
 @pytest.mark.parametrize(
-    "values",
+    ("values", "options", "instants", "masked"),
     [
-        THERE_AND_BACK,  # never begins anew
-        np.arange(2001.0) % 256,  # counts the samples
-        THERE_AND_BACK % 4096 + 0.5,
-        np.where(LONG % 2.0 < 1.0, 0.0, 1000.0),  # a switch
-        np.where(LONG < 8.0, np.floor(400.0 * np.sin(0.3 * LONG)), 0.0),  # set to zero
-        np.full(5, np.nan),
-        np.zeros(0),
+        # from +3 at 0.4 s to -1 at 0.5 s: zero at 0.475 s; 0.26 s around: 0.345 to 0.605 s
+        ([3, 3, 3, 3, 3, -1, -1, -1, -1, -1, -1], {"width": 0.26}, [0.475], [4, 5, 6]),
+        # a stay at zero is masked at both ends
+        ([1, 1, 0, 0, 0, 0, 0, 0, -1, -1, -1], {"width": 0.22}, [0.1, 0.8], [0, 1, 2, 7, 8, 9]),
+        # rest and the return to it are no crossings
+        ([0, 0, 1, 2, 0, 0, 1, 0, 0, 0, 0], {"width": 0.2}, [], []),
+        # noise below the level has no sign
+        ([2, 2, 0.01, -0.01, 0.01, -0.01, 2, 2, 2, 2, 2], {"width": 0.1, "level": 0.05}, [], []),
     ],
 )
-def test_what_is_none(values: np.ndarray) -> None:
-    assert rolls_over_at(values) is None
+def test_zero_crossings(values: list, options: dict, instants: list, masked: list) -> None:
+    found = zero_crossings(TIME, values, **options)
+    np.testing.assert_allclose(found.instants, instants)
+    np.testing.assert_array_equal(np.flatnonzero(found.masked), masked)
+
+
+def test_sign_of_a_current_on_its_way_to_zero() -> None:
+    command = np.array([0.0, -5.0, -5.0, 0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 4.0, 4.0])
+    reading = np.array([0.0, 0.1, 0.4, 0.3, 0.1, 0.0, 0.0, 0.2, 0.3, 0.4, 0.4])
+    expected = [0.0, -0.1, -0.4, -0.3, -0.1, 0.0, 0.0, 0.2, 0.3, 0.4, 0.4]
+    np.testing.assert_allclose(signed_by_command(reading, command), expected)
+
+
+def test_wrong_readings_are_refused() -> None:
+    with pytest.raises(InputError, match="rectified must not be negative, but row 3"):
+        signed_by_command(np.where(np.arange(11) == 3, -0.1, 0.1), TIME)
+    with pytest.raises(InputError, match="width must be positive"):
+        zero_crossings(TIME, TIME, width=0.0)
+    with pytest.raises(InputError, match="level must not be negative"):
+        zero_crossings(TIME, TIME, width=0.1, level=-1.0)

@@ -1,4 +1,9 @@
-"""Encoder counts: roll-overs taken out, staircases filled, jumps found, angles made of them."""
+"""Two instruments' readings: an encoder's counts, and one ammeter around both solenoid leads.
+
+Counts have their roll-overs taken out, their staircase filled and their jumps found. The ammeter
+reads the sum of magnitudes: compare it with the same of the simulation, and leave out what lies
+around the zero crossings, where a sign that is put back is a guess. Never differentiate through it.
+"""
 
 from math import ceil, log2
 from typing import NamedTuple
@@ -6,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swashplate.campaign.stamps import GAP, Array, Rows, increasing, signal
+from swashplate.campaign.stamps import GAP, Array, Mask, Rows, increasing, signal
 from swashplate.errors import InputError
-from swashplate.maneuvers.pieces import positive, row, whole
+from swashplate.maneuvers.pieces import not_negative, positive, row, whole
 
 WIDEST = 2**53
 """Most readings of a counter that a float64 holds to the count."""
@@ -140,34 +145,10 @@ def interpolate_counts(time: ArrayLike, counts: ArrayLike) -> Array:
     that a reversal, whose two changes pass the same edge, moves the position by one count.
     """
     stamps = increasing(time)
-    return interpolated(stamps, signal("counts", counts, stamps.size))
-
-
-def interpolated(time: Array, counts: Array) -> Array:
-    """`interpolate_counts` of arrays that are already checked."""
-    knots = np.concatenate([[0], np.flatnonzero(counts[1:] != counts[:-1]) + 1])
-    if knots.size == counts.size:
-        return counts.copy()
-    filled: Array = np.interp(time, time[knots], counts[knots])
+    edges = signal("counts", counts, stamps.size)
+    knots = np.concatenate([[0], np.flatnonzero(edges[1:] != edges[:-1]) + 1])
+    filled: Array = np.interp(stamps, stamps[knots], edges[knots])
     return filled
-
-
-def radians_per_count(counts_per_turn: float, gear_ratio: float = 1.0, sign: int = 1) -> float:
-    """Angle of the shaft for one count, negative where the count runs the other way. [rad]
-
-    From counts in one turn of the encoder, turns of it in one turn of the shaft, and -1 if the
-    counter goes down where the shaft's speed is positive: Kruse (2001), eqs. 7.2-7.4 before their
-    derivative, with the 2π that they leave out.
-
-    Raises
-    ------
-    InputError
-        If a ratio is not positive or the sign another.
-    """
-    if sign not in (1, -1):
-        raise InputError(f"sign must be 1 or -1, not {sign!r}.")
-    turn = positive("counts_per_turn", counts_per_turn) * positive("gear_ratio", gear_ratio)
-    return sign * 2.0 * np.pi / turn
 
 
 def find_lost_counts(time: ArrayLike, counts: ArrayLike) -> Rows:
@@ -231,3 +212,107 @@ def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int | 
     small = np.mean(np.abs(across) <= 2.0 * ordinary + (best - span)) >= 0.5
     level = np.ptp(np.concatenate([steps[~over], across])) == 0.0
     return None if level or not small or ordinary >= 0.25 * best else best
+
+
+# --- the ammeter ----------------------------------------------------------------------------------
+
+
+class ZeroCrossings(NamedTuple):
+    """Where a signal changes its sign, and what lies around it."""
+
+    instants: Array
+    """Instants of the crossings; of a stay at zero, when it begins and ends. [s]"""
+    masked: Mask
+    """True for samples within half the width of an instant: leave them out."""
+
+
+def zero_crossings(
+    time: ArrayLike, values: ArrayLike, *, width: float, level: float = 0.0
+) -> ZeroCrossings:
+    """Find where a signal changes its sign and mask the samples around.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Stamps. [s]
+    values : array_like, shape (n,)
+        The command, or better the simulated signed current, which lags like the measured one.
+    width : float
+        Length of the mask around each crossing, half before and half after. [s]
+    level : float
+        What is no larger than this counts as zero, in the unit of `values`.
+
+    Returns
+    -------
+    ZeroCrossings
+        A stay at zero between both signs is masked at both of its ends, and within if it is no
+        longer than the width. Leaving zero and coming back with the same sign is no crossing.
+
+    Raises
+    ------
+    InputError
+        If the stamps do not increase, a number is not finite, or the width is not positive.
+    """
+    stamps = increasing(time)
+    numbers = signal("values", values, stamps.size)
+    half = 0.5 * positive("width", width)
+    band = not_negative("level", level)
+    sure = np.flatnonzero(np.abs(numbers) > band)
+    turns = np.flatnonzero(np.sign(numbers[sure[1:]]) != np.sign(numbers[sure[:-1]]))
+    before, after = sure[turns], sure[turns + 1]
+    direct = after == before + 1
+    share = numbers[before] / (numbers[before] - numbers[after])
+    crossed = stamps[before] + share * (stamps[after] - stamps[before])
+    instants = np.unique(
+        np.concatenate([crossed[direct], stamps[before[~direct]], stamps[after[~direct]]])
+    )
+    masked = np.zeros(stamps.size, dtype=np.bool_)
+    for first, last in zip(
+        np.searchsorted(stamps, instants - half, side="left"),
+        np.searchsorted(stamps, instants + half, side="right"),
+        strict=True,
+    ):
+        masked[first:last] = True
+    return ZeroCrossings(instants, masked)
+
+
+def signed_by_command(rectified: ArrayLike, command: ArrayLike, *, level: float = 0.0) -> Array:
+    """Give a rectified current the sign of the command.
+
+    Parameters
+    ----------
+    rectified : array_like, shape (n,)
+        Reading of the ammeter, not negative. [A]
+    command : array_like, shape (n,)
+        Voltage, or any signal with the current's sign. [V]
+    level : float
+        A command no larger than this has no sign of its own. [V]
+
+    Returns
+    -------
+    array, shape (n,)
+        Current, positive where the command is. While the command has no sign the last one it had
+        holds, because the current is still on its way to zero; before the first it is positive. [A]
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, the lengths differ, or a reading is negative: it would have its
+        sign already.
+
+    Notes
+    -----
+    The true current passes zero smoothly; this one jumps where the command does, by twice the
+    reading. Its derivative, and that of a cost through it, mean nothing there.
+    """
+    numbers = row("command", command)
+    readings = signal("rectified", rectified, numbers.size)
+    negative = np.flatnonzero(readings < 0.0)
+    if negative.size:
+        raise InputError(
+            f"rectified must not be negative, but row {negative[0]} (the first is 0) is "
+            f"{readings[negative[0]]} A."
+        )
+    signs = np.where(np.abs(numbers) > level, np.sign(numbers), 0.0)
+    last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.size), 0))
+    return np.where(signs[last] < 0.0, -readings, readings)
