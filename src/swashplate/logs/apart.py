@@ -25,7 +25,7 @@ from weakref import finalize
 import numpy as np
 
 from swashplate.errors import FileError, InputError, SwashplateError
-from swashplate.logs.log import Array, Column, Log, printable, reader_of, said
+from swashplate.logs.log import Array, Column, Log, opener, printable, said
 
 _PATIENCE = 30.0
 """How long a small file may take [s]."""
@@ -36,12 +36,12 @@ _START = "import sys; sys.path[:] = {path!r}; from swashplate.logs.apart import 
 
 
 def open_apart(reader: str, path: Path) -> Log:
-    """Look into a file as a reader of this package does, in the other process.
+    """Look into a file of a format of this package, in the other process.
 
     Parameters
     ----------
     reader : str
-        Its name, as `reader_of` takes it.
+        Name of the format in `READERS`.
 
     Raises
     ------
@@ -194,15 +194,15 @@ def serve() -> None:
     last: tuple[object, Log] | None = None
     for line in sys.stdin.buffer:
         asked = json.loads(line)
-        path, reader = Path(asked["path"]), reader_of(asked["reader"])
+        path, reader = Path(asked["path"]), asked["reader"]
         arrays: Sequence[Array] = []
         answer: dict[str, Any]
         try:
             _limit_memory(path)
-            known = (asked["reader"], path, path.stat().st_mtime_ns, path.stat().st_size)
+            known = (reader, path, path.stat().st_mtime_ns, path.stat().st_size)
             if last is None or last[0] != known:
                 last = None
-                last = known, reader.open(path, TextOptions())
+                last = known, opener(reader)(path, TextOptions())
             log = last[1]
             if asked["positions"] is not None:
                 log = log.between(*asked["rows"]) if asked["rows"] else log
@@ -217,7 +217,7 @@ def serve() -> None:
             what = str(error)
             if not isinstance(error, SwashplateError):
                 what = (
-                    f"{path} cannot be read as {reader.name}, it is damaged or of another kind: "
+                    f"{path} cannot be read as {reader}, it is damaged or of another kind: "
                     f"{said(error)}."
                 )
             kind = "InputError" if isinstance(error, InputError) else "FileError"

@@ -14,7 +14,6 @@ from swashplate.logs.dialect import TextOptions
 from swashplate.logs.log import (
     Array,
     Column,
-    Format,
     Log,
     check_any,
     check_kind,
@@ -344,7 +343,3 @@ def _check_stored(path: Path, dataset: Any) -> None:
                 f"{path}: {what} has only {count} of its {expected} blocks; the others were never "
                 "written."
             )
-
-
-MATLAB = Format("MATLAB", (".mat",), open_matlab)
-HDF5 = Format("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), open_hdf5)

@@ -18,7 +18,6 @@ from swashplate.logs.dialect import TextOptions, shown
 from swashplate.logs.log import (
     Array,
     Column,
-    Format,
     Log,
     check_any,
     check_kind,
@@ -377,8 +376,3 @@ def _samples(path: Path, mdf: Any, called: str, group: int, place: int, rows: in
     if invalid is not None:
         numbers[np.asarray(invalid, bool)] = np.nan
     return numbers
-
-
-PARQUET = Format("Parquet", (".parquet", ".pq"), open_parquet)
-TDMS = Format("TDMS", (".tdms",), open_tdms)
-MDF = Format("MDF", (".mf4", ".mdf"), open_mdf)

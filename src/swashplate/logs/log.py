@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import FileError, InputError
-from swashplate.units import speed_unit, to_si
+from swashplate.units import scaling, speed_unit, to_si
 
 if TYPE_CHECKING:
     from swashplate.logs.dialect import TextOptions
@@ -167,14 +167,6 @@ class Log:
             raise
 
 
-class Format(NamedTuple):
-    """A reader of this package, as `Reader` has it."""
-
-    name: str
-    suffixes: tuple[str, ...]
-    open: Callable[[Path, TextOptions], Log]
-
-
 @runtime_checkable
 class Reader(Protocol):
     """What reads one format; a module or an object that has these three.
@@ -298,20 +290,18 @@ def check_any(
 
 # --- opening --------------------------------------------------------------------------------------
 
-_READERS = {
-    "text.TEXT": (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".log"),
-    "channels.PARQUET": (".parquet", ".pq"),
-    "arrays.MATLAB": (".mat",),
-    "arrays.HDF5": (".h5", ".hdf5", ".hdf", ".he5"),
-    "channels.TDMS": (".tdms",),
-    "channels.MDF": (".mf4", ".mdf"),
+READERS = {
+    "CSV": ("text.open_text", (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".log")),
+    "Parquet": ("channels.open_parquet", (".parquet", ".pq")),
+    "MATLAB": ("arrays.open_matlab", (".mat",)),
+    "HDF5": ("arrays.open_hdf5", (".h5", ".hdf5", ".hdf", ".he5")),
+    "TDMS": ("channels.open_tdms", (".tdms",)),
+    "MDF": ("channels.open_mdf", (".mf4", ".mdf")),
 }
-"""Reader of each format and the endings of its files: they are imported when one is opened."""
+"""What opens each format, imported when a file is opened, and the endings of its files. All but
+text have libraries that cannot be trusted with a damaged file: see `apart`."""
 
-_TRUSTED = ("text.TEXT",)
-"""Others have libraries that cannot be trusted with a damaged file: see `apart`."""
-
-SUFFIXES = tuple(suffix for suffixes in _READERS.values() for suffix in suffixes)
+SUFFIXES = tuple(suffix for _, suffixes in READERS.values() for suffix in suffixes)
 """Endings of files that swashplate reads itself."""
 
 GROUP = "swashplate.readers"
@@ -344,21 +334,24 @@ def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
 
     source = Path(path)
     suffix = source.suffix.lower()
-    name = next((name for name, suffixes in _READERS.items() if suffix in suffixes), None)
-    reader = _other(source) if name is None else None
+    name = next((name for name, (_, suffixes) in READERS.items() if suffix in suffixes), None)
+    other = _other(source) if name is None else None
     check_file(source)
-    if name is not None and name not in _TRUSTED:
-        from swashplate.logs.apart import open_apart
+    if name in (None, "CSV"):
+        look = other.open if other is not None else opener("CSV")
+        return look(source, options or TextOptions())
+    from swashplate.logs.apart import open_apart
 
-        return open_apart(name, source)
-    return (reader or reader_of(name or "")).open(source, options or TextOptions())
+    return open_apart(str(name), source)
 
 
-def reader_of(name: str) -> Reader:
-    """The reader of a format of this package, imported by its name: ``"channels.PARQUET"``."""
-    module, _, constant = name.partition(".")
-    reader: Reader = getattr(import_module(f"swashplate.logs.{module}"), constant)
-    return reader
+def opener(name: str) -> Callable[[Path, TextOptions], Log]:
+    """What opens a format of this package, imported by its name in `READERS`."""
+    module, _, function = READERS[name][0].partition(".")
+    look: Callable[[Path, TextOptions], Log] = getattr(
+        import_module(f"swashplate.logs.{module}"), function
+    )
+    return look
 
 
 def _other(path: Path) -> Reader:
@@ -452,8 +445,8 @@ def _si(log: Log, wanted: str, si: str, values: Array) -> Array:
     unit = unit_of(found, wanted, si)
     unit = speed_unit(unit) if si == "rad/s" else unit
     what = f"{log.path}: column '{found.name}'"
-    zero, one = (to_si(value, unit, si, what) for value in (0.0, 1.0))
-    return values * one if zero == 0.0 else values * (one - zero) + zero
+    factor, zero = scaling(unit, si, what)
+    return values * factor + zero
 
 
 # --- columns by name, and their units -------------------------------------------------------------

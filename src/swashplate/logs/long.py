@@ -51,7 +51,7 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
         columns = sorted({*columns, *(held[3] if held is not None and held[:3] == stamp else [])})
         _convert(log, columns, table, json.dumps([*stamp, columns]))
         held = [*stamp, columns]
-    stored = open_apart("channels.PARQUET", table)
+    stored = open_apart("Parquet", table)
     note = f"Its {stored.rows} rows are read from {table.name}, written beside it."
     kept = tuple(log.columns[position] for position in held[3])
     return replace(
