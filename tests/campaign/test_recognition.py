@@ -46,7 +46,6 @@ def test_tests_of_the_source_are_recognised_through_a_12_bit_readback(
     found = recognise(time, readback(run(time)))
     assert found.name == name
     assert found.kind == name.split()[0]
-    assert abs(found.rest - 0.03) < 0.01
 
 
 @pytest.mark.parametrize(("axis", "name"), SOURCE)
@@ -135,9 +134,8 @@ def test_returns_other_than_the_packages_leave_the_manoeuvre_what_it_is() -> Non
 def test_other_units_are_relative_to_rest() -> None:
     time = grid(5.0, 52.0)
     duty = np.where(time < 2.5, 7.4745, 10.01)
-    found = recognise(time, duty, unit="%")
-    assert found.name == "step +2.54 %"  # 2.5355, rounded within 0.2 %
-    assert found.rest == pytest.approx(7.4745)
+    # 2.5355, rounded within 0.2 %
+    assert recognise(time, duty, unit="%").name == "step +2.54 %"
     assert recognise(time, duty[::-1], unit="%").name == "step -2.54 %"
 
 
@@ -254,8 +252,7 @@ def test_any_record_has_an_answer(
     random = np.random.default_rng(seed)
     time = np.cumsum(random.uniform(0.001, 0.1, size))
     found = recognise(time, make(random, size))
-    assert found.name.split(" ")[0] == found.kind
-    assert np.isfinite(found.rest)
+    assert found.kind in ("rest", "step", "stairs", "ramp", "sine", "free")
 
 
 @pytest.mark.parametrize(

@@ -23,8 +23,8 @@ from swashplate.campaign.reading import (
     windows,
 )
 from swashplate.campaign.recognition import recognise
+from swashplate.campaign.samples import ambiguous_gaps, unwrap_counts
 from swashplate.campaign.schema import applying, inside
-from swashplate.campaign.sensors import ambiguous_gaps, unwrap_counts
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.errors import InputError
 from swashplate.logs import Log, open_log

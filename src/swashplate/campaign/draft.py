@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from swashplate.campaign.campaign import read_run
 from swashplate.campaign.quality import has_sign
 from swashplate.campaign.recognition import recognise
+from swashplate.campaign.samples import rolls_over_at
 from swashplate.campaign.schema import KINDS, CampaignFile, ChannelKind, InputKind, conversion
-from swashplate.campaign.sensors import rolls_over_at
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
 from swashplate.logs import Column, Log, open_log

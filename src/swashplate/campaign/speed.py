@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swashplate.campaign.experiment import Channel
-from swashplate.campaign.sensors import interpolate_counts
-from swashplate.campaign.stamps import Array, Stamps, signal, stamps_of
+from swashplate.campaign.samples import Array, Stamps, interpolate_counts, signal, stamps_of
 from swashplate.equations.cache import kernel
 from swashplate.errors import InputError
 from swashplate.maneuvers.pieces import positive
