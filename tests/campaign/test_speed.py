@@ -154,7 +154,9 @@ def test_matched_ramp_comes_when_the_measured_one_does(form: str) -> None:
     raw = matched_speed(time, speed, form=form, aligned=False)
     lags = [(measured - each)[-1] / 4.0 / H for each in (matched, raw)]
     np.testing.assert_allclose(lags, [0.0, 0.5], atol=1e-6)
-    assert time[-1] - measured[-1] / 4.0 == pytest.approx(path_delay(H, form=form), rel=1e-6)
+    # but for terms in h² of the exact form
+    late = time[-1] - measured[-1] / 4.0
+    assert late == pytest.approx(path_delay(H, form=form), rel=1e-6 if form == "source" else 1e-5)
 
 
 def test_unstable_and_uneven_are_refused_for_the_explicit_form_only() -> None:

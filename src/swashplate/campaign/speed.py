@@ -173,12 +173,8 @@ def path_delay(period: float, *, form: Form = "source") -> float:
         If the period is not positive, or the explicit form cannot be used.
     """
     h = positive("period", period)
-    _, recursion = _recursion(Stamps(np.array([0.0, h]), h), form)
-    first, second, from_state, _ = (float(each[0]) for each in recursion)
-    # mean age of what the output is made of, in samples: half a sample of the mean, what x adds
-    # where it is used, and what each recursion keeps
-    through_state = from_state / (1.0 - second) * (1.0 + first / (1.0 - first))
-    return h * (0.5 + through_state + second / (1.0 - second))
+    _recursion(Stamps(np.array([0.0, h]), h), form)
+    return 1.0 / LOW_PASS + 1.0 / DIFFERENTIATOR - (0.5 * h if form == "source" else 0.0)
 
 
 def _slope(stamps: Stamps, angle: Array) -> Array:

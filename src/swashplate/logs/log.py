@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module, metadata
 from pathlib import Path
@@ -274,18 +274,16 @@ def check_kind(path: Path, *expected: str) -> None:
             )
 
 
-def left_out_notes(left_out: Mapping[str, str]) -> tuple[str, ...]:
-    """What is left out of a file and why, one sentence each."""
-    return tuple(f"'{each}' is left out: {reason}." for each, reason in left_out.items())
+def checked(log: Log, what: str = "columns") -> Log:
+    """A log with a note on each thing that is left out; one without columns of numbers is refused.
 
-
-def check_any(
-    path: Path, columns: Collection[object], what: str, left_out: Mapping[str, str]
-) -> None:
-    """Refuse a file without columns of numbers, and say what it has instead."""
-    if not columns:
-        why = "".join(f"; '{each}': {reason}" for each, reason in left_out.items())[:300]
-        raise FileError(f"{path} has no {what} of numbers{why}.")
+    `what` is what the format calls its columns, for the sentence.
+    """
+    if not log.columns:
+        why = "".join(f"; '{each}': {reason}" for each, reason in log.left_out.items())[:300]
+        raise FileError(f"{log.path} has no {what} of numbers{why}.")
+    left_out = (f"'{each}' is left out: {reason}." for each, reason in log.left_out.items())
+    return replace(log, notes=(*log.notes, *left_out))
 
 
 # --- opening --------------------------------------------------------------------------------------
