@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     Model = TypeVar("Model", bound=BaseModel)
 
 
-_LARGEST = 1 << 28
-"""Bytes of a document; what holds more was written by no one. [byte]"""
+LARGEST = 64 * 2**20
+"""Bytes of a text that is read whole."""
+DEEPEST = 40
+_DEEP = re.compile(rf"(?<![\w-])(?:[\w-]+\s*\.\s*){{{DEEPEST}}}")
 
 
 def read_text(path: str | Path) -> str:
@@ -32,14 +34,17 @@ def read_text(path: str | Path) -> str:
     FileError
         If there is none, it cannot be read, or is no ordinary file of up to 268 MB.
     """
+    place = Path(path)
     try:
-        stat = Path(path).stat()
-        if not S_ISREG(stat.st_mode):
-            what = "is a folder, not a file" if S_ISDIR(stat.st_mode) else "is no ordinary file"
-            raise FileError(f"{path} {what}.")
-        if stat.st_size > _LARGEST:
-            raise FileError(f"{path} has {stat.st_size / 1e6:.0f} MB; no such document is so long.")
-        return Path(path).read_text("utf-8-sig")
+        found = place.stat()
+        if S_ISDIR(found.st_mode):
+            raise FileError(f"{path} is a folder, not a file.")
+        if not S_ISREG(found.st_mode):
+            raise FileError(f"{path} is no ordinary file.")
+        if found.st_size > LARGEST:
+            raise FileError(f"{path} has more than {LARGEST // 2**20} MB: it is not such a text.")
+        # Windows' Notepad writes a byte order mark, which is no part of the text
+        return place.read_text("utf-8-sig")
     except FileError:
         raise
     except FileNotFoundError:
@@ -53,28 +58,44 @@ def read_text(path: str | Path) -> str:
         raise FileError(f"{path} cannot be read: {why}.") from None
 
 
-_DOTTED = re.compile(r"(?:[\w-]+[ \t]*\.[ \t]*){100}")
-"""A key of a hundred parts, whose tables within tables would take minutes."""
-
-
 def parse_toml(text: str, origin: str) -> dict[str, Any]:
     """The tables of a TOML text; `origin` names it in errors.
 
     Raises
     ------
     FileError
-        If it is not TOML, with line and column.
+        If it is not TOML, with line and column, or has what nobody writes: keys or tables nested a
+        hundred deep, numbers of thousands of digits, control characters in a text.
     """
     try:
-        if _DOTTED.search(text):
-            raise RecursionError
-        return tomllib.loads(text)
+        if _DEEP.search(text):
+            raise FileError(f"{origin} has a key of more than {DEEPEST} parts.")
+        found = tomllib.loads(text)
+        _check_texts(found, origin)
     except tomllib.TOMLDecodeError as error:
         raise FileError(f"{origin} is not TOML: {error}.") from None
     except RecursionError:
-        raise FileError(f"{origin} has tables or arrays in more levels than are read.") from None
-    except ValueError:  # of Python, which limits the digits that it turns into a number
-        raise FileError(f"{origin} has a number of thousands of digits.") from None
+        raise FileError(f"{origin} nests its tables or lists too deeply.") from None
+    except ValueError as error:
+        if isinstance(error, FileError):
+            raise
+        raise FileError(f"{origin} has a number with too many digits.") from None
+    return found
+
+
+def _check_texts(found: Any, origin: str) -> None:
+    """Refuse characters that would steer a terminal or break a page."""
+    if isinstance(found, str):
+        for each in found:
+            if not each.isprintable() and each not in "\n\r\t" and ord(each) < 0xA0:
+                raise FileError(
+                    f"{origin} has the control character {ord(each):#04x} in the text {found!r:.60}"
+                )
+    elif isinstance(found, dict | list):
+        for name in found if isinstance(found, dict) else ():
+            _check_texts(name, origin)
+        for each in found.values() if isinstance(found, dict) else found:
+            _check_texts(each, origin)
 
 
 def toml_key(name: str) -> str:
@@ -119,6 +140,8 @@ def read_json(path: str | Path, model: type[Model], *, strict: bool = True) -> M
     text = read_text(path)
     try:
         return model.model_validate_json(text, strict=strict)
+    except (RecursionError, OverflowError):
+        raise FileError(f"{path} nests too deeply or has a number beyond any use.") from None
     except ValidationError as error:
         found = error.errors()
         if found[0]["type"] == "json_invalid":

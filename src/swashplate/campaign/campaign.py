@@ -28,8 +28,13 @@ from swashplate.campaign.schema import applying, inside
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.errors import InputError
 from swashplate.logs import Log, open_log
+from swashplate.results import Result, figures
+from swashplate.tables import Column as Head
+from swashplate.tables import Table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from swashplate.drive import Drive
 
 Array = NDArray[np.float64]
@@ -39,7 +44,7 @@ LISTED = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Campaign:
+class Campaign(Result):
     """Experiments on one machine, SI. Iterate it, or take one by its name.
 
     Examples
@@ -92,6 +97,26 @@ class Campaign:
                 experiments += read_run(place, name, run, file.axes, part)
         title = file.title or Path(path).resolve().parent.name
         return cls(Path(path), title, file.virtual, file.axes, tuple(experiments), tuple(ignored))
+
+    def table(self) -> Table:
+        """Its experiments: axis, role, manoeuvre, length and channels."""
+        columns = (Head("run"), Head("axis"), Head("role"), Head("manoeuvre"))
+        made = Table(self.title, (*columns, Head("s", ".4g"), Head("channels", wrap=True)))
+        for each in self:
+            made.add(
+                each.name,
+                each.axis,
+                each.role,
+                each.maneuver,
+                each.duration,
+                ", ".join(each.channels),
+            )
+        return made
+
+    def plot(self, **how: Any) -> list[Figure]:
+        """Figures of all runs, as of `swashplate.report.figures.plot_campaign`."""
+        drawn: list[Figure] = figures().plot_campaign(self, **{"title": self.title, **how})
+        return drawn
 
     def __iter__(self) -> Iterator[Experiment]:
         return iter(self.experiments)

@@ -25,6 +25,7 @@ from swashplate.campaign.samples import (
 )
 from swashplate.campaign.schema import applying, inside
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result
 from swashplate.tables import Column, Table
 from swashplate.units import display_unit
 
@@ -60,7 +61,7 @@ NAMED = 6
 
 
 @dataclass(frozen=True)
-class Quality:
+class Quality(Result):
     """What one signal of one experiment is like; of a channel what is not ignored."""
 
     experiment: str

@@ -17,6 +17,7 @@ from swashplate.identification.linearised import TOLERANCE, triangular_factor, w
 from swashplate.identification.unknowns import Unknowns
 from swashplate.models.pump import ANGLE, FORCE, MOTION, PRESSURE, TILT, TRAVEL, ZERO
 from swashplate.parameters.definitions import CATALOGUE
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
@@ -215,7 +216,7 @@ def _in_order(name: str) -> tuple[str | int, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Identifiability:
+class Identifiability(Result):
     """Verdict on a fit's unknowns, before a fit or after."""
 
     variables: Unknowns

@@ -10,9 +10,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from swashplate.analysis.envelope import dead_zone
-from swashplate.analysis.limits import limit_shares
-from swashplate.analysis.monte_carlo import drives
+from swashplate.analysis import dead_zone, drives, limit_shares
 from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
