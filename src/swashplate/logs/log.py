@@ -156,15 +156,28 @@ class Log:
         )
 
     def _position(self, wanted: str) -> int:
-        try:
-            return find_column(self.columns, wanted, self.path)
-        except InputError:
-            for name, reason in self.left_out.items():
-                if wanted in (name, name.rpartition("/")[2]):
-                    raise FileError(
-                        f"{self.path}: '{name}' cannot be read as numbers: {reason}."
-                    ) from None
-            raise
+        names = [column.name for column in self.columns]
+        suffixed = re.compile(rf"{re.escape(wanted)}_\w+")
+        for matches in (
+            lambda column: column.name == wanted,
+            lambda column: _without_unit(column) == wanted,
+            lambda column: suffixed.fullmatch(column.name),
+            lambda column: _last(column.name) == wanted or _last(_without_unit(column)) == wanted,
+        ):
+            found = [place for place, column in enumerate(self.columns) if matches(column)]
+            if len(found) == 1:
+                return found[0]
+            if found:
+                several = _listed([names[place] for place in found])
+                raise InputError(
+                    f"{self.path} has more than one '{wanted}': {several}; name the one."
+                )
+        for name, reason in self.left_out.items():
+            if wanted in (name, _last(name)):
+                raise FileError(f"{self.path}: '{name}' cannot be read as numbers: {reason}.")
+        raise InputError(
+            f"{self.path} has no column '{wanted}'; it has {_listed(names)}: name the one to take."
+        )
 
 
 @runtime_checkable
@@ -460,33 +473,6 @@ def split_unit(name: str) -> tuple[str, str | None]:
     if match is None or not match[1]:
         return name, None
     return match[1], (match[2] if match[2] is not None else match[3]).strip()
-
-
-def find_column(columns: Sequence[Column], wanted: str, path: str | Path) -> int:
-    """Position of the column of a name; see `Log.find`.
-
-    Raises
-    ------
-    InputError
-        If there is none or more than one; the sentence lists what there is.
-    """
-    names = [column.name for column in columns]
-    suffixed = re.compile(rf"{re.escape(wanted)}_\w+")
-    for matches in (
-        lambda column: column.name == wanted,
-        lambda column: _without_unit(column) == wanted,
-        lambda column: suffixed.fullmatch(column.name),
-        lambda column: _last(column.name) == wanted or _last(_without_unit(column)) == wanted,
-    ):
-        found = [position for position, column in enumerate(columns) if matches(column)]
-        if len(found) == 1:
-            return found[0]
-        if found:
-            several = _listed([names[position] for position in found])
-            raise InputError(f"{path} has more than one '{wanted}': {several}; name the one.")
-    raise InputError(
-        f"{path} has no column '{wanted}'; it has {_listed(names)}: name the one to take."
-    )
 
 
 def unit_of(column: Column, wanted: str, si: str) -> str:
