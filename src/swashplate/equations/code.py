@@ -272,12 +272,9 @@ class Code:
         self.items: list[Item] = []
         self.taken: set[str] = taken if isinstance(taken, set) else {*taken, *RESERVED}
         self.ruled = ruled
-        self.names: dict[str, Function] = {}
-        """Generated functions that texts of it call."""
-        self.origins: dict[str, str] = {}
-        """Equation that each name comes from."""
-        self.under_way: list[Parsed] = []
-        """Equations that are being read."""
+        self.names: dict[str, Function] = {}  # Generated functions that texts of it call.
+        self.origins: dict[str, str] = {}  # Equation that each name comes from.
+        self.under_way: list[Parsed] = []  # Equations that are being read.
 
     @property
     def repeats(self) -> bool:

@@ -287,6 +287,17 @@ def lines_of(code: Code, wanted: Iterable[Node]) -> list[str]:
 # --- functions ------------------------------------------------------------------------------------
 
 
+def indented(lines: Iterable[str]) -> list[str]:
+    """Lines moved in."""
+    return [f"    {line}" for line in lines]
+
+
+def function_source(head: str, says: str, lines: Iterable[str], mark: str = "@kernel") -> str:
+    """Text of a function."""
+    head = f"{mark}\ndef {head}:" if mark else f"def {head}:"
+    return "\n".join([head, f'    """{says}"""', *indented(lines), ""])
+
+
 def function_text(
     name: str,
     says: str,

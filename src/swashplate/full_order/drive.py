@@ -15,8 +15,8 @@ from swashplate.drive import Drive
 from swashplate.equations.cache import kernel
 from swashplate.equations.equation import interpreted
 from swashplate.equations.marching.jacobian import jacobian
-from swashplate.equations.marching.march import Stored
 from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, Record, record_of
 from swashplate.equations.marching.run import Instance, Part, Start, check_start, marched
 from swashplate.errors import DomainError, InputError

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.marching.march import Stored
+from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Instance, observe_kernel
 from swashplate.models.pump import Pump

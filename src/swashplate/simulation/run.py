@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code import generating
-from swashplate.equations.marching.march import Sampler, Stored
+from swashplate.equations.marching.march import Sampler
+from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Instance, Start, Started, called, marched
 from swashplate.equations.model import Model

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code import generating, leaves
-from swashplate.equations.fields import floats_of, value_at
+from swashplate.equations.fields import value_at
 from swashplate.equations.marching.graph import Graph, graph_of
 from swashplate.equations.marching.layout import Layout, Slot, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
@@ -25,7 +25,7 @@ from swashplate.equations.marching.rows import (
 )
 from swashplate.equations.marching.run import Instance, Places, Start, arrays_of, check_domain
 from swashplate.equations.marching.triangle import ROWS, aligned, upright
-from swashplate.equations.model import Model, Source
+from swashplate.equations.model import Model, Source, state_paths
 from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
@@ -41,10 +41,8 @@ Slopes = dict[str, float]
 class StartSlopes(NamedTuple):
     """Derivatives at the start, of all parts."""
 
-    constants: dict[Slot, float]
-    """Of constants by parameters."""
-    states: dict[tuple[int, str], Slopes]
-    """Of states by parameters, by part and path."""
+    constants: dict[Slot, float]  # Of constants by parameters.
+    states: dict[tuple[int, str], Slopes]  # Of states by parameters, by part and path.
 
 
 @generating
@@ -64,13 +62,11 @@ def start_slopes(
         External signals as they were before the first sample.
     """
     model = instance.model
-    several = len(model.parts) > 1
     constants: dict[Slot, float] = {}
     states: dict[tuple[int, str], Slopes] = {}
     signals: dict[tuple[int, str], tuple[float, Slopes]] = {}
     for code, starts in zip(graph.codes, graph.starts, strict=True):
         i, own = code.part, instance.parts[code.part]
-        prefix = f"{model.parts[i].name}." if several else ""
         values: dict[str, float] = {"h": h}
         values |= {node.value: value_at(own.p, path) for path, node in leaves(code.p)}
         values |= {node.value: value_at(own.given, path) for path, node in leaves(code.given)}
@@ -88,7 +84,7 @@ def start_slopes(
             if key[0] == "k":
                 constants[Slot("k", i, key[1], by.path)] = slope
                 continue
-            own_column = {f"{prefix}{by.path}": 1.0}
+            own_column = {f"{model.prefix(i)}{by.path}": 1.0}
             inner = own_column if by.kind == "p" else signals[by.part, by.path][1]
             for column, factor in inner.items():
                 made[key][column] = made[key].get(column, 0.0) + slope * factor
@@ -111,11 +107,9 @@ def tangents_of(
         Paths of states that the run starts from as its own unknowns: nothing else moves them.
     """
     tangent = np.zeros(layout.tangents)
-    several = len(model.parts) > 1
     free = set(own)
     for (part, path), found in layout.places.items():
-        full = f"{model.parts[part].name}.{path}" if several else path
-        if full in free:
+        if f"{model.prefix(part)}{path}" in free:
             for c, at in found.items():
                 tangent[at] = 1.0 if path in started_by(model, part, columns[c]) else 0.0
         else:
@@ -317,7 +311,7 @@ def _march(
     missing = [c for c in columns if c.startswith("start.") and c[6:] not in own.start]
     if missing:
         raise InputError(f"{missing[0]} is a column, so Own needs a value of it.")
-    states, paths = started.flat, state_paths(instance.model) if own.start else []
+    states, paths = started.flat, state_paths(instance.model) if own.start else ()
     for path, value in own.start.items():
         if path not in paths:
             raise InputError(f"There is no state '{path}' to start from; {', '.join(paths)}.")
@@ -366,13 +360,3 @@ def _with_numbers(layout: Layout, constants: Mapping[Slot, float], places: Place
         tap = slot.kind == "tap"
         scale[at] *= places.slope[int(slot.first)] if tap else constants[slot]
     return program._replace(terms=program.terms._replace(scale=scale))
-
-
-def state_paths(model: Model) -> list[str]:
-    """Paths of all states, in the order of the flat array."""
-    several = len(model.parts) > 1
-    return [
-        f"{part.name}.{path}" if several else path
-        for part in model.parts
-        for path in floats_of(part.state)
-    ]

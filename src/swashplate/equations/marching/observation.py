@@ -116,8 +116,7 @@ class ObservedRecord:
 
     record: Record
     observations: Sequence[Observation]
-    driven_by: str = "voltage"
-    """The signal that the record is of."""
+    driven_by: str = "voltage"  # The signal that the record is of.
     start: Start = "rest"
     others: Mapping[str, Array] = field(default_factory=dict)
     """Further signals from outside, on the grid of the record."""

@@ -34,23 +34,17 @@ OUTWARDS = 8
 class Terms(NamedTuple):
     """Rows that are sums of products of other rows, each known by its first place in the block."""
 
-    target: Indices
-    """(t,) rows to be made."""
-    first: Indices
-    """(t + 1,) first term of each, and how many there are."""
-    a: Indices
-    """(s,) row of a term's first factor."""
-    b: Indices
-    """(s,) row of its second factor, -1 for none."""
-    scale: Array
-    """(s,) number that multiplies a term."""
+    target: Indices  # (t,) rows to be made.
+    first: Indices  # (t + 1,) first term of each, and how many there are.
+    a: Indices  # (s,) row of a term's first factor.
+    b: Indices  # (s,) row of its second factor, -1 for none.
+    scale: Array  # (s,) number that multiplies a term.
 
 
 class Program(NamedTuple):
     """What is done in every block, in order."""
 
-    derived: int
-    """Columns."""
+    derived: int  # Columns.
     todo: Indices
     """(w, 4) in each row one of
 
@@ -61,17 +55,13 @@ class Program(NamedTuple):
     - FOLLOW, an observation, first place and end in `columns`: run a recurrence of one state whose
       weighted results are that observation's derivatives.
     """
-    terms: Terms
-    """Of all rows that are made, those of the observations behind the others."""
-    seen: int
-    """First target that is a row of the observations."""
+    terms: Terms  # Of all rows that are made, those of the observations behind the others.
+    seen: int  # First target that is a row of the observations.
     columns: Indices
     """For each recurrence what runs it takes: k² places of its factors, then the `columns` of
     `follow`; the number of columns, then theirs; what `follow_out` takes."""
-    value: Indices
-    """(r,) row of each observation's signal."""
-    integral: NDArray[np.bool_]
-    """(r,) whether an observation is its signal's integral."""
+    value: Indices  # (r,) row of each observation's signal.
+    integral: NDArray[np.bool_]  # (r,) whether an observation is its signal's integral.
 
 
 CALL, COMBINE, RECUR, FOLLOW, CHAIN = 0, 1, 2, 3, 4
@@ -81,28 +71,21 @@ SET, ADD, DONE = 0, 1, 2
 class Plan(NamedTuple):
     """Where all observations look, one after the other; m samples in all, r observations."""
 
-    first: Indices
-    """(r + 1,) first sample of each, and m."""
+    first: Indices  # (r + 1,) first sample of each, and m.
     cell: Indices
     """(m,) point of the grid at or before the stamp, never falling within an observation."""
-    fraction: Array
-    """(m,) how far behind it the stamp lies, in steps, 0 to 1."""
+    fraction: Array  # (m,) how far behind it the stamp lies, in steps, 0 to 1.
     back: Array
     """(m,) weight of the slope before the point in the derivative by time; empty if not wanted."""
-    ahead: Array
-    """(m,) weight of the slope behind it. [1/s]"""
-    measured: Array
-    """(m,) measured values, less the offset that is assumed in them."""
-    weight: Array
-    """(m,)"""
+    ahead: Array  # (m,) weight of the slope behind it. [1/s]
+    measured: Array  # (m,) measured values, less the offset that is assumed in them.
+    weight: Array  # (m,)
     regular: NDArray[np.bool_]
     """(r,) whether an observation has its stamps on successive points of the grid."""
     kept: Array
     """(r, q) what a step leaves of a value that passes a low pass; 0 where there is none."""
-    offset_column: Indices
-    """(r,) column of the derivative by the offset, -1 if not wanted."""
-    clock_column: Indices
-    """(r,) column of the derivative by the clock offset, -1 if not wanted."""
+    offset_column: Indices  # (r,) column of the derivative by the offset, -1 if not wanted.
+    clock_column: Indices  # (r,) column of the derivative by the clock offset, -1 if not wanted.
     way: Indices
     """(r, d) how the derivatives that the march gives get to the sink, one of SET, ADD and DONE."""
 
@@ -110,41 +93,27 @@ class Plan(NamedTuple):
 class Sink(NamedTuple):
     """Where weighted rows go: all residuals or derivatives of a column each, residuals last."""
 
-    rows: Array
-    """(k + 1, m) all rows, or (k + 1, ROWS) where a triangle is wanted."""
-    to: Indices
-    """(d,) where the derivatives go that the march gives."""
-    own: Indices
-    """(k - d,) where those by the observations' own unknowns go."""
-    factor: Array
-    """(k + 1, k + 1) triangle, (0, 0) where all rows are wanted."""
-    squares: Array
-    """(r,) sum of squared residuals of each observation."""
+    rows: Array  # (k + 1, m) all rows, or (k + 1, ROWS) where a triangle is wanted.
+    to: Indices  # (d,) where the derivatives go that the march gives.
+    own: Indices  # (k - d,) where those by the observations' own unknowns go.
+    factor: Array  # (k + 1, k + 1) triangle, (0, 0) where all rows are wanted.
+    squares: Array  # (r,) sum of squared residuals of each observation.
 
 
 class Room(NamedTuple):
     """Memory to work in; d columns, r observations, up to q low passes each."""
 
-    flat: Array
-    """The block."""
-    table: Array
-    """(rows, STRIDE) the same."""
+    flat: Array  # The block.
+    table: Array  # (rows, STRIDE) the same.
     seen: Array
     """(r, d + 2, STRIDE) of each observation its derivatives, the signal, and an idle row."""
-    flat_seen: Array
-    """The same."""
-    columns: Indices
-    """(r, 4, j) these rows of each observation, for `follow`."""
-    passed: Array
-    """(r, q, d + 2) outputs of the low passes at the next sample."""
-    integrals: Array
-    """(r, d + 1, 3) see `integrate_row`."""
-    aside: Array
-    """(STRIDE,) room for a row that is needed for a moment."""
-    products: Array
-    """Room for `absorb`."""
-    progress: Indices
-    """(r,) first stamp of each observation that is not yet dealt with."""
+    flat_seen: Array  # The same.
+    columns: Indices  # (r, 4, j) these rows of each observation, for `follow`.
+    passed: Array  # (r, q, d + 2) outputs of the low passes at the next sample.
+    integrals: Array  # (r, d + 1, 3) see `integrate_row`.
+    aside: Array  # (STRIDE,) room for a row that is needed for a moment.
+    products: Array  # Room for `absorb`.
+    progress: Indices  # (r,) first stamp of each observation that is not yet dealt with.
 
 
 @lru_cache(maxsize=16)

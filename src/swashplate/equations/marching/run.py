@@ -15,7 +15,8 @@ from swashplate.equations.cache import generated, kernel
 from swashplate.equations.code import compiled_names, generating
 from swashplate.equations.equation import inlined, interpreted
 from swashplate.equations.fields import floats_of, made, numbers_of, value_at
-from swashplate.equations.marching.march import Stored, march_source, observe_source, taps_of
+from swashplate.equations.marching.march import march_source, observe_source
+from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.pieces import Planned, addresses, piece, pointers, run_once
 from swashplate.equations.model import Link, Model, Place, Window, arguments_of, place
 from swashplate.equations.syntax import plain
@@ -50,8 +51,7 @@ class Started(NamedTuple):
     """States of all parts at the first sample, and what they follow from."""
 
     states: tuple[Any, ...]
-    before: Mapping[str, float]
-    """External signals before the record."""
+    before: Mapping[str, float]  # External signals before the record.
     arguments: tuple[Mapping[str, Any], ...]
     """Of each part what its equations take, by the arguments' names."""
 
@@ -99,7 +99,7 @@ class Instance:
         if key in self._places:
             return self._places[key]
         found: list[Place] = []
-        for each in taps_of(self.model, signals):
+        for each in taps_of(self.model, tuple(signals)):
             name, p = each.tap.delay, self.parts[each.part].p
             delay = float(value_at(p, name)) if name else 0.0
             if not 0.0 <= delay < math.inf:

@@ -28,12 +28,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.fields import floats_of, is_real, made, numbers_of, value_at
-from swashplate.equations.marching.jacobian import jacobian, state_paths
-from swashplate.equations.marching.march import Stored, output_of
+from swashplate.equations.marching.jacobian import jacobian
+from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Own, every_sample
+from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Instance, Part, Start, Started, marched
-from swashplate.equations.model import Model
+from swashplate.equations.model import Model, parameter_paths, state_paths
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]
@@ -171,7 +172,7 @@ def started(
             raise InputError(f"{path} begins at {begin[path]!r}, but must be a finite number.")
     states = list(found.states)
     for i, part in enumerate(instance.model.parts):
-        prefix = f"{part.name}." if len(instance.model.parts) > 1 else ""
+        prefix = instance.model.prefix(i)
         numbers = {
             path: begin.get(f"{prefix}{path}", number)
             for path, number in zip(floats_of(part.state), numbers_of(states[i]), strict=True)
@@ -278,13 +279,3 @@ def sensitivities(
     record, rest = Record(records[first], 0.0, rate, 1), {name: records[name] for name in others}
     observed = every_sample(record, output, first, start, rest)
     return jacobian(instance, observed, columns, Own(begin or {})).columns
-
-
-def parameter_paths(model: Model) -> tuple[str, ...]:
-    """Paths of all parameters, in the order of the flat array."""
-    several = len(model.parts) > 1
-    return tuple(
-        f"{part.name}.{path}" if several else path
-        for part in model.parts
-        for path in floats_of(part.parameters)
-    )
