@@ -10,7 +10,8 @@ from swashplate import Drive, InputError, ParameterError, maneuvers
 from swashplate.analysis.envelope import envelope
 from swashplate.equations import Definition, equation
 from swashplate.models.card import Channel, steady_current
-from swashplate.models.pump import Pump, shaft_speed, spool_balance
+from swashplate.models.displacement_control import Pump, spool_balance
+from swashplate.models.pump import shaft_speed
 
 RATE = 512.0
 COMMAND = maneuvers.sine(4.0, 0.8, start=0.05, length=1.5, settle=0.3).sample(RATE)

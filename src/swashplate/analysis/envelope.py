@@ -14,7 +14,7 @@ from swashplate.drive import Drive
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Instance, Part, observe_kernel
-from swashplate.models.pump import PumpOptions
+from swashplate.models.displacement_control import PumpOptions
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import instance_of
 from swashplate.simulation.run import pressure_limits, settled_state

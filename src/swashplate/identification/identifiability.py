@@ -15,7 +15,15 @@ from scipy.linalg import null_space, qr
 from swashplate.errors import InputError
 from swashplate.identification.linearised import TOLERANCE, triangular_factor, whitening
 from swashplate.identification.unknowns import Unknowns
-from swashplate.models.pump import ANGLE, FORCE, MOTION, PRESSURE, TILT, TRAVEL, ZERO
+from swashplate.models.displacement_control import (
+    ANGLE,
+    FORCE,
+    MOTION,
+    PRESSURE,
+    TILT,
+    TRAVEL,
+    ZERO,
+)
 from swashplate.parameters.definitions import CATALOGUE
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Instance, observe_kernel
-from swashplate.models.pump import Pump
+from swashplate.models.displacement_control import Pump
 from swashplate.tables import Tabular
 
 if TYPE_CHECKING:
