@@ -53,14 +53,7 @@ ARGUMENTS = {"atan2": (2, 2), "hypot": (2, 2), "min": (2, 99), "max": (2, 99)}
 def read(code: Code, equation: Any, given: Mapping[str, Value]) -> Value:
     """Append what an equation does to some code, and return its result.
 
-    Parameters
-    ----------
-    code : Code
-        Where it is done.
-    equation : equation
-        What is done.
-    given : mapping of str to Value
-        Its arguments by name; those that are left out have their defaults.
+    Arguments that are not `given` by name have their defaults.
 
     Raises
     ------

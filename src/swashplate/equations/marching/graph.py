@@ -57,8 +57,7 @@ class Group:
     after: tuple[bool, ...]
     """Whether a state's row holds the derivative behind the sample, as its signal needs it."""
     stored: tuple[bool, ...]  # Whether anyone reads a state's row.
-    piece: int = -1
-    """Piece that runs the recurrence; -1 where kernels of the library do, for one state or two."""
+    piece: int = -1  # Piece that runs the recurrence; -1 where a kernel does, for one state.
 
 
 @dataclass
@@ -421,7 +420,7 @@ class _Builder:
                     for path, behind in zip(bare, after, strict=True)
                 )
                 groups.append(Group(bare, after, stored))
-                if len(bare) > 2:
+                if len(bare) > 1:
                     groups[-1].piece = self._recurrence(graph, f"{own}_{bare[0]}", groups[-1])
             graph.components.append(Component(filled, groups, together))
         starts = {"rest": self._starting(part, rest_of(part))}

@@ -54,13 +54,7 @@ def rest_slopes(graph: Graph, instance: Instance, h: float) -> StartSlopes:
 def start_slopes(
     graph: Graph, instance: Instance, first: Mapping[str, float], h: float, start: Start
 ) -> StartSlopes:
-    """Derivatives of the state at the start by all parameters.
-
-    Parameters
-    ----------
-    first : mapping of str to float
-        External signals as they were before the first sample.
-    """
+    """Derivatives of the state at the start by all parameters, at signals as they were before."""
     model = instance.model
     constants: dict[Slot, float] = {}
     states: dict[tuple[int, str], Slopes] = {}
@@ -101,10 +95,7 @@ def tangents_of(
 ) -> Array:
     """Derivatives of the states at the first sample, in their places.
 
-    Parameters
-    ----------
-    own : iterable of str
-        Paths of states that the run starts from as its own unknowns: nothing else moves them.
+    `own` are paths of states that the run starts from as its own unknowns: nothing else moves them.
     """
     tangent = np.zeros(layout.tangents)
     free = set(own)
@@ -162,23 +153,10 @@ NOTHING_OWN = Own()
 def residuals(
     instance: Instance, observed: ObservedRecord, own: Own = NOTHING_OWN, *, block: int = BLOCK
 ) -> Array:
-    """Weighted residuals of all observations, one after the other.
+    """(m,) weighted residuals of all observations, one after the other, 0 where the weight is.
 
-    Parameters
-    ----------
-    instance : Instance
-        The model with its numbers.
-    observed : ObservedRecord
-        The record, and what was measured under it.
-    own : Own
-        Values of the experiment's own unknowns.
-    block : int
-        Samples marched at a time, 2 to 512.
-
-    Returns
-    -------
-    (m,) array
-        weight · (simulated - measured) in the signals' SI units; 0 where the weight is.
+    Of each weight · (simulated - measured) in its signal's SI unit; `own` are values of the
+    experiment's own unknowns, `block` the samples marched at a time, 2 to 512.
 
     Raises
     ------

@@ -467,22 +467,10 @@ def march_lanes(
 ) -> Marched:
     """March LANES sets over one record, from rest but for what the numbers say.
 
-    Parameters
-    ----------
-    numbers : mapping of str to (LANES,) array
-        Every parameter by its path, and every given, ``"given "`` before it; parameters that a type
-        has a default for may be left out. States at the first sample, ``"start."`` before their
-        paths, where they are not those at rest.
-    records : mapping of str to (n,) array
-        External signals, zero before.
-    h : float
-        Step. [s]
-    output : str
-        Signal that is kept or compared.
-    measured, weight : (n,) arrays
-        What it is compared with, and the weight of each squared error.
-    keep : bool
-        Whether the output is kept.
+    `numbers` has (LANES,) values of every parameter by its path, and every given, ``"given "``
+    before it; parameters that a type has a default for may be left out. States at the first sample,
+    ``"start."`` before their paths, where they are not those at rest. The output is compared with
+    (n,) `measured` values under the `weight` of each squared error.
     """
     lanes = lanes_of(model, tuple(records), options, output)
     block = aligned(len(lanes.rows), LANES)

@@ -273,13 +273,11 @@ class _Planner:
         abreast = PAIR if generated else ABREAST
         found += [[(self._constant(0.0), self.idle, 0)] * k] * (-len(found) % abreast)
         states = group.states
-        numbers = (
-            [len(found)]
-            if generated
-            else [
-                self._factor(by_result, path, other) * STRIDE for path in states for other in states
-            ]
-        )
+        numbers = [len(found)]
+        if not generated:
+            entry = by_result.get(f"state.{states[0]}", {}).get(By("state", states[0]), Entry(-1))
+            row = entry.row if entry.row >= 0 else self._constant(entry.value)
+            numbers = [row * STRIDE]
         for i, after in enumerate(group.after):
             numbers += [each[i][0] * STRIDE for each in found]
             numbers += [each[i][1] * STRIDE for each in found]
@@ -291,7 +289,7 @@ class _Planner:
         if generated:
             self.todo.append((CHAIN, group.piece, begin, begin + len(numbers)))
         else:
-            self.todo.append((RECUR, k, begin, begin + len(numbers)))
+            self.todo.append((RECUR, 0, begin, begin + len(numbers)))
         if k == 1 and early and not group.after[0]:
             columns = [(c, *each[0]) for c, each in zip(whose, found, strict=False)]
             self.chains.append(_Chain(self.todo[-1], numbers[0], columns))
@@ -346,13 +344,6 @@ class _Planner:
             (COMBINE, since, len(self.made), 0),
             (FOLLOW, r, begin, begin + len(numbers)),
         ]
-
-    def _factor(self, by_result: Mapping[str, Mapping[By, Entry]], path: str, other: str) -> int:
-        """Row of the derivative of a state behind the sample by another one at it."""
-        entry = by_result.get(f"state.{path}", {}).get(By("state", other))
-        if entry is None:
-            return self._constant(0.0)
-        return entry.row if entry.row >= 0 else self._constant(entry.value)
 
     def _signals(self, part: PartGraph, by_result: Mapping[str, Mapping[By, Entry]]) -> None:
         """Derivatives of the signals of a part that others need."""

@@ -317,30 +317,17 @@ def marched(
     stored: tuple[Stored, ...],
     cause: str = "input",
 ) -> tuple[Array, Flags]:
-    """March over whole records.
-
-    Parameters
-    ----------
-    records : mapping of str to (n,) array
-        External signals on the grid.
-    started : Started
-        Where it begins.
-    stored : tuple of Stored
-        What is kept.
-    cause : str
-        What drives the model, for the sentence of a `DomainError`.
+    """March over whole records from where it begins, keeping some numbers.
 
     Returns
     -------
-    out : (r, n) array
-        Numbers that are kept, in their order.
-    flags : (f, n) array
-        Limits that are kept, as bits.
+    out, flags : (r, n), (f, n) arrays
+        What is kept, in its order: numbers, and limits as bits.
 
     Raises
     ------
     DomainError
-        If the model leaves its domain, or a number overflows.
+        If the model leaves its domain, or a number overflows; `cause` is what drives the model.
     """
     signals, size = tuple(records), next(iter(records.values())).size
     numbers = tuple(each for each in stored if each.kind != "limits")
