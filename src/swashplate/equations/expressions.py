@@ -13,20 +13,7 @@ ARITHMETIC = ("+", "-", "*", "/", "**", "neg")
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 LOGIC = ("and", "or", "not")
 LEAVES = ("number", "name")
-CALLED = (
-    "sqrt",
-    "exp",
-    "log",
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "atan2",
-    "hypot",
-    "floor",
-)
+CALLED = tuple("sqrt exp log sin cos tan asin acos atan atan2 hypot floor".split())  # noqa: SIM905
 """Operations that are functions of `math`."""
 CHEAP = {*LEAVES, *COMPARISONS, *LOGIC, "+", "-", "*", "neg", "min", "max", "abs", "if"}
 """Operations that can be done for nothing on any numbers: no error, no call of a library."""

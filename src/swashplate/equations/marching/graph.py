@@ -257,13 +257,6 @@ class _Builder:
             found[part.source(source)] = By("signal", source.signal, source.part)
         return found
 
-    def _plain(self, part: PartCode, name: str) -> bool:
-        """Whether a name comes from outside, without being differentiated by."""
-        samples = {each for tap in part.taps for each in part.tap_samples(tap)}
-        fractions = {part.fraction(tap) for tap in part.taps}
-        given = {node.value for _, node in leaves(part.given)}
-        return name in samples | fractions | given or name == "h" or name.startswith("x_")
-
     def _arguments(self, part: PartCode, read: Iterable[str]) -> tuple[list[str], list[str]]:
         """Lines ahead of a loop over known samples, and those at the head of its body."""
         names = set(read)
@@ -450,8 +443,10 @@ class _Builder:
             if s.part == part.part
         }
         known = {name: by for name, by in self._by(part).items() if by.kind in ("p", "signal")}
+        given = {"h", *map(part.fraction, part.taps), *(n.value for _, n in leaves(part.given))}
+        outside = given.union(known, *map(part.tap_samples, part.taps))
         read = code.reads(results.values())
-        arguments = sorted(each for each in read if each in known or self._plain(part, each))
+        arguments = sorted(each for each in read if each in outside or each.startswith("x_"))
         active = [each for each in arguments if each in known]
         named = [(f"{kind} {name}", node) for (kind, name), node in results.items()]
         name = f"{part.own.name}_start"
@@ -586,19 +581,12 @@ def _sum(terms: Sequence[str]) -> str:
 
 def _weakly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> list[list[str]]:
     """States in groups that share no derivative."""
-    group = {each: {each} for each in states}
+    group = {each: frozenset((each,)) for each in states}
     for out, inputs in flows.items():
         for inp in inputs:
-            if group[out] is not group[inp]:
-                merged = group[out] | group[inp]
-                for each in merged:
-                    group[each] = merged
-    found: list[list[str]] = []
-    for each in states:
-        members = [other for other in states if other in group[each]]
-        if members not in found:
-            found.append(members)
-    return found
+            merged = group[out] | group[inp]
+            group |= dict.fromkeys(merged, merged)
+    return [[each for each in states if each in some] for some in dict.fromkeys(group.values())]
 
 
 def _strongly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> list[list[str]]:
@@ -615,12 +603,7 @@ def _strongly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) ->
         each: tuple(other for other in states if other in reach[each] and each in reach[other])
         for each in states
     }
-    order = TopologicalSorter(
-        {
-            group[each]: {group[i] for i in flows[each] if i in group} - {group[each]}
-            for each in states
-        }
-    )
+    order: TopologicalSorter[tuple[str, ...]] = TopologicalSorter()
     for each in states:
         order.add(group[each], *({group[i] for i in flows[each] if i in group} - {group[each]}))
     return [list(members) for members in order.static_order()]

@@ -23,9 +23,16 @@ from swashplate.equations.marching.rows import (
     room_for,
     rooms,
 )
-from swashplate.equations.marching.run import Instance, Places, Start, arrays_of, check_domain
+from swashplate.equations.marching.run import (
+    Instance,
+    Places,
+    Start,
+    arrays_of,
+    begun,
+    check_domain,
+)
 from swashplate.equations.marching.triangle import ROWS, aligned, upright
-from swashplate.equations.model import Model, Source, state_paths
+from swashplate.equations.model import Model, Source
 from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
@@ -289,11 +296,7 @@ def _march(
     missing = [c for c in columns if c.startswith("start.") and c[6:] not in own.start]
     if missing:
         raise InputError(f"{missing[0]} is a column, so Own needs a value of it.")
-    states, paths = started.flat, state_paths(instance.model) if own.start else ()
-    for path, value in own.start.items():
-        if path not in paths:
-            raise InputError(f"There is no state '{path}' to start from; {', '.join(paths)}.")
-        states[paths.index(path)] = value
+    states = begun(instance, started, own.start)
     if observed.start == "rest":
         slopes = rest_slopes(graph, instance, h)
     else:
