@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swashplate import Campaign, Drive, InputError, ParameterError, maneuvers
-from swashplate.analysis.envelope import envelope
+from swashplate.analysis import envelope
 from swashplate.equations import Definition, equation
 from swashplate.identification import fit, load_setup
 from swashplate.models.card import Channel, steady_current

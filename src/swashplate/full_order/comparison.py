@@ -20,8 +20,9 @@ from swashplate import maneuvers
 from swashplate.equations.marching.record import SOURCE_RATE, least_substeps
 from swashplate.equations.marching.run import Start
 from swashplate.full_order.drive import FullOrderDrive, FullOrderSimulation, Method
+from swashplate.results import Result, Tabular
 from swashplate.simulation.result import read_only
-from swashplate.tables import Cell, Column, Table, Tabular
+from swashplate.tables import Cell, Column, Table
 from swashplate.units import display_unit
 
 if TYPE_CHECKING:
@@ -32,15 +33,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FINE_STEPS = 64
-"""Steps a sample of the reduced model, whose march is of first order."""
+FINE_STEPS = 64  # Steps a sample of the reduced model, whose march is of first order.
 LEAST_FINE_STEPS = 4
 MOST_STEPS = 20_000_000
 """Steps of a whole record, beyond which a sample gets fewer than `FINE_STEPS`."""
-STILL = 1e-6
-"""Top speed up to which a drive does not move. [rad/s]"""
-BANDS = (0.001, 0.01)
-"""Differences, over the largest speed, that the table sorts by."""
+STILL = 1e-6  # Top speed up to which a drive does not move. [rad/s]
+BANDS = (0.001, 0.01)  # Differences, over the largest speed, that the table sorts by.
 TABLE_MANEUVERS: tuple[tuple[str, Maneuver], ...] = (
     ("step 1 V", maneuvers.step(1.0, start=1.0, length=10.0)),
     ("step 2 V", maneuvers.step(2.0, start=1.0, length=10.0)),
@@ -73,7 +71,7 @@ VALIDITY = {
 
 
 @dataclass(frozen=True)
-class Difference:
+class Difference(Result):
     """Difference in shaft speed of the reduced model to the full-order one."""
 
     largest: float
@@ -111,6 +109,8 @@ class Lag(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Comparison(Tabular):
     """Both models over one command, driven by the same current."""
+
+    figure = "plot_full_order"
 
     full: FullOrderSimulation
     reduced_speed: Array
@@ -243,8 +243,7 @@ def validity(
 
 # --- tables and verdicts --------------------------------------------------------------------------
 
-LAG_SHARE = 0.5
-"""Share of the difference from which a lag explains it."""
+LAG_SHARE = 0.5  # Share of the difference from which a lag explains it.
 
 
 def usual_rate(rate: float) -> float:

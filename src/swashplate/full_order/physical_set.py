@@ -30,10 +30,12 @@ from swashplate.parameters.files import AXES, written
 from swashplate.parameters.files import load_preset as load_parameters
 from swashplate.parameters.parameter_set import (
     Change,
+    HasParameters,
     Pair,
     Parameter,
     ParameterSet,
     Value,
+    set_of,
     value_of,
 )
 from swashplate.parameters.rules import out_of_range, range_sentence
@@ -67,8 +69,7 @@ IN_PLACE_OF: Mapping[str, str] = {
     "piston_damping": "swash_damping_ratio",
 }
 """Quantities that may be chosen in place of a frequency or a damping ratio."""
-AGREES = 1e-9
-"""Relative difference up to which a given value agrees with the one that follows."""
+AGREES = 1e-9  # Relative difference up to which a given value agrees with the one that follows.
 
 
 @dataclass(frozen=True)
@@ -310,7 +311,7 @@ def chosen_quantity(name: str) -> Definition:
 
 
 def from_lumped(
-    parameters: ParameterSet,
+    lumped: ParameterSet | HasParameters,
     like: str | None = None,
     *,
     name: str | None = None,
@@ -322,7 +323,7 @@ def from_lumped(
 
     Parameters
     ----------
-    parameters : ParameterSet
+    lumped : ParameterSet or Drive
         The lumped parameters that the set shall have, Z6 apart.
     like : str, optional
         Packaged set whose assumed values count where nothing is chosen; by default see
@@ -346,6 +347,7 @@ def from_lumped(
     ParameterError
         If lumps contradict each other or a chosen value; the sentence names them.
     """
+    parameters = set_of(lumped)
     owner = parameters.name if name is None else name
     assumed = load_choices(nearest_set(parameters.name) if like is None else like)
     given = chosen_over(assumed, {**(entries or {}), **chosen})

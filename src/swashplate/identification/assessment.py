@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,10 @@ from swashplate.identification.uncertainty import (
     slopes_by_fixed,
     uncertainty,
 )
+from swashplate.results import Result
+
+if TYPE_CHECKING:
+    from swashplate.tables import Table
 
 Array = NDArray[np.float64]
 
@@ -44,7 +48,7 @@ CHANCE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class ResidualTest:
+class ResidualTest(Result):
     """Whiteness of the residuals of one channel of one run, and independence of the input."""
 
     lags: Array
@@ -266,7 +270,7 @@ LIMITS = ("Z13", "Z14", "Z15", "Z16")
 
 
 @dataclass(frozen=True, eq=False)
-class RunQuality:
+class RunQuality(Result):
     """How well one channel of one run is simulated."""
 
     experiment: Experiment
@@ -284,12 +288,18 @@ class RunQuality:
 
 
 @dataclass(frozen=True, eq=False)
-class Assessment:
+class Assessment(Result):
     """What a stage's data tell of its unknowns, and how good the fit is."""
 
     stage: StageFit
     earlier: tuple[Assessment, ...] = ()
     """Of the stages before, whose results this one takes for granted."""
+
+    def tables(self) -> list[Table]:
+        """Estimates with their intervals, then the errors of each run."""
+        from swashplate.identification.tables import estimates_table, runs_tables
+
+        return [estimates_table(self), *runs_tables(self.runs)]
 
     @property
     def _vector(self) -> Array:

@@ -22,6 +22,7 @@ from swashplate.identification.solving import solve
 from swashplate.identification.spectral_lines import without_lines
 from swashplate.identification.unknowns import Unknowns
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
@@ -81,7 +82,7 @@ class NoiseDraws:
 
 
 @dataclass(frozen=True, eq=False)
-class Bootstrap:
+class Bootstrap(Result):
     """Estimates from other noise."""
 
     variables: Unknowns

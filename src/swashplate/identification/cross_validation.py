@@ -19,6 +19,7 @@ from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Loss
 from swashplate.identification.staging import Parameters, stage_problem
 from swashplate.identification.validation import predict, with_speeds
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ class FoldEstimate(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Fold:
+class Fold(Result):
     """One part of the runs, and the fit to the others."""
 
     number: int
@@ -93,7 +94,7 @@ class Spread(NamedTuple):
 
 
 @dataclass(frozen=True)
-class CrossValidation:
+class CrossValidation(Result):
     """The folds of a campaign."""
 
     seed: int

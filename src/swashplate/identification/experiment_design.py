@@ -32,6 +32,7 @@ from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
 from swashplate.parameters.definitions import CATALOGUE, find
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result, short
 
 Array = NDArray[np.float64]
 
@@ -169,7 +170,7 @@ def interval(problem: Problem, channel: str) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class Bench(Result):
     """A drive, what is to be found of it, and what is known so far: where candidates are tried."""
 
     parameters: ParameterSet
@@ -325,6 +326,9 @@ WORTH = 1e-3
 class Candidate(NamedTuple):
     """A test that could be made."""
 
+    def __repr__(self) -> str:
+        return short(self)
+
     name: str
     derivatives: Array
     """(m, K) of what it would measure by the solver's vector, over the noise's deviation; or their
@@ -356,7 +360,7 @@ class Gain(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Advice:
+class Advice(Result):
     """One candidate, judged."""
 
     candidate: str
@@ -477,6 +481,9 @@ def default_maneuvers() -> tuple[Maneuver, ...]:
 
 class SensorAdvice(NamedTuple):
     """A sensor that could be added to a test."""
+
+    def __repr__(self) -> str:
+        return short(self)
 
     sensor: Sensor
     maneuver: str

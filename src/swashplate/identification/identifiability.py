@@ -25,6 +25,7 @@ from swashplate.models.displacement_control import (
     ZERO,
 )
 from swashplate.parameters.definitions import CATALOGUE
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
@@ -223,7 +224,7 @@ def _in_order(name: str) -> tuple[str | int, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Identifiability:
+class Identifiability(Result):
     """Verdict on a fit's unknowns, before a fit or after."""
 
     variables: Unknowns

@@ -20,6 +20,7 @@ from swashplate.identification.validation import predict
 from swashplate.identification.verdict import Verdict, verdict
 from swashplate.parameters.definitions import find
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.results import Result
 
 if TYPE_CHECKING:
     from swashplate.campaign import Campaign, Experiment
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from swashplate.identification.solving import Loss
     from swashplate.identification.staging import Parameters
     from swashplate.identification.uncertainty import Estimate
+    from swashplate.tables import Table
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Wanted:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class Judged(Result):
     """A fit and all that was found out about it."""
 
     campaign: Campaign
@@ -62,6 +64,21 @@ class Judged:
     folds: CrossValidation | None = None
     notes: Mapping[str, str] = field(default_factory=dict)
     """Versions, seed, campaign."""
+
+    def tables(self) -> list[Table]:
+        """Criteria of the verdict, then the fit's tables and the errors of held-out runs."""
+        from swashplate.identification.tables import criteria_table, runs_tables
+
+        return [
+            criteria_table(self.verdict),
+            *self.result.tables(),
+            *(runs_tables(self.predicted) if self.predicted else ()),
+        ]
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The verdict's headline and all that it says."""
+        return (self.verdict.headline, *self.verdict.sentences)
 
     def name_of(self, profile: StageProfile) -> str:
         """The unknown that a profile is of."""

@@ -15,6 +15,7 @@ from swashplate.identification.model import Differentiable
 from swashplate.identification.problem import Problem
 from swashplate.identification.solving import Loss, influence
 from swashplate.identification.unknowns import Unknowns
+from swashplate.results import Result, short
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,9 @@ tests do tell at 2e-5. Derivatives by central differences are good to about 1e-9
 
 class LinearisedRun(NamedTuple):
     """One channel of one experiment at the optimum; only the samples that count."""
+
+    def __repr__(self) -> str:
+        return short(self)
 
     name: str
     """The experiment's."""
@@ -48,7 +52,7 @@ class LinearisedRun(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class LinearisedFit:
+class LinearisedFit(Result):
     """All runs of a fit at its optimum. Make it with `of`, which checks and cleans."""
 
     runs: tuple[LinearisedRun, ...]

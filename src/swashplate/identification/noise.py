@@ -12,6 +12,7 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.unknowns import Unknowns
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ LABELS: Mapping[Noise, str] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Covariance:
+class Covariance(Result):
     """Covariance of the solver's vector under one assumption on the noise."""
 
     noise: Noise
@@ -219,7 +220,7 @@ def flat_top(lags: Array, length: float) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class NoiseColour:
+class NoiseColour(Result):
     """How the residuals of one channel are correlated, from all its runs of one sampling step."""
 
     channel: str

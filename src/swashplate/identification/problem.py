@@ -24,13 +24,14 @@ from swashplate.identification.model import (
 )
 from swashplate.identification.solving import Evaluation
 from swashplate.identification.unknowns import Unknowns
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 Part = TypeVar("Part")
 
 
 @dataclass(frozen=True)
-class Problem:
+class Problem(Result):
     """Half the weighted sum of squares of all experiments, as a function of the unknowns.
 
     The residual of a sample is sqrt(weight)/scale times (simulated less measured).

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from swashplate.errors import DomainError
 from swashplate.identification.unknowns import Vector
+from swashplate.results import Result, short
 
 Array = NDArray[np.float64]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
@@ -60,6 +61,9 @@ def influence(residuals: Array, loss: Loss) -> tuple[Array, Array]:
 
 class Evaluation(NamedTuple):
     """Residuals and their derivatives by the solver's vector at one point."""
+
+    def __repr__(self) -> str:
+        return short(self)
 
     residuals: Array
     """(m,) residuals, or any vector of which sum of squares and gradient are the same."""
@@ -125,7 +129,7 @@ def longest_left(progress: Progress) -> float | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Result):
     """The optimum that a solver reached."""
 
     vector: Vector

@@ -15,6 +15,7 @@ from swashplate.documents import read_json
 from swashplate.errors import DomainError, FileError, InputError, SwashplateError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.solving import Objective, Solution, solve
+from swashplate.results import Result
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
@@ -68,7 +69,7 @@ def sobol_starts(objective: Objective, count: int, seed: int) -> Iterator[Array]
 
 
 @dataclass(frozen=True)
-class StartResult:
+class StartResult(Result):
     """How one start ended."""
 
     number: int

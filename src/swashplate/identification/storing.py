@@ -26,6 +26,7 @@ from swashplate.identification.staging import Parameters, stage_problem, with_es
 from swashplate.identification.starts import StartResult
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.parameters.files import dump_set, read_set
+from swashplate.results import Result
 from swashplate.tables import write_text
 
 
@@ -70,7 +71,7 @@ class FitFile(Entry):
 
 
 @dataclass(frozen=True, eq=False)
-class StoredFit:
+class StoredFit(Result):
     """A fit as it was, and what was computed with it."""
 
     fit: Fit

@@ -31,6 +31,7 @@ from swashplate.identification.spectral_lines import (
     without_lines,
 )
 from swashplate.identification.unknowns import Unknowns
+from swashplate.results import Result, short
 
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Experiment
@@ -173,6 +174,9 @@ def estimates(
 
 class Handed(NamedTuple):
     """An earlier stage's estimates as the later one takes them for granted."""
+
+    def __repr__(self) -> str:
+        return short(self)
 
     covariance: Covariance
     """Of the earlier stage's vector."""
@@ -320,7 +324,7 @@ def _part(variance: Array, freedom: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Uncertainty:
+class Uncertainty(Result):
     """Errors of a fit's estimates: those to quote, and others beside them."""
 
     quoted: Covariance

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import PlainSerializer, PlainValidator
 
 from swashplate.errors import InputError, ParameterError
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
@@ -148,7 +149,7 @@ def bounded(
 
 
 @dataclass(frozen=True, eq=False)
-class Unknowns(Sequence[Unknown]):
+class Unknowns(Result, Sequence[Unknown]):
     """The unknowns of a fit in the order of the solver's vector, at a point: nominal or estimated.
 
     The solver moves ln(value) of a logarithmic one, else value/scale: a change of 0.01 in its

@@ -22,18 +22,21 @@ from swashplate.identification.assessment import (
 from swashplate.identification.drive_model import SIGNALS, DriveModel, current_record
 from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.staging import Parameters
+from swashplate.parameters.parameter_set import HasParameters, set_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Kind = Literal["ramp", "step", "sine"]
 
 
-def predict(parameters: Parameters, experiments: Sequence[Experiment]) -> tuple[RunQuality, ...]:
+def predict(
+    model: Parameters | HasParameters, experiments: Sequence[Experiment]
+) -> tuple[RunQuality, ...]:
     """Predict runs from their input alone and compare every channel that the drive has.
 
     Parameters
     ----------
-    parameters : ParameterSet or ModelParameters
+    model : Drive, ParameterSet or ModelParameters
         The drive, or a model of one's own with its numbers.
     experiments : sequence of Experiment
         Runs that it was not fitted to. A voltage goes through the whole chain, a current through
@@ -51,6 +54,7 @@ def predict(parameters: Parameters, experiments: Sequence[Experiment]) -> tuple[
     DomainError
         If the model does not hold under a run's input.
     """
+    parameters = model if isinstance(model, ModelParameters) else set_of(model)
     if isinstance(parameters, ModelParameters):
         return tuple(
             compared(each, name, simulated)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -44,6 +44,10 @@ from swashplate.identification.lack_of_fit import (
 )
 from swashplate.identification.starts import StartResult
 from swashplate.identification.validation import pooled, with_speeds
+from swashplate.results import Result, short
+
+if TYPE_CHECKING:
+    from swashplate.tables import Table
 
 Weight = Literal["good", "look", "bad", "plain"]
 Grade = Literal["Usable", "Usable for prediction", "Not usable"]
@@ -52,6 +56,9 @@ Grade = Literal["Usable", "Usable for prediction", "Not usable"]
 class Statement(NamedTuple):
     """One subject of a verdict."""
 
+    def __repr__(self) -> str:
+        return short(self)
+
     subject: str
     weight: Weight
     """``"bad"`` where it rules out the use, ``"look"`` where something asks for attention."""
@@ -59,7 +66,7 @@ class Statement(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(Result):
     """The judgement on a fit, or on a drive over some runs."""
 
     headline: str
@@ -72,6 +79,12 @@ class Verdict:
     reach; empty for a drive that was not fitted."""
     assumed: tuple[str, ...] = ()
     """What is assumed and cannot be checked from these logs."""
+
+    def table(self) -> Table:
+        """Its criteria."""
+        from swashplate.identification.tables import criteria_table
+
+        return criteria_table(self)
 
     @property
     def usable(self) -> bool:

@@ -20,6 +20,7 @@ from swashplate.maneuvers.pieces import Curve as Curve
 from swashplate.maneuvers.pieces import Maneuver as Maneuver
 from swashplate.maneuvers.pieces import Piece as Piece
 from swashplate.maneuvers.pieces import SplineReturn as SplineReturn
+from swashplate.maneuvers.pieces import sampled as sampled
 from swashplate.maneuvers.pieces import spline_return as spline_return
 from swashplate.maneuvers.pieces import superpose as superpose
 from swashplate.maneuvers.records import recorded as recorded

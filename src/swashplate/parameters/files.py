@@ -12,8 +12,7 @@ from swashplate.parameters.parameter_set import Pair, Parameter, ParameterSet
 from swashplate.parameters.schema import CardFile, Entry, SetFile
 from swashplate.units import to_si
 
-AXES = ("hoist", "slew", "luff")
-"""The source's three axes."""
+AXES = ("hoist", "slew", "luff")  # The source's three axes.
 
 
 def preset_names() -> tuple[str, ...]:
