@@ -113,7 +113,7 @@ class Forces:
     minus: tuple[float, float, float, float]
     """Of the negative direction, as magnitudes. [A]"""
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the eight forces."""
         return tuple(f"force_{side}_{k}" for side in ("plus", "minus") for k in (1, 2, 3, 4))
