@@ -421,7 +421,7 @@ def _heading(ax: Axes, experiment: Experiment) -> None:
     # they may reach over the panels on their right
     how |= {"annotation_clip": False, "in_layout": False}
     run = ax.annotate(experiment.run, (0.0, 1.0), (0.0, 6.0), "axes fraction", weight="bold", **how)
-    ax.annotate("  ·  ".join(words), (1.0, 0.0), (7.0, 0.0), run, va="baseline", **how)
+    ax.annotate("  ·  ".join(words), (1.0, 1.0), (7.0, 6.0), (run, "axes fraction"), **how)
 
 
 def _stamps_in_words(experiment: Experiment) -> list[str]:

@@ -277,7 +277,8 @@
   }));
   const showAll = (width) => figures.forEach((each) => each.draw(width));
   function start() {
-    for (const each of figures.keys()) {
+    for (const [each, figure] of figures) {
+      if (each.getBoundingClientRect().top < innerHeight) figure.draw();
       near.observe(each);
       sized.observe(each);
     }
