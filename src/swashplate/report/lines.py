@@ -191,15 +191,19 @@ def draw(
         width *= 0.6
     style: Literal["default", "steps-post"] = "steps-post" if held else "default"
     how: dict[str, Any] = {"color": color, "zorder": zorder}
-    joints = {"solid_capstyle": "butt", "solid_joinstyle": "round", "drawstyle": style}
+    joints: dict[str, Any] = {
+        "solid_capstyle": "butt",
+        "solid_joinstyle": "round",
+        "drawstyle": style,
+    }
     points = broken(time, values, breaks, columns)
-    ax.plot(*points, linestyle=dashes, linewidth=width, label=label, **joints, **how)
+    ax.plot(*points, ls=dashes, lw=width, drawstyle=style, label=label, **joints, **how)
     # with a break, or nothing, on both sides no line would show it
     apart = np.ones(time.size + 1, dtype=np.bool_)
     apart[1:-1] = False
     apart[breaks + 1] = True
     if (lonely := apart[1:] & apart[:-1]).any():
-        dots = {"marker": ".", "markersize": 2.0 * width, "markeredgewidth": 0.0}
+        dots: dict[str, Any] = {"marker": ".", "markersize": 2.0 * width, "markeredgewidth": 0.0}
         ax.plot(time[lonely], values[lonely], linestyle="none", **dots, **how)
 
 
@@ -290,7 +294,11 @@ def mark_gaps(ax: Axes, time: Array) -> None:
     rows = gap_rows(time)
     if rows.size:
         middles = 0.5 * (time[rows] + time[rows + 1])
-        where = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 4.0}
+        where: dict[str, Any] = {
+            "transform": ax.get_xaxis_transform(),
+            "clip_on": False,
+            "zorder": 4.0,
+        }
         ax.plot(middles, np.ones(middles.size), **GAP_MARK, **where)
 
 

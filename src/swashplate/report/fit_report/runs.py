@@ -5,6 +5,7 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 from zlib import compress
 
@@ -17,7 +18,7 @@ from swashplate.identification.tables import ignored_words, start_words
 from swashplate.identification.validation import ignored_windows, with_speeds
 from swashplate.report.lines import gap_rows, thinned
 from swashplate.report.style import in_lines
-from swashplate.tables import quantity
+from swashplate.tables import quantity, write_table
 from swashplate.units import DisplayUnit, display_unit
 
 Array = NDArray[np.float64]
@@ -165,7 +166,33 @@ def run_words(quality: RunQuality) -> str:
     return " · ".join([*parts, f"ignored: {ignored_words(run, channel)}"])
 
 
-# --- samples --------------------------------------------------------------------------------------
+def write_samples(runs: Sequence[ShownRun], path: str | Path) -> None:
+    """Write all samples of runs, measured and simulated, as one table, CSV or Parquet, in SI.
+
+    A row is a sample: ``run``, ``role``, ``stage`` (empty for a run that was held out),
+    ``channel``, ``unit``, ``time`` [s], ``measured``, ``simulated``, ``weight``.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written, or has another ending.
+    """
+    import polars as pl
+
+    parts = []
+    for run in runs:
+        for each in run.channels:
+            channel, simulated = each.channel, each.quality.simulated
+            arrays = {"time": channel.time, "measured": channel.values, "simulated": simulated}
+            names = {"run": run.name, "role": run.role, "stage": each.stage}
+            names |= {"channel": each.quality.channel, "unit": channel.unit}
+            columns = [pl.lit(words).alias(name) for name, words in names.items()]
+            made = pl.DataFrame({**arrays, "weight": channel.weight})
+            parts.append(made.select(*columns, pl.all()))
+    write_table(pl.concat(parts), path)
+
+
+# --- samples of the page --------------------------------------------------------------------------
 
 
 def run_data(run: ShownRun) -> dict[str, Any]:
