@@ -235,6 +235,10 @@ def test_fixed_parameters_are_listed_and_free_ones_are_not(read: Page) -> None:
     assert not set(fixed) & {"G1_plus", "G1_minus", "omega_plus", "omega_minus", "Z10"}
     assert fixed["Z12"]["why, as far as can be told"] == "0: this effect is left out"
     assert fixed["Z14"]["why, as far as can be told"] == "inactive: no test reaches it"
+    # in the units that people read, the number with its unit
+    stop = Drive.preset("hoist").parameters.numbers["Z14"]
+    assert fixed["Z14"]["unit"] == "mm"
+    assert number(fixed["Z14"]["value"]) == pytest.approx(1e3 * stop, rel=1e-4)
 
 
 def test_rmse_and_fit_of_a_run_are_recomputed(read: Page, fitted: Fit) -> None:

@@ -135,8 +135,9 @@ def write_fit_report(
             shared[4],
             _setup_section(campaign, fit.nominal, fit.setup.title, notes, fit.stages),
         ]
-    content = {**head, "what": "Fit", "facts": f"{head['drive']} · {facts}"}
-    write_text(page([each for each in sections if each.blocks], content), path)
+        content = {**head, "what": "Fit", "facts": f"{head['drive']} · {facts}"}
+        made = page([each for each in sections if each.blocks], content)
+    write_text(made, path)
 
 
 def write_validation_report(
