@@ -191,11 +191,7 @@ def draw(
         width *= 0.6
     style: Literal["default", "steps-post"] = "steps-post" if held else "default"
     how: dict[str, Any] = {"color": color, "zorder": zorder}
-    joints: dict[str, Any] = {
-        "solid_capstyle": "butt",
-        "solid_joinstyle": "round",
-        "drawstyle": style,
-    }
+    joints: dict[str, Any] = {"solid_capstyle": "butt", "solid_joinstyle": "round"}
     points = broken(time, values, breaks, columns)
     ax.plot(*points, ls=dashes, lw=width, drawstyle=style, label=label, **joints, **how)
     # with a break, or nothing, on both sides no line would show it

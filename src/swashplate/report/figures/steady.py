@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from swashplate.analysis.envelope import dead_zone, saturation
+from swashplate.analysis import dead_zone, saturation
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
