@@ -44,6 +44,7 @@ from swashplate.cli.words import (
 )
 from swashplate.errors import InputError
 from swashplate.tables import (
+    TABLE,
     Form,
     check_folder,
     check_place,
@@ -510,6 +511,13 @@ def report(
     ] = None,
     pdf: PrintedReport = None,
     figures: PrintFigures = None,
+    data: Annotated[
+        Path | None,
+        option(
+            "Write all samples, measured and simulated, as one table: .csv or .parquet.",
+            metavar="FILE",
+        ),
+    ] = None,
     truth: Annotated[
         str | None,
         option(
@@ -526,9 +534,13 @@ def report(
     """
     from swashplate.campaign import Campaign
     from swashplate.identification.assessment import judge_stored
+    from swashplate.report.fit_report import shown_runs, write_samples
 
     if pdf is not None:
         _check_printing(pdf, True)
+    if data is not None:
+        ending(data, TABLE)
+        check_place(data)
     folder = fitted if fitted.is_dir() else fitted.parent
     with working(f"Reading {path}"):
         if not (folder / STORED).is_file():
@@ -546,6 +558,9 @@ def report(
     place = made_folder(out or folder)
     for line in _shown(found, place, pdf=pdf, figures=figures, truth=true):
         note(line)
+    if data is not None:
+        write_samples(shown_runs(found.assessments, found.predicted), data)
+        note(f"Samples:   {data}")
     say(found.verdict.headline)
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import ChannelKind
-from swashplate.campaign.ammeter import signed_by_command
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
+from swashplate.campaign.samples import signed_by_command
 from swashplate.equations.marching.observation import ObservedRecord
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.errors import DomainError, InputError, ParameterError
