@@ -140,7 +140,7 @@ class Crane:
     def __repr__(self) -> str:
         drives = ", ".join(f"{axis} {getattr(self, axis).name!r}" for axis in AXES)
         assumed = sum(each.status == "assumed" for each in self.quantities.values())
-        return f"Crane({self.name!r}, {drives}; {assumed} of {len(UNITS)} quantities assumed)"
+        return f"Crane({self.name!r}, {drives}; {assumed} of {len(UNITS)} lengths assumed)"
 
     def with_drive(
         self, *, hoist: Drive | None = None, slew: Drive | None = None, luff: Drive | None = None

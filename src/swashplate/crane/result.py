@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import pi, sqrt
@@ -15,7 +16,7 @@ from swashplate.crane.rope import GRAVITY
 from swashplate.crane.stick import AXES
 from swashplate.errors import InputError
 from swashplate.simulation.result import Limit, Simulation
-from swashplate.tables import UNIT, Column, Table
+from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
     import polars
@@ -182,28 +183,9 @@ class CraneRun:
         run = self.drive(axis)
         return {each.name.lower(): float(run.active(each).mean()) for each in Limit if each.name}
 
-    def table(self) -> Table:
-        """What the run amounts to."""
-        made = Table("", (Column("Result"), Column("value", ".4g"), UNIT))
-        late = self.time[-1] < self.settling_starts
-        made.add("residual swing", None if late else np.radians(self.residual_deg), unit="rad")
-        made.add("largest swing", float(np.radians(self.swing_deg.max())), unit="rad")
-        made.add("swing, rms", float(np.radians(self.rms_deg())), unit="rad")
-        made.add("slew at the end", float(np.radians(self.slew_deg[-1])), unit="rad")
-        made.add("boom at the end", float(np.radians(self.boom_deg[-1])), unit="rad")
-        made.add("rope at the end", float(self.rope[-1]), unit="m")
-        made.add("largest tension", float(self.tension.max()), unit="N")
-        made.add("rope slack", 100.0 * float(self.slack.mean()), unit="%")
-        return made
-
-    def limits_table(self) -> Table:
-        """Shares of time for which limits act, for each axis."""
-        columns = (Column("Limit"), *(Column(axis, ".1%") for axis in AXES))
-        made = Table("Share of time for which limits act", columns)
-        shares = [self.limits(axis) for axis in AXES]
-        for name in shares[0]:
-            made.add(name.replace("_", " "), *(each[name] for each in shares))
-        return made
+    def summary(self) -> Table:
+        """What the run amounts to, as a table of one row; `run_table` compares several."""
+        return run_table({self.actuation: self})
 
     def to_polars(self) -> polars.DataFrame:
         """All signals, a row for each sample, in SI."""
@@ -220,3 +202,49 @@ class CraneRun:
         from swashplate.report.figures import plot_crane
 
         return plot_crane(self)
+
+
+def run_table(runs: Mapping[str, CraneRun]) -> Table:
+    """What runs amount to, a row for each by its name: swing, where they end, slack.
+
+    The residual swing is empty where a run is too short for it.
+    """
+    columns = (
+        Column("run"),
+        Column("residual", ".2f", "rad", none="–", key="residual_swing"),
+        Column("rms", ".2f", "rad", key="rms_swing"),
+        Column("largest", ".2f", "rad", of="pf", key="largest_swing"),
+        Column("slew", ".2f", "rad"),
+        Column("boom", ".2f", "rad"),
+        Column("rope", ".2f", "m"),
+        Column("slack", ".1%", of="pf"),
+    )
+    made = Table("", columns, "Swing, and where slew, boom and rope end")
+    for name, run in runs.items():
+        late = run.settling_starts > run.time[-1]
+        angles = (
+            np.nan if late else run.residual_deg,
+            run.rms_deg(),
+            run.swing_deg.max(),
+            run.slew_deg[-1],
+            run.boom_deg[-1],
+        )
+        numbers = [float(np.radians(each)) for each in angles]
+        made.add(name, *numbers, float(run.rope[-1]), float(run.slack.mean()))
+    return made
+
+
+def limit_table(runs: Mapping[str, CraneRun]) -> Table:
+    """Share of time for which limits of the drives act, a row for each run and axis.
+
+    Ideal drives are left out.
+    """
+    shown = (Limit.CURRENT_RATE, Limit.ORIFICE, Limit.SWASH_STOP)
+    heads = ("current rate", "orifice (acceleration)", "swash stop (speed)")
+    columns = (Column("run"), Column("axis"), *(Column(each, ".1%") for each in heads))
+    made = Table("Share of time for which limits act", columns)
+    for name, run in runs.items():
+        for axis in AXES if run.actuation != "ideal" else ():
+            shares = run.limits(axis)
+            made.add(name, axis, *(shares[str(each.name).lower()] for each in shown))
+    return made

@@ -10,6 +10,7 @@ from .analysis import plot_whatif as plot_whatif
 from .campaign import plot_campaign as plot_campaign
 from .campaign import plot_current as plot_current
 from .campaign import plot_encoder as plot_encoder
+from .crane import plot_crane as plot_crane
 from .fit import plot_fit as plot_fit
 from .fit import plot_overlay as plot_overlay
 from .fit import plot_waterfall as plot_waterfall
