@@ -3,7 +3,7 @@
     .venv/bin/python benchmarks/starts.py [--axis hoist] [--starts 50] [--sqp-starts 50]
 
 The stages of a set-up on a realistic virtual campaign whose truth lies within 10 % of the published
-values, from Sobol points over all bounds. docs/starts.md has the table and what it means.
+values, from Sobol points over all bounds. docs/multi-start.md has the table and what it means.
 """
 
 import argparse

@@ -32,7 +32,7 @@ def pages(folder: Path) -> None:
     made["command-line.md"] = command_line()
     made["campaign-file.md"] = schema_page("Campaign file", CampaignFile, CAMPAIGN)
     made["parameter-file.md"] = schema_page("Parameter file", SetFile, PARAMETERS)
-    made["set-up-file.md"] = schema_page("Set-up file", Setup, SETUP)
+    made["set-up-file.md"] = schema_page("Fit configuration file", Setup, SETUP)
     for path in folder.iterdir():
         if path.name not in made:
             path.unlink()
@@ -43,15 +43,16 @@ def pages(folder: Path) -> None:
 
 
 CAMPAIGN = """\
-A campaign says where the logs of a machine are and what stands in them. `swashplate campaign init`
-writes a draft from your logs, `swashplate campaign schema` prints this page as a JSON Schema that
-editors complete from. The story is told in [campaigns](../campaign.md)."""
+A campaign says where the logs of a machine are and what their columns mean.
+`swashplate campaign init` writes a draft from your logs, `swashplate campaign schema` prints this
+page as a JSON Schema with which editors complete entries. An introduction:
+[campaigns](../campaign.md)."""
 PARAMETERS = """\
 A drive in numbers. `swashplate show hoist --toml > mine.toml` writes one to start from; symbols,
-units and ranges stand in the [nomenclature](../nomenclature.md)."""
+units and ranges: [nomenclature](../nomenclature.md)."""
 SETUP = """\
-What a fit sets free, stage by stage. `swashplate excitation` writes one for your tests;
-[identification](../identification.md) has an example."""
+The parameters that a fit estimates, stage by stage. `swashplate excitation --write` makes one for
+your tests; [identification](../identification.md) has an example."""
 
 
 def api_pages() -> Iterator[tuple[str, str]]:
@@ -65,7 +66,7 @@ def api_pages() -> Iterator[tuple[str, str]]:
             short = name.rpartition(".")[2]
             lines += [f"## {short}", "", "```{eval-rst}", f".. {kind}:: {name}"]
             if kind == "autoclass":
-                lines += ["   :members:"]
+                lines += ["   :members:", "   :exclude-members: model_config"]
             lines += ["```", ""]
         yield page["name"], "\n".join(lines)
 
@@ -196,7 +197,7 @@ def type_words(entry: Mapping[str, Any], tables: set[str], schema: Mapping[str, 
 NOMENCLATURE = HERE / "nomenclature.md"
 HEADS: Mapping[Block, tuple[str, ...]] = {
     "control_card": ("equation",),
-    "pump_motor": ("lump", "equation"),
+    "pump_motor": ("lumped from", "equation"),
     "refinements": ("not given", "option", "of"),
 }
 """Columns of a block's table after those of all tables."""
@@ -208,7 +209,7 @@ def nomenclature(text: str) -> str:
     Parameters
     ----------
     text : str
-        The page; a table begins with a row ``| symbol | name | unit | each way | range | ...``.
+        The page; a table begins with a row ``| symbol | name | unit | per direction | ...``.
     """
     tables = iter(HEADS)
 
@@ -220,7 +221,7 @@ def nomenclature(text: str) -> str:
 
 def parameter_table(block: Block) -> str:
     """All parameters of a block, a row each."""
-    heads = ("symbol", "name", "unit", "each way", "range", *HEADS[block])
+    heads = ("symbol", "name", "unit", "per direction", "range", *HEADS[block])
     members = [d for d in (*CATALOGUE.values(), *REFINEMENTS.values()) if d.block == block]
     lines = [row(heads), "|" + "---|" * len(heads), *(row(cells(each)) for each in members)]
     return "\n".join(lines) + "\n"

@@ -115,23 +115,24 @@ class Drive:
     def with_equation(
         self, old: Equation, new: Equation, parameters: type[NamedTuple] | None = None
     ) -> Drive:
-        """A drive with an equation of one's own in the place of one of the pump's.
+        """A drive with an equation of one's own in the place of one of the card's or the pump's.
 
         Parameters
         ----------
         old : equation
-            Of `swashplate.models.pump` or `swashplate.models.refinements`.
+            Of `swashplate.models.card`, `swashplate.models.pump` or
+            `swashplate.models.refinements`.
         new : equation
             The same arguments, and behind them, by name, any of `parameters`.
         parameters : class of named tuples, optional
             What the equation brings along, each a float with its `Definition` and a default. They
             are parameters of the drive from then on: ``drive.replace(seal_drag=1e-5)``, a fit's
-            unknowns, columns of `sensitivities`.
+            unknowns, columns of `sensitivities`. Only the pump's equations can have some.
 
         Raises
         ------
         InputError
-            If the pump does not use the equation, or the arguments do not fit.
+            If the drive does not use the equation, or the arguments do not fit.
         ParameterError
             If a parameter has no definition, or the name of another one.
         """

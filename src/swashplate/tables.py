@@ -289,7 +289,7 @@ def ending(path: str | Path, form: Form) -> str:
     """
     suffix = Path(path).suffix
     if suffix.lower() not in (*form.endings, *form.also):
-        known = f"{', '.join(form.endings[:-1])} or {form.endings[-1]}"
+        known = " or ".join(filter(None, (", ".join(form.endings[:-1]), form.endings[-1])))
         raise FileError(f"{path} ends in '{suffix}'; {form.what} is written as {known}.")
     return suffix.lower()
 

@@ -168,6 +168,10 @@ def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str
             for si, (name, factor) in zip(("rad/s", "rad", "rad/s^2"), turns, strict=True):
                 chosen[si] = DisplayUnit(name, factor)
             continue
+        usual = [(si, each) for si, units in _USUAL.items() for _, each in units]
+        if word and word in (each.name for _, each in usual):
+            chosen.update((si, each) for si, each in usual if each.name == word)
+            continue
         for si in ("Pa", "m", "m/s", "A", "rad"):
             try:
                 size = to_si(1.0, word, si, "--units")

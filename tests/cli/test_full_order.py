@@ -198,14 +198,3 @@ def test_the_examples_in_its_help(run, done, tmp_path):
     assert len(examples) >= 4
     for example in examples:
         done(*shlex.split(example))
-
-
-def test_the_page_shows_what_is_printed(done, monkeypatch, tmp_path):
-    page = PAGE.read_text("utf-8")
-    ((command, shown),) = re.findall(r"```console\n\$ swashplate (.*?)\n(.*?)```", page, re.DOTALL)
-    (tmp_path / "docs" / "images").mkdir(parents=True)
-    printed = [" ".join(line.split()) for line in done(*shlex.split(command)).splitlines()]
-    for line in shown.splitlines():
-        assert line == "..." or " ".join(re.sub("─+", "─", line).split()) in printed, line
-    made, kept = (each / "images" / "full-order.png" for each in (tmp_path / "docs", PAGE.parent))
-    assert made.read_bytes()[:24] == kept.read_bytes()[:24]  # a PNG of the same size

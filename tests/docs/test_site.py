@@ -5,13 +5,22 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 import typer.main
 
 import swashplate
+from swashplate import Limit
+from swashplate.analysis.outcomes import OUTCOMES
+from swashplate.analysis.whatif import LEVERS
+from swashplate.campaign import CHANNEL_KINDS
 from swashplate.cli import app
+from swashplate.logs import SUFFIXES
+from swashplate.parameters.definitions import CATALOGUE, REFINEMENTS
+from swashplate.simulation.result import SIGNALS
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -21,12 +30,16 @@ OBJECTS = [
     for page in tomllib.loads((DOCS / "api.toml").read_text("utf-8"))["page"]
     for name in page["objects"]
 ]
-
-
 KEYS = {"campaign-file": "counts_per_turn", "parameter-file": "pump_motor", "set-up-file": "tied"}
 
 
-@pytest.mark.slow
+@pytest.fixture
+def scripts(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """The importer of docs/generate.py and docs/figures.py."""
+    monkeypatch.syspath_prepend(str(DOCS))
+    return importlib
+
+
 def test_the_site_builds(tmp_path: Path) -> None:
     """A broken link, a page that none leads to, a wrong docstring: each is a warning, and fails."""
     done = subprocess.run(
@@ -36,7 +49,7 @@ def test_the_site_builds(tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    theory = (tmp_path / "theory" / "stroker.html").read_text("utf-8")
+    theory = (tmp_path / "theory" / "motor.html").read_text("utf-8")
     # equations need no network
     (script,) = set(re.findall(r'src="([^"]*mathjax[^"?]*)', theory))
     assert not script.startswith("http")
@@ -66,12 +79,40 @@ def test_the_reference_has_whole_modules(module: str) -> None:
     }
 
 
-def test_every_figure_can_be_made_again() -> None:
-    sys.path.insert(0, str(DOCS))
-    try:
-        figures = importlib.import_module("figures")
-    finally:
-        sys.path.remove(str(DOCS))
+def test_the_tables_of_the_nomenclature_are_those_of_the_definitions(scripts: ModuleType) -> None:
+    """``python docs/generate.py`` writes them anew."""
+    page = (DOCS / "nomenclature.md").read_text("utf-8")
+    assert scripts.import_module("generate").nomenclature(page) == page
+    for definition in (*CATALOGUE.values(), *REFINEMENTS.values()):
+        assert page.count(f"\n| {definition.symbol} | {definition.name} |") == 1
+
+
+BOTH_WAYS = [name for name in LEVERS if not name.endswith(("_plus", "_minus"))]
+
+
+@pytest.mark.parametrize(
+    ("page", "names"),
+    [
+        ("nomenclature.md", [*SIGNALS, *(limit.name for limit in Limit)]),
+        ("refinements.md", REFINEMENTS),
+        ("what-if.md", [*BOTH_WAYS, *OUTCOMES]),
+        ("campaign.md", CHANNEL_KINDS),
+    ],
+)
+def test_a_page_names_all_of_them(page: str, names: Iterable[str]) -> None:
+    text = (DOCS / page).read_text("utf-8")
+    for name in names:
+        assert f"`{name}`" in text, name
+
+
+def test_every_ending_of_a_log_is_named() -> None:
+    text = (DOCS / "campaign.md").read_text("utf-8")
+    for suffix in SUFFIXES:
+        assert re.search(rf"{re.escape(suffix)}\b", text), suffix
+
+
+def test_every_figure_can_be_made_again(scripts: ModuleType) -> None:
+    figures = scripts.import_module("figures")
     shown = {
         Path(target).name
         for page in PAGES
@@ -80,3 +121,14 @@ def test_every_figure_can_be_made_again() -> None:
     }
     assert shown == set(figures.FIGURES)
     assert {each.name for each in figures.IMAGES.iterdir()} == shown
+
+
+def test_figures_have_the_size_of_those_that_are_kept(
+    scripts: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figures = scripts.import_module("figures")
+    kept = figures.IMAGES
+    monkeypatch.setattr(figures, "IMAGES", tmp_path)
+    for name in figures.FIGURES.keys() - {"main-job.png"}:  # the demo's, which tests/cli runs
+        figures.make(name)
+        assert (tmp_path / name).read_bytes()[:24] == (kept / name).read_bytes()[:24], name

@@ -254,12 +254,6 @@ def test_many_workers_at_once(tmp_path: Path) -> None:
         assert each.returncode == 0
 
 
-def test_kept_with_the_user_where_no_folder_is_named(tmp_path: Path) -> None:
-    home = {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "home" / "cache")}
-    generate(tmp_path, NUMBA_CACHE_DIR="", **home)
-    assert list((tmp_path / "home").rglob("generated/machine_*.py"))
-
-
 def files(folder: Path, *names: str, age: float = 0.0, size: int = 10) -> None:
     folder.mkdir(exist_ok=True)
     for name in names:
@@ -280,15 +274,6 @@ def test_modules_that_nobody_used_lately_are_removed(tmp_path: Path) -> None:
     files(modules, "tidied", age=5.0 * DAY)
     tidy([modules, code, tmp_path / "none"], unused=4.0 * DAY)
     assert left(modules, code) == {"kept_2.py", "kept_2.march-3.py311.nbi", "tidied"}
-
-
-def test_beyond_a_size_those_go_first_that_were_not_used_for_longest(tmp_path: Path) -> None:
-    for k in range(5):
-        files(tmp_path, f"module_{k}.py", f"module_{k}.march-3.py311.nbi", age=100.0 * k)
-    tidy([tmp_path], largest=50)
-    assert left(tmp_path) == {
-        name for k in (0, 1) for name in (f"module_{k}.py", f"module_{k}.march-3.py311.nbi")
-    }
 
 
 def test_the_folder_is_tidied_once_a_day_and_use_counts(tmp_path: Path) -> None:

@@ -1,99 +1,21 @@
 """An equation of the drive replaced by one's own, without a change to the package."""
 
 from math import exp
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from swashplate import Drive, InputError, maneuvers
+from swashplate import InputError
 from swashplate.equations import (
-    Definition,
     Model,
     equation,
     join,
     replaced,
-    sensitivities,
     simulate,
 )
 from swashplate.models.drive import drive
 from swashplate.models.pump import Pump, spool_balance, stopped_spool
-from swashplate.simulation.instance import instance_of
-
-RATE = 512.0
-COMMAND = maneuvers.sine(4.0, 0.8, start=0.05, length=1.5, settle=0.3).sample(RATE)
-OUTPUT = "shaft_speed"
-
-
-class Seal(NamedTuple):
-    """A seal on the spool."""
-
-    seal_drag: Annotated[
-        float, Definition("what the seal takes from the spool's displacement", "m", lower=0.0)
-    ] = 0.0
-
-
-@equation
-def sealed_balance(force: float, arm_sine: float, p: Pump, seal_drag: float) -> float:
-    """The spool's balance less the drag, which grows softly over 10 µm."""
-    free = spool_balance(force, arm_sine, p)
-    return free - seal_drag * free / (abs(free) + 1e-5)
-
-
-sealed = replaced(drive, spool_balance, sealed_balance, Seal)
-
-
-def numbers(model: Model, **more: float) -> tuple[tuple, tuple]:
-    """Parameters and options of the hoist's drive on a model of its kind."""
-    card, pump = instance_of(Drive.preset("hoist").parameters, by_voltage=True).parts
-    own = model.parts[1].parameters(**{**pump.p._asdict(), **more})
-    return model.parameters(card.p, own), model.options(card.options, pump.options)
-
-
-def speed(model: Model, **more: float) -> np.ndarray:
-    p, options = numbers(model, **more)
-    return simulate(model, p, {"voltage": COMMAND}, RATE, options=options)[OUTPUT]
-
-
-def test_at_zero_it_is_the_drive_to_the_last_bit() -> None:
-    plain = Drive.preset("hoist").simulate(COMMAND).shaft_speed
-    assert np.array_equal(speed(sealed), plain)
-    assert np.array_equal(speed(drive), plain)
-
-
-def test_the_equation_acts_at_every_sample() -> None:
-    """At rest but for the drag, the spool's balance itself is what the replaced equation says."""
-    p, options = numbers(sealed, seal_drag=2e-5)
-    run = simulate(sealed, p, {"voltage": COMMAND}, RATE, options=options)
-    own = p.pump
-    for n in (100, 300, 500):
-        arm_sine = own.Z3 * own.Z1 * run["pressure"][n] - own.Z3 * own.Z2
-        free = spool_balance(run["solenoid_force"][n], arm_sine, own)
-        expected = free - 2e-5 * free / (abs(free) + 1e-5)
-        assert run["spool_free"][n] == pytest.approx(expected, rel=1e-9, abs=1e-18)
-
-
-def test_derivatives_are_those_of_differences() -> None:
-    p, options = numbers(sealed, seal_drag=2e-5)
-    by = sensitivities(
-        sealed,
-        p,
-        {"voltage": COMMAND},
-        RATE,
-        output=OUTPUT,
-        parameters=["pump.seal_drag", "pump.Z8", "card.plus.G1"],
-        options=options,
-    )
-    h = 1e-9
-    rise = speed(sealed, seal_drag=2e-5 + h) - speed(sealed, seal_drag=2e-5 - h)
-    np.testing.assert_allclose(by[:, 0], rise / (2 * h), atol=1e-5 * np.abs(by[:, 0]).max())
-    assert np.abs(by).max(axis=0).min() > 0.0
-
-
-def test_the_model_itself_is_as_it_was() -> None:
-    assert "seal_drag" not in drive.parts[1].parameters._fields
-    assert sealed.parts[0] is drive.parts[0]
-    assert sealed.external == drive.external
 
 
 def test_a_single_model_and_no_further_parameter() -> None:

@@ -13,7 +13,6 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, least_squares
 
 from swashplate import Drive
-from swashplate.equations.library import interpolated
 from swashplate.equations.model import Window
 from swashplate.models import card
 from swashplate.models.card import Channel, ChannelConstants, Filter
@@ -310,25 +309,3 @@ def test_limits_can_be_off(channel: Channel) -> None:
     assert card.limited_current(1.3, 0.2, 1.0, p, decay, 0.01, None) == 1.3
     assert card.limited_current(0.1, 0.9, 0.0, p, decay, 0.01, None) == 0.1
     assert card.limited_current(-0.1, 0.9, 0.0, p, decay, 0.01, None) == 0.0
-
-
-@pytest.mark.interpreted
-def test_declared_rules_are_the_slopes() -> None:
-    """Of the jump's share, by central differences where the command crosses the dead zone."""
-    at = [2.0, 1.2, 0.1, 0.3, 1.0]
-    for values in (at, [0.1, 1.2, 2.0, 0.3, 1.4], [2.0, 0.7, 0.1, 0.6, 1.0]):
-        declared = card._jump_share(*values)
-        for index, slope in enumerate(declared):
-            above, below = list(values), list(values)
-            above[index] += 1e-6
-            below[index] -= 1e-6
-            difference = (card.jump_share(*above) - card.jump_share(*below)) / 2e-6
-            assert slope == pytest.approx(difference, rel=1e-6, abs=1e-8)
-    assert card._jump_share(0.5, 0.5, 0.5, 0.3, 0.5) == (0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@pytest.mark.interpreted
-@given(st.floats(-10.0, 10.0), st.floats(-10.0, 10.0), st.floats(0.0, 1.0))
-def test_interpolation_lies_between(newer: float, older: float, fraction: float) -> None:
-    value = interpolated(newer, older, fraction)
-    assert min(newer, older) - 1e-12 <= value <= max(newer, older) + 1e-12

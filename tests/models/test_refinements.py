@@ -1,7 +1,6 @@
 """The refinements against what they are to be: friction, hysteresis, ripple, damping, line."""
 
-from itertools import pairwise
-from math import atan, cos, exp, inf, pi, sqrt
+from math import atan, cos, exp, pi, sqrt
 
 import numpy as np
 import pytest
@@ -41,11 +40,6 @@ def test_the_frictions_width_is_the_force_over_the_springs_stiffness() -> None:
     assert friction_width(0.1, 0.25, 0.01) == pytest.approx(2e-5, rel=1e-15)
 
 
-def test_dither_leaves_a_share_each_step() -> None:
-    assert dither_factor(0.5, 0.25) == pytest.approx(exp(-0.5), rel=1e-15)
-    assert dither_factor(inf, 0.25) == 1.0
-
-
 def test_a_spool_without_give_stands_still_until_the_force_is_spent() -> None:
     # the balance moves by 2/3 of the width and back, then by two widths
     assert 2e-5 - held_back(0.0, 2e-5, 0.0, W, 0.0, 1.0) == 0.0
@@ -82,15 +76,6 @@ def test_it_never_gives_energy(path: list[float], travel: float, factor: float) 
         assert work >= 0.5 * travel / W * deflection**2 - 1e-22
 
 
-@given(BALANCES)
-def test_without_friction_to_speak_of_the_spool_is_at_its_balance(path: list[float]) -> None:
-    deflection, spool = 0.0, 0.0
-    for balance in path:
-        deflection = held_back(deflection, balance, spool, 1e-15, TRAVEL, 1.0)
-        spool = balance - deflection
-        assert abs(spool - balance) < 2e-15  # the width, and rounding
-
-
 # --- hysteresis -----------------------------------------------------------------------------------
 
 PLAY = 0.01
@@ -112,18 +97,6 @@ def test_the_force_lags_on_both_sides_of_the_loop() -> None:
 
 def test_a_small_motion_moves_nothing() -> None:
     assert followed([0.009, -0.009, 0.005]) == [0.0, 0.0, 0.0]
-
-
-@given(CURRENTS)
-def test_without_play_it_is_the_current(path: list[float]) -> None:
-    assert followed(path, 0.0) == path
-
-
-@given(CURRENTS)
-def test_points_on_the_way_change_nothing(path: list[float]) -> None:
-    there = [0.5 * (a + b) for a, b in pairwise(path)]
-    finer = [each for pair in zip(path, [*there, path[-1]], strict=True) for each in pair]
-    assert followed(finer)[-1] == followed(path)[-1]
 
 
 @given(CURRENTS)
@@ -151,11 +124,6 @@ def test_a_quarter_cycle() -> None:
     assert rippled_angle(0.21, 0.0, 0.05, 5.5, 0.0) == 0.21
     assert rippled_angle(0.21, 0.5 * pi / 5.5, 0.05, 5.5, 0.0) == pytest.approx(0.2)
     assert rippled_angle(0.21, 0.0, 0.05, 5.5, -0.5 * pi) == pytest.approx(0.21 / 0.95)
-
-
-@given(st.floats(-0.3, 0.3), st.floats(-50.0, 50.0))
-def test_without_depth_it_is_the_plates_own_angle(angle: float, shaft: float) -> None:
-    assert rippled_angle(angle, shaft, 0.0, 5.5, 0.3) == angle
 
 
 @given(st.floats(0.0, 0.9), st.floats(-pi, pi))
@@ -212,17 +180,6 @@ def test_the_lumps() -> None:
     assert lumps(1e-6, 3e4, 5e3, 12.0) == pytest.approx((0.03, 0.06))
 
 
-def test_a_hanging_load_slows_hoisting_and_speeds_lowering_up() -> None:
-    Z11, _ = lumps(1e-6, 3e4, 5e3, 12.0)
-    assert 1.0 - Z11 < 1.0
-    assert abs(-1.0 - Z11) > 1.0
-
-
-def test_a_load_at_rest_bears_its_weight_alone() -> None:
-    assert stiff_line_torque(0.2, 0.0, 3e4, 5e3, 12.0) == 3e4
-    assert stiff_line_torque(0.0, 0.5, 0.0, 5e3, 12.0) == pytest.approx(5e3 * 6.0)
-
-
 @given(st.floats(-1.0, 1.0), st.floats(-2.0, 2.0), st.floats(-5e4, 5e4))
 def test_the_leakage_goes_with_the_torque(tangent: float, rate: float, torque: float) -> None:
     K, J, Z10 = 1e-6, 5e3, 12.0
@@ -242,12 +199,6 @@ STATES = st.tuples(st.floats(-1e5, 1e5), st.floats(-4.0, 4.0))
 
 def energy(torque: float, speed: float) -> float:
     return torque**2 / (2.0 * K) + 0.5 * J * speed**2
-
-
-def test_at_rest_the_line_bears_the_load() -> None:
-    flow = 1.5
-    state = (LOAD, flow - LEAK * LOAD)
-    assert line_step(*state, flow, LOAD, K, LEAK, J, H) == pytest.approx(state, rel=1e-14)
 
 
 def test_it_solves_its_equations() -> None:
@@ -280,14 +231,3 @@ def test_left_alone_it_never_gains_energy(
     middle = 0.5 * (state[0] + after[0])
     lost = step * leakage * middle**2
     assert energy(*after) == pytest.approx(energy(*state) - lost, rel=1e-9, abs=1e-9)
-
-
-def test_a_stiff_line_follows_the_flow() -> None:
-    """k → ∞: Ω = Ω_0 - K_mL T with the torque that the load asks for."""
-    flows = np.linspace(0.0, 2.0, 513)
-    state = (LOAD, -LEAK * LOAD)
-    for last, flow in pairwise(flows):
-        state = line_step(*state, 0.5 * (last + flow), LOAD, 1e8, LEAK, J, H)
-    torque, speed = state
-    assert torque == pytest.approx(LOAD + J * 2.0 / (512 * H), rel=1e-2)
-    assert speed == pytest.approx(2.0 - LEAK * torque, rel=1e-3)

@@ -27,11 +27,15 @@ from swashplate.identification.truth import in_the_fits_scales
 from swashplate.identification.validation import predict
 from swashplate.identification.verdict import verdict
 from swashplate.report.figures import plot_overlay, save_fit_figures, save_run_figures
-from swashplate.report.fit_report import (
-    write_fit_report,
-    write_validation_report,
+from swashplate.report.fit_report import print_report, write_fit_report, write_validation_report
+from swashplate.report.fit_report.runs import (
+    Shown,
+    off_scale,
+    packed,
+    predicted_runs,
+    run_data,
+    shown_runs,
 )
-from swashplate.report.fit_report.runs import Shown, off_scale, shown_runs
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
 SETUP = Setup.model_validate(
@@ -99,6 +103,7 @@ STARTS = tuple(
     StartResult(number, (0.0,), (0.0,), 9.0, cost, 10, number != 2, "done", 0.1)
     for number, cost in enumerate((3.0, 3.0, 70.0, float("inf")))
 )
+HEADS = ("unknown", "run", "parameter", "channel", "fold", "quantity")
 NOTES = {"command": HOSTILE, "seed": "4"}
 
 
@@ -165,10 +170,11 @@ class Page(HTMLParser):
         """Rows of all tables of a class by the heads of their columns; sums of others left out."""
         found, head = [], []
         for row in self.tables[table]:
-            if row[0] in ("unknown", "run", "parameter", "channel", "fold"):
+            if row[0] in HEADS or row[1] == "run":
                 head = row
             elif row[0] != "all":
-                found.append({**dict(zip(head, row, strict=True)), "name": row[0].split(" ")[0]})
+                # a symbol stands below its meaning
+                found.append({**dict(zip(head, row, strict=True)), "name": row[0].split(" ")[-1]})
         return found
 
 
@@ -259,16 +265,67 @@ def test_a_position_is_judged_by_its_speed_too(read: Page) -> None:
     assert "start transient" in read.words
 
 
-def test_every_sample_is_in_the_file(read: Page, fitted: Fit) -> None:
-    data = json.loads(read.scripts["samples-0"])
-    kept = np.frombuffer(b64decode(data["channels"][0]["measured"]["data"]), "<f4")
-    measured = fitted.stages[0].problem.experiments[0]["current"].values
-    assert np.array_equal(kept[np.isfinite(kept)], measured.astype("<f4"))
-    clock = data["clocks"][data["channels"][0]["clock"]]
-    assert clock["type"] == "float32"
-    time = np.frombuffer(b64decode(clock["data"]), "<f4")
-    assert time.size == kept.size
-    assert (np.diff(time) >= 0.0).all()
+def unpacked(found: dict) -> np.ndarray:
+    """Numbers of `runs.packed`, read bit by bit as its docstring says."""
+    bits = iter(np.unpackbits(np.frombuffer(b64decode(found["code"]), np.uint8)).tolist())
+    values = []
+    for row in range(found["size"]):
+        if row % 256 == 0:
+            k = int("".join(str(next(bits)) for _ in range(5)), 2)
+        zeros = next(place for place, bit in enumerate(bits) if bit)
+        length, high = (32, 0) if zeros == 24 else (k, zeros << k)
+        number = high + int("0" + "".join(str(next(bits)) for _ in range(length)), 2)
+        values.append(number // 2 if number % 2 == 0 else -(number + 1) // 2)
+    whole = np.array(values, dtype=float)
+    for _ in range(found["order"]):
+        whole = np.cumsum(whole)
+    return found["zero"] + found["step"] * whole
+
+
+@pytest.mark.parametrize(
+    ("values", "step"),
+    [
+        (np.sin(np.arange(3000) / 50.0), None),
+        (np.random.default_rng(0).standard_cauchy(1000), 0.1),  # some take all 32 bits
+        (np.arange(600) / 512.0, 1.0 / 512.0 / 16.0),
+        (np.full(300, 7.0), None),
+        (np.array([3.0]), None),
+        (np.array([]), None),
+    ],
+)
+def test_numbers_are_packed_to_half_a_step(values: np.ndarray, step: float | None) -> None:
+    found = packed(values, step)
+    np.testing.assert_allclose(unpacked(found), values, rtol=1e-12, atol=0.5001 * found["step"])
+
+
+def test_samples_of_a_run_are_in_the_page(read: Page, fitted: Fit) -> None:
+    experiment = fitted.stages[0].problem.experiments[0]
+    channel = json.loads(read.scripts["samples-0"])["channels"][0]
+    simulated, residual = map(unpacked, channel["signals"])
+    np.testing.assert_allclose(unpacked(channel["time"]), experiment["current"].time, atol=2e-4)
+    measured = simulated - channel["ratio"] * residual
+    rms = float(np.sqrt(np.mean(residual**2)))
+    error = measured - experiment["current"].values
+    assert float(np.abs(error).max()) < rms / 16.0
+
+
+def test_a_long_run_costs_few_bytes(validation) -> None:
+    (quality,) = validation
+    channel = quality.experiment[quality.channel]
+    many = 40
+    time = np.arange(many * channel.time.size) / 512.0
+    values = np.tile(channel.values, many)
+    spiked = 12345
+    values[spiked] = 9.9
+    channel = replace(channel, time=time, values=values, weight=np.ones(values.size))
+    experiment = replace(quality.experiment, channels={quality.channel: channel})
+    long = replace(quality, experiment=experiment, simulated=np.tile(quality.simulated, many))
+    (run,) = predicted_runs([long])
+    data = run_data(run)
+    assert len(json.dumps(data)) < 1.0 * values.size
+    simulated, residual = map(unpacked, data["channels"][0]["signals"])
+    measured = simulated - data["channels"][0]["ratio"] * residual
+    assert measured.max() == pytest.approx(9.9, abs=0.02)
 
 
 def test_ignored_spikes_leave_the_scale_to_what_counts() -> None:
@@ -362,6 +419,44 @@ def test_truth_is_moved_to_the_scales_that_the_fit_held(campaign: Campaign) -> N
     assert moved["Z10"] == pytest.approx(1.03 * nominal.parameters.numbers["Z10"])
 
 
+def test_the_first_screen_is_for_the_owner(read: Page, fitted: Fit, validated: Path) -> None:
+    rows = {row["quantity"]: row for row in read.rows("numbers")}
+    drive = fitted.drive
+    top = rows["Top speed at ±10 V"]
+    assert top["unit"] == "deg/s"
+    for way, head in ((10.0, "positive"), (-10.0, "negative")):
+        settled = np.degrees(drive.simulate(np.full(8192, way), 512.0).shaft_speed[-1])
+        assert number(top[head]) == pytest.approx(settled, rel=2e-3)
+        # no force acts at the edge of the dead zone, and one does beyond it
+        volts = number(rows["Dead zone, up to"][head])
+        inside, outside = drive.steady_current(np.array([0.99 * volts, 1.01 * volts]))
+        dead = drive.parameters.numbers["Z17"]
+        assert abs(float(inside)) <= dead < abs(float(outside))
+    assert "±" in rows["Dead zone, up to"]["positive"]
+    # a drive alone has no intervals
+    assert "±" not in Page(validated.read_text("utf-8")).rows("numbers")[0]["positive"]
+    assert "The held-out run" in read.words
+    assert "Change first:" in read.words
+
+
+def test_each_run_has_a_light_and_links(read: Page, tmp_path, campaign, fitted, validation) -> None:
+    rows = read.rows("overview")
+    assert [row["role"] for row in rows] == ["fit", "fit", "validate"]
+    (held,) = validation
+    wrong = replace(held, simulated=0.0 * held.simulated, measures=Measures(10, 1.0, 1.0))
+    path = tmp_path / "fit.html"
+    write_fit_report(fitted, campaign, path, validation=[wrong])
+    page = Page(path.read_text("utf-8"))
+    lights = [of["class"] for tag, of in page.tags if tag == "span" and of.get("role") == "img"]
+    assert lights[0] == "light bad"  # of the verdict
+    assert lights[-1] == "light bad"
+    assert page.rows("overview")[-1]["why"].startswith("current misses 100 % of the movement")
+    targets = {of["id"] for _, of in page.tags if "id" in of}
+    links = {of["href"] for tag, of in page.tags if tag == "a"}
+    assert {"#run-0", "#run-1", "#run-2"} <= links
+    assert all(each.removeprefix("#") in targets for each in links)
+
+
 def test_shares_of_the_runs_add_up(read: Page) -> None:
     rows = [row for row in read.tables["excitation"] if row[0] != "unknown"]
     assert {row[0] for row in rows} == {"G1_plus", "G1_minus", "omega", "Z10"}
@@ -408,7 +503,7 @@ def test_starts_of_each_stage_are_drawn(tmp_path: Path, campaign, fitted, assess
     page = Page(path.read_text("utf-8"))
     assert "card: 2 of 4 starts reached the best cost, 3." in page.words
     assert "1 left the model's domain" in page.words
-    assert "item-waterfall-0" in page.scripts
+    assert sum(tag == "circle" for tag, _ in page.tags) == 3
 
 
 @pytest.fixture(scope="module")
@@ -424,7 +519,9 @@ def validated(tmp_path_factory, campaign: Campaign, fitted: Fit) -> Path:
 def test_a_validation_has_no_fit(validated: Path, campaign: Campaign, fitted: Fit) -> None:
     page = Page(validated.read_text("utf-8"))
     assert HOSTILE not in validated.read_text("utf-8")
-    assert set(page.tables) == {"agreement", "errors", "residuals", "data", "notes"}
+    assert set(page.tables) == {
+        *("numbers", "overview", "agreement", "errors", "residuals", "data", "notes")
+    }
     roles = {row["run"]: row["role"] for row in page.rows("agreement")}
     assert roles == {each.name: each.role for each in campaign}
     predicted = predict(fitted.parameters, campaign.experiments)
@@ -490,14 +587,14 @@ def test_long_names_stay_beside_their_panels(assessments, assert_legible) -> Non
 
 
 ZOOM = """<script>
-setTimeout(() => {
-  const run = Bokeh.documents.find((each) => each.get_model_by_name("overlay 0") !== null);
-  run.get_model_by_name("time").setv({ start: 2.0, end: 3.0 });
-  setTimeout(() => {
-    const { time } = run.get_model_by_name("overlay 0").data;
-    document.body.dataset.rows = Array.from(time).filter((t) => t >= 2.0 && t <= 3.0).length;
-  }, 2000);
-}, 8000);
+addEventListener("load", () => {
+  const stack = document.querySelector(".run .stack");
+  const { left, width } = stack.getBoundingClientRect();
+  const at = { clientX: left + 0.5 * width, bubbles: true };
+  stack.dispatchEvent(new WheelEvent("wheel", { ...at, ctrlKey: true, deltaY: -1500 }));
+  stack.dispatchEvent(new PointerEvent("pointermove", at));
+  dispatchEvent(new Event("beforeprint"));
+});
 </script></body>"""
 
 
@@ -532,21 +629,40 @@ def test_the_page_renders_and_zooms_in_a_browser_without_errors(
     zoomed = tmp_path / "zoomed.html"
     zoomed.write_text(page.read_text("utf-8").replace("</body>", ZOOM), "utf-8")
     made = browsed(zoomed)
-    figures = len(re.findall(r'class="figure[ "]', page.read_text("utf-8")))
-    # 3 runs, sensitivities of each of two stages, starts, a profile, and correlations
-    assert figures == 3 + 2 + 1 + 1 + made.count('data-item="correlation-')
-    assert made.count('data-drawn="yes"') == figures
-    # a second in view: every sample of it
-    time = fitted.stages[0].problem.experiments[0]["current"].time
-    expected = int(np.count_nonzero((time >= 2.0) & (time <= 3.0)))
-    rows = re.search(r'data-rows="(\d+)"', made)
-    assert rows is not None
-    assert expected > 500
-    assert abs(int(rows[1]) - expected) <= 1  # stamps in single precision
+    # 3 runs, and one of those held out, which is alone on the first screen
+    assert made.count('data-drawn="yes"') == made.count('class="stack"') == 4
+    assert "<details>" not in made  # on paper nothing stays folded
+    # the values where the pointer is are those of the run
+    said = re.search(r'class="readout">([\d.]+) s · .*? measured current (\S+) (m?A) ·', made)
+    assert said is not None
+    channel = fitted.stages[0].problem.experiments[0]["current"]
+    value = float(said[2].replace("−", "-")) * (1e-3 if said[3] == "mA" else 1.0)
+    row = int(np.searchsorted(channel.time, float(said[1])))
+    assert value == pytest.approx(float(channel.values[row]), abs=5e-4)
+    # and the view is 1.002^1500, twenty times, as short
+    ticks = [float(t) for t in re.findall(r'text-anchor="middle">([\d.]+)</text>', made)]
+    assert len(ticks) > 4
+
+
+def test_a_report_is_printed(page: Path, tmp_path: Path, browsed) -> None:
+    printed = tmp_path / "fit.pdf"
+    print_report(page, printed)
+    content = printed.read_bytes()
+    assert content.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type /Page\b", content)) >= 5
+    with pytest.raises(FileError, match=r"ends in '.txt'; a printed report is written as \.pdf"):
+        print_report(page, tmp_path / "fit.txt")
+
+
+def test_without_a_browser_it_says_so(page: Path, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(FileError, match=r"No browser was found .* install Chromium"):
+        print_report(page, tmp_path / "fit.pdf")
+    assert not list(tmp_path.glob("*.pdf"))
 
 
 def test_a_validation_renders_in_a_browser_without_errors(validated: Path, browsed) -> None:
-    assert browsed(validated).count('data-drawn="yes"') == 3
+    assert browsed(validated).count('data-drawn="yes"') == 4
 
 
 def test_ignored_windows_in_words(fitted: Fit) -> None:

@@ -1,7 +1,9 @@
 import subprocess
 import sys
+import warnings
 from itertools import pairwise
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from hypothesis import given
@@ -9,7 +11,17 @@ from hypothesis import strategies as st
 
 from swashplate import FileError, Simulation
 from swashplate.report.figures import plot_simulation, save_figure
-from swashplate.report.style import handle, in_lines, legend_columns, legend_rows, signed, spread
+from swashplate.report.style import (
+    BLUE,
+    dress,
+    handle,
+    in_lines,
+    legend_columns,
+    legend_rows,
+    sheet,
+    signed,
+    spread,
+)
 
 GAP = 0.1
 
@@ -122,3 +134,15 @@ assert "matplotlib.pyplot" not in sys.modules
 assert {name: matplotlib.rcParams[name] for name in settings} == before
 """
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("format", ["svg", "png", "pdf"])
+def test_names_are_drawn_as_they_are(tmp_path: Path, format: str) -> None:
+    """A dollar in a name is no formula, and a control character no part of an SVG."""
+    figure, (ax,) = sheet([1.0], "$\\frac{1}{$ <b>\x1b]0;x\x07 ${1}", legend=[handle("a$b$", BLUE)])
+    dress(ax, "speed $\\x$ (V)", "$t")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        save_figure(figure, tmp_path / f"a.{format}")
+    if format == "svg":
+        ElementTree.parse(tmp_path / "a.svg")

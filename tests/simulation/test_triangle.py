@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from swashplate import DomainError, Drive, InputError
 from swashplate.equations.marching.observation import Observation, ObservedRecord
@@ -31,23 +29,6 @@ def test_factor_is_numpys(rows: int) -> None:
     found, expected = combine([matrix]), upright(np.linalg.qr(matrix, mode="r"))
     assert np.array_equal(found, np.triu(found))
     np.testing.assert_allclose(found / scale, expected / scale, rtol=0.0, atol=1e-13)
-
-
-@given(st.integers(1, 40), st.integers(1, 6), st.integers(0, 2**32 - 1))
-def test_squares_and_products_are_kept(rows: int, columns: int, seed: int) -> None:
-    matrix = numbers(rows, columns, seed)
-    factor, size = combine([matrix]), np.linalg.norm(matrix, axis=0)
-    products = (factor.T @ factor - matrix.T @ matrix) / np.outer(size, size)
-    assert np.abs(products).max() < 1e-13
-    assert (np.diag(factor) >= 0.0).all()
-
-
-def test_parts_combine_to_the_whole() -> None:
-    matrix = numbers(3000, 5)
-    whole = combine([matrix])
-    parts = combine([combine([matrix[:10]]), combine([matrix[10:1900]]), matrix[1900:]])
-    scale = np.linalg.norm(matrix, axis=0)
-    np.testing.assert_allclose(parts / scale, whole / scale, rtol=0.0, atol=1e-13)
 
 
 def test_empty_and_equal_columns_keep_the_singular_values() -> None:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from json import JSONDecodeError, loads
 from pathlib import Path
-from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -170,13 +169,20 @@ def filled(
 # --- monte carlo ----------------------------------------------------------------------------------
 
 
-class Deviations(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Deviations:
     """Errors of one stage's vector."""
 
     own: Array
     """(K, K) covariance of its own noise."""
-    slopes: Mapping[int, Array] = MappingProxyType({})
+    slopes: Mapping[int, Array] = field(default_factory=dict)
     """By the number of an earlier stage (K, K_earlier): by how much its errors move this one's."""
+
+    @cached_property
+    def axes(self) -> tuple[Array, Array]:
+        """(K,) standard deviations along the covariance's own axes, and (K, K) these as columns."""
+        values, directions = np.linalg.eigh(self.own)
+        return np.sqrt(np.maximum(values, 0.0)), directions
 
 
 def draw_deviations(stages: Sequence[Deviations], random: np.random.Generator) -> tuple[Array, ...]:
@@ -201,8 +207,8 @@ def draw_deviations(stages: Sequence[Deviations], random: np.random.Generator) -
     """
     drawn: list[Array] = []
     for each in stages:
-        values, directions = np.linalg.eigh(each.own)
-        error = directions @ (np.sqrt(np.maximum(values, 0.0)) * random.normal(size=values.size))
+        deviations, directions = each.axes
+        error = directions @ (deviations * random.normal(size=deviations.size))
         for earlier, slopes in each.slopes.items():
             error = error + slopes @ drawn[earlier]
         drawn.append(error)

@@ -19,7 +19,7 @@ EXAMPLES = """\
 Examples:
   swashplate doctor
 """
-LIBRARIES = ("numpy", "scipy", "numba", "polars", "pydantic", "matplotlib", "bokeh", "h5py")
+LIBRARIES = ("numpy", "scipy", "numba", "polars", "pydantic", "matplotlib", "jinja2", "h5py")
 """Whose versions matter when a result or a figure differs."""
 
 

@@ -43,7 +43,15 @@ from swashplate.cli.words import (
     runs_to_fit,
 )
 from swashplate.errors import InputError
-from swashplate.tables import check_folder, joined, made_folder, write_text
+from swashplate.tables import (
+    Form,
+    check_folder,
+    check_place,
+    ending,
+    joined,
+    made_folder,
+    write_text,
+)
 
 if TYPE_CHECKING:
     from swashplate.campaign import Campaign
@@ -77,6 +85,7 @@ Examples:
   swashplate fit virtual/campaign.toml --out fitted
   swashplate report fitted virtual/campaign.toml --truth virtual/truth
   swashplate report fitted virtual/campaign.toml --figures pdf
+  swashplate report fitted virtual/campaign.toml --pdf report.pdf
 """
 DEMO_EXAMPLES = """\
 Examples:
@@ -102,6 +111,9 @@ RESIDUALS = (
 Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
 Role = Literal["validate", "fit", "all"]
 CAMPAIGN = Path("campaign.toml")
+PrintedReport = Annotated[
+    Path | None, option("Print the report to this PDF as well, by Chromium.", metavar="FILE")
+]
 
 
 def fit(
@@ -138,6 +150,7 @@ def fit(
     ] = "linear",
     require: Required = 10.0,
     report: Annotated[bool, option("Write report.html, one file that works offline.")] = True,
+    pdf: PrintedReport = None,
     figures: PrintFigures = None,
     timing: Annotated[bool, option("Say how long each part took.", "--timing")] = False,
 ) -> None:
@@ -156,6 +169,8 @@ def fit(
             "more, 1000 for smooth ones."
         )
     check_folder(out)
+    if pdf is not None:
+        _check_printing(pdf, report)
     clock = Timing()
     if model is not None and (setup is not None or begin is not None or joint):
         raise InputError(f"{model} says what is free and where it begins: leave out the others.")
@@ -207,7 +222,8 @@ def fit(
     with working("Judging") as status:
         found = judge_fit(campaign, chosen, runs, nominal, plan, result, wanted, status.update)
     clock.ended("judging")
-    lines = [*_written(found, out), *_shown(found, out, report=report, figures=figures)]
+    lines = _written(found, out)
+    lines += _shown(found, out, report=report, pdf=pdf, figures=figures)
     clock.ended("report and files")
     note(f"{campaign.title}{' (virtual)' if campaign.virtual else ''}: fitted in {seconds:.2f} s")
     _say_fit(found)
@@ -318,12 +334,13 @@ def _shown(
     out: Path,
     *,
     report: bool = True,
+    pdf: Path | None = None,
     figures: Figures | None = None,
     truth: ParameterSet | None = None,
 ) -> list[str]:
     """Write the report and the figures for print; lines that say so."""
     from swashplate.report.figures import save_fit_figures
-    from swashplate.report.fit_report import write_fit_report
+    from swashplate.report.fit_report import print_report, write_fit_report
 
     what, lines = (found.result, found.campaign), []
     if report:
@@ -340,6 +357,10 @@ def _shown(
                 validation=found.predicted,
             )
         lines.append(f"Report:    {out / 'report.html'}")
+    if pdf is not None:
+        with working("Printing the report"):
+            print_report(out / "report.html", pdf)
+        lines.append(f"Printed:   {pdf}")
     if figures is not None:
         with working("Drawing"):
             paths = save_fit_figures(
@@ -351,6 +372,17 @@ def _shown(
             )
         lines.append(f"Figures:   {len(paths)} in {out / 'figures'}")
     return lines
+
+
+def _check_printing(pdf: Path, report: bool) -> None:
+    """See to it, before long work, that a report can be printed."""
+    from swashplate.report.fit_report import find_browser
+
+    if not report:
+        raise InputError("--pdf prints the report: leave out --no-report.")
+    ending(pdf, Form("a printed report", (".pdf",)))
+    check_place(pdf)
+    find_browser()
 
 
 def _say_verdict(verdict: Verdict) -> None:
@@ -486,6 +518,7 @@ def report(
         Path | None,
         option("Folder for report.html; by default where the fit is.", metavar="DIR"),
     ] = None,
+    pdf: PrintedReport = None,
     figures: PrintFigures = None,
     truth: Annotated[
         str | None,
@@ -504,6 +537,8 @@ def report(
     from swashplate.campaign import Campaign
     from swashplate.identification.judging import judge_stored
 
+    if pdf is not None:
+        _check_printing(pdf, True)
     folder = fitted if fitted.is_dir() else fitted.parent
     with working(f"Reading {path}"):
         if not (folder / STORED).is_file():
@@ -518,7 +553,8 @@ def report(
         stored = _stored(fitted, folder / STORED, campaign, model)
     with working("Judging"):
         found = judge_stored(campaign, stored)
-    for line in _shown(found, made_folder(out or folder), figures=figures, truth=true):
+    place = made_folder(out or folder)
+    for line in _shown(found, place, pdf=pdf, figures=figures, truth=true):
         note(line)
     say(found.verdict.headline)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.equations.equation import interpreted
 from swashplate.equations.marching.run import Instance, called
 from swashplate.errors import DomainError, InputError
-from swashplate.models.card import Card, channel_level
+from swashplate.models.card import Card
 from swashplate.models.pump import (
     Pump,
     moment_sine,
@@ -115,7 +115,7 @@ def operating_point(
             raise InputError(f"The voltage is {voltage:g} V, but the card takes ±10 V.")
         if input == "voltage":
             sides += _check_card(parameters, voltage)
-        current = _level(voltage, card_of(parameters))
+        current = float(steady_states(parameters, np.array([voltage]))[0][0])
     assert current is not None
     sine = interpreted(moment_sine)(interpreted(solenoid_force)(current, pump), pump)
     if not 1.0 - sine * sine > 0.0:
@@ -156,12 +156,6 @@ def beyond_dead_zone(voltage: float, card: Card) -> float:
     if voltage >= 0.0:
         return max(voltage, nextafter(card.plus.V_dz, np.inf))
     return min(voltage, -nextafter(card.minus.V_dz, np.inf))
-
-
-def _level(voltage: float, card: Card) -> float:
-    """Signed current that the card settles at. [A]"""
-    level = interpreted(channel_level)
-    return float(level(voltage, card.plus) - level(-voltage, card.minus))
 
 
 # --- where nothing moves --------------------------------------------------------------------------

@@ -5,8 +5,25 @@ from typing import NamedTuple
 
 from swashplate.equations.equation import equation
 from swashplate.equations.model import Model, join
-from swashplate.models.card import Currents, card, flowing_card
-from swashplate.models.pump import pump, pump_rates
+from swashplate.models.card import (
+    Card,
+    CardOptions,
+    Currents,
+    card,
+    channel_level,
+    flowing_card,
+)
+from swashplate.models.pump import (
+    Pump,
+    PumpConstants,
+    PumpInputs,
+    PumpOptions,
+    PumpSignals,
+    pump,
+    pump_rates,
+    pump_sample,
+    pump_settled,
+)
 
 
 @equation
@@ -34,8 +51,8 @@ class Source(NamedTuple):
     """A given current has no parameters."""
 
 
-class SourceState(NamedTuple):
-    """A given current remembers nothing."""
+class Nothing(NamedTuple):
+    """State of what remembers nothing, as a given current."""
 
 
 @equation
@@ -45,14 +62,12 @@ def current_sample(current: float) -> Currents:
 
 
 @equation
-def current_step(state: SourceState) -> SourceState:
+def forgotten(state: Nothing) -> Nothing:
     """Nothing to remember."""
     return state
 
 
-source = Model(
-    "source", parameters=Source, state=SourceState, step=current_step, sample=current_sample
-)
+source = Model("source", parameters=Source, state=Nothing, step=forgotten, sample=current_sample)
 
 pump_drive = join(
     "pump_drive",
@@ -70,3 +85,36 @@ flowing_drive, flowing_pump_drive = (
     for name, before in (("drive", flowing_card), ("pump_drive", source))
 )
 """Both in continuous time: rates in place of the step, and no delay."""
+
+
+@equation
+def settled_currents(voltage: float, p: Card) -> Currents:
+    """Currents that the card settles at under a constant command. [V]"""
+    plus, minus = channel_level(voltage, p.plus), channel_level(-voltage, p.minus)
+    return Currents(plus - minus, plus, minus)
+
+
+@equation
+def settled_sample(
+    inputs: PumpInputs, p: Pump, k: PumpConstants, h: float, options: PumpOptions
+) -> PumpSignals:
+    """What is known of the pump where it has settled under a constant current."""
+    return pump_sample(pump_settled(inputs, p, k, options), inputs, p, k, h, options)
+
+
+settled_drive = join(
+    "settled_drive",
+    Model("card", Card, Nothing, forgotten, settled_currents, options=CardOptions),
+    Model(
+        "pump",
+        Pump,
+        Nothing,
+        forgotten,
+        settled_sample,
+        pump.constants,
+        inputs=PumpInputs,
+        defaults=pump.defaults,
+        options=PumpOptions,
+    ),
+)
+"""The steady map: to each sample of a voltage what the drive settles at under it."""

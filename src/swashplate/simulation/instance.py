@@ -20,7 +20,13 @@ from swashplate.equations.syntax import plain
 from swashplate.errors import InputError
 from swashplate.models.card import Card, CardOptions, Channel
 from swashplate.models.drive import Source as CurrentSource
-from swashplate.models.drive import drive, flowing_drive, flowing_pump_drive, pump_drive
+from swashplate.models.drive import (
+    drive,
+    flowing_drive,
+    flowing_pump_drive,
+    pump_drive,
+    settled_drive,
+)
 from swashplate.models.pump import Pump, PumpOptions
 from swashplate.parameters.definitions import OWN
 from swashplate.parameters.parameter_set import ParameterSet
@@ -57,18 +63,19 @@ def path_of(column: str) -> str:
 
 
 class Models(NamedTuple):
-    """The drive's models: behind a voltage and a current, by samples and in continuous time."""
+    """The drive's models: behind a voltage and a current, in samples and in time, and settled."""
 
     drive: Model
     pump_drive: Model
     flowing_drive: Model
     flowing_pump_drive: Model
+    settled_drive: Model
 
 
 @lru_cache(maxsize=64)
 def models_of(equations: tuple[Replacement, ...]) -> Models:
     """The drive's models with one's own equations in them."""
-    models = Models(drive, pump_drive, flowing_drive, flowing_pump_drive)
+    models = Models(drive, pump_drive, flowing_drive, flowing_pump_drive, settled_drive)
     for each in equations:
         models = Models(*(again(m, each) if uses(m, each.old) else m for m in models))
     return models
@@ -76,11 +83,16 @@ def models_of(equations: tuple[Replacement, ...]) -> Models:
 
 def with_equation(parameters: ParameterSet, made: Replacement) -> ParameterSet:
     """The set with an equation of one's own; see `Drive.with_equation`."""
-    own = (*parameters.equations, made)
-    if not uses(models_of(parameters.equations).pump_drive, made.old):
+    own, models = (*parameters.equations, made), models_of(parameters.equations)
+    if not uses(models.drive, made.old):
         raise InputError(
-            f"{plain(made.old).__name__} is no equation of the pump: swashplate.models.pump and "
-            "swashplate.models.refinements have those."
+            f"{plain(made.old).__name__} is no equation of the drive: swashplate.models.card, "
+            "swashplate.models.pump and swashplate.models.refinements have those."
+        )
+    if made.parameters is not None and not uses(models.pump_drive, made.old):
+        raise InputError(
+            f"{plain(made.old).__name__} is an equation of the card: one of your own in its place "
+            "has the same arguments; parameters of your own go with the pump's equations."
         )
     models_of(own)  # refuses what does not fit
     found = replace(parameters, equations=own)
@@ -123,7 +135,7 @@ def pump_options(parameters: ParameterSet) -> PumpOptions:
         on.add("steep")
     if parameters.pressure_root == "symmetric":
         on.add("symmetric")
-    if parameters.equations:
+    if any(uses(pump_drive, each.old) for each in parameters.equations):
         on.add("own")
     return PumpOptions(**dict.fromkeys(on, True))
 

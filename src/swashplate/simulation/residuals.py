@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.marching import jacobian as engine
 from swashplate.equations.marching.jacobian import Jacobian as Jacobian
 from swashplate.equations.marching.jacobian import Triangle as Triangle
-from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.observation import ObservedRecord, every_sample
 from swashplate.equations.marching.observation import Own as EngineOwn
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.rows import BLOCK
@@ -135,14 +135,12 @@ def moved_by(
     parameters: ParameterSet, observed: ObservedRecord, names: Sequence[str]
 ) -> list[bool]:
     """Whether anything observed can depend on each column: on a driven channel, on the pump."""
-    low, high = observed.extremes
-    by_voltage = observed.driven_by == "voltage"
-    driven = {
-        "plus": by_voltage and high > parameters.numbers["V_dz_plus"],
-        "minus": by_voltage and -low > parameters.numbers["V_dz_minus"],
+    low, high = observed.extremes if observed.driven_by == "voltage" else (0.0, 0.0)
+    moved = {
+        "card.plus": high > parameters.numbers["V_dz_plus"],
+        "card.minus": -low > parameters.numbers["V_dz_minus"],
     }
-    moved = {"card.plus": driven["plus"], "card.minus": driven["minus"]}
-    moved["card"] = any(driven.values())
+    moved["card"] = any(moved.values())
     moved["pump"] = any(each.signal not in CURRENTS for each in observed.observations)
     return [moved[part] for part in _parts(tuple(names))]
 
@@ -214,9 +212,7 @@ ALL_COLUMNS = (
 
 def _columns(found: Sensitivities, signal: str) -> Array:
     """The Jacobian of unit weights: every sample observed as zero."""
-    time = found.record.time
-    seen = Observation(signal, time, np.zeros(time.size))
-    observed = ObservedRecord(found.record, [seen], found.driven_by, found.start)
+    observed = every_sample(found.record, signal, found.driven_by, found.start)
     return jacobian(found.parameters, observed, found.names).columns
 
 

@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations import expressions as ex
-from swashplate.equations.code import Code, Tuple, generating, leaves
-from swashplate.equations.expressions import text
-from swashplate.equations.marching.march import Sampler, Stored, function_source, indented, value_of
+from swashplate.equations.code import generating
+from swashplate.equations.marching.march import Sampler, Stored
 from swashplate.equations.marching.record import Record
-from swashplate.equations.marching.run import Instance, Start, Started, called, marched, module
+from swashplate.equations.marching.run import Instance, Start, Started, called, marched
 from swashplate.equations.model import Model
-from swashplate.equations.writing import lines_of
 from swashplate.errors import DomainError, InputError
-from swashplate.models.card import channel_level
-from swashplate.models.pump import (
-    PumpConstants,
-    PumpInputs,
-    PumpState,
-)
+from swashplate.models.pump import PumpConstants, PumpInputs, PumpState
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.instance import check_filter_stability, instance_of
+from swashplate.simulation.instance import (
+    check_filter_stability,
+    instance_of,
+    models_of,
+    without_ripple,
+)
 from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
@@ -164,55 +162,13 @@ def measured_records(
 # --- steady states --------------------------------------------------------------------------------
 
 
-@generating
-def _kernel(model: Model, options: tuple[Any, ...]) -> Callable[..., None]:
-    """The compiled map from constant voltages to currents and speeds."""
-    sampler = Sampler(model, ("voltage",), options, [])
-    card, pump = sampler.parts
-    code = Code(pump.code.taken)
-    volts = ex.name("volts")
-    plus = card.call(code, channel_level, {"voltage": volts, "p": card.p.items[0]})  # type: ignore[union-attr]
-    minus = card.call(
-        code,
-        channel_level,
-        {"voltage": ex.make("neg", volts), "p": card.p.items[1]},  # type: ignore[union-attr]
-    )
-    current = ex.make("-", plus, minus)  # type: ignore[arg-type]
-    given = (current, *(value_of(pump.p, name) for name in ("pump_speed", "load_torque", "Z9")))
-    known = {**pump.known, "inputs": Tuple(PumpInputs, given)}
-    assert pump.own.settled is not None
-    assert pump.own.sample is not None
-    known["state"] = pump.call(code, pump.own.settled, known)
-    speed = value_of(pump.call(code, pump.own.sample, known), "shaft_speed")
-    results = [current, speed]
-    sampler.ends = [[ex.name(node.value) for _, node in leaves(part.p)] for part in sampler.parts]
-    read = code.reads(results)
-    for part in sampler.parts:
-        sampler.ends[part.part] = [ex.name(name) for name in sorted(read)]
-    lines = [
-        *sampler.ahead(),
-        "for n in range(voltage.size):",
-        "    volts = voltage[n]",
-        *indented(lines_of(code, results)),
-        f"    current[n] = {text(current)}",
-        f"    speed[n] = {text(speed)}",
-    ]
-    source = function_source(
-        "settled(voltage, params, given, h, current, speed)",
-        "Signed current and speed that each of many constant voltages settles at.",
-        lines,
-    )
-    return module("drive_settled", source, sampler.names | code.names)["settled"]  # type: ignore[no-any-return]
-
-
 def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Array]:
     """Signed current [A] and speed [rad/s] that each of many constant voltages settles at."""
-    instance = instance_of(parameters, True)
-    card, pump = instance.options
-    current, speed = np.empty(voltage.size), np.empty(voltage.size)
-    _kernel(instance.model, (card, pump._replace(ripple=None)))(
-        voltage, instance.params, instance.given, 1.0, current, speed
-    )
+    whole = without_ripple(instance_of(parameters, True))
+    settled = replace(whole, model=models_of(parameters.equations).settled_drive)
+    wanted = (Stored(0, "signals", "current"), Stored(1, "signals", "shaft_speed"))
+    begun = Started((), {"voltage": 0.0}, ())
+    (current, speed), _ = marched(settled, {"voltage": voltage}, 1.0, begun, wanted)
     return current, speed
 
 

@@ -581,7 +581,10 @@ class _Builder:
     ) -> int:
         """Piece that writes partial derivatives, and values, at known states into rows."""
         rows = {}
-        for key, partial in partials.items():
+        # what moves constants, too, last: it is summed up elsewhere, the others lie side by side
+        constants = [ex.name(name) for name in self.sampler.constants(part)]
+        twice = {part.parameters.get(name, "") for name in part.prologue.reads(constants)}
+        for key, partial in sorted(partials.items(), key=lambda each: each[0][1].path in twice):
             if partial.op == "number":
                 graph.entries[key] = Entry(-1, float(partial.value))
             else:

@@ -21,6 +21,7 @@ from swashplate.equations.marching.rows import (
     Sink,
     march_observed,
     room_for,
+    rooms,
 )
 from swashplate.equations.marching.run import Instance, Places, Start, arrays_of, check_domain
 from swashplate.equations.marching.triangle import ROWS, aligned, upright
@@ -232,7 +233,8 @@ def jacobian(
     if places.size < count:
         out[:count][~np.isin(np.arange(count), places)] = 0.0
     sink = _all_rows(out, count, places, observed)
-    _march(instance, observed, own, tuple(columns[int(c)] for c in places), sink, block, count)
+    moving = tuple(columns[c] for c in places.tolist())
+    _march(instance, observed, own, moving, sink, block, count)
     return Jacobian((*columns, *observed.own_columns), out, sink.squares)
 
 
@@ -315,8 +317,7 @@ def _march(
     missing = [c for c in columns if c.startswith("start.") and c[6:] not in own.start]
     if missing:
         raise InputError(f"{missing[0]} is a column, so Own needs a value of it.")
-    states = started.flat
-    paths = state_paths(instance.model)
+    states, paths = started.flat, state_paths(instance.model) if own.start else []
     for path, value in own.start.items():
         if path not in paths:
             raise InputError(f"There is no state '{path}' to start from; {', '.join(paths)}.")
@@ -331,11 +332,13 @@ def _march(
     program = _with_numbers(layout, slopes.constants, places)
     marched = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
     met = np.array([np.inf])
-    room = room_for(layout.rows, layout.constant, len(columns), plan)
+    spare = rooms(layout.rows, tuple(layout.constant.items()), len(columns), plan.kept.shape)
+    room = room_for(spare, layout, len(columns), plan)
     arrays = arrays_of(instance, marched, started, places, states, met, room.flat)
     pieces, grid = addresses(graph.pieces, layout.pieces), (marched[0].size, block, h)
     march_observed(pieces, arrays, grid, tangent, program, plan, sink, room)
     check_domain(instance, states, float(met[0]), observed.driven_by)
+    spare.append(room)
 
 
 def _whole(

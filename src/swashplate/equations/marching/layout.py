@@ -352,11 +352,8 @@ class _Planner:
 
     def _follow(self, chain: _Chain, r: int, through: int) -> None:
         """Put a recurrence that ends in an observation in the place of one that ends in rows."""
-        columns, since = sorted(chain.columns, key=lambda each: each[1]), len(self.made)
-        numbers = [through * STRIDE, chain.factor]
-        for k in range(0, len(columns), OUTWARDS):
-            some = columns[k : k + OUTWARDS]
-            some += some[-1:] * (OUTWARDS - len(some))
+        since, numbers = len(self.made), [through * STRIDE, chain.factor]
+        for some in _abreast(sorted(chain.columns, key=lambda each: each[1])):
             rows = [row for _, row, _, _ in some]
             if rows != list(range(rows[0], rows[0] + OUTWARDS)):
                 rows = [self._row() for _ in some]
@@ -424,6 +421,22 @@ class _Planner:
         if place in self.graph.stored:
             return self.graph.stored[place]
         return self.graph.values[place.part, place.path]
+
+
+def _abreast(columns: list[tuple[int, int, int, int]]) -> Iterator[list[tuple[int, int, int, int]]]:
+    """Columns by OUTWARDS: first those whose inputs lie in neighbouring rows, which stay there."""
+    rest, k = [], 0
+    while k < len(columns):
+        some = columns[k : k + OUTWARDS]
+        if some[-1][1] - some[0][1] == OUTWARDS - 1 == len(some) - 1:
+            yield some
+            k += OUTWARDS
+        else:
+            rest.append(columns[k])
+            k += 1
+    for k in range(0, len(rest), OUTWARDS):
+        some = rest[k : k + OUTWARDS]
+        yield some + some[-1:] * (OUTWARDS - len(some))
 
 
 def _by_result(part: PartGraph) -> dict[str, dict[By, Entry]]:

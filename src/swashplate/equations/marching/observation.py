@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
@@ -241,6 +241,30 @@ class ObservedRecord:
             clock_column=none,
             way=np.zeros((len(self.observations), 0), dtype=np.int64),
         )
+
+
+def every_sample(
+    record: Record,
+    signal: str,
+    driven_by: str,
+    start: Start,
+    others: Mapping[str, Array] = MappingProxyType({}),
+) -> ObservedRecord:
+    """A record under which a signal was observed as zero, at every sample and with weight 1."""
+    size = record.values.size
+    seen, plan = _every_sample(signal, record.start, record.rate, record.substeps, size)
+    observed = ObservedRecord(record, (seen,), driven_by, start, others)
+    observed.__dict__["_unmoved"] = plan
+    return observed
+
+
+@lru_cache(maxsize=8)
+def _every_sample(
+    signal: str, start: float, rate: float, substeps: int, size: int
+) -> tuple[Observation, Plan]:
+    record = Record(np.zeros(size), start, rate, substeps)
+    seen = Observation(signal, record.time, np.zeros(record.time.size))
+    return seen, ObservedRecord(record, (seen,))._unmoved
 
 
 def _cells(record: Record, time: Array, moving: bool) -> tuple[NDArray[np.int64], Array, Array]:

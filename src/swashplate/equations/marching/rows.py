@@ -3,7 +3,8 @@
 What is here knows no model: it works on rows of a block of samples that a plan names by number.
 """
 
-from collections.abc import Mapping
+from collections import deque
+from contextlib import suppress
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -146,14 +147,24 @@ class Room(NamedTuple):
     """(r,) first stamp of each observation that is not yet dealt with."""
 
 
-def room_for(rows: int, constant: Mapping[int, float], derived: int, plan: Plan) -> Room:
-    """Memory for a march with so many rows, columns and observations.
+@lru_cache(maxsize=16)
+def rooms(
+    rows: int, constant: tuple[tuple[int, float], ...], derived: int, kept: tuple[int, int]
+) -> deque[Room]:
+    """Memory of marches that have ended: new memory takes longer to get than a short march."""
+    return deque(maxlen=8)
 
-    `constant` are numbers of rows that hold just one value.
-    """
-    flat = aligned_room(rows * STRIDE)
-    table = flat.reshape(rows, STRIDE)
-    for row, value in constant.items():
+
+def room_for(spare: deque[Room], layout: Any, derived: int, plan: Plan) -> Room:
+    """Memory for a march of some columns, a room of earlier ones if there is any."""
+    if spare:
+        with suppress(IndexError):  # another thread was faster
+            room = spare.pop()
+            room.seen[:, :, :CARRIED] = room.passed[:] = room.integrals[:] = 0.0
+            return room._replace(progress=plan.first[:-1].copy())
+    flat = aligned_room(layout.rows * STRIDE)
+    table = flat.reshape(layout.rows, STRIDE)
+    for row, value in layout.constant.items():
         table[row] = value
     observations, low_passes = plan.kept.shape
     seen = aligned(observations, derived + 2, STRIDE)

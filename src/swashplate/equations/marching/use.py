@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.fields import floats_of, is_real, made, numbers_of, value_at
 from swashplate.equations.marching.jacobian import jacobian, state_paths
 from swashplate.equations.marching.march import Stored, output_of
-from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
+from swashplate.equations.marching.observation import Own, every_sample
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Instance, Part, Start, Started, marched
 from swashplate.equations.model import Model
@@ -275,14 +275,8 @@ def sensitivities(
             f"{', '.join(parameter_paths(model))}."
         )
     first, *others = records
-    record = Record(records[first], 0.0, rate, 1)
-    observed = ObservedRecord(
-        record,
-        [Observation(output, record.time, np.zeros(record.values.size))],
-        first,
-        start,
-        {name: records[name] for name in others},
-    )
+    record, rest = Record(records[first], 0.0, rate, 1), {name: records[name] for name in others}
+    observed = every_sample(record, output, first, start, rest)
     return jacobian(instance, observed, columns, Own(begin or {})).columns
 
 

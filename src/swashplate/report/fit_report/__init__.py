@@ -2,5 +2,5 @@
 
 import lazy_loader
 
-# the page needs no matplotlib, the figures no Bokeh: each is imported when it is first used
+# figures need no page and the page no figures: each is imported when it is first used
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,2 +1,4 @@
 from .content import write_fit_report as write_fit_report
 from .content import write_validation_report as write_validation_report
+from .page import find_browser as find_browser
+from .page import print_report as print_report

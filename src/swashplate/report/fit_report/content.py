@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
+from datetime import date
+from math import inf
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from markupsafe import Markup
+
 from swashplate.campaign import Campaign, examine, quality_table
+from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
 from swashplate.identification.assessment import Assessment, RunQuality, assess
 from swashplate.identification.cross_validation import CrossValidation
 from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.own_model import ModelParameters
-from swashplate.identification.spectral_lines import SpectralLine
 from swashplate.identification.staging import Parameters
 from swashplate.identification.starts import StartResult
 from swashplate.identification.storing import StageProfile
@@ -22,9 +27,8 @@ from swashplate.identification.truth import in_the_fits_scales
 from swashplate.identification.validation import error_tables, pooled, source_rules
 from swashplate.identification.verdict import Statement, Verdict, Weight, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.report.fit_report import plots
+from swashplate.report.fit_report import charts
 from swashplate.report.fit_report.page import Block, Section, listed_block, page, text
-from swashplate.report.fit_report.plots import stack_item, stack_of
 from swashplate.report.fit_report.runs import (
     ShownRun,
     predicted_runs,
@@ -32,7 +36,9 @@ from swashplate.report.fit_report.runs import (
     run_words,
     shown_runs,
 )
-from swashplate.tables import Column, Table, count, joined, listed, write_text
+from swashplate.report.fit_report.summary import light, run_error, run_lights, summary_section
+from swashplate.tables import NONE, Column, Table, count, joined, listed, write_text
+from swashplate.units import chosen_unit, shown_in, unit_text
 
 Role = Literal["fit", "validate"]
 _PARTS = {
@@ -93,8 +99,8 @@ def write_fit_report(
 
     Notes
     -----
-    Every sample is in the file, in single precision. A figure shows the lowest and the highest
-    sample of each of 1,000 stretches of what is in view, and all of them up to 4,000.
+    The page holds what the eye can tell of every run, a few bytes a sample (`runs.run_data`): it
+    grows with the number of runs, not with their length.
     """
     assessed = assess(fit.stages) if assessments is None else tuple(assessments)
     if [each.stage.stage.name for each in assessed] != [each.stage.name for each in fit.stages]:
@@ -104,7 +110,6 @@ def write_fit_report(
         judged = verdict(assessed, validation, starts=starts, planned=planned)
     several = starts_of(assessed, starts)
     runs = shown_runs(assessed, validation)
-    items: dict[str, Any] = {}
     held_out = sum(run.validates for run in runs)
     samples = sum(each.problem.samples for each in fit.stages)
     facts = (
@@ -112,19 +117,24 @@ def write_fit_report(
         f"{count(len(runs) - held_out, 'run')} fitted, {held_out} held out · "
         f"{count(samples, 'sample')} that count"
     )
-    head, shared = _shared(campaign, runs, fit.nominal, items)
-    sections = [
-        _verdict_section(judged, assessed, runs, head["findings"]),
-        _parameter_section(fit, assessed, truth),
-        *shared[:4],
-        _excitation_section(assessed),
-        _identifiability_section(assessed, items),
-        _starts_section(several, items),
-        _profile_section(fit, profiles, items),
-        _folds_section(folds, assessed),
-        shared[4],
-        _setup_section(campaign, fit.nominal, fit.setup.title, notes, fit.stages),
-    ]
+    drive = fit.parameters
+    found = Drive(drive) if isinstance(drive, ParameterSet) else None
+    head, shared = _shared(campaign, runs, fit.nominal)
+    with _units_of_people():
+        sections = [
+            summary_section(judged, campaign, found, assessed, runs, head["findings"]),
+            *shared[:2],
+            _parameter_section(fit, assessed, truth),
+            _identifiability_section(assessed),
+            _profile_section(fit, profiles),
+            _starts_section(several),
+            _folds_section(folds, assessed),
+            *shared[2:4],
+            _excitation_section(assessed),
+            _verdict_section(judged, assessed, runs, head["findings"]),
+            shared[4],
+            _setup_section(campaign, fit.nominal, fit.setup.title, notes, fit.stages),
+        ]
     content = {**head, "what": "Fit", "facts": f"{head['drive']} · {facts}"}
     write_text(page([each for each in sections if each.blocks], content), path)
 
@@ -163,14 +173,17 @@ def write_validation_report(
     runs = predicted_runs(predicted)
     found = judged if judged is not None else verdict((), predicted)
     samples = sum(each.measures.samples for each in predicted)
-    head, shared = _shared(campaign, runs, drive, {})
+    head, shared = _shared(campaign, runs, drive)
+    known = Drive(drive) if isinstance(drive, ParameterSet) else None
     facts = (
         f"{head['drive']} · {count(len(runs), 'run')} predicted from the command alone · "
         f"{count(samples, 'sample')} that count"
     )
     sections = [
+        summary_section(found, campaign, known, (), runs, head["findings"]),
+        *shared[:4],
         _verdict_section(found, (), runs, head["findings"]),
-        *shared,
+        shared[4],
         _setup_section(campaign, drive, "", notes, ()),
     ]
     write_text(page(sections, {**head, "what": "Validation", "facts": facts}), path)
@@ -179,22 +192,27 @@ def write_validation_report(
 # --- what every page has --------------------------------------------------------------------------
 
 
+def _units_of_people() -> AbstractContextManager[None]:
+    """Parameters in mm, bar and degrees rather than SI, where no units were chosen."""
+    usual = {"m": "mm", "Pa": "bar", "rad": "deg"}
+    return shown_in([unit for si, unit in usual.items() if chosen_unit(si).name == unit_text(si)])
+
+
 def _shared(
-    campaign: Campaign, runs: Sequence[ShownRun], drive: Parameters, items: dict[str, Any]
+    campaign: Campaign, runs: Sequence[ShownRun], drive: Parameters
 ) -> tuple[dict[str, Any], list[Section]]:
-    """Head of a page, and its sections on runs, errors, residuals and data; figures to `items`."""
-    stacks = {stack_of(run): "" for run in runs}
-    for number, stack in enumerate(stacks):
-        stacks[stack] = f"stack-{number}"
-        items[f"stack-{number}"] = stack_item(stack)
+    """Head of a page, and its sections on runs, curves, errors, residuals and data."""
     axes = {run.experiment.axis for run in runs}
     examined = {each: examine(each) for each in campaign if each.axis in axes}
-    findings = [
-        f"{each.experiment}, {each.signal}: {words}."
-        for found in examined.values()
-        for each in found
+    found = [
+        (each.experiment, f"{each.experiment}, {each.signal}: {words}.")
+        for qualities in examined.values()
+        for each in qualities
         for words in each.findings
     ]
+    findings: dict[str, list[int]] = {}
+    for number, (run, _) in enumerate(found, start=1):
+        findings.setdefault(run, []).append(number)
     words = f"Drive {drive.name}"
     if isinstance(drive, ModelParameters):
         words = f"Model {drive.name}"
@@ -204,22 +222,26 @@ def _shared(
         "title": campaign.title,
         "virtual": campaign.virtual,
         "drive": words,
-        "findings": len(findings),
-        "items": items,
+        "date": f"{date.today():%d %B %Y}",
+        "findings": len(found),
         "run_data": [run_data(run) for run in runs],
     }
-    quality = joined([quality_table(each, found) for each, found in examined.items()])
+    quality = joined([quality_table(each, of_run) for each, of_run in examined.items()])
     said = "The check of the logs finds nothing to look into."
+    numbered = [
+        Markup('<span id="finding-{}">{}</span>').format(number, sentence)
+        for number, (_, sentence) in enumerate(found, start=1)
+    ]
     data = [
-        text(f"{count(len(findings), 'finding')}:" if findings else said),
-        *listed_block(findings),
+        text(f"{count(len(found), 'finding')}:" if found else said),
+        *listed_block(numbered),
         Block("details", [Block("table", quality, "data")], count(len(quality.rows), "signal")),
     ]
     sections = [
-        _agreement_section(runs),
-        _runs_section(runs, stacks, campaign.virtual),
-        _errors_section(runs, drive.name),
+        _agreement_section(runs, findings),
+        _curves_section(runs, campaign.virtual),
         _residual_section(runs),
+        _errors_section(runs, drive.name),
         Section("data", "Data quality", data),
     ]
     return head, sections
@@ -235,38 +257,60 @@ def _qualities(runs: Sequence[ShownRun], role: Role | None = None) -> list[RunQu
     ]
 
 
-def _agreement_section(runs: Sequence[ShownRun]) -> Section:
+def _agreement_section(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> Section:
+    error = Column("error / range", ".1%", none=NONE)
+    columns = (Column(""), Column("run"), Column("role"), Column("manoeuvre"), Column("judged by"))
+    overview = Table("", (*columns, error, Column("why"), Column("findings")))
+    for number, (run, (look, why)) in enumerate(zip(runs, run_lights(runs, findings), strict=True)):
+        part = run_error(run)
+        to_curves = Markup('<a href="#run-{}">{}</a>').format(number, run.name)
+        links = Markup(" ").join(
+            Markup('<a href="#finding-{0}">{0}</a>').format(each)
+            for each in findings.get(run.experiment.name, [])
+        )
+        overview.add(
+            light(look, why),
+            to_curves,
+            run.role,
+            run.experiment.maneuver,
+            run.judged.quality.channel,
+            None if part == inf else part,
+            why,
+            links,
+            look=look != "good",
+        )
     made = [t for role in get_args(Role) for t in tables.runs_tables(_qualities(runs, role))]
     words = (
         "RMSE is the root of the mean squared difference of the samples that count; NRMSE is RMSE "
         "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE); R² is "
-        "1 − NRMSE². A part of a channel's range, as in the verdict, is RMSE over the largest less "
-        "the smallest value measured."
+        "1 − NRMSE². Error / range is RMSE over the largest less the smallest value measured in "
+        "the run; the verdict takes the range of all runs."
     )
-    blocks = [text(words), Block("table", joined(made), "agreement")]
-    return Section("agreement", "Agreement by run", blocks)
+    measures = Block("table", joined(made), "agreement")
+    blocks = [
+        Block("table", overview, "overview"),
+        Block("details", [text(words), measures], "Measures of every channel"),
+    ]
+    return Section("agreement", "Runs", blocks)
 
 
-def _runs_section(runs: Sequence[ShownRun], stacks: Mapping[Any, str], virtual: bool) -> Section:
+def _curves_section(runs: Sequence[ShownRun], virtual: bool) -> Section:
     measured = "virtual test" if virtual else "measured"
     words = (
         "Drag to zoom in time, Ctrl and wheel to zoom about the pointer, double-click for all of "
-        "it. Every sample is there: a wide view shows the lowest and highest of each stretch. "
-        f"Residuals are simulated less {measured}. Grey stretches do not count."
+        f"it. Residuals are simulated less {measured}. Grey stretches do not count."
     )
-    blocks = [text(words)]
+    blocks = [text(words, "screen")]
     for number, run in enumerate(runs):
         content = {
             "number": number,
-            "name": run.name,
-            "role": run.role,
+            "run": run,
             "maneuver": run.experiment.maneuver,
             "measures": [(each.quality.channel, run_words(each.quality)) for each in run.channels],
             "measured": measured,
-            "stack": stacks[stack_of(run)],
         }
         blocks.append(Block("run", content))
-    return Section("runs", "Overlays", blocks)
+    return Section("runs", "Curves", blocks)
 
 
 def _errors_section(runs: Sequence[ShownRun], drive: str) -> Section:
@@ -301,9 +345,9 @@ def _residual_section(runs: Sequence[ShownRun]) -> Section:
     made = Table("", tuple(map(Column, (*heads, "verdict"))))
     for each in _qualities(runs):
         if (test := each.test) is not None:
-            charts = plots.autocorrelation_chart(test), plots.cross_correlation_chart(test)
+            drawn = charts.autocorrelation_chart(test), charts.cross_correlation_chart(test)
             run = each.experiment
-            made.add(run.name, run.role, each.channel, *charts, test.verdict)
+            made.add(run.name, run.role, each.channel, *drawn, test.verdict)
     return Section("residuals", "Residuals", [text(words), Block("table", made, "residuals")])
 
 
@@ -332,7 +376,7 @@ def _setup_section(
         blocks += listed_block(_stage_words(each))
         summary = f"Bounds of {count(len(bounds.rows), 'unknown')}"
         blocks.append(Block("details", [Block("table", bounds, "bounds")], summary))
-    return Section("setup", "Set-up and versions", blocks)
+    return Section("setup", "Configuration", blocks)
 
 
 def _stage_words(fit: StageFit) -> list[str]:
@@ -369,13 +413,8 @@ def _window(weight: object) -> str:
 def _verdict_section(
     judged: Verdict, assessments: Sequence[Assessment], runs: Sequence[ShownRun], findings: int
 ) -> Section:
-    looks = {"Usable": "good", "Usable for prediction": "look"}
     said = statements(judged, assessments, runs, findings)
-    blocks = [
-        text(judged.headline, f"headline {looks.get(judged.grade, 'bad')}"),
-        Block("terms", said, "verdict"),
-    ]
-    return Section("verdict", "Verdict", blocks)
+    return Section("verdict", "Verdict in detail", [Block("terms", said, "verdict")])
 
 
 def statements(
@@ -409,7 +448,7 @@ def statements(
             for each in assessments
             for words in uncertainty_sentences(each)
         )
-        made.append(Statement("Errors", "plain", said))
+        made.append(Statement("Uncertainty", "plain", said))
     if judged.criteria:
         lines = (
             f"{'Met' if each.passed else 'NOT MET'}: {each.name}: {each.value} "
@@ -459,10 +498,9 @@ def _parameter_section(
     scaled = None if truth is None else in_the_fits_scales(truth, fit)
     made = [tables.estimates_table(each, truth=scaled) for each in assessments]
     words = (
-        "In SI units, as the parameter files have them, unless others were chosen. Change is from "
-        "the nominal value. Intervals are for residuals that are correlated over time; those for "
-        "white noise stand beside them because other programs quote them. An unknown at a bound "
-        "has no symmetric interval."
+        "Change is from the nominal value. Intervals are for residuals that are correlated over "
+        "time; those for white noise stand beside them because other programs quote them. An "
+        "unknown at a bound has no symmetric interval. Parameter files have SI units."
     )
     blocks = [text(words)]
     if truth is not None:
@@ -504,12 +542,11 @@ def _excitation_section(assessments: Sequence[Assessment]) -> Section:
     return Section("excitation", "Information per run", [*blocks, text(last, "remark")])
 
 
-def _identifiability_section(assessments: Sequence[Assessment], items: dict[str, Any]) -> Section:
+def _identifiability_section(assessments: Sequence[Assessment]) -> Section:
     blocks = []
-    for number, each in enumerate(assessments):
+    for each in assessments:
         found = each.identifiability
         general = [unknown.run is None for unknown in each.stage.problem.unknowns]
-        items[f"sensitivity-{number}"] = plots.sensitivity_item(found, general)
         blocks.append(Block("heading", f"Stage {each.stage.stage.name}", "h3"))
         blocks += listed_block(found.sentences())
         width = Column("half width", ".3g", "%", none="none")
@@ -522,30 +559,27 @@ def _identifiability_section(assessments: Sequence[Assessment], items: dict[str,
             directions.add(kind, 100.0 * way.half_width if way.weak else None, moves, known)
         if directions.rows:
             blocks.append(Block("table", directions, "directions"))
+        blocks.append(Block("heading", "What the intervals rest on", "h4"))
+        blocks += listed_block(uncertainty_sentences(each))
         without = f"; none: {', '.join(found.unexcited)}" if found.unexcited else ""
-        words = f"Sensitivity of each unknown that all runs share{without}"
-        blocks.append(Block("figure", f"sensitivity-{number}", words))
-        blocks += _errors_rest_on(each, number, general, items)
-    return Section("identifiability", "Identifiability", blocks)
+        words = f"Change of all weighted residuals for 1 % of each unknown{without}"
+        drawn = [Block("figure", charts.sensitivity_chart(found, general), words)]
+        blocks.append(Block("details", drawn, "Sensitivity"))
+        blocks += _correlations(each, general)
+    return Section("identifiability", "Uncertainty", blocks)
 
 
-def _errors_rest_on(
-    assessment: Assessment, number: int, general: Sequence[bool], items: dict[str, Any]
-) -> list[Block]:
-    """Correlations of the estimates, what the intervals rest on, and tones of the residuals."""
-    blocks, lines = [], list[SpectralLine]()
+def _correlations(assessment: Assessment, general: Sequence[bool]) -> list[Block]:
+    """Correlations of the estimates, and spectral lines of the residuals, if there are any."""
     try:
-        covariance = assessment.uncertainty.quoted
-        lines = list(assessment.uncertainty.lines)
-        drawn = plots.correlation_item(covariance, general)
-    except InputError:  # the sentences below say why there are none
-        drawn = None
+        drawn = charts.correlation_chart(assessment.uncertainty.quoted, general)
+    except InputError:  # the sentences above say why there are none
+        return []
+    blocks, lines = [], assessment.uncertainty.lines
     if drawn is not None:
-        items[f"correlation-{number}"] = drawn
-        words = "Correlations of the estimates, of the covariance that is quoted"
-        blocks.append(Block("figure", f"correlation-{number}", words))
-    blocks.append(Block("heading", "What the intervals rest on", "h4"))
-    blocks += listed_block(uncertainty_sentences(assessment))
+        words = "Of the covariance that is quoted: vermilion +1, white 0, blue −1"
+        drawing = [Block("figure", drawn, words)]
+        blocks.append(Block("details", drawing, "Correlations of the estimates"))
     if len(lines) > 1:
         share = "share of the residuals' variance"
         columns = (Column("channel"), Column("frequency", ".3g", "Hz"), Column(share, ".1%"))
@@ -557,34 +591,32 @@ def _errors_rest_on(
     return blocks
 
 
-def _starts_section(several: Mapping[str, Sequence[StartResult]], items: dict[str, Any]) -> Section:
+def _starts_section(several: Mapping[str, Sequence[StartResult]]) -> Section:
     blocks = []
-    for number, (stage, results) in enumerate(several.items()):
-        items[f"waterfall-{number}"] = plots.waterfall_item(results)
+    for stage, results in several.items():
         failed = sum(not each.cost < 1e300 for each in results)
         more = f"; {failed} left the model's domain" if failed else ""
         blocks += [Block("heading", f"Stage {stage}", "h3")] if stage else []
         words = f"Where each of {len(results)} starts ended; hollow points did not converge{more}."
-        blocks.append(Block("figure", f"waterfall-{number}", words))
+        blocks.append(Block("figure", charts.waterfall_chart(results), words))
     return Section("starts", "Starts", blocks)
 
 
-def _profile_section(fit: Fit, profiles: Sequence[StageProfile], items: dict[str, Any]) -> Section:
+def _profile_section(fit: Fit, profiles: Sequence[StageProfile]) -> Section:
     tiles = []
-    for number, given in enumerate(profiles):
+    for given in profiles:
         unknowns = _stage(fit, given.stage).problem.unknowns
         index = given.profile.index
         name = unknowns.names[index]
-        items[f"profile-{number}"] = plots.profile_item(given.profile, unknowns.items[index], name)
-        drawn = Block("figure", f"profile-{number}", f"{name} ({given.stage})")
+        drawn = charts.profile_chart(given.profile, unknowns.items[index], name)
         said = [text(words, "remark") for words in given.profile.sentences(name)]
-        tiles.append(Block("tile", [drawn, *said]))
+        tiles.append(Block("tile", [Block("figure", drawn, f"{name} ({given.stage})"), *said]))
     words = (
         "The least cost with one unknown fixed, above that of the optimum; the dashed line ends "
         "the interval."
     )
     blocks = [text(words), Block("tiles", tiles)] if tiles else []
-    return Section("profiles", "Profiles", blocks)
+    return Section("profiles", "Profile likelihoods", blocks)
 
 
 def _stage(fit: Fit, name: str) -> StageFit:

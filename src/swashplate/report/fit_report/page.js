@@ -1,15 +1,61 @@
 "use strict";
 (() => {
-  // A view of more samples than 4 * COLUMNS shows the extremes of each of COLUMNS stretches.
-  const COLUMNS = 1000;
-  // While the view moves the samples at hand are drawn; others come when it has rested so long (ms).
-  const REST = 60;
+  const LEFT = 78, RIGHT = 8, GAP = 12, BELOW = 34;
+  const HEIGHTS = { input: 84, overlay: 150, residual: 92 };
+  const PRINTED = 450;
+  const SVG = "http://www.w3.org/2000/svg";
 
-  const parsed = (id) => JSON.parse(document.getElementById(id).textContent);
+  // --- samples, as `runs.packed` writes them ---
 
-  function unpacked({ type, data }) {
-    const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
-    return type === "float64" ? new Float64Array(bytes.buffer) : new Float32Array(bytes.buffer);
+  function unpacked({ size, zero, step, order, code }) {
+    const bytes = Uint8Array.from(atob(code), (letter) => letter.charCodeAt(0));
+    const values = new Float64Array(size);
+    let [place, k] = [0, 0];
+    const bit = () => (bytes[place >> 3] >> (7 - (place++ & 7))) & 1;
+    const read = (bits) => {
+      let value = 0;
+      for (; bits > 0; bits--) value = 2 * value + bit();
+      return value;
+    };
+    for (let row = 0; row < size; row++) {
+      if (row % 256 === 0) k = read(5);
+      let zeros = 0;
+      while (!bit()) zeros++;
+      const number = zeros === 24 ? read(32) : zeros * 2 ** k + read(k);
+      values[row] = number % 2 ? -(number + 1) / 2 : number / 2;
+    }
+    for (; order > 0; order--) for (let row = 1; row < size; row++) values[row] += values[row - 1];
+    return values.map((number) => zero + step * number);
+  }
+
+  /** Signals of a run: the input, then of each channel what was simulated and measured, and the residual. */
+  function samples(number) {
+    const run = JSON.parse(document.getElementById(`samples-${number}`).textContent);
+    const clock = (each) => ({ time: unpacked(each.time), breaks: new Set(each.breaks) });
+    const input = { ...clock(run.input), held: run.held, lines: [["input", unpacked(run.input.signals[0])]] };
+    const channels = run.channels.map((each) => {
+      const own = { ...clock(each), ignored: each.ignored };
+      const [simulated, residual] = each.signals.map(unpacked);
+      const measured = simulated.map((value, row) => value - each.ratio * residual[row]);
+      return {
+        overlay: { ...own, lines: [["measured", measured], ["simulated", simulated]] },
+        residual: { ...own, lines: [["residual", residual]] },
+      };
+    });
+    const ends = [input, ...channels.map((each) => each.overlay)].filter((each) => each.time.length);
+    const start = Math.min(...ends.map((each) => each.time[0]));
+    const end = Math.max(...ends.map((each) => each.time.at(-1)));
+    return { input, channels, all: [start, end > start ? end : start + 1] };
+  }
+
+  // --- drawing ---
+
+  function put(parent, name, attributes, words) {
+    const made = document.createElementNS(SVG, name);
+    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+    if (words !== undefined) made.textContent = words;
+    parent.append(made);
+    return made;
   }
 
   /** First row whose stamp is not below an instant. */
@@ -23,139 +69,231 @@
     return low;
   }
 
-  /** Rows between two instants, and one on either side, that show what all of them would. */
-  function rowsWithin(time, signals, start, end) {
-    const first = Math.max(rowAt(time, start) - 1, 0);
-    const after = Math.min(rowAt(time, end) + 1, time.length);
-    const rows = [];
-    if (after - first <= 4 * COLUMNS) {
-      for (let row = first; row < after; row++) rows.push(row);
-      return rows;
+  function ticks(low, high, most) {
+    const rough = (high - low) / most;
+    const power = 10 ** Math.floor(Math.log10(rough));
+    const step = [1, 2, 5, 10].map((each) => each * power).find((each) => each >= rough * (1 - 1e-9));
+    const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+    const made = [];
+    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
+      made.push([k * step, (k * step).toFixed(Math.min(decimals, 12)).replace(/^-(?=0\.?0*$)/, "").replace("-", "−")]);
     }
-    const stretch = (after - first) / COLUMNS;
-    for (let column = 0; column < COLUMNS; column++) {
-      const from = first + Math.floor(column * stretch);
-      const to = first + Math.floor((column + 1) * stretch);
-      const kept = new Set(column === 0 ? [from] : []);
-      for (const values of signals) {
-        let [lowest, highest, gap] = [-1, -1, -1];
-        for (let row = from; row < to; row++) {
-          if (Number.isNaN(values[row])) gap = row;
-          else {
-            if (lowest < 0 || values[row] < values[lowest]) lowest = row;
-            if (highest < 0 || values[row] > values[highest]) highest = row;
-          }
-        }
-        for (const row of [lowest, highest, gap]) if (row >= 0) kept.add(row);
-      }
-      rows.push(...[...kept].sort((a, b) => a - b));
-    }
-    rows.push(after - 1);
-    return rows;
+    return made;
   }
 
-  /** Columns of a source; a held signal as a staircase. */
-  function picked(time, signals, rows, held) {
-    const data = { time: Float64Array.from(rows, (row) => time[row]) };
-    for (const [name, values] of Object.entries(signals)) {
-      data[name] = Float64Array.from(rows, (row) => values[row]);
-    }
-    if (!held) return data;
-    const stairs = { time: [], values: [] };
-    rows.forEach((_, k) => {
-      if (k > 0) {
-        stairs.time.push(data.time[k]);
-        stairs.values.push(data.values[k - 1]);
-      }
-      stairs.time.push(data.time[k]);
-      stairs.values.push(data.values[k]);
-    });
-    return stairs;
-  }
-
-  let copies = 0;
-
-  /** An item of the page with identifiers of its own, so that it can be drawn many times. */
-  function copied(element) {
-    const text = document.getElementById(`item-${element.dataset.item}`).textContent;
-    const copy = copies++;
-    return JSON.parse(text.replaceAll(/"(id|root_id)":"p(\d+)"/g, `"$1":"c${copy}-$2"`));
-  }
-
-  /** Attributes of an item's models that have a name, by it. */
-  function named(node, found = new Map()) {
-    if (node === null || typeof node !== "object") return found;
-    if (node.type === "object" && node.attributes?.name) found.set(node.attributes.name, node.attributes);
-    for (const each of Object.values(node)) named(each, found);
-    return found;
-  }
-
-  async function drawn(element, item = copied(element)) {
-    element.id = `figure-${copies++}`;
-    const manager = await Bokeh.embed.embed_item(item, element.id);
-    return [...manager][0].model.document;
-  }
-
-  async function showRun(element) {
-    const run = parsed(`samples-${element.dataset.run}`);
-    const clocks = run.clocks.map(unpacked);
-    const lines = [{ name: "input", time: clocks[run.input.clock], held: run.held,
-      signals: { values: unpacked(run.input.values) } }];
-    run.channels.forEach((channel, k) => {
-      const time = clocks[channel.clock];
-      lines.push({ name: `overlay ${k}`, time, signals: {
-        measured: unpacked(channel.measured), simulated: unpacked(channel.simulated) } });
-      lines.push({ name: `residual ${k}`, time, signals: { residual: unpacked(channel.residual) } });
-    });
-    const within = ({ time, signals, held }, from, to) =>
-      picked(time, signals, rowsWithin(time, Object.values(signals), from, to), held);
-    const start = Math.min(...clocks.map((time) => time[0]));
-    const end = Math.max(...clocks.map((time) => time[time.length - 1]));
-
-    // The first samples are there before anything is drawn.
-    const item = copied(element);
-    const attributes = named(item);
-    Object.assign(attributes.get("time"), { start, end, reset_start: start, reset_end: end, bounds: [start, end] });
-    const put = (name, data) => {
-      attributes.get(name).data.entries = Object.entries(data).map(([key, each]) => [key, Array.from(each)]);
+  /** Points of a line: of many rows in one column of dots the first, lowest, highest and last. */
+  function path(panel, values, first, after, x, y) {
+    const { time, breaks, held } = panel;
+    const parts = [];
+    let [pen, row] = ["M", first];
+    const go = (at) => {
+      if (held && pen === "L") parts.push(`H${x(time[at]).toFixed(1)}`);
+      parts.push(`${pen}${x(time[at]).toFixed(1)} ${y(values[at]).toFixed(1)}`);
+      pen = "L";
     };
-    for (const each of lines) put(each.name, within(each, start, end));
-    run.channels.forEach((channel, k) => put(`ignored ${k}`, {
-      first: channel.ignored.map((each) => each[0]), last: channel.ignored.map((each) => each[1]) }));
-    const figures = await drawn(element, item);
+    while (row < after) {
+      const column = Math.floor(x(time[row]));
+      let [last, lowest, highest] = [row, row, row];
+      while (!breaks.has(last) && last + 1 < after && Math.floor(x(time[last + 1])) === column) {
+        last++;
+        if (values[last] < values[lowest]) lowest = last;
+        if (values[last] > values[highest]) highest = last;
+      }
+      for (const at of [...new Set([row, lowest, highest, last])].sort((a, b) => a - b)) go(at);
+      if (breaks.has(last)) {
+        if (parts.at(-1)[0] === "M") parts.push("h.01");
+        pen = "M";
+      }
+      row = last + 1;
+    }
+    return parts.join("");
+  }
 
-    const range = figures.get_model_by_name("time");
-    let waiting = 0;
-    range.change.connect(() => {
-      clearTimeout(waiting);
-      waiting = setTimeout(() => {
-        for (const each of lines) {
-          figures.get_model_by_name(each.name).data = within(each, range.start, range.end);
+  function drawPanel(svg, panel, kind, label, top, height, width, [start, end]) {
+    const inner = width - LEFT - RIGHT;
+    const x = (time) => ((time - start) / (end - start)) * inner;
+    const first = Math.max(rowAt(panel.time, start) - 1, 0);
+    const after = Math.min(rowAt(panel.time, end) + 1, panel.time.length);
+    let [low, high] = kind === "overlay" ? [Infinity, -Infinity] : [0, 0];
+    for (const [, values] of panel.lines) {
+      for (let row = first; row < after; row++) {
+        if (values[row] < low) low = values[row];
+        if (values[row] > high) high = values[row];
+      }
+    }
+    if (!(low <= high)) [low, high] = [0, 0];
+    const room = 0.07 * (high - low) || Math.abs(high) || 1;
+    [low, high] = [low - room, high + room];
+    const y = (value) => ((high - value) / (high - low)) * height;
+    const axis = put(svg, "g", { transform: `translate(${LEFT} ${top})` });
+    const box = put(axis, "svg", { width: inner, height });
+    for (const [from, to] of panel.ignored ?? []) {
+      const left = x(from);
+      if (to > start && from < end) put(box, "rect", { class: "ignored", x: left, y: 0, width: Math.max(x(to) - left, 1), height });
+    }
+    for (const [value, words] of ticks(low, high, height < 100 ? 4 : 5)) {
+      put(box, "line", { class: value === 0 ? "zero" : "grid", x1: 0, x2: inner, y1: y(value), y2: y(value) });
+      put(axis, "text", { x: -7, y: y(value) + 4, "text-anchor": "end" }, words);
+    }
+    for (const [value] of ticks(start, end, inner / 75)) put(box, "line", { class: "grid", x1: x(value), x2: x(value), y1: 0, y2: height });
+    for (const [name, values] of panel.lines) put(box, "path", { class: name, d: path(panel, values, first, after, x, y) });
+    const lines = label.split("\n");
+    lines.forEach((words, k) => {
+      const across = -LEFT + 11 + 13 * k;
+      put(axis, "text", { class: "label", transform: `translate(${across} ${height / 2}) rotate(-90)`, "text-anchor": "middle" }, words);
+    });
+  }
+
+  class Figure {
+    constructor(element) {
+      this.element = element;
+      this.labels = JSON.parse(element.dataset.labels);
+      this.brief = element.dataset.channel === undefined ? null : Number(element.dataset.channel);
+      this.readout = document.createElement("p");
+      this.readout.className = "readout";
+    }
+
+    begin() {
+      if (this.run) return;
+      this.run = samples(this.element.dataset.run);
+      this.view = this.run.all;
+      if (this.brief === null) this.listen();
+    }
+
+    panels() {
+      const [input, ...channels] = this.labels;
+      const made = this.brief === null ? [[this.run.input, "input", input]] : [];
+      this.run.channels.forEach((each, k) => {
+        if (this.brief !== null && this.brief !== k) return;
+        made.push([each.overlay, "overlay", channels[k][0]]);
+        if (this.brief === null) made.push([each.residual, "residual", channels[k][1]]);
+      });
+      return made;
+    }
+
+    draw(width = this.element.clientWidth) {
+      if (!width) return;
+      this.begin();
+      const panels = this.panels();
+      const height = panels.reduce((sum, [, kind]) => sum + HEIGHTS[kind] + GAP, BELOW);
+      const svg = document.createElementNS(SVG, "svg");
+      for (const [key, value] of [["viewBox", `0 0 ${width} ${height}`], ["role", "img"]]) svg.setAttribute(key, value);
+      svg.setAttribute("aria-label", `${this.element.dataset.name}: measured and simulated over time`);
+      let top = 6;
+      for (const [panel, kind, label] of panels) {
+        drawPanel(svg, panel, kind, label, top, HEIGHTS[kind], width, this.view);
+        top += HEIGHTS[kind] + GAP;
+      }
+      const inner = width - LEFT - RIGHT;
+      const [start, end] = this.view;
+      for (const [value, words] of ticks(start, end, inner / 75)) {
+        put(svg, "text", { x: LEFT + ((value - start) / (end - start)) * inner, y: top + 4, "text-anchor": "middle" }, words);
+      }
+      put(svg, "text", { class: "label", x: LEFT + inner / 2, y: top + 22, "text-anchor": "middle" }, "time (s)");
+      this.width = width;
+      this.mark = put(svg, "rect", { class: "selected", x: 0, y: 6, width: 0, height: top - 6 - GAP });
+      this.element.replaceChildren(svg, this.readout);
+      this.element.dataset.drawn = "yes";
+    }
+
+    look(view) {
+      const [start, end] = this.run.all;
+      const least = 1e-4 * (end - start);
+      const from = Math.max(start, view[0]);
+      this.view = [from, Math.max(Math.min(end, view[1]), from + least)];
+      this.draw();
+    }
+
+    /** Instant at a place of the pointer, and the place within the figure. */
+    at(event) {
+      const { left, width } = this.element.firstChild.getBoundingClientRect();
+      const place = Math.min(Math.max(((event.clientX - left) * this.width) / width, LEFT), this.width - RIGHT);
+      const [start, end] = this.view;
+      return [start + ((place - LEFT) / (this.width - LEFT - RIGHT)) * (end - start), place];
+    }
+
+    listen() {
+      const { element } = this;
+      let held = null;
+      element.addEventListener("pointerdown", (event) => {
+        if (event.button !== 0 || event.pointerType === "touch") return;
+        held = this.at(event);
+        element.setPointerCapture(event.pointerId);
+        event.preventDefault();
+      });
+      element.addEventListener("pointermove", (event) => {
+        const [instant, place] = this.at(event);
+        const from = held ? Math.min(held[1], place) : place;
+        this.mark.setAttribute("x", from);
+        this.mark.setAttribute("width", held ? Math.abs(held[1] - place) : 0.8);
+        this.read(instant);
+      });
+      element.addEventListener("pointerup", (event) => {
+        if (!held) return;
+        const [instant, place] = this.at(event);
+        const [first, from] = held;
+        held = null;
+        if (Math.abs(place - from) > 5) this.look([Math.min(first, instant), Math.max(first, instant)]);
+      });
+      element.addEventListener("dblclick", () => this.look(this.run.all));
+      element.addEventListener("wheel", (event) => {
+        if (!event.ctrlKey) return;
+        event.preventDefault();
+        const [instant] = this.at(event);
+        const factor = 1.002 ** event.deltaY;
+        this.look(this.view.map((each) => instant + factor * (each - instant)));
+      }, { passive: false });
+    }
+
+    /** Write the values at an instant below the figure. */
+    read(instant) {
+      const words = [`${instant.toFixed(3)} s`];
+      for (const [panel, , label] of this.panels()) {
+        const row = Math.min(rowAt(panel.time, instant), panel.time.length - 1);
+        for (const [name, values] of panel.lines) {
+          const what = name === "input" || name === "residual" ? name : `${name} ${label.replaceAll("\n", " ").replace(/ \([^()]*\)$/, "")}`;
+          const unit = /\(([^()]*)\)$/.exec(label)?.[1] ?? "";
+          words.push(`${what} ${values[row].toPrecision(4).replace("-", "−")} ${unit}`);
         }
-      }, REST);
-    });
-    element.addEventListener("dblclick", () => range.setv({ start, end }));
+      }
+      this.readout.textContent = words.join(" · ");
+    }
   }
 
-  // One after another: what the reader looks at is drawn when it comes near.
-  let queue = Promise.resolve();
-  function show(element) {
-    if (element.dataset.drawn) return;
-    element.dataset.drawn = "waiting";
-    queue = queue.then(async () => {
-      await (element.dataset.run === undefined ? drawn(element) : showRun(element));
-      element.dataset.drawn = "yes";
-    });
-  }
-
-  const figures = document.querySelectorAll(".figure");
+  // What the reader comes near is drawn; all of it for paper, where nobody scrolls.
+  const figures = new Map([...document.querySelectorAll(".stack")].map((each) => [each, new Figure(each)]));
   const near = new IntersectionObserver((seen) => {
-    for (const each of seen) if (each.isIntersecting) { near.unobserve(each.target); show(each.target); }
+    for (const each of seen) {
+      if (!each.isIntersecting || each.target.dataset.drawn) continue;
+      figures.get(each.target).draw();
+    }
   }, { rootMargin: "600px" });
-  for (const each of figures) near.observe(each);
-  const showAll = () => figures.forEach(show);
-  addEventListener("beforeprint", showAll);
+  // in a frame of its own: drawing changes the height, which is observed, too
+  const sized = new ResizeObserver((seen) => requestAnimationFrame(() => {
+    for (const { target } of seen) {
+      const figure = figures.get(target);
+      if (figure.width && figure.width !== target.clientWidth && !matchMedia("print").matches) figure.draw();
+    }
+  }));
+  for (const each of figures.keys()) {
+    near.observe(each);
+    sized.observe(each);
+  }
+  const showAll = (width) => figures.forEach((each) => each.draw(width));
+  addEventListener("beforeprint", () => showAll(PRINTED));
+  addEventListener("afterprint", () => showAll());
   if (location.hash === "#all") showAll();
+
+  // A link into folded details opens them, and paper shows them.
+  const opened = () => {
+    const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    for (let each = target?.closest("details"); each; each = each.parentElement.closest("details")) each.open = true;
+    target?.scrollIntoView();
+  };
+  addEventListener("hashchange", opened);
+  if (location.hash) opened();
+  const folded = [...document.querySelectorAll("details:not([open])")];
+  addEventListener("beforeprint", () => folded.forEach((each) => (each.open = true)));
 
   // The contents mark where the reader is.
   const links = new Map([...document.querySelectorAll("nav a")].map((a) => [a.hash.slice(1), a]));

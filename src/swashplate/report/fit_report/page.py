@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.resources import files
+from pathlib import Path
+from shutil import which
+from subprocess import TimeoutExpired, run
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from bokeh.resources import Resources
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from swashplate.tables import UNIT, Row, Table
+from swashplate.errors import FileError
+from swashplate.tables import UNIT, Form, Row, Table, ending, write_whole
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True)
 class Block:
-    """A piece of a section: text, list, table, figure, details, pair, tiles, or its own HTML."""
+    """A piece of a section: its kind, of those that `page.html` knows, and what it shows."""
 
     kind: str
     content: Any
@@ -57,15 +63,14 @@ def page(sections: Sequence[Section], content: Mapping[str, Any]) -> str:
         lstrip_blocks=True,
     )
     environment.globals["html_table"] = html_table
-    items = {name: _script_json(item) for name, item in content["items"].items()}
     made: str = environment.get_template("page.html").render(
-        {**content, "items": items, "run_data": map(_script_json, content["run_data"])},
+        {**content, "run_data": map(_script_json, content["run_data"])},
         sections=sections,
-        bokeh=Markup(Resources(mode="inline", components=["bokeh"], log_level="warn").render()),
         css=Markup(resource("page.css")),
         js=Markup(resource("page.js")),
     )
-    return made
+    # control characters of a name, and what turns the direction of writing, are no part of HTML
+    return re.sub("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]", "\ufffd", made)
 
 
 def resource(name: str) -> str:
@@ -74,55 +79,50 @@ def resource(name: str) -> str:
 
 
 def html_table(table: Table, look: str = "") -> Markup:
-    """A table's columns for a page. A meaning stands below its name, a role is a badge."""
+    """A table's columns for a page. A symbol stands below its meaning, a role is a badge."""
     shown = table.of("p")
-    heads, columns = shown.heads(), shown.columns
-    parts = [Markup('<table class="{}"><thead><tr>').format(look)]
-    for column, head in zip(columns, heads, strict=True):
+    parts = [f'<table class="{escape(look)}"><thead><tr>']
+    for column, head in zip(shown.columns, shown.heads(), strict=True):
         if column.name == "meaning":
             continue
-        name = "unit" if column is UNIT else head
+        name = escape("unit" if column is UNIT else head)
         classes = "n turned" if column.shade else "n" if column.spec else ""
-        inner = Markup("<span>{}</span>").format(name) if column.shade else escape(name)
-        parts.append(Markup('<th class="{}">{}</th>').format(classes, inner))
-    parts.append(Markup("</tr></thead><tbody>"))
-    for row in shown.rows:
-        parts += _html_row(shown, row)
-    return Markup("").join([*parts, Markup("</tbody></table>")])
+        inner = f"<span>{name}</span>" if column.shade else name
+        parts.append(f'<th class="{classes}">{inner}</th>')
+    parts.append("</tr></thead><tbody>")
+    parts += [_html_row(shown, row) for row in shown.rows]
+    return Markup("".join([*parts, "</tbody></table>"]))
 
 
-def _html_row(table: Table, row: Row) -> list[Markup]:
+def _html_row(table: Table, row: Row) -> str:
+    # every piece is escaped where it is put in: Markup's own formatting takes ten times as long
     classes = " ".join(w for w, on in (("look", row.look), ("total", row.total)) if on)
-    parts = [Markup('<tr class="{}">').format(classes) if classes else Markup("<tr>")]
-    cells, raw = table.texts(row), iter(row.cells)
-    meaning = next(
-        (c for c, k in zip(cells, table.columns, strict=True) if k.name == "meaning"), ""
-    )
-    first = True
-    for cell, column in zip(cells, table.columns, strict=True):
+    parts = [f'<tr class="{classes}">' if classes else "<tr>"]
+    raw, meaning, first = iter(row.cells), "", True
+    cells = list(zip(table.texts(row), table.columns, strict=True))
+    for cell, column in cells:
         value = cell if column is UNIT else next(raw)
         if column.name == "meaning":
             continue
-        shown = (
-            value if isinstance(value, Markup) else escape(typeset(cell) if column.spec else cell)
-        )
+        shown = value if isinstance(value, Markup) else escape(cell)
+        if column.spec and not isinstance(value, Markup):
+            shown = escape(typeset(cell))
         if column.name == "role":
             shown = Markup('<span class="badge {0}">{0}</span>').format(cell)
         if first:
-            below = Markup(' <span class="meaning">{}</span>').format(meaning) if meaning else ""
-            look = Markup(' class="n"') if column.spec else ""
-            parts.append(Markup('<th scope="row"{}>{}{}</th>').format(look, shown, below))
+            meaning = next((words for words, each in cells if each.name == "meaning"), "")
+            symbol = f'{escape(meaning)} <span class="symbol">{shown}</span>' if meaning else shown
+            look = ' class="n"' if column.spec else ""
+            parts.append(f'<th scope="row"{look}>{symbol}</th>')
         elif column.shade:
-            share = getattr(value, "value", value)
-            inner = Markup('<td class="n share" style="--share: {:.3f}">{}</td>')
-            parts.append(inner.format(share, shown))
+            share = float(getattr(value, "value", value))
+            parts.append(f'<td class="n share" style="--share: {share:.3f}">{shown}</td>')
         else:
             missed = " miss" if column.name == "holds" and cell == "no" else ""
             look = "unit" if column is UNIT else f"n{missed}" if column.spec else missed.strip()
-            inner = Markup('<td class="{}">{}</td>' if look else "<td{}>{}</td>")
-            parts.append(inner.format(look, shown))
+            parts.append(f'<td class="{look}">{shown}</td>' if look else f"<td>{shown}</td>")
         first = False
-    return [*parts, Markup("</tr>\n")]
+    return "".join([*parts, "</tr>\n"])
 
 
 def typeset(words: str) -> str:
@@ -139,3 +139,60 @@ def _script_json(content: Any) -> Markup:
     """JSON that can stand in a script element: no text in it can end the element."""
     words = json.dumps(content, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return Markup(words.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+
+
+# --- on paper -------------------------------------------------------------------------------------
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "msedge")
+PATIENCE = 180.0
+"""After which a browser that has not printed is stopped. [s]"""
+
+
+def find_browser() -> str:
+    """Path of a Chromium, which prints pages.
+
+    Raises
+    ------
+    FileError
+        If none is found.
+    """
+    found = next((place for each in BROWSERS if (place := which(each)) is not None), None)
+    if found is None:
+        raise FileError(
+            f"No browser was found that prints a PDF ({', '.join(BROWSERS)}): install Chromium, or "
+            "open report.html in any browser and print it there."
+        )
+    return found
+
+
+def print_report(page: str | Path, path: str | Path) -> None:
+    """Print a report's page as PDF, whole or not at all, by a Chromium without a window.
+
+    Parameters
+    ----------
+    page : path
+        As `write_fit_report` writes it.
+    path : path
+        The PDF, which replaces an older one.
+
+    Raises
+    ------
+    FileError
+        If there is no Chromium, it prints nothing, or the file cannot be written or does not end
+        in ``.pdf``.
+    """
+    ending(path, Form("a printed report", (".pdf",)))
+    browser, address = find_browser(), Path(page).absolute().as_uri()
+
+    def write(beside: Path) -> None:
+        with TemporaryDirectory() as profile:
+            words = [browser, "--headless", "--disable-gpu", "--no-pdf-header-footer"]
+            if hasattr(os, "geteuid") and os.geteuid() == 0:
+                words.append("--no-sandbox")  # Chromium has none for the superuser
+            words += [f"--user-data-dir={profile}", f"--print-to-pdf={beside.absolute()}", address]
+            with suppress(TimeoutExpired):
+                run(words, capture_output=True, timeout=PATIENCE, check=False)
+        if not beside.stat().st_size:
+            raise OSError(0, f"{browser} printed nothing")
+
+    write_whole(path, write)

@@ -14,13 +14,23 @@ from swashplate.campaign import Channel
 from swashplate.identification.assessment import Assessment, RunQuality
 from swashplate.identification.tables import ignored_words, start_words
 from swashplate.identification.validation import ignored_windows, with_speeds
-from swashplate.report.lines import gap_rows
+from swashplate.report.lines import gap_rows, thinned
+from swashplate.report.style import in_lines
 from swashplate.tables import quantity
 from swashplate.units import DisplayUnit, display_unit
 
 Array = NDArray[np.float64]
-FINE = 0.01
-"""Single precision is enough for stamps if its steps are below this part of their interval."""
+Mask = NDArray[np.bool_]
+MOST_ROWS = 16_384
+"""A longer run is shown by the extremes of its signals: five or more for each dot of a screen."""
+LEVELS = 65_535
+"""Steps into which the range of a signal is rounded."""
+FINE = 16
+"""Steps in the rms of a residual, and in the interval of uneven stamps."""
+LETTERS = {"input": 13, "overlay": 24, "residual": 14}
+"""That fit along a panel's axis."""
+BLOCK, ESCAPE, LONGEST = 256, 24, 32
+"""Numbers that share a parameter; quotients from which a number stands as its bits; how many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +69,27 @@ class ShownRun:
     def role(self) -> Literal["fit", "validate"]:
         """Whether it was fitted or held out."""
         return "validate" if self.validates else "fit"
+
+    @property
+    def judged(self) -> Shown:
+        """The channel that it is judged by: the last, of a position its speed."""
+        return self.channels[-1]
+
+    @property
+    def labels(self) -> list[Any]:
+        """Labels of the panels in lines: of the input, then of each channel and its residual."""
+        names = [each.quality.channel for each in self.channels]
+        several = len({each.stage for each in self.channels}) > 1
+        made: list[Any] = [in_lines(self.input_label, LETTERS["input"])]
+        for each, name in zip(self.channels, names, strict=True):
+            words = f"{name}, {each.stage}" if names.count(name) > 1 and several else name
+            made.append(
+                (
+                    in_lines(each.unit.label(words), LETTERS["overlay"]),
+                    in_lines(each.small.label("residual"), LETTERS["residual"]),
+                )
+            )
+        return made
 
     @property
     def input_unit(self) -> DisplayUnit:
@@ -112,14 +143,14 @@ def _gathered(found: Sequence[tuple[RunQuality, str, bool]]) -> tuple[ShownRun, 
     return tuple(runs)
 
 
-def off_scale(channel: Channel, values: Array) -> NDArray[np.bool_]:
+def off_scale(channel: Channel, values: Array) -> Mask:
     """(m,) ignored samples so far from those that count that they would press these flat."""
     used = channel.used
     if not used.any():
         return np.zeros(values.size, dtype=np.bool_)
     low, high = float(values[used].min()), float(values[used].max())
     room = 0.5 * (high - low)
-    far: NDArray[np.bool_] = ~used & ((values < low - room) | (values > high + room))
+    far: Mask = ~used & ((values < low - room) | (values > high + room))
     return far
 
 
@@ -141,59 +172,109 @@ def run_words(quality: RunQuality) -> str:
 def run_data(run: ShownRun) -> dict[str, Any]:
     """Stamps and samples of a run for `page.js`: input, and each channel with its residual.
 
-    Ignored samples that would press the others flat are left out. Lines are broken by a NaN where
-    the stamps have a gap. A clock that several signals share is given once.
+    Ignored samples that would press the others flat are left out, and lines are broken there and
+    at gaps. What was measured is left to the page: simulated less residual. Of runs of more than
+    `MOST_ROWS` rows those are kept that show each signal as all of them would.
+
+    Notes
+    -----
+    Signals are rounded to 1/65,535 of their range, residuals to 1/16 of their rms. The page decodes
+    them at once, so that a browser may print it in the moment in which it was opened: the
+    browser's own decompression would answer too late.
     """
-    clocks: list[Array] = []
     drive = run.experiment.input
-    given = {"values": run.input_unit.factor * drive.values}
     return {
-        "input": _signals(clocks, drive.time, given),
-        "channels": [_channel(clocks, each) for each in run.channels],
         "held": drive.interpolation == "previous",
-        "clocks": [packed(_broken(time, time, stamps=True), stamps=True) for time in clocks],
+        "input": _signals(drive.time, [(run.input_unit.factor * drive.values, None)]),
+        "channels": [_channel(each) for each in run.channels],
     }
 
 
-def packed(values: Array, *, stamps: bool = False) -> dict[str, str]:
-    """Numbers as base64 of little-endian floats, single precision unless stamps need double.
+def _channel(shown: Shown) -> dict[str, Any]:
+    channel, factor, small = shown.channel, shown.unit.factor, shown.small.factor
+    residual = small * shown.quality.residual
+    rms = float(np.sqrt(np.mean(np.square(residual[channel.used])))) if channel.used.any() else 0.0
+    signals = [(factor * shown.quality.simulated, None), (residual, rms / FINE or None)]
+    return {
+        **_signals(channel.time, signals, off_scale(channel, factor * channel.values)),
+        "ratio": factor / small,
+        "ignored": ignored_windows(channel),
+    }
+
+
+def _signals(
+    time: Array, signals: Sequence[tuple[Array, float | None]], hidden: Mask | None = None
+) -> dict[str, Any]:
+    """Signals of one clock, each with the step that it is rounded to if that is known."""
+    breaks = gap_rows(time)
+    rows = np.arange(time.size)
+    if time.size > MOST_ROWS:
+        columns = MOST_ROWS // (2 * len(signals))
+        rows = np.unique(np.concatenate([thinned(time, v, breaks, columns) for v, _ in signals]))
+    if hidden is not None and hidden.any():
+        rows = rows[~hidden[rows]]
+        breaks = np.union1d(breaks, np.flatnonzero(hidden))
+    # the last row shown before each break
+    ends = np.unique(np.searchsorted(rows, breaks, side="right")) - 1
+    stamps = time[rows]
+    interval = float(np.median(np.diff(stamps))) if stamps.size > 1 else 1.0
+    return {
+        "time": packed(stamps, interval / FINE),
+        "breaks": [int(each) for each in ends if 0 <= each < rows.size - 1],
+        "signals": [packed(values[rows], step) for values, step in signals],
+    }
+
+
+def packed(values: Array, step: float | None = None) -> dict[str, Any]:
+    """Numbers as whole multiples of a step, differenced and in Rice's code, as base64.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Finite numbers.
+    step : float, optional
+        What they are rounded to; at least 2⁻²⁸ of their range, by default 1/65,535 of it.
 
     Returns
     -------
     dict
-        ``"type"``: ``"float32"`` or ``"float64"``; ``"data"``: the text.
+        ``size``, ``zero`` and ``step``: value = zero + step · number. ``order``: how many times the
+        numbers were differenced. ``code``: of each 256 numbers five bits, the parameter k, then of
+        each n (0, -1, 1, -2 ... as 0, 1, 2, 3 ...) n >> k zeros, a one, and the k lowest bits; 24
+        zeros and a one are followed by all 32 bits.
     """
-    double = False
-    if stamps and values.size > 1:
-        step = float(np.median(np.diff(values)))
-        double = bool(np.spacing(np.float32(np.abs(values).max())) > FINE * step)
-    kind = "<f8" if double else "<f4"
-    text = b64encode(values.astype(kind).tobytes()).decode("ascii")
-    return {"type": "float64" if double else "float32", "data": text}
+    zero = float(np.median(values)) if values.size else 0.0
+    reach = float(np.ptp(values)) if values.size else 0.0
+    step = max(step or reach / LEVELS, reach / 2**28) or 1.0
+    whole = np.rint((values - zero) / step).astype(np.int64)
+    orders = [whole]
+    for _ in range(2):
+        orders.append(np.diff(orders[-1], prepend=0))
+    sizes = [float(np.log2(1.0 + np.abs(each)).sum()) for each in orders]
+    order = int(np.argmin(sizes))
+    number = np.where(orders[order] < 0, -2 * orders[order] - 1, 2 * orders[order])
+    data = b64encode(_rice(number)).decode("ascii")
+    return {"size": values.size, "zero": zero, "step": step, "order": order, "code": data}
 
 
-def _channel(clocks: list[Array], shown: Shown) -> dict[str, Any]:
-    channel, factor = shown.channel, shown.unit.factor
-
-    def on_scale(values: Array) -> Array:
-        return np.where(off_scale(channel, values), np.nan, values)
-
-    lines = {
-        "measured": on_scale(factor * channel.values),
-        "simulated": factor * shown.quality.simulated,
-        "residual": on_scale(shown.small.factor * shown.quality.residual),
-    }
-    return {**_signals(clocks, channel.time, lines), "ignored": ignored_windows(channel)}
-
-
-def _signals(clocks: list[Array], time: Array, signals: dict[str, Array]) -> dict[str, Any]:
-    number = next((k for k, each in enumerate(clocks) if np.array_equal(each, time)), len(clocks))
-    if number == len(clocks):
-        clocks.append(time)
-    return {"clock": number, **{k: packed(_broken(time, v)) for k, v in signals.items()}}
-
-
-def _broken(time: Array, values: Array, *, stamps: bool = False) -> Array:
-    """With a NaN after each row that a gap follows; of stamps that row's own once more."""
-    breaks = gap_rows(time)
-    return np.insert(values, breaks + 1, values[breaks] if stamps else np.nan)
+def _rice(number: NDArray[np.int64]) -> bytes:
+    firsts = np.arange(0, number.size, BLOCK)
+    sizes = np.diff(firsts, append=number.size)
+    means = np.add.reduceat(number, firsts) / sizes if number.size else np.empty(0)
+    per_block = np.floor(np.log2(np.maximum(0.7 * means, 1.0))).astype(np.int64)
+    k = np.repeat(per_block, sizes)
+    zeros = number >> k
+    escaped = zeros >= ESCAPE
+    zeros[escaped], k[escaped] = ESCAPE, LONGEST
+    head = np.zeros(number.size, dtype=np.int64)
+    head[firsts] = 5
+    starts = np.cumsum(head + zeros + 1 + k) - (zeros + 1 + k)
+    bits = np.zeros(int(starts[-1] + zeros[-1] + 1 + k[-1]) if number.size else 0, dtype=np.uint8)
+    for place in range(5):
+        bits[starts[firsts] - 5 + place] = per_block >> (4 - place) & 1
+    bits[starts + zeros] = 1
+    ends = starts + zeros + k
+    for place in range(int(k.max(initial=0))):
+        has = k > place
+        bits[ends[has] - place] = number[has] >> place & 1
+    return np.packbits(bits).tobytes()

@@ -1,0 +1,281 @@
+"""First screen of a report, for the machine's owner: verdict, curves, numbers, next steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from math import ceil, floor, log10
+from typing import Literal
+
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from swashplate.analysis.envelope import dead_zone
+from swashplate.analysis.limits import limit_shares
+from swashplate.analysis.monte_carlo import drives
+from swashplate.campaign import Campaign
+from swashplate.drive import Drive
+from swashplate.errors import SwashplateError
+from swashplate.identification.assessment import Assessment, Measures, RunQuality
+from swashplate.identification.criteria import CARRIES_OVER, POOR, following, part_of_range, percent
+from swashplate.identification.validation import pooled
+from swashplate.identification.verdict import Grade, Verdict, weak_unknowns
+from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.report.fit_report.page import Block, Section, listed_block, text
+from swashplate.report.fit_report.runs import ShownRun
+from swashplate.tables import NONE, UNIT, Cell, Column, Table, count, listed
+from swashplate.units import display_unit
+
+Array = NDArray[np.float64]
+Light = Literal["good", "look", "bad"]
+
+LIGHTS: dict[Grade, Light] = {
+    "Usable": "good",
+    "Usable for prediction": "look",
+    "Not usable": "bad",
+}
+DRAWS = 64
+"""Drives that the tests allow, from whose spread the intervals of the numbers come: it is known to
+9 %."""
+RATE, SECONDS = 512.0, 8.0
+"""Of the full step that the numbers are read from. [Hz, s]"""
+MOVES, MOST_OF_IT = 0.02, 0.63
+"""Parts of the top speed at which the delay ends, and the lag."""
+QUANTILE = 1.96
+"""Standard deviations on either side of a 95 % interval."""
+
+
+# --- numbers --------------------------------------------------------------------------------------
+
+
+def numbers_of(drive: Drive) -> Array:
+    """What matters about a drive, (6, 2): each way, positive and negative. SI
+
+    Dead zone [V]; top speed [rad/s], steady under ±10 V; largest acceleration [rad/s²], delay and
+    lag [s] of a full step from rest, the delay up to 2 % of the change to the top speed, the lag
+    from there to 63 %; creep, the steady speed at 0 V [rad/s]. NaN where the drive has none.
+    """
+    rest = float(drive.steady_speed(0.0))
+    made = np.full((6, 2), np.nan)
+    for column, way in enumerate((1.0, -1.0)):
+        command = np.full(int(SECONDS * RATE) + 1, way * FULL_VOLTAGE)
+        command[0] = 0.0
+        run = drive.simulate(command, RATE, start="steady")
+        top = float(drive.steady_speed(way * FULL_VOLTAGE))
+        made[0, column] = dead_zone(drive, way).inside
+        made[1, column], made[5, column] = top, rest
+        if top == rest:
+            continue
+        made[2, column] = way * RATE * float((way * np.diff(run.shaft_speed)).max())
+        done = np.maximum.accumulate((run.shaft_speed - rest) / (top - rest))
+        if done[-1] >= MOST_OF_IT:
+            first, last = np.interp((MOVES, MOST_OF_IT), done, run.time)
+            made[3:5, column] = first, last - first
+    return made
+
+
+def numbers_table(drive: Drive, assessments: Sequence[Assessment]) -> tuple[Table, list[str]]:
+    """The numbers that matter, each with its 95 % interval, and what these leave out.
+
+    Parameters
+    ----------
+    drive : Drive
+        As fitted, or as it was held against runs.
+    assessments : sequence of Assessment
+        Of the fit's stages; none for a drive of which no interval is known.
+    """
+    values, half, said = numbers_of(drive), np.full((6, 2), np.nan), list[str]()
+    if assessments:
+        try:
+            drawn = drives(assessments, DRAWS)
+            half = QUANTILE * np.std([numbers_of(each) for each in drawn.drives], axis=0)
+            said += drawn.sentences()
+        except SwashplateError as error:
+            said.append(f"There are no intervals: {error}")
+    made = Table("", (Column("quantity"), Column("positive", "s"), Column("negative", "s"), UNIT))
+    rows = (
+        ("Dead zone, up to", "V"),
+        ("Top speed at ±10 V", "rad/s"),
+        ("Largest acceleration", "rad/s^2"),
+        ("Delay, to 2 % of top speed", "s"),
+        ("Lag, from there to 63 %", "s"),
+        ("Creep at 0 V", "rad/s"),
+    )
+    for (words, unit), row, width in zip(rows, values, half, strict=True):
+        factor = display_unit(unit, float(np.nanmax(np.abs(row), initial=0.0))).factor
+        cells = [_with_interval(factor * v, factor * w) for v, w in zip(row, width, strict=True)]
+        if words.startswith("Creep"):
+            cells[1] = Cell(None, "")
+        made.add(words, *cells, unit=unit, spec=".3f")
+    return made, said
+
+
+def _with_interval(value: float, half: float) -> Cell:
+    if not np.isfinite(value):
+        return Cell(None, NONE)
+    if not (np.isfinite(half) and half > 0.0):
+        return Cell(value, f"{value:.4g}")
+    # as many digits as the interval gives sense to, and no more than an engineer would write down
+    decimals = 1 - floor(log10(half))
+    decimals = max(min(decimals, 3 - floor(log10(max(abs(value), half)))), 0)
+    shown = ceil(half * 10.0**decimals - 1e-9) / 10.0**decimals
+    return Cell(value, f"{value:.{decimals}f} ± {shown:.{decimals}f}")
+
+
+# --- lights ---------------------------------------------------------------------------------------
+
+
+def light(look: Light, words: str) -> Markup:
+    """A traffic light with its meaning, which does not rest on colour alone."""
+    sign = {"good": "✓", "look": "!", "bad": "✗"}[look]
+    made = Markup('<span class="light {}" title="{}" role="img" aria-label="{}">{}</span>')
+    return made.format(look, words, words, sign)
+
+
+def run_error(run: ShownRun) -> float:
+    """RMSE of a run's judged channel over its range in that run; infinite where nothing moves."""
+    shown = run.judged.quality
+    part = part_of_range([shown], shown.channel)
+    return np.inf if part is None else part
+
+
+def run_lights(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> list[tuple[Light, str]]:
+    """For each run its light and why, from its errors beside those of all runs that are fitted.
+
+    Parameters
+    ----------
+    runs : sequence of ShownRun
+        Fitted and held out.
+    findings : dict of str to list of int
+        Findings on the data, by the name of their run.
+    """
+    fitted = [each.quality for run in runs if not run.validates for each in run.channels]
+    whole = pooled(fitted or [each.quality for run in runs for each in run.channels])
+    made = list[tuple[Light, str]]()
+    for run in runs:
+        bad, look = [], []
+        for each in (shown.quality for shown in run.channels):
+            own = each.measures.nrmse or 0.0
+            pool = whole.get(each.channel)
+            if own >= POOR and _moves(each, pool):
+                bad.append(f"{each.channel} misses {percent(min(own, 9.99))} of the movement")
+            elif pool and each.measures.rmse > 2.0 * CARRIES_OVER * pool.rmse:
+                ratio = each.measures.rmse / pool.rmse
+                look.append(f"{each.channel}: {ratio:.1f} times the usual RMSE")
+            elif following([each], each.channel)[1]:
+                look.append(f"residuals of {each.channel} follow the input")
+        own_findings = findings.get(run.experiment.name, [])
+        if own_findings:
+            look.append(count(len(own_findings), "finding"))
+        if bad:
+            made.append(("bad", "; ".join(bad)))
+        else:
+            made.append(("look", "; ".join(look)) if look else ("good", "as the others"))
+    return made
+
+
+def _moves(quality: RunQuality, pool: Measures | None) -> bool:
+    return pool is None or quality.measures.spread > 0.05 * pool.spread
+
+
+# --- section --------------------------------------------------------------------------------------
+
+
+def summary_section(
+    judged: Verdict,
+    campaign: Campaign,
+    drive: Drive | None,
+    assessments: Sequence[Assessment],
+    runs: Sequence[ShownRun],
+    findings: int,
+) -> Section:
+    """The first screen: `drive` is None for a model of one's own, which has no such numbers."""
+    look = LIGHTS[judged.grade]
+    shown = [Block("verdict", (light(look, judged.grade), judged.headline), look)]
+    shown.append(Block("pair", list(_curves(runs, campaign.virtual))))
+    numbers, limits = [], []
+    if drive is not None:
+        numbers.append(Block("heading", "Numbers that matter", "h3"))
+        try:
+            table, said = numbers_table(drive, assessments)
+            numbers.append(Block("table", table, "numbers"))
+        except SwashplateError as error:
+            said = [f"This drive has none: {error}"]
+        words = (
+            "With 95 % intervals of the fit, rounded up, which do not cover what the model leaves "
+            "out."
+        )
+        numbers.append(text(" ".join([words, *said] if assessments else said), "remark"))
+        limits.append(Block("heading", "What limits it", "h3"))
+        limits += listed_block(_limits(drive))
+    limits.append(Block("heading", "What to do next", "h3"))
+    limits += listed_block(_next(judged, campaign, assessments, runs, findings))
+    shown.append(Block("pair", [Block("tile", each) for each in (numbers, limits) if each]))
+    return Section("summary", "Summary", shown)
+
+
+def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[Block]:
+    """The runs that are predicted best and worst, of those held out if there are any."""
+    held = [k for k, run in enumerate(runs) if run.validates]
+    chosen = sorted(held or range(len(runs)), key=lambda k: run_error(runs[k]))
+    ends = {"Best": chosen[0], "Worst": chosen[-1]} if len(chosen) > 1 else {"The": chosen[0]}
+    for which, k in ends.items():
+        kind = "held-out run" if held else "run" if runs[k].validates else "fitted run"
+        part = run_error(runs[k])
+        error = "never moves" if part == np.inf else f"error {percent(part)} of its range"
+        content = {
+            "number": k,
+            "run": runs[k],
+            "words": f"{which} {kind}: {runs[k].name}, {error}",
+            "channel": len(runs[k].channels) - 1,
+            "measured": "virtual test" if virtual else "measured",
+        }
+        yield Block("curve", content)
+
+
+def _limits(drive: Drive) -> list[str]:
+    """What acts during a full step each way, and what to change first."""
+    length = int(2.0 * RATE)
+    command = np.repeat((0.0, FULL_VOLTAGE, 0.0, -FULL_VOLTAGE, 0.0), length)
+    try:
+        found = limit_shares(drive, command, RATE, interpolation="previous")
+    except SwashplateError as error:
+        return [str(error)]
+    acting = sorted(found.shares, key=lambda each: each.time_share or 0.0, reverse=True)
+    shares = (
+        f"{each.limit[0].upper()}{each.limit[1:]}: acts {percent(each.time_share)} of the time."
+        for each in acting[:3]
+        if each.time_share
+    )
+    head = "Steps from rest to ±10 V and back:"
+    return [f"{head} {' '.join(shares)}", *found.sentences()[:1]]
+
+
+def _next(
+    judged: Verdict,
+    campaign: Campaign,
+    assessments: Sequence[Assessment],
+    runs: Sequence[ShownRun],
+    findings: int,
+) -> list[str | Markup]:
+    failed = [each.failure for each in judged.criteria if not each.passed]
+    said: list[str | Markup] = [f"Settle first: {words}." for words in failed[:3]]
+    if findings:
+        link = Markup('Look into the <a href="#data">{}</a> on the logs.')
+        said.append(link.format(count(findings, "finding")))
+    weak = [name for each in assessments for name in weak_unknowns(each)]
+    if weak:
+        code = Markup(
+            "Not determined to within ±10 %: {}. The tests that would determine them are ranked by "
+            "<code>swashplate advise {}</code>."
+        )
+        named = listed(weak[:6]) if len(weak) <= 6 else f"{', '.join(weak[:6])} and others"
+        said.append(code.format(named, campaign.path))
+    if assessments and not any(run.validates for run in runs):
+        said.append('Hold a run out of the fit (role = "validate"): nothing was predicted yet.')
+    if judged.usable:
+        what = "Use the drive" if judged.grade == "Usable" else "Use the drive for prediction only"
+        said.append(f"{what}. {judged.validity}" if judged.validity else f"{what}.")
+        if assessments:
+            said.append(Markup("Try it: <code>swashplate simulate drive.toml step:9</code>."))
+    return said
