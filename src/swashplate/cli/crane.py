@@ -132,8 +132,8 @@ def run(
         runs: dict[str, CraneRun] = {}
         for word in variant or ["inverse"]:
             actuation, _, law = word.partition(":")
-            known: dict[str, Any] = {"actuation": actuation, "control": control_of(law)}
-            runs[word] = chosen.simulate(stick, sea=seaway, brake=brake, **known, **begin)
+            how: dict[str, Any] = {"actuation": actuation, "control": control_of(law), **begin}
+            runs[word] = chosen.simulate(stick, sea=seaway, brake=brake, **how)
         table = run_table(runs)
     if out is not None and len(runs) > 1:
         raise InputError(f"--out writes one run's signals, but there are {len(runs)} variants.")

@@ -243,10 +243,11 @@ def settings_of(control: Control | None) -> tuple[Settings, Law | None, int]:
     made, law, halves = Settings(), None, 0
     for each in control.stages if control is not None else ():
         if isinstance(each, _Shaper):
-            impulses = (*each.impulses, 0.0)[:3]
+            first, second, *third = each.impulses
+            impulses = (first, second, third[0] if third else 0.0)
             halves = len(each.impulses) - 1
-            where = "joint" if isinstance(each, JointShaper) else "tip"
-            made = made._replace(**{where: impulses})
+            joint = isinstance(each, JointShaper)
+            made = made._replace(joint=impulses) if joint else made._replace(tip=impulses)
         elif isinstance(each, DelayedFeedback):
             made = made._replace(feedback=each.gain, delay=each.delay)
         elif isinstance(each, ShipCompensation):

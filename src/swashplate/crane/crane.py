@@ -140,14 +140,15 @@ class Crane:
     def __repr__(self) -> str:
         drives = ", ".join(f"{axis} {getattr(self, axis).name!r}" for axis in AXES)
         assumed = sum(each.status == "assumed" for each in self.quantities.values())
-        return f"Crane({self.name!r}, {drives}; {assumed} of {len(UNITS)} lengths assumed)"
+        return f"Crane({self.name!r}, {drives}; {assumed} of {len(UNITS)} quantities assumed)"
 
     def with_drive(
         self, *, hoist: Drive | None = None, slew: Drive | None = None, luff: Drive | None = None
     ) -> Crane:
         """The crane with other drives: ``crane.with_drive(luff=crane.luff.scale(Z16=1.5))``."""
-        given = {"hoist": hoist, "slew": slew, "luff": luff}
-        return replace(self, **{axis: each for axis, each in given.items() if each is not None})
+        return replace(
+            self, hoist=hoist or self.hoist, slew=slew or self.slew, luff=luff or self.luff
+        )
 
     def with_geometry(self, **changes: float | tuple[float, ...]) -> Crane:
         """The crane with other quantities, in SI and by name: ``boom_length=38.0``.
@@ -365,7 +366,10 @@ class Crane:
         fixed = Fixed(
             self.geometry,
             self.home(pose),
-            Air(AIR * drag_area / (2.0 * self._mass(load)), Vector(*map(float, wind), 0.0)),
+            Air(
+                AIR * drag_area / (2.0 * self._mass(load)),
+                Vector(float(wind[0]), float(wind[1]), 0.0),
+            ),
             settings,
             mode,
             bool(brake),

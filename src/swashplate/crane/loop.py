@@ -147,7 +147,8 @@ def delayed(memory: Array, row: int, sample: int, delay: float) -> float:
     whole = int(delay)
     part = delay - whole
     last = memory.shape[1] - 1  # lengths are powers of two
-    newer, older = memory[row, (sample - whole) & last], memory[row, (sample - whole - 1) & last]
+    newer: float = memory[row, (sample - whole) & last]
+    older: float = memory[row, (sample - whole - 1) & last]
     return newer + part * (older - newer)
 
 
@@ -156,7 +157,7 @@ def shaped(
     memory: Array, row: int, sample: int, half: float, impulses: tuple[float, float, float]
 ) -> float:
     """A remembered signal through a shaper whose impulses are `half` samples apart."""
-    made = impulses[0] * memory[row, sample & (memory.shape[1] - 1)]
+    made: float = impulses[0] * memory[row, sample & (memory.shape[1] - 1)]
     if impulses[1] > 0.0:
         made += impulses[1] * delayed(memory, row, sample, half)
     if impulses[2] > 0.0:
@@ -167,26 +168,24 @@ def shaped(
 @inlined
 def on_branch(wanted: float, speed: Array, voltage: Array) -> float:
     """Voltage for a speed on one branch of an inverse map, held at its ends."""
-    if wanted <= speed[0]:
-        return voltage[0]
-    last = speed.size - 1
-    if wanted >= speed[last]:
-        return voltage[last]
-    low, high = 0, last
+    low, high = 0, speed.size - 1
+    inside = min(max(wanted, speed[low]), speed[high])
     while high - low > 1:
         middle = (low + high) // 2
-        if speed[middle] <= wanted:
+        if speed[middle] <= inside:
             low = middle
         else:
             high = middle
-    share = (wanted - speed[low]) / (speed[low + 1] - speed[low])
-    return voltage[low] + share * (voltage[low + 1] - voltage[low])
+    share = (inside - speed[low]) / (speed[high] - speed[low])
+    made: float = voltage[low] + share * (voltage[high] - voltage[low])
+    return made
 
 
 @inlined
 def inverse_voltage(wanted: float, inverse: Inverse) -> float:
     """Voltage by `InverseMap.voltage` with its rule in the gap, clipped. [V]"""
-    lower, upper = inverse.minus_speed[inverse.minus_speed.size - 1], inverse.plus_speed[0]
+    lower: float = inverse.minus_speed[inverse.minus_speed.size - 1]
+    upper: float = inverse.plus_speed[0]
     if wanted < lower:
         return on_branch(wanted, inverse.minus_speed, inverse.minus_voltage)
     if wanted > upper:
@@ -194,9 +193,10 @@ def inverse_voltage(wanted: float, inverse: Inverse) -> float:
     at_rest = abs(wanted - inverse.creep)
     if at_rest <= wanted - lower and at_rest <= upper - wanted:
         return 0.0
-    if wanted - lower <= upper - wanted:
-        return inverse.minus_voltage[inverse.minus_voltage.size - 1]
-    return inverse.plus_voltage[0]
+    way = lower if wanted - lower <= upper - wanted else upper
+    minus, plus = inverse.minus_voltage[inverse.minus_voltage.size - 1], inverse.plus_voltage[0]
+    edge: float = minus if way == lower else plus
+    return edge
 
 
 @inlined
@@ -504,18 +504,10 @@ def machine_of(
 
 def inverse_of(inverse: InverseMap) -> Inverse:
     """An inverse map as the loop takes it."""
-    branches = (
-        inverse.minus.speed,
-        inverse.minus.voltage,
-        inverse.plus.speed,
-        inverse.plus.voltage,
-    )
-    return Inverse(
-        *(np.ascontiguousarray(each, dtype=np.float64) for each in branches),
-        inverse.creep,
-        *inverse.limits,
-        min(inverse.acceleration),
-    )
+    branches = (*inverse.minus, *inverse.plus)
+    a, b, c, d = (np.ascontiguousarray(each, dtype=np.float64) for each in branches)
+    low, high = inverse.limits
+    return Inverse(a, b, c, d, inverse.creep, low, high, min(inverse.acceleration))
 
 
 class Loop:
@@ -565,7 +557,7 @@ class Loop:
             step, self._own = machine_of(instance, signals, stored, self._h)
             self._picks = np.array([SEEN.index(each) for each in signals], dtype=np.int64)
             self._instances.append(instance)
-        self._loop = loop_of(*steps, step)
+        self._loop = loop_of(steps[0], steps[1], steps[2], step)
         self._inverses = tuple(map(inverse_of, inverses))
         self._margins = np.full(4, np.inf)
         g, home = fixed.geometry, fixed.home

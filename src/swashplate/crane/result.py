@@ -240,7 +240,7 @@ def limit_table(runs: Mapping[str, CraneRun]) -> Table:
     Ideal drives are left out.
     """
     shown = (Limit.CURRENT_RATE, Limit.ORIFICE, Limit.SWASH_STOP)
-    heads = ("current rate", "orifice (acceleration)", "swash stop (speed)")
+    heads = ("current rate", "orifice", "swash stop")
     columns = (Column("run"), Column("axis"), *(Column(each, ".1%") for each in heads))
     made = Table("Share of time for which limits act", columns)
     for name, run in runs.items():
