@@ -113,6 +113,20 @@ class Fixed(NamedTuple):
     """Limits of the rope. [m]"""
 
 
+class Plant(NamedTuple):
+    """What the loop drives, and what is remembered of it in arrays."""
+
+    inverses: tuple[Inverse, Inverse, Inverse]
+    drives: tuple[Machine, Machine, Machine]
+    law: Machine
+    picks: NDArray[np.int64]
+    """Which of `SEEN` the law takes."""
+    memory: Array
+    """Delayed signals, a row each: three commands, wanted tip x and y, swing x and y."""
+    margins: Array
+    """Worst margins of the domains of the drives and the law."""
+
+
 class State(NamedTuple):
     """What one sample passes to the next, delayed signals and the drives' states apart."""
 
@@ -220,12 +234,19 @@ def half_clip(size: float, speed: float, acceleration: float, share: float, omeg
 
 @inlined
 def clipped_offset(
-    x: float, y: float, path_x: float, path_y: float, boom: Boom, rope: float,
-    g: Geometry, settings: Settings, slew: Inverse, luff: Inverse,
-) -> tuple[float, float]:  # fmt: skip
+    offset: tuple[float, float],
+    path: tuple[float, float],
+    boom: Boom,
+    rope: float,
+    fixed: Fixed,
+    inverses: tuple[Inverse, Inverse, Inverse],
+) -> tuple[float, float]:
     """Offset of the tip held, along the boom and across it, within what the drives can follow."""
     omega = sqrt(GRAVITY / rope)
-    e_x, e_y = path_x - g.axis.x, path_y - g.axis.y
+    g, settings = fixed.geometry, fixed.settings
+    _, slew, luff = inverses
+    x, y = offset
+    e_x, e_y = path[0] - g.axis.x, path[1] - g.axis.y
     reach = sqrt(e_x * e_x + e_y * e_y)
     e_x, e_y = e_x / reach, e_y / reach
     rate = reach_rate(boom, g)
@@ -285,12 +306,11 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
 
     @kernel
     def loop(
-        count: int, h: float, fixed: Fixed, state: State,
-        inverses: tuple[Inverse, Inverse, Inverse],
-        drives: tuple[Machine, Machine, Machine], laws: Machine, picks: NDArray[np.int64],
-        memory: Array, stick: Array, ship: Array, margins: Array, out: Array,
-    ) -> tuple[State, int]:  # fmt: skip
-        """Take so many samples; the state behind the last, and how the pass ended."""
+        h: float, fixed: Fixed, state: State, plant: Plant, stick: Array, ship: Array, out: Array
+    ) -> tuple[State, int]:
+        """Take the stick's samples; the state behind the last, and how the pass ended."""
+        inverses, laws, picks = plant.inverses, plant.law, plant.picks
+        memory, margins = plant.memory, plant.margins
         g, home, settings, actuation = fixed.geometry, fixed.home, fixed.settings, fixed.actuation
         moving = ship.shape[1] > 1
         size = memory.shape[1] - 1
@@ -304,7 +324,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
         r = Rotation(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
         shift = Vector(0.0, 0.0, 0.0)
         ended = FINE
-        for m in range(count):
+        for m in range(len(stick)):
             half = pi * sqrt(rope / GRAVITY) / h
             if moving:
                 shift = Vector(ship[m, 0], ship[m, 1], ship[m, 2])
@@ -369,9 +389,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                     x += laws.out[0]
                     y += laws.out[1]
                 if settings.clip > 0.0 or settings.share > 0.0:
-                    x, y = clipped_offset(
-                        x, y, path_x, path_y, boom, rope, g, settings, inverses[1], inverses[2]
-                    )
+                    x, y = clipped_offset((x, y), (path_x, path_y), boom, rope, fixed, inverses)
                 path_x += x
                 path_y += y
                 target = shafts_for(path_x, path_y, aim, g, home)
@@ -396,7 +414,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                 volts[1] = voltage_for(wanted.slew, inverses[1], actuation)
                 volts[2] = voltage_for(wanted.luff, inverses[2], actuation)
             if actuation != IDEAL:
-                a, b, c = drives
+                a, b, c = plant.drives
                 a.values[0], b.values[0], c.values[0] = volts[0], volts[1], volts[2]
                 margins[0] = min(margins[0], hoist(
                     a.values, a.lines, a.whole, a.fraction, a.params, a.given, h, a.constants,
@@ -545,8 +563,7 @@ class Loop:
             *(machine_of(each, ("voltage",), speed, self._h) for each in self._instances),
             strict=True,
         )
-        self._machines = machines
-        step, self._own, self._picks = None, Machine(*machines[0]), np.zeros(0, dtype=np.int64)
+        step, own, picks = None, Machine(*machines[0]), np.zeros(0, dtype=np.int64)
         if law is not None:
             instance = instance_of(law.model, law.values)
             signals = law.model.external
@@ -554,12 +571,10 @@ class Loop:
                 Stored(0, "signals" if _is_signal(law.model, each) else "state", each)
                 for each in GIVES
             )
-            step, self._own = machine_of(instance, signals, stored, self._h)
-            self._picks = np.array([SEEN.index(each) for each in signals], dtype=np.int64)
+            step, own = machine_of(instance, signals, stored, self._h)
+            picks = np.array([SEEN.index(each) for each in signals], dtype=np.int64)
             self._instances.append(instance)
         self._loop = loop_of(steps[0], steps[1], steps[2], step)
-        self._inverses = tuple(map(inverse_of, inverses))
-        self._margins = np.full(4, np.inf)
         g, home = fixed.geometry, fixed.home
         zero, boom = Shafts(0.0, 0.0, 0.0), boom_at(0.0, g, home)
         tip = tip_of(home.slew, boom, g)
@@ -567,8 +582,17 @@ class Loop:
             0, zero, zero, zero, zero, zero, boom, home.rope, tip, tip, tip, tip, 0.0, 0.0
         )  # fmt: skip
         longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * rate + 4.0
-        self._memory = np.zeros((7, 1 << int(longest).bit_length()))
-        self._memory[3:5] = [[tip.x], [tip.y]]
+        memory = np.zeros((7, 1 << int(longest).bit_length()))
+        memory[3:5] = [[tip.x], [tip.y]]
+        hoist, slew, luff = map(inverse_of, inverses)
+        self._plant = Plant(
+            (hoist, slew, luff),
+            (machines[0], machines[1], machines[2]),
+            own,
+            picks,
+            memory,
+            np.full(4, np.inf),
+        )
 
     def take(self, stick: Array, ship: Array) -> tuple[Array, int]:
         """The next samples.
@@ -593,13 +617,11 @@ class Loop:
             If a drive or a law leaves its domain.
         """
         out = np.empty((len(stick), len(ROWS)))
-        self.state, ended = self._loop(
-            len(stick), self._h, self.fixed, self.state, self._inverses, self._machines, self._own,
-            self._picks, self._memory, stick, ship, self._margins, out,
-        )  # fmt: skip
-        machines = (*self._machines, self._own)
+        plant = self._plant
+        self.state, ended = self._loop(self._h, self.fixed, self.state, plant, stick, ship, out)
+        machines = (*plant.drives, plant.law)
         for instance, machine, worst in zip(
-            self._instances, machines, self._margins.tolist(), strict=False
+            self._instances, machines, plant.margins.tolist(), strict=False
         ):
             check_domain(instance, machine.states, worst, "command")
         return out, ended
