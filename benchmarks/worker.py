@@ -71,9 +71,8 @@ def hour(folder: Path) -> dict[str, float]:
 
 def sobol() -> dict[str, float]:
     """Sobol's indices of eight levers and five outcomes over a step of 10 s, on two threads."""
-    from swashplate.analysis.outcomes import trial
-    from swashplate.analysis.sensitivity import ranges_of
-    from swashplate.analysis.sensitivity import sobol as indices
+    from swashplate.analysis import ranges_of, trial
+    from swashplate.analysis import sobol as indices
 
     hoist = Drive.preset("hoist")
     command = trial(hoist, maneuvers.step(9.0).sample())

@@ -22,7 +22,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from swashplate import DomainError, Drive
-from swashplate.analysis.compensation import inverse_map
+from swashplate.analysis import inverse_map
 
 parser = argparse.ArgumentParser(description="A load that does not swing.")
 parser.add_argument("--figure", help="draw positions and speeds here")

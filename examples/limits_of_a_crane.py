@@ -14,12 +14,17 @@ import sys
 import numpy as np
 
 from swashplate import Drive, maneuvers
-from swashplate.analysis.envelope import envelope
-from swashplate.analysis.limits import limit_shares
-from swashplate.analysis.outcomes import performance, trial
-from swashplate.analysis.sizing import WIDEST, Requirements, size
-from swashplate.analysis.tracking import largest_sine
-from swashplate.analysis.whatif import what_if
+from swashplate.analysis import (
+    WIDEST,
+    Requirements,
+    envelope,
+    largest_sine,
+    limit_shares,
+    performance,
+    size,
+    trial,
+    what_if,
+)
 from swashplate.report.figures import plot_limit_timeline, save_figure
 
 parser = argparse.ArgumentParser(description="What limits my crane.")

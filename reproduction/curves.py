@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reproduction.catalogue import Shown
 from reproduction.content import Curve, Figure, Level, Panel
-from swashplate.analysis.whatif import pulled
+from swashplate.analysis import pulled
 from swashplate.campaign import matched_speed
 from swashplate.drive import Drive
 from swashplate.maneuvers import source_tests

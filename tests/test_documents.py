@@ -1,10 +1,12 @@
 """What is wrong in a TOML document, said in one sentence."""
 
+import os
+
 import pytest
 from pydantic import BaseModel, ConfigDict
 
-from swashplate import ParameterError
-from swashplate.documents import validated
+from swashplate import FileError, ParameterError, documents
+from swashplate.documents import parse_toml, read_json, read_text, validated
 
 
 class Entry(BaseModel):
@@ -31,3 +33,45 @@ def test_one_sentence(entries, said):
         validated({"signal": entries}, Document, "a.toml")
     assert said in str(refused.value)
     assert str(refused.value).startswith("a.toml: [signal]")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (f"a = {'[' * 500}{']' * 500}", "nests its tables or lists too deeply"),
+        (f"a = {'[' * 100_000}{']' * 100_000}", "nests its tables or lists too deeply"),
+        (f"a = {'{a=' * 3000}1{'}' * 3000}", "nests its tables or lists too deeply"),
+        (f"a = {'9' * 5000}", "a number with too many digits"),
+        (f"{'.'.join('a' * 20_000)} = 1", "a key of more than 40 parts"),
+        (f"[{' . '.join('a' * 20_000)}]", "a key of more than 40 parts"),
+        ('name = "\\u001b[31mred"', "the control character 0x1b in the text"),
+        ('[runs]\n"a\\u0007" = 1', "the control character 0x07"),
+        ("name = ", "Invalid value (at end of document)"),
+    ],
+)
+def test_toml_that_nobody_writes(text, said):
+    with pytest.raises(FileError) as refused:
+        parse_toml(text, "a.toml")
+    assert str(refused.value).startswith("a.toml ")
+    assert said in str(refused.value)
+
+
+def test_texts_that_are_no_files(tmp_path, monkeypatch):
+    (tmp_path / "bom.toml").write_bytes(b"\xef\xbb\xbfname = 'a'")
+    assert parse_toml(read_text(tmp_path / "bom.toml"), "a") == {"name": "a"}
+    os.mkfifo(tmp_path / "fifo.toml")
+    (tmp_path / "zero.toml").symlink_to("/dev/zero")
+    for name in ("fifo.toml", "zero.toml", "."):
+        with pytest.raises(FileError, match="is (no ordinary|a folder, not a) file"):
+            read_text(tmp_path / name)
+    monkeypatch.setattr(documents, "LARGEST", 5)
+    with pytest.raises(FileError, match="it is not such a text"):
+        read_text(tmp_path / "bom.toml")
+
+
+def test_json_that_nobody_writes(tmp_path):
+    place = tmp_path / "fit.json"
+    for text in ("[" * 100_000, f'{{"column": {"9" * 5000}, "unit": "V"}}', "", '{"column"'):
+        place.write_text(text)
+        with pytest.raises((FileError, ParameterError), match="fit.json"):
+            read_json(place, Entry)

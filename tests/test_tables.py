@@ -1,5 +1,6 @@
 """Tables: numbers for people in units of choice, and for files in SI."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import polars as pl
@@ -7,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swashplate import InputError
+from swashplate import FileError, InputError
 from swashplate.tables import (
     UNIT,
     Cell,
@@ -20,6 +21,8 @@ from swashplate.tables import (
     plain,
     quantity,
     spread,
+    write_table,
+    write_whole,
 )
 from swashplate.units import chosen_unit, display_unit, shown_in, unit_text, units_of_choice
 
@@ -148,3 +151,55 @@ def test_an_interval_is_shown_to_two_digits_of_its_half_width(value: float, shar
     shown = spread(value, value - half, value + half)
     for text, exact in zip(shown, (value, value - half, value + half), strict=True):
         assert float(text) == pytest.approx(exact, abs=0.06 * half)
+
+
+@pytest.mark.parametrize("text", ["=1+1", "@sum(a)", "+cmd|' /C calc'!A0", "-a"])
+def test_no_text_of_a_csv_is_a_formula_to_a_spreadsheet(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "runs.csv"
+    write_table(pl.DataFrame({"run": [text, "-4 V", "a=b"], text: [-1.5, 0.0, 1.0]}), path)
+    read = pl.read_csv(path)
+    assert read.columns == ["run", f"'{text}"]
+    assert read["run"].to_list() == [f"'{text}", "-4 V", "a=b"]
+    assert read[f"'{text}"].to_list() == [-1.5, 0.0, 1.0]
+
+
+def test_a_table_as_text_and_for_a_notebook() -> None:
+    made = Table("Speeds <b>", (Column("run"), Column("speed", ".1f", "rad/s")))
+    made.add("step", 1.0)
+    made.add("a & b", 2.0)
+    assert str(made).splitlines() == [
+        "Speeds <b>",
+        "run    speed deg/s",
+        "step          57.3",
+        "a & b        114.6",
+    ]
+    html = made._repr_html_()
+    assert "<caption>Speeds &lt;b&gt;</caption>" in html
+    assert "<td>a &amp; b</td><td>114.6</td>" in html
+
+
+def no_room(*_: object) -> None:
+    raise pl.exceptions.ComputeError("writing failed: No space left on device (os error 28)")
+
+
+def stumbling(*_: object) -> None:
+    try:
+        raise OSError(28, "No space left on device")
+    except OSError:
+        raise AttributeError("a library's clean-up") from None
+
+
+@pytest.mark.parametrize("write", [no_room, stumbling])
+def test_a_full_disk_is_a_sentence(tmp_path: Path, write: Callable[..., None]) -> None:
+    (tmp_path / "a.csv").write_text("old")
+    with pytest.raises(FileError, match=r"a\.csv cannot be written: No space left on device\."):
+        write_whole(tmp_path / "a.csv", write)
+    assert [each.read_text() for each in tmp_path.iterdir()] == ["old"]
+
+
+def test_a_librarys_own_error_passes(tmp_path: Path) -> None:
+    def broken(_: Path) -> None:
+        raise AttributeError("nothing of the disk")
+
+    with pytest.raises(AttributeError, match="nothing of the disk"):
+        write_whole(tmp_path / "a.csv", broken)

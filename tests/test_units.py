@@ -36,3 +36,24 @@ def test_wrong_and_unknown_units() -> None:
         to_si(1.0, "V", "rad", "the stop")
     with pytest.raises(InputError, match="unknown unit 'furlongs_per_blink'"):
         to_si(1.0, "furlongs_per_blink", "m/s", "it")
+
+
+@pytest.mark.parametrize(
+    "unit",
+    [
+        *("V**9**9**9**9", "V^9^9^9^9^9", "9**9**9**9", "V**(9**9)", "V**9999", "<b>V</b>", "V/0"),
+        pytest.param("*".join("V" * 5000), id="many factors"),
+        pytest.param(f"{'(' * 5000}V{')' * 5000}", id="nested"),
+    ],
+)
+def test_a_unit_that_would_take_for_ever(unit):
+    with pytest.raises(InputError, match="column 'u' has the unreadable unit"):
+        to_si(1.0, unit, "V", "column 'u'")
+
+
+@pytest.mark.parametrize(
+    ("unit", "si", "value"),
+    [("m/s**2", "m/s^2", 1.0), ("m^(-1)", "1/m", 1.0), ("bar**0.5", "sqrt(Pa)", 1e5**0.5)],
+)
+def test_powers_of_units(unit, si, value):
+    assert to_si(1.0, unit, si, "x") == pytest.approx(value, rel=1e-12)

@@ -8,6 +8,7 @@ import tomllib
 from difflib import get_close_matches
 from pathlib import Path
 from reprlib import Repr
+from stat import S_ISDIR, S_ISREG
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from swashplate.errors import FileError, ParameterError
@@ -19,24 +20,42 @@ if TYPE_CHECKING:
     Model = TypeVar("Model", bound=BaseModel)
 
 
+LARGEST = 64 * 2**20
+"""Bytes of a text that is read whole."""
+DEEPEST = 40
+_DEEP = re.compile(rf"(?<![\w-])(?:[\w-]+\s*\.\s*){{{DEEPEST}}}")
+
+
 def read_text(path: str | Path) -> str:
-    """The text of a UTF-8 file.
+    """The text of a UTF-8 file, without the byte-order mark that some editors begin it with.
 
     Raises
     ------
     FileError
-        If there is none or it cannot be read.
+        If there is none, it cannot be read, or is no ordinary file of up to 268 MB.
     """
+    place = Path(path)
     try:
-        return Path(path).read_text("utf-8")
+        found = place.stat()
+        if S_ISDIR(found.st_mode):
+            raise FileError(f"{path} is a folder, not a file.")
+        if not S_ISREG(found.st_mode):
+            raise FileError(f"{path} is no ordinary file.")
+        if found.st_size > LARGEST:
+            raise FileError(f"{path} has more than {LARGEST // 2**20} MB: it is not such a text.")
+        # Windows' Notepad writes a byte order mark, which is no part of the text
+        return place.read_text("utf-8-sig")
+    except FileError:
+        raise
     except FileNotFoundError:
         raise FileError(f"There is no file {path}.") from None
     except UnicodeDecodeError as error:
         raise FileError(
             f"{path} is not UTF-8 text: byte {error.start} is {error.object[error.start]:#04x}."
         ) from None
-    except OSError as error:
-        raise FileError(f"{path} cannot be read: {error.strerror or error}.") from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise FileError(f"{path} cannot be read: {why}.") from None
 
 
 def parse_toml(text: str, origin: str) -> dict[str, Any]:
@@ -45,12 +64,38 @@ def parse_toml(text: str, origin: str) -> dict[str, Any]:
     Raises
     ------
     FileError
-        If it is not TOML, with line and column.
+        If it is not TOML, with line and column, or has what nobody writes: keys or tables nested a
+        hundred deep, numbers of thousands of digits, control characters in a text.
     """
     try:
-        return tomllib.loads(text)
+        if _DEEP.search(text):
+            raise FileError(f"{origin} has a key of more than {DEEPEST} parts.")
+        found = tomllib.loads(text)
+        _check_texts(found, origin)
     except tomllib.TOMLDecodeError as error:
         raise FileError(f"{origin} is not TOML: {error}.") from None
+    except RecursionError:
+        raise FileError(f"{origin} nests its tables or lists too deeply.") from None
+    except ValueError as error:
+        if isinstance(error, FileError):
+            raise
+        raise FileError(f"{origin} has a number with too many digits.") from None
+    return found
+
+
+def _check_texts(found: Any, origin: str) -> None:
+    """Refuse characters that would steer a terminal or break a page."""
+    if isinstance(found, str):
+        for each in found:
+            if not each.isprintable() and each not in "\n\r\t" and ord(each) < 0xA0:
+                raise FileError(
+                    f"{origin} has the control character {ord(each):#04x} in the text {found!r:.60}"
+                )
+    elif isinstance(found, dict | list):
+        for name in found if isinstance(found, dict) else ():
+            _check_texts(name, origin)
+        for each in found.values() if isinstance(found, dict) else found:
+            _check_texts(each, origin)
 
 
 def toml_key(name: str) -> str:
@@ -95,6 +140,8 @@ def read_json(path: str | Path, model: type[Model], *, strict: bool = True) -> M
     text = read_text(path)
     try:
         return model.model_validate_json(text, strict=strict)
+    except (RecursionError, OverflowError):
+        raise FileError(f"{path} nests too deeply or has a number beyond any use.") from None
     except ValidationError as error:
         found = error.errors()
         if found[0]["type"] == "json_invalid":

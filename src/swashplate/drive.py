@@ -15,9 +15,11 @@ from swashplate.equations.marching.run import Start
 from swashplate.equations.model import Equation
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError
+from swashplate.maneuvers import Maneuver, sampled
 from swashplate.parameters.files import dump_set, load_preset, load_set
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result
 from swashplate.simulation.batch import Batch, SquaredError, simulate_drives
 from swashplate.simulation.instance import at_every_rate, with_equation
 from swashplate.simulation.residuals import Sensitivities, sensitivities
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
         SweptInput,
         SweptOutput,
     )
+    from swashplate.tables import Table
 
 Array = NDArray[np.float64]
 
@@ -48,7 +51,7 @@ class Given(TypedDict, total=False):
 
 
 @dataclass(frozen=True)
-class Drive:
+class Drive(Result):
     """A hydrostatic drive from joystick voltage to shaft speed. Immutable.
 
     Examples
@@ -79,6 +82,10 @@ class Drive:
         from swashplate.tables import write_text
 
         write_text(dump_set(self.parameters), path)
+
+    def tables(self) -> list[Table]:
+        """Every parameter with its unit and status."""
+        return self.parameters.tables()
 
     def __repr__(self) -> str:
         return f"Drive({self.name!r}, card {self.parameters.card!r})"
@@ -161,7 +168,7 @@ class Drive:
 
     def simulate(
         self,
-        voltage: ArrayLike,
+        voltage: ArrayLike | Maneuver,
         rate: float = SOURCE_RATE,
         *,
         time: ArrayLike | None = None,
@@ -177,8 +184,8 @@ class Drive:
 
         Parameters
         ----------
-        voltage : (n,) array_like
-            Command. [V]
+        voltage : (n,) array_like or Maneuver
+            Command; a manoeuvre is sampled at `rate`. [V]
         rate : float
             Samples a second, 10 Hz to 100 kHz; with `time`, rate of the result's grid. [Hz]
         time : (n,) array_like, optional
@@ -233,7 +240,7 @@ class Drive:
 
     def sensitivities(
         self,
-        voltage: ArrayLike,
+        voltage: ArrayLike | Maneuver,
         rate: float = SOURCE_RATE,
         *,
         parameters: Sequence[str] | None = None,
@@ -271,7 +278,7 @@ class Drive:
         self,
         changes: Mapping[str, ArrayLike],
         *,
-        voltage: ArrayLike | None = None,
+        voltage: ArrayLike | Maneuver | None = None,
         current: ArrayLike | None = None,
         rate: float = SOURCE_RATE,
         interpolation: Interpolation | None = None,
@@ -459,7 +466,8 @@ class Drive:
 
 
 def _record(
-    voltage: ArrayLike, rate: float, *, clip: bool = False, **options: Unpack[Given]
+    voltage: ArrayLike | Maneuver, rate: float, *, clip: bool = False, **options: Unpack[Given]
 ) -> Record:
     """A command on the march's grid."""
-    return check_voltage(record_of(voltage, rate, what="voltage", **options), clip)
+    command = sampled(voltage, rate)
+    return check_voltage(record_of(command, rate, what="voltage", **options), clip)

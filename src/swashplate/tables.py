@@ -8,9 +8,10 @@ digits in SI.
 from __future__ import annotations
 
 import os
-from abc import ABC, abstractmethod
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from math import floor, isfinite, isnan, log10
 from pathlib import Path
 from secrets import token_hex
@@ -168,6 +169,27 @@ class Table:
         """Write the table of `to_polars` as CSV or Parquet, by the path's ending."""
         write_table(self.to_polars(), path)
 
+    def __str__(self) -> str:
+        """The table as plain text, numbers to the right."""
+        shown = self.of("t")
+        lines = [shown.heads(), *map(shown.texts, shown.rows)]
+        sizes = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
+        right = [">" if each.spec else "<" for each in shown.columns]
+        text = [
+            "  ".join(f"{c:{r}{s}}" for c, r, s in zip(line, right, sizes, strict=True)).rstrip()
+            for line in lines
+        ]
+        return "\n".join([*([self.title] * bool(self.title)), *text])
+
+    def _repr_html_(self) -> str:
+        shown = self.of("t")
+        rows = [("th", shown.heads()), *(("td", shown.texts(row)) for row in shown.rows)]
+        body = "".join(
+            f"<tr>{''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells)}</tr>"
+            for tag, cells in rows
+        )
+        return f"<table><caption>{escape(self.title)}</caption>{body}</table>"
+
 
 def joined(tables: Sequence[Table]) -> Table:
     """One table of the rows of several that have the same columns."""
@@ -253,26 +275,6 @@ def count(number: int, what: str, several: str = "") -> str:
 
 
 # --- files ----------------------------------------------------------------------------------------
-
-
-class Tabular(ABC):
-    """A result that is a table."""
-
-    @abstractmethod
-    def to_polars(self) -> polars.DataFrame:
-        """The table, SI."""
-
-    def write(self, path: str | Path) -> None:
-        """Write the table of `to_polars` as CSV or Parquet, by the path's ending.
-
-        The file appears whole or not at all: it is written beside and renamed.
-
-        Raises
-        ------
-        FileError
-            For another ending, or a folder that cannot be written.
-        """
-        write_table(self.to_polars(), path)
 
 
 TABLE = Form("a table", (".csv", ".parquet"), (".pq",))
@@ -372,6 +374,8 @@ def write_whole(path: str | Path, write: Callable[[Path], None]) -> None:
         try:
             beside.touch(exist_ok=False)
             write(beside)
+            with beside.open("rb") as written:  # a power cut leaves the old file or the new one
+                os.fsync(written.fileno())
             beside.replace(target)
         finally:
             try:
@@ -382,6 +386,21 @@ def write_whole(path: str | Path, write: Callable[[Path], None]) -> None:
                 raise
     except OSError as error:
         raise FileError(f"{target} cannot be written: {error.strerror or error}.") from None
+    except Exception as error:
+        reason = _of_the_disk(error)
+        if reason is None:
+            raise
+        raise FileError(f"{target} cannot be written: {reason}.") from None
+
+
+def _of_the_disk(error: BaseException) -> str | None:
+    """What a disk said, where a library says it in an error of its own or stumbles over it."""
+    if "(os error " in str(error):
+        return str(error).partition(" (os error ")[0].rpartition(": ")[2]
+    before = error.__cause__ or error.__context__
+    if isinstance(before, OSError):
+        return before.strerror or str(before)
+    return None if before is None else _of_the_disk(before)
 
 
 def write_text(text: str, path: str | Path) -> None:
@@ -396,12 +415,20 @@ def write_text(text: str, path: str | Path) -> None:
 def write_table(table: polars.DataFrame, path: str | Path) -> None:
     """Write a table as CSV or Parquet, by the path's ending.
 
+    A text that a spreadsheet would take for a formula, such as a run called ``=1+1``, has an
+    apostrophe before it in CSV.
+
     Raises
     ------
     FileError
         For another ending or a place that cannot be written.
     """
+    import polars as pl
+
     if ending(path, TABLE) == ".csv":
-        write_whole(path, lambda beside: table.write_csv(beside))
+        formula = r"^([=@\t\r]|[+-][^\d.])"
+        plain = table.with_columns(pl.col(pl.String).str.replace(formula, "'${1}"))
+        plain = plain.rename({name: re.sub(formula, r"'\1", name) for name in table.columns})
+        write_whole(path, lambda beside: plain.write_csv(beside))
     else:
         write_whole(path, lambda beside: table.write_parquet(beside))

@@ -1,5 +1,6 @@
 """Units at the edge: what comes in is turned into SI or refused, what goes out is for people."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -25,6 +26,12 @@ _A_MINUTE = frozenset(
 )
 _A_SECOND = frozenset("1/s s-1 s**-1 u/s r/s rev/s rps tr/s turn/s turns/s".split())  # noqa: SIM905
 """Turns a minute and a second, as nameplates and loggers write them; folded by `_folded`."""
+
+
+LONGEST = 80
+"""Letters of a unit."""
+_POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[+-]?\d{1,2}(?:[./]\d{1,3})?\s*\)?(?!\s*(?:\*\*|\^|\d))")
+"""A power as a unit has it: a plain number, no power of a power."""
 
 
 def _written_out(unit: str) -> str:
@@ -67,6 +74,14 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
     """
     if unit == si:
         return value
+    shown = unit if len(unit) <= LONGEST else f"{unit[:LONGEST]}..."
+    powers = _POWER.sub(" ", unit)
+    if len(unit) > LONGEST or any(each in powers for each in ("**", "^", "<", ">")):
+        # a unit is evaluated, and some would take for ever
+        raise InputError(
+            f"{what} has the unreadable unit '{shown}'; give it in {si}, or in a unit whose "
+            "powers are plain numbers."
+        )
     if si == "rad/s" and _folded(unit) in _A_MINUTE:
         return 2.0 * pi / 60.0 * value
     if si == "rad/s" and unit.endswith(("Hz", "hertz")):
@@ -88,15 +103,19 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
             f"give it in {wanted}."
         ) from None
     except (
+        ArithmeticError,
         DefinitionSyntaxError,
         AssertionError,
         AttributeError,
+        RecursionError,
         TokenError,
         TypeError,
         ValueError,
     ):
         # pint's parser meets unreadable text with any of these
-        raise InputError(f"{what} has the unreadable unit '{unit}'; give it in {wanted}.") from None
+        raise InputError(
+            f"{what} has the unreadable unit '{shown}'; give it in {wanted}."
+        ) from None
 
 
 # --- units that people read -----------------------------------------------------------------------

@@ -6,32 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swashplate import DomainError, Drive, FileError, InputError, ParameterError
-from swashplate.analysis.compensation import InverseMap, inverse_map
+from swashplate import DomainError, Drive, FileError, InputError, ParameterError, maneuvers
+from swashplate.analysis import (
+    InverseMap,
+    improvement,
+    inverse_map,
+    proportional_command,
+    wanted_of_stick,
+)
 
 MAPS = {name: inverse_map(Drive.preset(name)) for name in ("hoist", "slew", "luff", "neutral")}
-
-
-@pytest.mark.parametrize(
-    ("name", "volts", "speed_deg_s"),
-    [
-        ("hoist", 1.0, 22.25),
-        ("hoist", 4.0, 97.75),
-        ("hoist", 6.5, 161.67),
-        ("hoist", -1.0, -22.16),
-        ("hoist", -4.0, -85.72),
-        ("hoist", -6.5, -153.98),
-        ("slew", 1.0, 0.88),
-        ("slew", 4.0, 3.23),
-        ("slew", -1.0, -0.76),
-        ("slew", -4.0, -3.06),
-    ],
-)
-def test_static_table_backwards(name: str, volts: float, speed_deg_s: float) -> None:
-    """The model description's table, good to half a digit: 0.005 deg/s over the slope there."""
-    slope = 20.0 if name == "hoist" else 0.75
-    found = float(MAPS[name].voltage(np.radians(speed_deg_s)))
-    assert found == pytest.approx(volts, abs=0.0051 / slope + 2e-4)
 
 
 def test_limits_and_gap() -> None:
@@ -70,24 +54,16 @@ def test_monotone_and_in_range(name: str) -> None:
     assert np.isfinite(volts).all()
 
 
-def test_more_points_make_it_better(hoist: Drive) -> None:
+def test_points_shapes_and_standstill(hoist: Drive) -> None:
     errors = [inverse_map(hoist, points).error for points in (11, 21, 41)]
     # half the distance is a quarter of the error, short of where the curvature is greatest
     assert errors[0] > 3.0 * errors[1] > 9.0 * errors[2] > 0.0
-
-
-def test_shapes() -> None:
-    hoist = MAPS["hoist"]
-    assert hoist.voltage(1.0).shape == ()
-    assert hoist.voltage([[0.5, 1.0], [1.5, 2.0]]).shape == (2, 2)
-    assert hoist.voltage([]).size == 0
-    assert "101 + 101 points" in repr(hoist)
-
-
-def test_standstill_is_0_volts() -> None:
-    for inverse in MAPS.values():
-        assert float(inverse.voltage(inverse.creep)) == 0.0
-    assert float(MAPS["hoist"].voltage(0.0)) == 0.0  # the creep is nearer than the slowest return
+    map = MAPS["hoist"]
+    assert map.voltage([[0.5, 1.0], [1.5, 2.0]]).shape == (2, 2)
+    assert (map.voltage(1.0).shape, map.voltage([]).size) == ((), 0)
+    assert "101 + 101 points" in repr(map)
+    assert all(float(each.voltage(each.creep)) == 0.0 for each in MAPS.values())
+    assert float(map.voltage(0.0)) == 0.0  # the creep is nearer than the slowest return
 
 
 @pytest.mark.parametrize("speed", [4.0, -4.0, [0.0, 4.0]])
@@ -100,14 +76,6 @@ def test_beyond_the_limit(speed) -> None:
     worst = speed if isinstance(speed, float) else speed[1]
     clipped = float(np.ravel(hoist.voltage(speed, clip=True))[-1])
     assert clipped == pytest.approx(7.8726 if worst > 0.0 else -7.4067, abs=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("speed", "said"), [(np.nan, "finite"), ([1.0, np.inf], "finite"), ("fast", "a number")]
-)
-def test_no_speed(speed, said) -> None:
-    with pytest.raises(InputError, match=said):
-        MAPS["hoist"].voltage(speed)
 
 
 def test_command_runs_ahead(hoist: Drive) -> None:
@@ -134,6 +102,8 @@ def test_command_runs_ahead(hoist: Drive) -> None:
         ([1.0, 1.0], 0.0, None, "a rate above 0 Hz"),
         ([1.0, 1.0], 512.0, -1.0, "a lead of 0 s or more"),
         ([1.0, 9.0], 512.0, None, "cannot settle at"),
+        ([1.0, np.nan], 512.0, None, "finite"),
+        ("fast", 512.0, None, "a number"),
     ],
 )
 def test_commands_that_cannot_be(speed, rate, lead, said) -> None:
@@ -215,3 +185,39 @@ def test_drives_without_an_inverse(hoist: Drive) -> None:
     for points in (1, 10_002):
         with pytest.raises(InputError, match="takes 2 to 10001 points"):
             inverse_map(hoist, points)
+
+
+# --- what the map buys ----------------------------------------------------------------------------
+
+
+def test_stick_and_straight_line() -> None:
+    """Full stick is full speed, which the straight line commands with the saturation voltage."""
+    inverse = MAPS["hoist"]
+    wanted = wanted_of_stick(inverse, [-10.0, -5.0, 0.0, 5.0, 10.0])
+    assert np.degrees(wanted) == pytest.approx([-185.0, -92.5, 0.0, 98.0, 196.0], abs=0.05)
+    volts = proportional_command(inverse, wanted)
+    assert volts == pytest.approx([-7.41, -3.705, 0.0, 3.935, 7.87], abs=0.006)
+
+
+def test_the_map_makes_it_better_and_the_lead_again(axis: Drive) -> None:
+    inverse = MAPS[axis.name]
+    wanted = wanted_of_stick(inverse, maneuvers.sine(2.0, 0.1).sample())
+    found = improvement(axis, wanted)
+    names = ["straight line", "inverse map", "inverse map and lead"]
+    assert [way.name for way in found.ways] == names
+    plain, mapped, led = (way.error.rms for way in found.ways)
+    assert plain > mapped > led
+    if axis.name != "luff":  # whose slowest speed of 31 deg/s leaves nothing to gain there
+        assert led < 0.25 * mapped
+    np.testing.assert_allclose(found.ways[1].run.voltage, inverse.voltage(wanted))
+    off = axis.simulate(inverse.voltage(wanted)).shaft_speed - wanted
+    assert found.ways[1].error == pytest.approx((np.sqrt(np.mean(off**2)), np.abs(off).max()))
+
+
+def test_the_map_of_another_drive(hoist: Drive) -> None:
+    wanted = np.radians(50.0) * np.sin(np.arange(5120) * 0.2 * np.pi / 512.0)
+    other = inverse_map(hoist.scale(Z10=0.8))
+    right, wrong = improvement(hoist, wanted), improvement(hoist, wanted, inverse=other)
+    assert wrong.ways[1].error.rms > right.ways[1].error.rms
+    with pytest.raises(InputError, match="cannot settle at 200 deg/s"):
+        improvement(hoist, np.radians([0.0, 200.0, 0.0]))

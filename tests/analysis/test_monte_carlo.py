@@ -4,11 +4,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-import polars as pl
 import pytest
 
 from swashplate import Drive, InputError, ParameterError, maneuvers
-from swashplate.analysis.monte_carlo import (
+from swashplate.analysis import (
     Deviations,
     bands,
     draw_deviations,
@@ -18,11 +17,10 @@ from swashplate.analysis.monte_carlo import (
 )
 from swashplate.campaign import Campaign, rig
 from swashplate.errors import FileError
-from swashplate.identification.assessment import assess
+from swashplate.identification.assessment import assess, save_fit
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Free, Setup, load_setup
-from swashplate.identification.storing import save_fit
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.maneuvers import source_tests
 
@@ -222,33 +220,13 @@ def test_the_campaign_may_have_moved(fitted, tmp_path):
         stored_draws(tmp_path)
     drawn = stored_draws(tmp_path, campaign=old, draws=2)
     assert len(drawn.drives) == 2
+    with pytest.raises(InputError, match="is that of another drive .* differ"):
+        stored_draws(tmp_path, campaign=old, drive=Drive.preset("luff"))
 
 
-def test_estimates_alone(hoist, tmp_path):
-    hoist.to_toml(tmp_path / "drive.toml")
-    table = {
-        "unknown": ["Z10", "Z16_plus", "force_plus_1", "offset counts (run 3)", "Z18"],
-        "standard error": [0.1, 1e-6, 0.2, 0.1, None],
-    }
-    pl.DataFrame(table).write_csv(tmp_path / "estimates.csv")
-    drawn = stored_draws(tmp_path, draws=50, seed=1)
-    assert drawn.held == ("force_plus_1", "Z18")
-    assert drawn.columns["Z10"].std() == pytest.approx(0.1, rel=0.3)
-    assert (drawn.columns["Z18"] == hoist.parameters.numbers["Z18"]).all()
-    assert "Correlations ignored" in drawn.sentences()[0]
-
-
-def test_folders_that_are_none(tmp_path, hoist):
-    with pytest.raises(InputError, match="holds neither fit.json nor estimates.csv"):
+def test_folders_that_are_none(tmp_path):
+    with pytest.raises(InputError, match="holds no fit.json: give a folder that a fit wrote"):
         stored_draws(tmp_path)
     (tmp_path / "fit.json").write_text("{}", "utf-8")
     with pytest.raises(FileError, match="is no stored fit"):
-        stored_draws(tmp_path)
-    (tmp_path / "fit.json").unlink()
-    hoist.to_toml(tmp_path / "drive.toml")
-    (tmp_path / "estimates.csv").write_text("unknown,value\nZ10,1\n", "utf-8")
-    with pytest.raises(FileError, match="has no column 'standard error'"):
-        stored_draws(tmp_path)
-    (tmp_path / "estimates.csv").write_text("unknown,standard error\nZ10,wide\n", "utf-8")
-    with pytest.raises(FileError, match="row 2: the standard error 'wide' is no number"):
         stored_draws(tmp_path)

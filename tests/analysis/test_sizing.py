@@ -2,15 +2,19 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError, maneuvers
-from swashplate.analysis import sizing
-from swashplate.analysis.outcomes import (
+from swashplate.analysis import (
+    WIDEST,
     Performance,
+    Requirements,
+    Trial,
     command_for,
     performance,
-    proportional_speed,
-    wanted,
+    size,
+    sizing,
+    smallest_alone,
+    smallest_change,
+    trial,
 )
-from swashplate.analysis.sizing import WIDEST, Requirements, size, smallest_alone, smallest_change
 
 BOX = np.full(2, 0.5), np.full(2, 2.0)
 
@@ -68,7 +72,7 @@ def test_what_the_hoist_can_do(hoist):
 
 def test_a_larger_pump_is_given_less_voltage(hoist):
     voltage = maneuvers.sine(6.0, 0.1).sample()
-    follow = wanted(proportional_speed(hoist, voltage))
+    follow = trial(hoist, voltage)
     np.testing.assert_allclose(command_for(hoist, follow), voltage, atol=1e-6)
     larger = hoist.scale(Z10=1.5)
     np.testing.assert_allclose(command_for(larger, follow), voltage / 1.5, atol=1e-6)
@@ -96,7 +100,7 @@ def test_an_acceleration_is_shared_by_orifice_and_pump(hoist):
 
 
 def test_a_tracking_error(hoist):
-    follow = wanted(proportional_speed(hoist, maneuvers.sine(9.0, 0.1).sample()))
+    follow = trial(hoist, maneuvers.sine(9.0, 0.1).sample())
     required = Requirements(tracking_error=np.radians(18.0))
     found = size(hoist, required, {"pump": WIDEST}, follow=follow)
     assert found.before.tracking_error > required.tracking_error >= found.after.tracking_error
@@ -128,7 +132,7 @@ def test_requirements_that_exclude_each_other(hoist, monkeypatch):
 
     monkeypatch.setattr(sizing, "performance", made_up)
     required = Requirements(speed=np.radians(300.0), tracking_error=np.radians(12.0))
-    follow = wanted([0.0, 1.0])
+    follow = Trial(np.zeros(2), 512.0, np.array([0.0, 1.0]))
     with pytest.raises(InputError, match="meets each requirement, but not all at once: nearest"):
         size(hoist, required, {"pump": WIDEST}, follow=follow)
 
@@ -145,5 +149,3 @@ def test_refusals(hoist):
         size(hoist, required, {"pump": (1.2, 2.0)})
     with pytest.raises(InputError, match="only be required with a speed to follow"):
         size(hoist, Requirements(tracking_error=0.1), {"pump": WIDEST})
-    with pytest.raises(InputError, match="two finite numbers or more"):
-        wanted([1.0])

@@ -1,57 +1,298 @@
+"""Levers, outcomes of a command, before and after, and sensitivities."""
+
+import sys
+
 import numpy as np
 import pytest
 
-from swashplate import InputError, ParameterError, maneuvers
-from swashplate.analysis.outcomes import trial
-from swashplate.analysis.whatif import AS_IS, CHANGED, what_if
+from swashplate import Drive, InputError, ParameterError, maneuvers
+from swashplate.analysis import (
+    AS_IS,
+    CHANGED,
+    LEVERS,
+    OUTCOMES,
+    Trial,
+    batch_outcomes,
+    find_lever,
+    find_outcomes,
+    one_at_a_time,
+    outcome_matrix,
+    outcomes,
+    proportional_speed,
+    pulled,
+    pulled_columns,
+    ranges_of,
+    sobol,
+    speed_per_volt,
+    trial,
+    what_if,
+)
 
-BOTH = {"orifice": 1.5, "pump": 1.5}
+RATE = 10.0
+TIME = np.arange(41) / RATE
+VOLTAGE = np.where((TIME > 0.95) & (TIME < 3.05), 5.0, 0.0)
+TRIAL = Trial(VOLTAGE, RATE, np.where(VOLTAGE > 0.0, 8.0, 0.0))
+RAMP = np.clip(10.0 * (TIME - 0.9), 0.0, 10.0)
+"""From 0.9 s, the last sample before the command, 10 rad/s² up to 10 rad/s; never down again."""
+
+
+@pytest.fixture(scope="module")
+def task(hoist: Drive) -> Trial:
+    return trial(hoist, maneuvers.step(9.0, stop=4.0, length=5.0).sample())
+
+
+# --- levers ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("factors", "expected"),
+    [
+        ({"orifice": 1.5}, {"Z16_plus": 1.74510e-4, "Z16_minus": 2.26890e-4}),
+        ({"orifice_plus": 2.0}, {"Z16_plus": 2.32680e-4, "Z16_minus": 1.5126e-4}),
+        # an area goes with the square of its diameter
+        ({"orifice_diameter": 1.2}, {"Z16_plus": 1.675296e-4, "Z16_minus": 2.178144e-4}),
+        ({"pump": 1.5}, {"Z10": 18.594}),
+        ({"pump": 1.5, "drive_speed": 0.8}, {"Z10": 14.8752}),
+        ({"dead_zone": 0.0}, {"V_dz_plus": 0.0, "V_dz_minus": 0.0}),
+        ({"rate_limit_up": np.inf}, {"lim1_plus": np.inf, "lim1_minus": np.inf}),
+        ({"spool_stroke": 0.5}, {"Z14": 0.00182305}),
+        ({"relief": 2.0}, {"Z15": 8.2382e6}),
+        ({"Z9": 1.1}, {"Z9": 1.18173e7}),
+        ({"Z16_minus": 2.0}, {"Z16_plus": 1.1634e-4, "Z16_minus": 3.0252e-4}),
+    ],
+)
+def test_what_a_lever_multiplies(hoist, factors, expected):
+    before, numbers = hoist.parameters.numbers, pulled(hoist, factors).parameters.numbers
+    assert {name: numbers[name] for name in expected} == pytest.approx(expected, rel=1e-12)
+    assert all(numbers[k] == before[k] for k in set(before) - set(pulled_columns(before, factors)))
+
+
+def test_levers_of_every_kind(hoist):
+    for name, lever in LEVERS.items():
+        assert lever.meaning.endswith(".")
+        assert pulled(hoist, {name: 1.0}).parameters.numbers == hoist.parameters.numbers
+    # Z12 = K_mL K_mf C_i C_q holds the pump's displacement as Z10 = K_mf C_q does
+    larger = pulled(hoist.replace(Z11=0.1, Z12=0.2), {"pump": 1.5})
+    assert (larger["Z12"].value, larger["Z11"].value) == (pytest.approx(0.3), 0.1)
+    many = {"orifice": [1.0, 1.5], "orifice_plus": [2.0, 1.0]}
+    columns = pulled_columns(hoist.parameters.numbers, many)
+    np.testing.assert_allclose(columns["Z16_plus"], 1.1634e-04 * np.array([2.0, 1.5]))
+    np.testing.assert_allclose(columns["Z16_minus"], 1.5126e-04 * np.array([1.0, 1.5]))
+
+
+# --- outcomes -------------------------------------------------------------------------------------
+
+
+def of(speed: np.ndarray, name: str, task: Trial = TRIAL) -> float:
+    return float(outcome_matrix(speed[None, :], task, find_outcomes([name]))[0, 0])
+
+
+@pytest.mark.parametrize(
+    ("name", "expected", "signed"),
+    [
+        ("final_speed", 10.0, True),
+        ("peak_speed", 10.0, False),
+        ("rise_time", 0.8, False),
+        ("response_time", 0.9, False),
+        ("largest_acceleration", 10.0, False),
+        ("overshoot", 0.0, False),
+        ("creep", 0.0, True),
+        ("travel", 26.0, True),  # half of 1 s at 10 rad/s, then 2.1 s of it
+    ],
+)
+def test_a_ramp_by_hand(name, expected, signed):
+    assert of(RAMP, name) == pytest.approx(expected, abs=1e-9)
+    assert of(-RAMP, name) == pytest.approx(-expected if signed else expected, abs=1e-9)
+
+
+def test_other_outcomes_by_hand():
+    beyond = RAMP.copy()
+    beyond[20] = 12.0
+    assert of(beyond, "overshoot") == pytest.approx(0.2)
+    assert of(TRIAL.wanted + 3.0, "tracking_error") == pytest.approx(3.0)
+    assert of(RAMP + 0.5, "creep") == 0.5
+    at_once = Trial(np.where(TIME > 0.05, 5.0, 0.0), RATE, TRIAL.wanted)
+    assert np.isnan(of(RAMP + 0.5, "creep", at_once))
+    still = np.zeros_like(TIME)
+    assert of(still, "final_speed") == 0.0
+    assert all(np.isnan(of(still, name)) for name in ("rise_time", "response_time", "overshoot"))
+
+
+def test_a_batch_is_what_single_runs_are(hoist, monkeypatch):
+    monkeypatch.setattr(outcomes, "SAMPLES_AT_ONCE", 8 * 5121)  # two blocks
+    task, chosen = trial(hoist, maneuvers.step(9.0).sample()), tuple(OUTCOMES.values())
+    z16 = hoist.parameters.numbers["Z16_plus"] * np.linspace(0.8, 1.2, 11)
+    found = batch_outcomes(hoist, {"Z16_plus": z16}, task, chosen, threads=2)
+    for k in (0, 7, 10):
+        run = hoist.replace(Z16_plus=float(z16[k])).simulate(task.voltage)
+        single = outcome_matrix(run.shaft_speed[None, :], task, chosen)[0]
+        # the march side by side agrees to 1e-12; an acceleration is a difference of its speeds
+        np.testing.assert_allclose(found.values[k], single, rtol=1e-8, atol=1e-8)
+    assert (found.failures, list(found.sentences())) == ({}, [])
+
+
+def test_variants_that_cannot_run_and_outcomes_that_are_not(hoist):
+    task = trial(hoist, maneuvers.step(9.0, start=0.1, stop=1.0, length=2.0).sample())
+    values, chosen = np.array([12.0, -1.0]), find_outcomes(["creep", "final_speed"])
+    found = batch_outcomes(hoist, {"Z10": values}, task, chosen)
+    assert list(found.failures) == [1]
+    assert "Z10" in found.failures[1]
+    assert np.isnan(found.values[1]).all()
+    assert list(found.sentences()) == [
+        "1 of 2 variants have no creep: the command does not rest at 0 V long enough at its start."
+    ]
+
+
+def test_the_ratio_is_that_of_the_limit_to_the_voltage_that_reaches_it(hoist):
+    """Reference numbers of Kruse's drive: 196.0 at 7.87 V and -185.0 at -7.41 V."""
+    up, down = 196.0 / 7.87, 185.0 / 7.41
+    found = [np.degrees(speed_per_volt(hoist, sign)) for sign in (1.0, -1.0)]
+    assert found == pytest.approx([up, down], rel=1e-3)
+    wanted = np.degrees(proportional_speed(hoist, [-9.0, 0.0, 4.0]))
+    np.testing.assert_allclose(wanted, [-9.0 * down, 0.0, 4.0 * up], rtol=1e-3)
+    wide = hoist.replace(Z13=0.5, Z15=np.inf)  # never saturates
+    assert speed_per_volt(wide, 1.0) == pytest.approx(wide.steady_speed(10.0) / 10.0)
+
+
+# --- before and after -----------------------------------------------------------------------------
 
 
 def test_figure_9_1(hoist):
-    """The source's extrapolation: orifice and pump flow 50 % up, a sine of 9 V and 0.1 Hz."""
-    task = trial(hoist, maneuvers.sine(9.0, 0.1).sample())
-    result = what_if(hoist, BOTH, task)
+    """Kruse's extrapolation: orifice and pump flow 50 % up, a sine of 9 V and 0.1 Hz."""
+    sine = trial(hoist, maneuvers.sine(9.0, 0.1).sample())
+    result = what_if(hoist, {"orifice": 1.5, "pump": 1.5}, sine)
     assert np.degrees(result.before.speed_limits) == pytest.approx([196.0, -185.0], abs=0.05)
     assert np.degrees(result.after.speed_limits) == pytest.approx([294.0, -277.5], abs=0.05)
     speed = np.degrees(result.after.run.shaft_speed)
-    assert speed.max() == pytest.approx(294.0, abs=0.05)
-    assert speed.min() == pytest.approx(-277.5, abs=0.05)
+    assert [speed.max(), speed.min()] == pytest.approx([294.0, -277.5], abs=0.05)
 
 
 def test_the_acceleration_limit_goes_with_both(hoist):
     """Z10 Z16 stand in the closed form of the limit: 2.25 times as much."""
     task = trial(hoist, maneuvers.step(9.0).sample())
-    result = what_if(hoist, BOTH, task, outcomes=["largest_acceleration", "final_speed"])
-    ratio = result.after.values / result.before.values
-    assert ratio == pytest.approx([2.25, 1.5], rel=5e-3)
-    assert list(result.variants) == [AS_IS, "orifice x 1.5", "pump x 1.5", CHANGED]
-    alone = [result.variants[name].values for name in ("orifice x 1.5", "pump x 1.5")]
-    assert alone[0] / result.before.values == pytest.approx([1.5, 1.0], rel=5e-3)
-    assert alone[1] / result.before.values == pytest.approx([1.5, 1.5], rel=5e-3)
+    factors, names = {"orifice": 1.5, "pump": 1.5}, ["largest_acceleration", "final_speed"]
+    found = what_if(hoist, factors, task, outcomes=names).variants
+    ratios = {name: each.values / found[AS_IS].values for name, each in found.items()}
+    expected = {"orifice x 1.5": [1.5, 1.0], "pump x 1.5": [1.5, 1.5], CHANGED: [2.25, 1.5]}
+    assert list(ratios) == [AS_IS, *expected]
+    for name, both in expected.items():
+        assert ratios[name] == pytest.approx(both, rel=5e-3)
 
 
-def test_a_larger_pump_misses_the_speed_that_the_old_one_was_asked_for(hoist):
-    """The wanted speed stays that of the drive as it is."""
+def test_what_is_wanted_and_what_there_is_not(hoist):
+    # the wanted speed stays that of the drive as it is
     task = trial(hoist, maneuvers.step(5.0).sample())
     result = what_if(hoist, {"pump": 1.2}, task, outcomes=["tracking_error"])
     assert result.after.values[0] > result.before.values[0]
     assert list(result.variants) == [AS_IS, CHANGED]
-
-
-def test_a_compensated_dead_zone_answers_a_small_command(hoist):
-    slew = hoist.preset("slew")
+    # a compensated dead zone answers a small command
+    slew = Drive.preset("slew")
     task = trial(slew, maneuvers.step(0.08).sample())
     result = what_if(slew, {"dead_zone": 0.0}, task, outcomes=["final_speed", "rise_time"])
-    assert result.before.values[0] == 0.0
-    assert result.after.values[0] > 0.0
+    assert result.after.values[0] > result.before.values[0] == 0.0
     (sentence,) = result.sentences()
     assert sentence.startswith("as it is: no rise_time, the shaft stands still")
 
 
-def test_refusals(hoist):
-    task = trial(hoist, maneuvers.step(9.0).sample())
-    with pytest.raises(InputError, match="at least one lever"):
-        what_if(hoist, {}, task)
+# --- sensitivities --------------------------------------------------------------------------------
+
+
+def test_the_speed_limit_goes_with_the_pump_alone(hoist, task):
+    ranges, final = ranges_of(["orifice", "pump"], 0.1), np.radians(196.0)
+    result = one_at_a_time(hoist, ranges, task, outcomes=["final_speed"])
+    assert result.base == pytest.approx([final], rel=1e-4)
+    np.testing.assert_allclose(result.low[:, 0], [final, 0.9 * final], rtol=1e-4)
+    np.testing.assert_allclose(result.high[:, 0], [final, 1.1 * final], rtol=1e-4)
+    np.testing.assert_allclose(result.swings[:, 0], [0.0, 0.2 * final], rtol=1e-4, atol=1e-9)
+    assert result.sentences == ()
+    # a feedback spring too weak for the solenoid: Z5 F/√Z4 reaches 1
+    result = one_at_a_time(hoist, {"Z4": (0.01, 1.1)}, task, outcomes=["final_speed"])
+    assert np.isnan(result.low[0, 0])
+    assert np.isfinite(result.high[0, 0])
+    assert result.sentences[0].startswith("Z4 x 0.01 cannot be simulated: hoist: ")
+
+
+def test_sobol_of_a_product_in_closed_form(hoist, task):
+    """Creep goes with pump times plussing, nearly: of a product of two uniform factors of 1 ± s
+    each causes s²/3 of the variance (1 + s²/3)² - 1 by itself."""
+    s = 0.5
+    ranges = ranges_of(["pump", "plussing", "relief"], s)
+    result = sobol(hoist, ranges, task, outcomes=["creep", "overshoot"], samples=256, seed=1)
+    part = s**2 / 3.0
+    by_itself = part / ((1.0 + part) ** 2 - 1.0)
+    assert result.runs == 256 * 5
+    # 256 base samples are good to a few hundredths
+    np.testing.assert_allclose(result.first[:2, 0], by_itself, atol=0.06)
+    np.testing.assert_allclose(result.total[:2, 0], 1.0 - by_itself, atol=0.06)
+    np.testing.assert_allclose([result.first[2, 0], result.total[2, 0]], 0.0, atol=1e-6)
+    assert result.mean[0] == pytest.approx(np.radians(3.09), rel=0.02)
+    assert np.isnan(result.total[:, 1]).all()
+    assert result.sentences == ("None of the levers moves overshoot.",)
+
+
+def test_the_seed_decides_and_threads_do_not(hoist, task):
+    def indices(seed: int, threads: int):
+        ranges = ranges_of(["orifice", "pump"])
+        names = {"outcomes": ["rise_time"], "samples": 16}
+        return sobol(hoist, ranges, task, **names, seed=seed, threads=threads)
+
+    first, again, other = indices(0, 1), indices(0, 2), indices(2, 1)
+    np.testing.assert_array_equal(first.total, again.total)
+    np.testing.assert_array_equal(first.total_error, again.total_error)
+    assert (first.total != other.total).any()
+
+
+def test_undefined_outcomes_have_no_indices(hoist):
+    at_once = trial(hoist, maneuvers.step(9.0, start=0.1, stop=1.0, length=2.0).sample())
+    result = sobol(hoist, ranges_of(["pump"]), at_once, outcomes=["creep"], samples=16)
+    assert np.isnan(result.first).all()
+    assert "48 of 48 variants have no creep" in result.sentences[0]
+
+
+CREEP = {"outcomes": ["creep"], "samples": 16}
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda d, t: find_lever("orifise"), r"no lever 'orifise' \(did you mean orifice\?\)"),
+        (lambda d, t: find_lever("xyz"), "no lever 'xyz'; the levers are orifice, "),
+        (lambda d, t: pulled(d, {"pump": -1.0}), "factor on pump is -1, but must be 0 or more"),
+        (lambda d, t: pulled(d, {"pump": float("nan")}), "The factor on pump is nan"),
+        (
+            lambda d, t: pulled(d.replace(Z15=np.inf), {"relief": 0.0}),
+            "Z15 is inf, which the factor 0 cannot change",
+        ),
+        (lambda d, t: what_if(d, {}, t), "at least one lever"),
+        (lambda d, t: find_outcomes(["rise_tim"]), r"'rise_tim' \(did you mean rise_time\?\)"),
+        (lambda d, t: find_outcomes([]), "at least one outcome"),
+        (lambda d, t: trial(d, [3.0, 3.0]), "stays at 3 V"),
+        (lambda d, t: trial(d, [0.0, 11.0]), "within ±10 V"),
+        (lambda d, t: trial(d, [0.0, 1.0, 2.0], wanted=[0.0, 1.0]), "must be 3 finite numbers"),
+        (lambda d, t: ranges_of(["orifice"], 1.5), "span 1.5 of the factors"),
+        (lambda d, t: ranges_of([]), "Name at least one lever"),
+        (
+            lambda d, t: one_at_a_time(d, {"pump": (2.0, 1.0)}, t, outcomes=["creep"]),
+            "must rise from 0 or more, not 2 to 1",
+        ),
+        (
+            lambda d, t: sobol(d, ranges_of(["pump"]), t, outcomes=["creep"], samples=100),
+            "100, but must be a power of 2 from 16",
+        ),
+        (
+            lambda d, t: sobol(d, {"Z4": (0.01, 1.1)}, t, **CREEP),
+            "of 48 variants cannot be simulated, the first because",
+        ),
+    ],
+)
+def test_refusals(hoist, task, call, said):
+    with pytest.raises(InputError, match=said):
+        call(hoist, task)
+
+
+def test_what_breaks_a_rule_and_what_is_not_installed(hoist, task, monkeypatch):
     with pytest.raises(ParameterError, match="Z10"):
         what_if(hoist, {"pump": 0.0}, task)
+    monkeypatch.setitem(sys.modules, "SALib.sample.sobol", None)
+    with pytest.raises(InputError, match=r"pip install 'swashplate\[sensitivity\]'"):
+        sobol(hoist, ranges_of(["pump"]), task, **CREEP)

@@ -1,5 +1,6 @@
 """A campaign file and its logs become experiments in SI."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -195,6 +196,19 @@ def test_counts_beyond_their_counter(edited: Edit) -> None:
         ('file = "up.csv"', 'file = "left.csv"', "There is no file"),
         ('unit = "ms"', 'unit = "V"', "does not measure the same as s"),
         ("[[runs]]", "[[runs]", "is not TOML"),
+        (
+            'title = "Bench"',
+            f"title = {'[' * 600}{']' * 600}",
+            "nests its tables or lists too deeply",
+        ),
+        ('title = "Bench"', f"{'a.' * 20_000}a = 1", "has a key of more than 40 parts"),
+        ('title = "Bench"', f"title = {'9' * 5000}", "has a number with too many digits"),
+        ('unit = "mV"', 'unit = "V**9**9**9**9"', "has the unreadable unit 'V**9**9**9**9'"),
+        ('unit = "mV"', 'unit = "((9**99)*9)**99*V"', "unreadable unit"),
+        ('unit = "mV"', f'unit = "{"*".join(["V"] * 5000)}"', "unreadable unit 'V*V*V*"),
+        ('unit = "mV"', 'unit = "V/0"', "unreadable unit 'V/0'"),
+        ('unit = "mV"', 'unit = "V", offset = 1e308', "check its unit, scale and offset"),
+        ('column = "time", unit = "ms"', "rate = 5e-324", "last inf s by the rate"),
     ],
 )
 def test_what_is_wrong_is_one_sentence(edited: Edit, old: str, new: str, sentence: str) -> None:
@@ -213,6 +227,16 @@ def test_the_campaign_file_itself(tmp_path: Path) -> None:
     (tmp_path / "campaign.toml").write_text("title = 'x'\n", "utf-8")
     with pytest.raises(ParameterError, match="the file needs an entry 'axes'"):
         Campaign.from_toml(tmp_path / "campaign.toml")
+    os.mkfifo(tmp_path / "pipe.toml")
+    for special in (tmp_path / "pipe.toml", Path("/dev/zero")):
+        with pytest.raises(FileError, match=f"{special.name} is no ordinary file"):
+            Campaign.from_toml(special)
+
+
+def test_a_campaign_file_may_begin_with_a_byte_order_mark(campaign_folder: Path) -> None:
+    path = campaign_folder / "campaign.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert len(Campaign.from_toml(path)) == 2
 
 
 def test_reversed_stamps_name_file_and_row(edited: Edit) -> None:

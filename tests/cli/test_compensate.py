@@ -3,7 +3,7 @@ import polars as pl
 import pytest
 
 from swashplate import Drive
-from swashplate.analysis.compensation import InverseMap
+from swashplate.analysis import InverseMap
 
 
 def test_the_map_that_is_printed(done):

@@ -4,9 +4,9 @@ from pathlib import Path
 import pytest
 
 from swashplate import Campaign, Drive
+from swashplate.identification.assessment import save_fit
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Setup
-from swashplate.identification.storing import save_fit
 
 Words = Callable[..., str]
 TESTS = (

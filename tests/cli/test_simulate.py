@@ -3,7 +3,7 @@ import polars as pl
 import pytest
 
 from swashplate import Drive, Limit, maneuvers
-from swashplate.analysis import runs
+from swashplate.analysis import outcomes
 
 
 def test_a_step_prints_the_known_speeds(done, number):
@@ -156,12 +156,12 @@ def test_the_first_lag_of_a_straight_line_is_read_off_the_speed():
     # milliseconds twice
     drive = Drive.preset("neutral")
     run = drive.simulate(maneuvers.step(1.0).sample(10_240.0), 10_240.0)
-    time = runs.time_to_reach(run, 1.0)
+    time = outcomes.time_to_reach(run, 1.0)
     assert time == pytest.approx(0.1 * np.log(10.0) + 2.0 / 512.0, abs=5e-4)
-    assert runs.time_to_reach(run, 2.0) is None
-    assert runs.time_to_reach(run, 0.0) is None
+    assert outcomes.time_to_reach(run, 2.0) is None
+    assert outcomes.time_to_reach(run, 0.0) is None
 
 
 def test_peaks_of_what_never_goes_one_way():
-    assert runs.peaks(np.array([-3.0, -1.0])) == (0.0, -3.0)
-    assert runs.peaks(np.array([2.0])) == (2.0, 0.0)
+    assert outcomes.peaks(np.array([-3.0, -1.0])) == (0.0, -3.0)
+    assert outcomes.peaks(np.array([2.0])) == (2.0, 0.0)

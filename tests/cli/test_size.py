@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive
-from swashplate.analysis.outcomes import performance
-from swashplate.analysis.whatif import pulled
+from swashplate.analysis import performance, pulled
 
 
 def test_speed_and_acceleration(done, number, tmp_path):

@@ -10,7 +10,6 @@ import pytest
 import scipy.signal
 
 from swashplate import Drive, FileError, InputError
-from swashplate.linear import pade_polynomials
 
 control = pytest.importorskip("control", reason="python-control is not installed")
 
@@ -34,7 +33,6 @@ def test_without_delay(hoist: Drive) -> None:
     model = hoist.linearize(current=0.45, outputs=OUTPUTS[:2])
     expected = model.response(F)
     system, states = model.to_scipy(), model.to_control()
-    transfer = model.to_control("transfer_function")
     assert system.dt is None
     assert states.state_labels == ["stroker_pressure"]
     assert states.output_labels == list(OUTPUTS[:2])
@@ -42,7 +40,6 @@ def test_without_delay(hoist: Drive) -> None:
     for row in range(2):
         np.testing.assert_allclose(of_scipy(system, F, row), expected[row], rtol=1e-9)
         np.testing.assert_allclose(states(2j * np.pi * F)[row, 0], expected[row], rtol=1e-9)
-        np.testing.assert_allclose(transfer(2j * np.pi * F)[row, 0], expected[row], rtol=1e-9)
     np.testing.assert_allclose(control.poles(states), model.poles)
     np.testing.assert_allclose(control.dcgain(states)[:, 0], model.gains)
 
@@ -52,14 +49,12 @@ def test_a_sampled_model_is_exact(axis: Drive, rate: float) -> None:
     model = axis.linearize(2.0, outputs=OUTPUTS).discrete(1.0 / rate)
     expected = model.response(F)
     system, states = model.to_scipy(), model.to_control()
-    transfer = model.to_control("transfer_function")
-    assert system.dt == states.dt == transfer.dt == 1.0 / rate
+    assert system.dt == states.dt == 1.0 / rate
     assert len(states.state_labels) == system.A.shape[0]
     z = np.exp(2j * np.pi * F / rate)
     for row in range(3):
         np.testing.assert_allclose(of_scipy(system, F, row), expected[row], rtol=1e-8)
         np.testing.assert_allclose(states(z)[row, 0], expected[row], rtol=1e-8)
-        np.testing.assert_allclose(transfer(z)[row, 0], expected[row], rtol=1e-5)
 
 
 def test_python_control_marches_like_the_simulation(hoist: Drive) -> None:
@@ -71,28 +66,14 @@ def test_python_control_marches_like_the_simulation(hoist: Drive) -> None:
     np.testing.assert_allclose(answer, moved, rtol=0.0, atol=1e-4 * np.abs(moved).max())
 
 
-@pytest.mark.parametrize("order", [1, 2, 5, 8])
-def test_a_delay_as_a_rational_function(hoist: Drive, order: int) -> None:
-    model = hoist.linearize(4.0)
-    expected = model.response(F)[0]
-    # the approximant agrees with e^(-p) to p^(2n+1): here p = jω delay up to 1.76
-    worst = {1: 0.4, 2: 0.04, 5: 1e-7, 8: 1e-9}[order]
-    for got in (
-        of_scipy(model.to_scipy(pade=order), F, 0),
-        model.to_control(pade=order)(2j * np.pi * F),
-        model.to_control("transfer_function", pade=order)(2j * np.pi * F),
-    ):
-        np.testing.assert_allclose(got, expected, rtol=worst)
-    ours, theirs = pade_polynomials(0.014, order), control.pade(0.014, order)
-    for mine, other in zip(ours, theirs, strict=True):
-        np.testing.assert_allclose(np.divide(mine, ours[1][0]), np.divide(other, theirs[1][0]))
-
-
-def test_the_delay_left_out(hoist: Drive) -> None:
+def test_a_delay_left_out_or_approximated(hoist: Drive) -> None:
     model = hoist.linearize(4.0)
     without = model.response(F)[0] * np.exp(2j * np.pi * F * 0.014)
-    np.testing.assert_allclose(of_scipy(model.to_scipy(pade=0), F, 0), without)
-    np.testing.assert_allclose(model.to_control(pade=0)(2j * np.pi * F), without)
+    np.testing.assert_allclose(of_scipy(model.to_scipy(without_delay=True), F, 0), without)
+    plain = model.to_control(without_delay=True)
+    np.testing.assert_allclose(plain(2j * np.pi * F), without)
+    together = plain * control.tf(*control.pade(model.delay, 5))  # as the documentation says
+    np.testing.assert_allclose(together(2j * np.pi * F), model.response(F)[0], rtol=1e-6)
     numerator, denominator = model.transfer_function()
     np.testing.assert_allclose(
         np.polyval(numerator, 2j * np.pi * F) / np.polyval(denominator, 2j * np.pi * F), without
@@ -120,18 +101,11 @@ def test_refusals(hoist: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
     for export in (model.to_scipy, model.to_control):
         with pytest.raises(InputError, match="has a delay of 0.014 s, which no state space holds"):
             export()
-        for order in (-1, 9):
-            with pytest.raises(InputError, match=f"is {order}, but must be 1 to 8"):
-                export(pade=order)
-    with pytest.raises(InputError, match="leave pade out"):
-        model.discrete(0.01).to_scipy(pade=2)
-    with pytest.raises(InputError, match="form is 'zpk'"):
-        model.to_control("zpk", pade=2)
     with pytest.raises(InputError, match="has no output 'torque'"):
         model.transfer_function("torque")
     monkeypatch.setitem(sys.modules, "control", None)
     with pytest.raises(InputError, match="not installed: pip install"):
-        model.to_control(pade=2)
+        model.to_control(without_delay=True)
 
 
 @pytest.mark.parametrize("ending", ["toml", "json"])

@@ -311,7 +311,7 @@ DAMAGED = [
         text(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"),
         "but no HDF5; it is damaged",
     ),
-    ("seven_cut.mat", cut(hdf5, 0.5), "seven_cut.mat cannot be read as HDF5, it is damaged"),
+    ("seven_cut.mat", cut(hdf5, 0.5), "seven_cut.mat cannot be read as MATLAB, it is damaged"),
     # HDF5
     ("text.h5", text("time,voltage\n0,1\n"), "text.h5 is no HDF5 file"),
     ("pickle.h5", impostor, "ends in '.h5' but holds Python pickle"),

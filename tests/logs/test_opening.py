@@ -3,7 +3,7 @@
 import os
 import signal
 import sys
-from importlib import import_module, metadata
+from importlib import metadata
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,12 +12,12 @@ import polars as pl
 import pytest
 
 from swashplate import FileError
-from swashplate.logs import SUFFIXES, Column, Log, Reader, TextOptions, apart, open_log, opening
+from swashplate.logs import SUFFIXES, Column, Log, Reader, TextOptions, apart, log, open_log
 
 
 def test_every_format_is_a_reader():
-    for module, suffixes in opening._READERS.items():
-        reader = import_module(f"swashplate.logs.{module}")
+    for name, suffixes in log._READERS.items():
+        reader = log.reader_of(name)
         assert isinstance(reader, Reader)
         assert reader.suffixes == suffixes
         assert set(suffixes) <= set(SUFFIXES)
@@ -99,6 +99,9 @@ def test_what_is_no_file(tmp_path):
     os.mkfifo(tmp_path / "pipe.csv")
     with pytest.raises(FileError, match="pipe.csv is no ordinary file"):
         open_log(tmp_path / "pipe.csv")
+    (tmp_path / "zero.csv").symlink_to("/dev/zero")
+    with pytest.raises(FileError, match="zero.csv is no ordinary file"):
+        open_log(tmp_path / "zero.csv")
     with pytest.raises(FileError, match="cannot be read"):
         open_log(tmp_path / ("a" * 300 + ".csv"))
 
@@ -112,18 +115,18 @@ def test_a_file_that_must_not_be_read(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("module", "library", "extra"), [("tdms", "npTDMS", "tdms"), ("mdf", "asammdf", "mdf")]
+    ("content", "library", "extra"),
+    [
+        (b"TDSm" + bytes(24), "npTDMS", "tdms"),
+        (b"MDF     4.10    ".ljust(64, b"\0"), "asammdf", "mdf"),
+    ],
 )
-def test_an_extra_that_is_not_installed(tmp_path, monkeypatch, module, library, extra):
-    path = tmp_path / f"log.{module}"
-    contents = {
-        "tdms": b"TDSm" + bytes(24),
-        "mdf": b"MDF     4.10    ".ljust(64, b"\0"),
-    }
-    path.write_bytes(contents[module])
-    for name in ("nptdms", "asammdf", "asammdf.blocks.utils"):
+def test_an_extra_that_is_not_installed(tmp_path, monkeypatch, content, library, extra):
+    path = tmp_path / f"log.{extra}"
+    path.write_bytes(content)
+    for name in ("nptdms", "asammdf"):
         monkeypatch.setitem(sys.modules, name, None)
-    reader = import_module(f"swashplate.logs.{module}")
+    reader = log.reader_of(f"channels.{extra.upper()}")
     with pytest.raises(FileError, match=rf"needs the library {library}.*'swashplate\[{extra}\]'"):
         reader.open(path, TextOptions())
 

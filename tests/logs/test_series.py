@@ -192,6 +192,7 @@ def test_parquet(tmp_path):
             "'time' goes back from 2.0 to 1.0 in data row 3",
         ),
         ("time,voltage\n0,1\n1,1\n1,1\n", FileError, "'time' has 1.0 twice, in data rows 2 and 3"),
+        ("time,voltage\n0,1\n1e-320,1\n", FileError, "its 2 rows last 1e-320 s by column 'time'"),
     ],
 )
 def test_bad_files_are_refused_in_a_sentence(tmp_path, text, error, sentence):

@@ -246,7 +246,7 @@ def test_options_that_make_no_sense(options, said):
 
 
 def test_a_large_file_is_read_in_pieces(tmp_path, text, all_of, monkeypatch):
-    monkeypatch.setattr("swashplate.logs.text.encoding.PIECE", 64)
+    monkeypatch.setattr("swashplate.logs.text.PIECE", 64)
     rows = "".join(f"{i},{i}.5\r\n" for i in range(200))
     expected = {"time": [float(i) for i in range(200)], "u": [i + 0.5 for i in range(200)]}
     assert all_of(text("time,u\r\n" + rows)) == expected

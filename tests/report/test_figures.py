@@ -7,13 +7,19 @@ import pytest
 from matplotlib.figure import Figure
 
 from swashplate import Drive, FullOrderDrive, InputError, Limit, Simulation, maneuvers
-from swashplate.analysis.compensation import inverse_map
-from swashplate.analysis.envelope import envelope
-from swashplate.analysis.monte_carlo import bands, independent_drives
-from swashplate.analysis.outcomes import Trial, trial
-from swashplate.analysis.sensitivity import one_at_a_time, ranges_of, sobol
-from swashplate.analysis.tracking import improvement
-from swashplate.analysis.whatif import what_if
+from swashplate.analysis import (
+    Trial,
+    bands,
+    envelope,
+    improvement,
+    independent_drives,
+    inverse_map,
+    one_at_a_time,
+    ranges_of,
+    sobol,
+    trial,
+    what_if,
+)
 from swashplate.full_order.comparison import compare
 from swashplate.report import figures
 from swashplate.report.lines import MOST_POINTS, MOST_RUNS, SHADES

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError, ParameterError, maneuvers
-from swashplate.analysis.envelope import envelope
+from swashplate.analysis import envelope
 from swashplate.equations import Definition, equation
 from swashplate.models.card import Channel, steady_current
 from swashplate.models.pump import Pump, shaft_speed, spool_balance

@@ -1,1 +1,6 @@
-"""What a drive can do and what limits it: envelope, what-if, sizing, compensation."""
+"""What a drive can do, what limits it, and what a change would buy."""
+
+import lazy_loader
+
+# names are imported when they are first used: most callers need few of the modules
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

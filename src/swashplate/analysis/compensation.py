@@ -12,21 +12,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
-from swashplate.analysis.envelope import dead_zone, saturation, starting_acceleration
+from swashplate.analysis.capability import dead_zone, saturation, starting_acceleration
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
-from swashplate.errors import DomainError, FileError, InputError
+from swashplate.errors import DomainError, InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.tables import UNIT, Column, Table
+from swashplate.results import Result, short
+from swashplate.tables import UNIT, Column, Form, Table, ending, write_table, write_text
 
 if TYPE_CHECKING:
     import polars
 
-# --- inverse --------------------------------------------------------------------------------------
-
-
 Array = NDArray[np.float64]
 
+# --- the map --------------------------------------------------------------------------------------
+
+FEWEST, MOST = 2, 10_001  # Points each way.
+INVERSE_MAP = Form("an inverse map", (".toml", ".csv", ".parquet"), (".pq",))
+COMMENTS = """\
+# swashplate inverse steady-state map: the voltage for a wanted speed; SI units
+# plus and minus: straight lines between the points; beyond their ends hold the end
+# between minus and plus: the nearest of minus' last point, rest and plus' first point
+"""
 ROUNDING = 1e-9
 """Part of the range of speeds by which a wanted one may exceed it and still count as the limit."""
 
@@ -34,19 +41,22 @@ ROUNDING = 1e-9
 class Branch(NamedTuple):
     """One way's part of the map, both rising, straight lines between the points."""
 
-    speed: Array
-    """[rad/s]"""
-    voltage: Array
-    """[V]"""
+    def __repr__(self) -> str:
+        return short(self)
+
+    speed: Array  # [rad/s]
+    voltage: Array  # [V]
 
 
 @dataclass(frozen=True, eq=False)
-class InverseMap:
+class InverseMap(Result):
     """Voltage for a wanted speed; positive voltage and positive speed go together.
 
     Between the slowest speeds that can be held each way there is nothing but the creep at 0 V. A
     wanted speed in this gap gets whichever of the three is nearest, 0 V if two are.
     """
+
+    figure = "plot_compensation"
 
     name: str
     """Name of the drive."""
@@ -190,14 +200,23 @@ class InverseMap:
     def to_toml(self, path: str | Path) -> None:
         """Write the map for a controller; `from_toml` gives an equal one back.
 
-        Raises
-        ------
-        FileError
-            If the file cannot be written; an older file of that name then stays as it was.
+        If the file cannot be written (`FileError`), an older one of that name stays as it was.
         """
-        from swashplate.tables import write_text
+        from tomlkit import dumps
 
-        write_text(dump_map(self), path)
+        content = {
+            "format": 1,
+            "drive": self.name,
+            "speed_unit": "rad/s",
+            "voltage_unit": "V",
+            "acceleration": list(self.acceleration),
+            "lag": self.lag,
+            "error": self.error,
+            "minus": {name: each.tolist() for name, each in self.minus._asdict().items()},
+            "rest": {"speed": self.creep},
+            "plus": {name: each.tolist() for name, each in self.plus._asdict().items()},
+        }
+        write_text(COMMENTS + dumps(content), path)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> InverseMap:
@@ -210,7 +229,12 @@ class InverseMap:
         ParameterError
             If an entry is wrong; the sentence names it.
         """
-        return load_map(path)
+        read = validated(parse_toml(read_text(path), str(path)), MapFile, str(path))
+        minus, plus = (
+            Branch(np.array(each.speed), np.array(each.voltage)) for each in (read.minus, read.plus)
+        )
+        up, down = read.acceleration
+        return cls(read.drive, minus, plus, read.rest.speed, (up, down), read.lag, read.error)
 
     def write(self, path: str | Path) -> None:
         """Write the map as .toml, or the table of `to_polars` as .csv or .parquet.
@@ -220,17 +244,14 @@ class InverseMap:
         FileError
             For another ending or a place that cannot be written.
         """
-        from swashplate.tables import write_table
-
-        suffix = Path(path).suffix.lower()
-        if suffix == ".toml":
+        if ending(path, INVERSE_MAP) == ".toml":
             self.to_toml(path)
-        elif suffix in (".csv", ".parquet", ".pq"):
-            write_table(self.to_polars(), path)
         else:
-            raise FileError(
-                f"{path} ends in '{suffix}'; an inverse map is written as .toml, .csv or .parquet."
-            )
+            write_table(self.to_polars(), path)
+
+    def tables(self) -> list[Table]:
+        """The map, at a few points each way, and between which limits it holds."""
+        return [map_table(self), map_limits_table(self)]
 
 
 def _finite(speed: ArrayLike) -> Array:
@@ -243,13 +264,8 @@ def _finite(speed: ArrayLike) -> Array:
     return wanted
 
 
-# --- compensation ---------------------------------------------------------------------------------
+# --- of a drive -----------------------------------------------------------------------------------
 
-
-__all__ = ["Branch", "InverseMap", "inverse_map"]
-
-FEWEST, MOST = 2, 10_001
-"""Points each way."""
 LAG_FREQUENCY = 1e-4
 """Frequency at which the lag of small motions is read, far below all of a drive's own. [Hz]"""
 
@@ -340,14 +356,7 @@ def _lag(drive: Drive, plus: Branch, minus: Branch) -> float:
     return 0.5 * sum(lags)
 
 
-# --- compensation file ----------------------------------------------------------------------------
-
-
-COMMENTS = (
-    "swashplate inverse steady-state map: the voltage for a wanted speed; SI units",
-    "plus and minus: straight lines between the points; beyond their ends hold the end",
-    "between minus and plus: the nearest of minus' last point, rest and plus' first point",
-)
+# --- its file -------------------------------------------------------------------------------------
 
 
 def _rising(values: list[float]) -> list[float]:
@@ -415,48 +424,7 @@ class MapFile(BaseModel):
         return self
 
 
-def dump_map(inverse: InverseMap) -> str:
-    """An inverse map as TOML text; every number comes back to the last bit."""
-    from tomlkit import comment, document, dumps, item, table
-
-    text = document()
-    for line in COMMENTS:
-        text.add(comment(line))
-    text.add("format", item(1))
-    text.add("drive", item(inverse.name))
-    text.add("speed_unit", item("rad/s"))
-    text.add("voltage_unit", item("V"))
-    text.add("acceleration", item(list(inverse.acceleration)))
-    text.add("lag", item(inverse.lag))
-    text.add("error", item(inverse.error))
-    for name, branch in (("minus", inverse.minus), ("rest", None), ("plus", inverse.plus)):
-        part = table()
-        if branch is None:
-            part.add("speed", item(inverse.creep))
-        else:
-            part.add("speed", item(branch.speed.tolist()))
-            part.add("voltage", item(branch.voltage.tolist()))
-        text.add(name, part)
-    return dumps(text)
-
-
-def load_map(path: str | Path) -> InverseMap:
-    """An inverse map from a TOML file; see `InverseMap.from_toml`."""
-    content = validated(parse_toml(read_text(path), str(path)), MapFile, str(path))
-    minus, plus = (
-        Branch(np.array(each.speed), np.array(each.voltage))
-        for each in (content.minus, content.plus)
-    )
-    plus_acceleration, minus_acceleration = content.acceleration
-    return InverseMap(
-        content.drive,
-        minus,
-        plus,
-        content.rest.speed,
-        (plus_acceleration, minus_acceleration),
-        content.lag,
-        content.error,
-    )
+# --- tables ---------------------------------------------------------------------------------------
 
 
 def wanted_table(found: InverseMap, speeds: Sequence[float]) -> Table:

@@ -1,4 +1,4 @@
-"""Outcomes of a command: what a drive made of it, one number each, for one drive or many."""
+"""Outcomes of a command: what a drive made of it, for one drive, two or many."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property, partial
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,29 +17,30 @@ from swashplate.equations.marching.lanes import LANES
 from swashplate.errors import InputError
 from swashplate.executors import Serial, available_cores
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result
+from swashplate.simulation.result import Limit
+from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import DisplayUnit, display_unit
 
-# --- trial ----------------------------------------------------------------------------------------
-
+if TYPE_CHECKING:
+    from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
 
-REST = 0.5
-"""A command that rests at 0 V this long lets the drive settle at its creep. [s]"""
-STOPPED = 1.0 - 1e-9
-"""Part of the speed limit from which the plate counts as at its stop."""
+REST = 0.5  # A command that rests at 0 V this long lets the drive settle at its creep. [s]
+STOPPED = 1.0 - 1e-9  # Part of the speed limit from which the plate counts as at its stop.
+REACHED = 0.9  # Part of the settled speed that counts as reached.
+
+# --- a command to judge drives by -----------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class Trial(Result):
     """A command, and the speed that a perfect drive would make of it. Make it with `trial`."""
 
-    voltage: Array
-    """(n,) [V]"""
-    rate: float
-    """Samples a second. [Hz]"""
-    wanted: Array
-    """(n,) speed of the shaft. [rad/s]"""
+    voltage: Array  # (n,) [V]
+    rate: float  # Samples a second. [Hz]
+    wanted: Array  # (n,) speed of the shaft. [rad/s]
 
     @property
     def time(self) -> Array:
@@ -49,7 +50,7 @@ class Trial:
     @cached_property
     def begin(self) -> int:
         """Sample from which on the command leaves its first value: the last one before it."""
-        return max(int(np.argmax(self.voltage != self.voltage[0])) - 1, 0)
+        return first_move(self.voltage)
 
     @cached_property
     def held(self) -> int:
@@ -63,12 +64,13 @@ class Trial:
         return bool(self.voltage[0] == 0.0 and self.begin >= REST * self.rate)
 
 
+def first_move(voltage: Array) -> int:
+    """Last sample before a command leaves its first value, 0 where it never does."""
+    return max(int(np.argmax(voltage != voltage[0])) - 1, 0)
+
+
 def trial(
-    drive: Drive,
-    voltage: ArrayLike,
-    rate: float = 512.0,
-    *,
-    wanted: ArrayLike | None = None,
+    drive: Drive, voltage: ArrayLike, rate: float = 512.0, *, wanted: ArrayLike | None = None
 ) -> Trial:
     """A command to judge drives by.
 
@@ -95,43 +97,23 @@ def trial(
         raise InputError("A command needs two samples or more, in one row, within ±10 V.")
     if (volts == volts[0]).all():
         raise InputError(f"The command stays at {volts[0]:g} V; to judge a drive it has to change.")
-    if wanted is None:
-        speed = proportional_speed(drive, volts)
-    else:
-        speed = np.array(wanted, dtype=np.float64)
-        if speed.shape != volts.shape or not np.isfinite(speed).all():
-            raise InputError(
-                f"The wanted speed must be {volts.size} finite numbers, one a sample of the "
-                "command."
-            )
+    speed = proportional_speed(drive, volts) if wanted is None else np.array(wanted, dtype=float)
+    if speed.shape != volts.shape or not np.isfinite(speed).all():
+        raise InputError(
+            f"The wanted speed must be {volts.size} finite numbers, one a sample of the command."
+        )
     return Trial(volts, float(rate), speed)
 
 
 def proportional_speed(drive: Drive, voltage: ArrayLike) -> Array:
-    """Speed in proportion to the command, each way at the drive's own ratio. [rad/s]
-
-    Parameters
-    ----------
-    drive : Drive
-        Its speed limit by the voltage that first reaches it is the ratio, beyond the limit, too.
-    voltage : (n,) array_like
-        Command. [V]
-    """
+    """Speed in proportion to a command (n,) [V], each way by `speed_per_volt`. [rad/s]"""
     volts = np.asarray(voltage, dtype=np.float64)
     plus, minus = speed_per_volt(drive, 1.0), speed_per_volt(drive, -1.0)
     return np.where(volts >= 0.0, plus, minus) * volts
 
 
 def speed_per_volt(drive: Drive, sign: float) -> float:
-    """Speed limit by the voltage that first reaches it. [(rad/s)/V]
-
-    Parameters
-    ----------
-    drive : Drive
-        The drive.
-    sign : float
-        Positive or negative direction.
-    """
+    """Speed limit of a direction by the voltage that first reaches it. [(rad/s)/V]"""
     low, high = 0.0, FULL_VOLTAGE
     limit = abs(drive.steady_speed(float(np.copysign(FULL_VOLTAGE, sign))))
     for _ in range(4):  # each pass narrows the place a hundredfold
@@ -146,22 +128,20 @@ def speed_per_volt(drive: Drive, sign: float) -> float:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(Result):
     """One number that says what a drive made of a command."""
 
     name: str
     unit: str
     meaning: str
-    undefined: str
-    """Why there may be none, as a half sentence."""
     compute: Callable[[Array, Trial], Array]
+    """From (m, n) speeds [rad/s] and the command to (m,) numbers, NaN where there is none."""
+    undefined: str = ""  # Why there may be none, as a half sentence.
 
     @property
     def words(self) -> str:
         """Its name as words."""
         return self.name.replace("_", " ")
-
-    """From (m, n) speeds [rad/s] and the command to (m,) numbers, NaN where there is none."""
 
 
 def outcome_unit(outcome: Outcome) -> DisplayUnit:
@@ -170,64 +150,22 @@ def outcome_unit(outcome: Outcome) -> DisplayUnit:
 
 
 def outcome_matrix(speed: Array, trial: Trial, outcomes: Sequence[Outcome]) -> Array:
-    """Outcomes of some drives.
-
-    Parameters
-    ----------
-    speed : (m, n) array
-        Of the shaft under the trial's command, one drive a row. [rad/s]
-    trial : Trial
-        The command.
-    outcomes : sequence of Outcome
-        K of them.
-
-    Returns
-    -------
-    (m, K) array
-        In the outcomes' units; NaN where there is none; `Outcome.undefined` says why.
-    """
+    """(m, K) outcomes, in their units, of (m, n) speeds [rad/s]; NaN where there is none."""
     return np.column_stack([each.compute(speed, trial) for each in outcomes])
 
 
 def find_outcomes(names: Sequence[str]) -> tuple[Outcome, ...]:
-    """Outcomes by name.
-
-    Raises
-    ------
-    InputError
-        If there is none of a name, or none is named.
-    """
+    """Outcomes by name; an unknown name, or none at all, is refused in an `InputError`."""
     if not names:
         raise InputError(f"Name at least one outcome: {', '.join(OUTCOMES)}.")
-    return tuple(_find(name) for name in dict.fromkeys(names))
-
-
-def _find(name: str) -> Outcome:
-    if name not in OUTCOMES:
-        close = get_close_matches(name, OUTCOMES, n=1)
-        hint = f" (did you mean {close[0]}?)" if close else ""
-        raise InputError(
-            f"There is no outcome '{name}'{hint}; the outcomes are {', '.join(OUTCOMES)}."
-        )
-    return OUTCOMES[name]
-
-
-def _final_speed(speed: Array, trial: Trial) -> Array:
-    return np.array(speed[:, trial.held])
-
-
-def _peak_speed(speed: Array, trial: Trial) -> Array:
-    peak: Array = np.maximum(speed.max(axis=1), -speed.min(axis=1))
-    return peak
-
-
-def _rise_time(speed: Array, trial: Trial) -> Array:
-    late, early = _reached(speed, trial, 0.9), _reached(speed, trial, 0.1)
-    return late - early
-
-
-def _response_time(speed: Array, trial: Trial) -> Array:
-    return _reached(speed, trial, 0.9)
+    for name in names:
+        if name not in OUTCOMES:
+            close = get_close_matches(name, OUTCOMES, n=1)
+            hint = f" (did you mean {close[0]}?)" if close else ""
+            raise InputError(
+                f"There is no outcome '{name}'{hint}; the outcomes are {', '.join(OUTCOMES)}."
+            )
+    return tuple(OUTCOMES[name] for name in dict.fromkeys(names))
 
 
 def _reached(speed: Array, trial: Trial, part: float) -> Array:
@@ -246,155 +184,97 @@ def _reached(speed: Array, trial: Trial, part: float) -> Array:
 
 def _largest_acceleration(speed: Array, trial: Trial) -> Array:
     change = np.diff(speed, axis=1)
-    largest: Array = np.maximum(change.max(axis=1), -change.min(axis=1)) * trial.rate
-    return largest
+    return np.asarray(np.maximum(change.max(axis=1), -change.min(axis=1)) * trial.rate)
 
 
 def _overshoot(speed: Array, trial: Trial) -> Array:
     rising = speed[:, trial.begin : trial.held + 1]
     final = rising[:, -1]
-    peak = np.where(final > 0.0, rising.max(axis=1), -rising.min(axis=1))
-    size = np.abs(final)
-    beyond: Array = np.where(size > 0.0, peak / np.where(size > 0.0, size, 1.0) - 1.0, np.nan)
-    return beyond
+    peak, size = np.where(final > 0.0, rising.max(axis=1), -rising.min(axis=1)), np.abs(final)
+    return np.where(size > 0.0, peak / np.where(size > 0.0, size, 1.0) - 1.0, np.nan)
 
 
 def _tracking_error(speed: Array, trial: Trial) -> Array:
     error = speed - trial.wanted
-    rms: Array = np.sqrt(np.einsum("ij,ij->i", error, error) / error.shape[1])
-    return rms
-
-
-def _creep(speed: Array, trial: Trial) -> Array:
-    if not trial.rests:
-        return np.full(len(speed), np.nan)
-    return np.array(speed[:, trial.begin])
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", error, error) / error.shape[1]))
 
 
 def _travel(speed: Array, trial: Trial) -> Array:
     inner = speed.sum(axis=1) - 0.5 * (speed[:, 0] + speed[:, -1])
-    travel: Array = inner / trial.rate
-    return travel
+    return np.asarray(inner / trial.rate)
 
 
 _NEVER = "the shaft stands still while the command is at its largest"
 _ALL = (
     Outcome(
-        "final_speed",
-        "rad/s",
+        *("final_speed", "rad/s"),
         "Speed at the last moment at which the command is at its largest.",
-        "",
-        _final_speed,
+        lambda speed, trial: np.array(speed[:, trial.held]),
     ),
-    Outcome("peak_speed", "rad/s", "Largest speed, either way.", "", _peak_speed),
     Outcome(
-        "rise_time",
-        "s",
-        "Time from 10 % to 90 % of the final speed.",
+        *("peak_speed", "rad/s", "Largest speed, either way."),
+        lambda speed, trial: np.asarray(np.maximum(speed.max(axis=1), -speed.min(axis=1))),
+    ),
+    Outcome(
+        *("rise_time", "s", "Time from 10 % to 90 % of the final speed."),
+        lambda speed, trial: _reached(speed, trial, 0.9) - _reached(speed, trial, 0.1),
         _NEVER,
-        _rise_time,
     ),
     Outcome(
-        "response_time",
-        "s",
-        "Time from the command's first move to 90 % of the final speed.",
+        *("response_time", "s", "Time from the command's first move to 90 % of the final speed."),
+        partial(_reached, part=0.9),
         _NEVER,
-        _response_time,
     ),
     Outcome(
-        "largest_acceleration",
-        "rad/s^2",
+        *("largest_acceleration", "rad/s^2"),
         "Largest change of speed from sample to sample, either way.",
-        "",
         _largest_acceleration,
     ),
     Outcome(
-        "overshoot",
-        "1",
-        "How far the speed goes beyond the final one, as a part of it.",
-        _NEVER,
+        *("overshoot", "1", "How far the speed goes beyond the final one, as a part of it."),
         _overshoot,
+        _NEVER,
     ),
     Outcome(
-        "tracking_error",
-        "rad/s",
+        *("tracking_error", "rad/s"),
         "Root of the mean squared difference from the wanted speed.",
-        "",
         _tracking_error,
     ),
     Outcome(
-        "creep",
-        "rad/s",
-        "Speed just before the command first leaves zero.",
+        *("creep", "rad/s", "Speed just before the command first leaves zero."),
+        lambda speed, trial: (
+            np.array(speed[:, trial.begin]) if trial.rests else np.full(len(speed), np.nan)
+        ),
         "the command does not rest at 0 V long enough at its start",
-        _creep,
     ),
-    Outcome("travel", "rad", "How far the shaft has gone at the end.", "", _travel),
+    Outcome("travel", "rad", "How far the shaft has gone at the end.", _travel),
 )
 
-OUTCOMES: Mapping[str, Outcome] = {each.name: each for each in _ALL}
-"""Outcomes by name."""
+OUTCOMES: Mapping[str, Outcome] = {each.name: each for each in _ALL}  # Outcomes by name.
 
 
-# --- performance ----------------------------------------------------------------------------------
-
+# --- what a drive can do --------------------------------------------------------------------------
 
 Direction = Literal["both", "positive", "negative"]
-
 SIGNS: Mapping[Direction, tuple[float, ...]] = {
     "both": (1.0, -1.0),
     "positive": (1.0,),
     "negative": (-1.0,),
 }
-STEP_LENGTH = 2.0
-"""Of the full step that shows the largest acceleration. [s]"""
-STEP_RATE = 512.0
+STEP_LENGTH, STEP_RATE = 2.0, 512.0  # Of the full step that shows the largest acceleration. [s, Hz]
 
 
 class Performance(NamedTuple):
     """What a drive can do; of two directions the worse one."""
 
-    speed: float
-    """That the largest command settles at. [rad/s]"""
-    acceleration: float
-    """Largest one after a full step from rest. [rad/s²]"""
+    speed: float  # That the largest command settles at. [rad/s]
+    acceleration: float  # Largest one after a full step from rest. [rad/s²]
     tracking_error: float | None
     """RMS difference from the wanted speed, None where none is wanted. [rad/s]"""
 
 
-@dataclass(frozen=True, eq=False)
-class Wanted:
-    """A speed to follow. Make it with `wanted`, which checks."""
-
-    speed: Array
-    """(n,) [rad/s]"""
-    rate: float
-    """Samples a second. [Hz]"""
-
-
-def wanted(speed: ArrayLike, rate: float = 512.0) -> Wanted:
-    """A speed to follow.
-
-    Parameters
-    ----------
-    speed : (n,) array_like
-        [rad/s]
-    rate : float
-        Samples a second. [Hz]
-
-    Raises
-    ------
-    InputError
-        If it is no row of two finite numbers or more.
-    """
-    profile = np.array(speed, dtype=np.float64)
-    if profile.ndim != 1 or profile.size < 2 or not np.isfinite(profile).all():
-        raise InputError("The wanted speed must be two finite numbers or more, in one row.")
-    return Wanted(profile, float(rate))
-
-
 def performance(
-    drive: Drive, follow: Wanted | None = None, *, direction: Direction = "both"
+    drive: Drive, follow: Trial | None = None, *, direction: Direction = "both"
 ) -> Performance:
     """What a drive can do.
 
@@ -402,9 +282,9 @@ def performance(
     ----------
     drive : Drive
         From rest.
-    follow : Wanted, optional
-        A speed to follow. The command is in proportion to it, by the drive's own ratio (see
-        `trial.speed_per_volt`), and ends at ±10 V: a larger pump is given less voltage.
+    follow : Trial, optional
+        Its wanted speed is to be followed. The command is in proportion to it, by the drive's own
+        ratio (see `speed_per_volt`), and ends at ±10 V: a larger pump is given less voltage.
     direction : {"both", "positive", "negative"}
         Which speed and acceleration count.
 
@@ -419,18 +299,15 @@ def performance(
     error = None
     if follow is not None:
         run = drive.simulate(command_for(drive, follow), follow.rate)
-        error = float(np.sqrt(np.mean((run.shaft_speed - follow.speed) ** 2)))
+        error = rms_difference(run.shaft_speed, follow.wanted)
     return Performance(float(speed), acceleration, error)
 
 
-def command_for(drive: Drive, follow: Wanted) -> Array:
+def command_for(drive: Drive, follow: Trial) -> Array:
     """Voltage in proportion to a wanted speed, by the drive's own ratio, within ±10 V. [V]"""
-    ratio = np.where(
-        follow.speed >= 0.0,
-        max(speed_per_volt(drive, 1.0), 1e-300),
-        max(speed_per_volt(drive, -1.0), 1e-300),
-    )
-    return np.clip(follow.speed / ratio, -FULL_VOLTAGE, FULL_VOLTAGE)
+    plus, minus = (max(speed_per_volt(drive, sign), 1e-300) for sign in (1.0, -1.0))
+    volts = follow.wanted / np.where(follow.wanted >= 0.0, plus, minus)
+    return np.clip(volts, -FULL_VOLTAGE, FULL_VOLTAGE)
 
 
 def _acceleration(drive: Drive, sign: float) -> float:
@@ -441,28 +318,35 @@ def _acceleration(drive: Drive, sign: float) -> float:
     return float((sign * change).max() * STEP_RATE)
 
 
-# --- outcome batch --------------------------------------------------------------------------------
+def rms_difference(speed: Array, other: Array) -> float:
+    """Root of the mean squared difference of two speeds, (n,) each. [rad/s]"""
+    return float(np.sqrt(np.mean((speed - other) ** 2)))
 
+
+# --- many drives at once --------------------------------------------------------------------------
 
 SAMPLES_AT_ONCE = 2**20
 """Samples of speed that a block of drives holds: 8 MB, whatever the number of drives."""
 
 
 @dataclass(frozen=True, eq=False)
-class BatchOutcomes:
+class BatchOutcomes(Result):
     """Outcomes of many drives over one command."""
 
     outcomes: tuple[Outcome, ...]
     values: Array
     """(m, K); NaN where a drive has no such outcome, and in all of a drive that failed."""
-    failures: Mapping[int, str]
-    """Why a drive could not be simulated, by its number."""
+    failures: Mapping[int, str]  # Why a drive could not be simulated, by its number.
 
-    def undefined(self, number: int) -> int:
-        """How many of the drives that ran have no such outcome."""
-        failed = np.zeros(len(self.values), dtype=bool)
-        failed[list(self.failures)] = True
-        return int((np.isnan(self.values[:, number]) & ~failed).sum())
+    def sentences(self) -> Iterator[str]:
+        """What some of the drives that ran have not, and why."""
+        missing = np.isnan(np.delete(self.values, list(self.failures), axis=0)).sum(axis=0)
+        for each, number in zip(self.outcomes, missing, strict=True):
+            if number:
+                yield (
+                    f"{number} of {len(self.values)} variants have no {each.name}: "
+                    f"{each.undefined}."
+                )
 
 
 def batch_outcomes(
@@ -520,11 +404,87 @@ def batch_outcomes(
     )
 
 
-def undefined_sentences(found: BatchOutcomes) -> Iterator[str]:
-    """What some of the drives have not, and why."""
-    for number, each in enumerate(found.outcomes):
-        missing = found.undefined(number)
-        if missing:
-            yield (
-                f"{missing} of {len(found.values)} variants have no {each.name}: {each.undefined}."
-            )
+# --- runs in words --------------------------------------------------------------------------------
+
+
+def time_share(run: Simulation, limit: Limit) -> float:
+    """Share of a record's samples at which a limit acts, 0 to 1.
+
+    Of the dead zone only samples with a command other than 0 count: at rest nothing is asked that
+    it could hold back.
+    """
+    acts = run.active(limit)
+    if limit == Limit.DEAD_ZONE:
+        command = run.current if run.voltage is None else run.voltage
+        acts = acts & (command != 0.0)
+    return float(acts.mean())
+
+
+def _time_shares(run: Simulation) -> dict[str, float]:
+    return {str(limit.name).lower().replace("_", " "): time_share(run, limit) for limit in Limit}
+
+
+def peaks(signal: Array) -> tuple[float, float]:
+    """Largest values either way of a signal, in its unit; zero where there is none."""
+    return max(float(signal.max()), 0.0), min(float(signal.min()), 0.0)
+
+
+def time_to_reach(run: Simulation, settled_speed: float) -> float | None:
+    """Time [s] from the command's first move to 90 % of a speed [rad/s], None if never reached."""
+    begin = first_move(_voltage(run))
+    reached = run.shaft_speed[begin:] * np.sign(settled_speed) >= REACHED * abs(settled_speed)
+    if settled_speed == 0.0 or not reached.any():
+        return None
+    return float(run.time[begin + np.argmax(reached)] - run.time[begin])
+
+
+def _voltage(run: Simulation) -> Array:
+    assert run.voltage is not None  # runs by voltage only
+    return run.voltage
+
+
+def run_tables(run: Simulation) -> tuple[Table, Table]:
+    """What a drive did under a command, and how long each of its limits held it back."""
+    did = Table("", (Column("Shaft"), Column("", "z.2f"), UNIT))
+    position, ways = float(run.shaft_position[-1]), ("positive", "negative")
+    for way, speed in zip(ways, peaks(run.shaft_speed), strict=True):
+        did.add(f"peak speed, {way}", speed, unit="rad/s")
+    did.add("speed at the end", float(run.shaft_speed[-1]), unit="rad/s")
+    did.add("position at the end", position, unit="rad", spec="z.1f")
+    did.add("", position / (2.0 * np.pi), unit="turns", spec="z.3f")
+    for way, current in zip(ways, peaks(run.current), strict=True):
+        section = way == "positive"
+        did.add(f"peak current, {way}", current, unit="A", spec="z.4f", section=section)
+    held = Table("", (Column("Limit"), Column("share of time", ".1%")))
+    for limit, share in _time_shares(run).items():
+        held.add(limit, share or Cell(0.0, "never"))
+    return did, held
+
+
+def side_by_side(drives: Mapping[str, Drive], runs: Mapping[str, Simulation]) -> Table:
+    """Two drives or more under the same command: peaks, settled speed and the time to reach it."""
+    voltage = _voltage(next(iter(runs.values())))
+    volts = float(voltage[np.argmax(np.abs(voltage))])
+    positive, negative = zip(*(peaks(run.shaft_speed) for run in runs.values()), strict=True)
+    settled = [float(drive.steady_speed(volts)) for drive in drives.values()]
+    times = [time_to_reach(run, each) for run, each in zip(runs.values(), settled, strict=True)]
+    columns = [Column(label, "z.2f", none="never") for label in runs]
+    made = Table("", (Column(""), *columns, UNIT))
+    made.add("peak speed, positive", *positive, unit="rad/s")
+    made.add("peak speed, negative", *negative, unit="rad/s")
+    made.add(f"settled speed at {volts:g} V", *settled, unit="rad/s")
+    made.add("time to 90 % of it", *times, unit="s", spec=".3f")
+    return made
+
+
+def overview_table(runs: Mapping[str, Mapping[str, Simulation]]) -> Table:
+    """Peak speeds of many runs and the limits that they meet, by axis and manoeuvre."""
+    speed = ("z.2f", "rad/s")
+    words = Column("axis"), Column("manoeuvre"), Column("samples", "d")
+    limits = Column("limits met", wrap=True)
+    made = Table("Peak speeds", (*words, Column("plus", *speed), Column("minus", *speed), limits))
+    for axis, by_name in runs.items():
+        for number, (name, run) in enumerate(by_name.items()):
+            met = ", ".join(limit for limit, share in _time_shares(run).items() if share)
+            made.add(axis, name, run.time.size, *peaks(run.shaft_speed), met, section=number == 0)
+    return made

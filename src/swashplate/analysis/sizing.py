@@ -10,27 +10,24 @@ from math import ceil, copysign
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.analysis.outcomes import Direction, Performance, Wanted, performance
-from swashplate.analysis.whatif import find_lever, pulled
+from swashplate.analysis.outcomes import Direction, Performance, Trial, performance
+from swashplate.analysis.whatif import Range, check_ranges, pulled
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.results import Result
 from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import display_unit
-
-# --- search ---------------------------------------------------------------------------------------
-
 
 Array = NDArray[np.float64]
 Slack = Callable[[Array], Array]
 """From (L,) factors to (r,) slacks, all 0 or more where the factors satisfy."""
 
-SCANNED = 5
-"""ln₂ of the points of a Sobol sequence that are tried besides the corners."""
+# --- search ---------------------------------------------------------------------------------------
+
+SCANNED = 5  # ln₂ of the points of a Sobol sequence that are tried besides the corners.
 MOST_CORNERS = 64
-FINEST = 1e-9
-"""Part of the way to which an end is bisected."""
-ALONG = 33
-"""Points along a single factor's range."""
+FINEST = 1e-9  # Part of the way to which an end is bisected.
+ALONG = 33  # Points along a single factor's range.
 
 
 def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
@@ -58,10 +55,9 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
     if _met(slack, unchanged):
         return unchanged
     points = [unchanged, *_scan(low, high)]
-    singles = [smallest_alone(slack, low, high, k) for k in range(low.size)]
-    for k, factor in enumerate(singles):
-        if factor is not None:
-            points.append(_with(unchanged, k, factor))
+    for k in range(low.size):
+        factor = smallest_alone(slack, low, high, k)
+        points += [] if factor is None else [_with(unchanged, k, factor)]
     best = max(points, key=lambda point: float(slack(point).min()))
     if not _met(slack, best):
         best = _most_nearly(slack, best, low, high)
@@ -70,8 +66,12 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
     good = sorted((point for point in [*points, best] if _met(slack, point)), key=_change)
     found = [_drawn_in(slack, each) for each in good[:2]]
     for start in list(found):
-        moved = _constrained(slack, start, low, high)
-        for each in (moved, start + 1.0001 * (moved - start), _beyond(moved, low, high)):
+        moved = _minimised(
+            *(slack, low, high, start, _change, lambda x: 2.0 * (x - 1.0)), tolerance=1e-10
+        )
+        # SLSQP may have stopped on the wrong side: a little farther from 1
+        beyond = np.clip(1.0 + 1.001 * (moved - 1.0), low, high)
+        for each in (moved, start + 1.0001 * (moved - start), beyond):
             if _met(slack, each):
                 found.append(_drawn_in(slack, each))
                 break
@@ -79,15 +79,7 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
 
 
 def smallest_alone(slack: Slack, low: Array, high: Array, index: int) -> float | None:
-    """The factor nearest to 1 that satisfies by itself, None if none does.
-
-    Parameters
-    ----------
-    slack, low, high :
-        As of `smallest_change`.
-    index : int
-        Which factor; the others are 1.
-    """
+    """The factor nearest to 1 that satisfies by itself, the others being 1; None if none does."""
     unchanged = np.ones(low.size)
     if _met(slack, unchanged):
         return 1.0
@@ -95,10 +87,9 @@ def smallest_alone(slack: Slack, low: Array, high: Array, index: int) -> float |
     for end in (float(low[index]), float(high[index])):
         before = 1.0
         for factor in np.linspace(1.0, end, ALONG)[1:] if end != 1.0 else ():
-            if _met(slack, _with(unchanged, index, factor)):
-                base = _with(unchanged, index, before)
-                goal = _with(unchanged, index, factor)
-                ends.append(float(_bisected(slack, base, goal)[index]))
+            goal = _with(unchanged, index, factor)
+            if _met(slack, goal):
+                ends.append(float(_bisected(slack, _with(unchanged, index, before), goal)[index]))
                 break
             before = float(factor)
     return min(ends, key=lambda factor: abs(factor - 1.0), default=None)
@@ -113,39 +104,41 @@ def _scan(low: Array, high: Array) -> list[Array]:
     return [low + point * (high - low) for point in points]
 
 
-def _most_nearly(slack: Slack, start: Array, low: Array, high: Array) -> Array:
-    """The point whose worst slack is largest, by raising a level below all slacks."""
+def _minimised(
+    slack: Slack,
+    low: Array,
+    high: Array,
+    start: Array,
+    cost: Callable[[Array], float],
+    slope: Callable[[Array], Array] | None,
+    *,
+    tolerance: float,
+) -> Array:
+    """What SLSQP finds within the box; a number behind the factors is a level below all slacks."""
     from scipy.optimize import minimize
 
+    size = low.size
     found = minimize(
-        lambda x: -x[-1],
-        [*start, float(slack(start).min())],
+        cost,
+        start,
+        jac=slope,
         method="SLSQP",
-        bounds=[*zip(low, high, strict=True), (None, None)],
+        bounds=[*zip(low, high, strict=True), *[(None, None)] * (len(start) - size)],
         constraints={
             "type": "ineq",
-            "fun": lambda x: slack(np.clip(x[:-1], low, high)) - x[-1],
+            "fun": lambda x: slack(np.clip(x[:size], low, high)) - x[size:].sum(),
         },
-        options={"maxiter": 60, "ftol": 1e-8, "eps": 1e-5},
+        options={"maxiter": 60, "ftol": tolerance, "eps": 1e-5},
     )
-    point: Array = np.clip(found.x[:-1], low, high)
-    return max((start, point), key=lambda each: float(slack(each).min()))
-
-
-def _constrained(slack: Slack, start: Array, low: Array, high: Array) -> Array:
-    from scipy.optimize import minimize
-
-    found = minimize(
-        lambda x: float(np.sum((x - 1.0) ** 2)),
-        start,
-        jac=lambda x: 2.0 * (x - 1.0),
-        method="SLSQP",
-        bounds=list(zip(low, high, strict=True)),
-        constraints={"type": "ineq", "fun": lambda x: slack(np.clip(x, low, high))},
-        options={"maxiter": 60, "ftol": 1e-10, "eps": 1e-5},
-    )
-    point: Array = np.clip(found.x, low, high)
+    point: Array = np.clip(found.x[:size], low, high)
     return point
+
+
+def _most_nearly(slack: Slack, start: Array, low: Array, high: Array) -> Array:
+    """The point whose worst slack is largest, by raising a level below all slacks."""
+    level = np.array([*start, float(slack(start).min())])
+    point = _minimised(slack, low, high, level, lambda x: -x[-1], None, tolerance=1e-8)
+    return max((start, point), key=lambda each: float(slack(each).min()))
 
 
 def _drawn_in(slack: Slack, point: Array) -> Array:
@@ -169,11 +162,6 @@ def _bisected(slack: Slack, bad: Array, good: Array) -> Array:
     return good if high == 1.0 else bad + high * (good - bad)
 
 
-def _beyond(point: Array, low: Array, high: Array) -> Array:
-    """A little farther from 1, where SLSQP has stopped on the wrong side."""
-    return np.asarray(np.clip(1.0 + 1.001 * (point - 1.0), low, high))
-
-
 def _with(point: Array, index: int, factor: float) -> Array:
     moved = point.copy()
     moved[index] = factor
@@ -190,15 +178,17 @@ def _change(point: Array) -> float:
 
 # --- sizing ---------------------------------------------------------------------------------------
 
-
-Range = tuple[float, float]
-
-WIDEST: Range = (0.5, 2.0)
-"""Factors that a lever may take unless others are given."""
+WIDEST: Range = (0.5, 2.0)  # Factors that a lever may take unless others are given.
+REQUIRED = {
+    "speed": ("a speed of", "rad/s", ">="),
+    "acceleration": ("an acceleration of", "rad/s^2", ">="),
+    "tracking_error": ("a tracking error of", "rad/s", "<="),
+}
+"""What can be required: in words, its unit, and how it is compared."""
 
 
 @dataclass(frozen=True)
-class Requirements:
+class Requirements(Result):
     """What is required; None is not."""
 
     speed: float | None = None
@@ -211,38 +201,37 @@ class Requirements:
     """In which directions speed and acceleration are required."""
 
     def __post_init__(self) -> None:
-        given = {name: getattr(self, name) for name in ("speed", "acceleration", "tracking_error")}
-        if all(value is None for value in given.values()):
+        if not self.given:
             raise InputError(
                 "Require at least one of a speed, an acceleration and a tracking error."
             )
-        for name, value in given.items():
-            if value is not None and not (np.isfinite(value) and value > 0.0):
+        for name, value in self.given.items():
+            if not (np.isfinite(value) and value > 0.0):
                 raise InputError(
                     f"The required {name.replace('_', ' ')} is {value:g}, but must be positive."
                 )
 
+    @property
+    def given(self) -> dict[str, float]:
+        """What is required by name, SI."""
+        values = {name: getattr(self, name) for name in REQUIRED}
+        return {name: value for name, value in values.items() if value is not None}
+
     def slacks(self, found: Performance) -> dict[str, float]:
         """By how much each requirement is met: ln of the ratio, negative where it is not. [1]"""
-        made = {}
-        if self.speed is not None:
-            made["speed"] = _ratio(found.speed, self.speed)
-        if self.acceleration is not None:
-            made["acceleration"] = _ratio(found.acceleration, self.acceleration)
-        if self.tracking_error is not None:
-            assert found.tracking_error is not None
-            made["tracking_error"] = -_ratio(found.tracking_error, self.tracking_error)
-        return made
+        return {
+            name: (1.0 if REQUIRED[name][2] == ">=" else -1.0)
+            * float(np.log(max(getattr(found, name), 1e-300) / value))
+            for name, value in self.given.items()
+        }
 
 
 @dataclass(frozen=True, eq=False)
-class Sizing:
+class Sizing(Result):
     """The smallest change that meets the requirements."""
 
-    factors: Mapping[str, float]
-    """By lever; 1 leaves it alone."""
-    drive: Drive
-    """The changed drive."""
+    factors: Mapping[str, float]  # By lever; 1 leaves it alone.
+    drive: Drive  # The changed drive.
     before: Performance
     after: Performance
     alone: Mapping[str, float | None]
@@ -253,13 +242,17 @@ class Sizing:
         """Root of the summed squares of (factor - 1). [1]"""
         return float(np.sqrt(sum((factor - 1.0) ** 2 for factor in self.factors.values())))
 
+    def table(self) -> Table:
+        """How far each lever moves, and how far it would have to by itself."""
+        return levers_table(self)
+
 
 def size(
     drive: Drive,
     requirements: Requirements,
     ranges: Mapping[str, Range],
     *,
-    follow: Wanted | None = None,
+    follow: Trial | None = None,
 ) -> Sizing:
     """Find the smallest change of the levers that meets the requirements.
 
@@ -271,8 +264,8 @@ def size(
         What it shall do.
     ranges : mapping of str to (float, float)
         The levers that may be moved, with the lowest and highest factor; 1 lies between. [1]
-    follow : Wanted, optional
-        The speed to follow, needed for a required tracking error.
+    follow : Trial, optional
+        Whose wanted speed is to be followed, needed for a required tracking error.
 
     Raises
     ------
@@ -284,119 +277,66 @@ def size(
     -----
     Smallest means the least Σ (factor - 1)²: twice as large counts as much as 100 % off.
     """
-    _check(requirements, ranges, follow)
+    if requirements.tracking_error is not None and follow is None:
+        raise InputError("A tracking error can only be required with a speed to follow.")
+    check_ranges(ranges, around=1.0)
     names = list(ranges)
     low, high = (np.array([pair[k] for pair in ranges.values()]) for k in (0, 1))
     known: dict[bytes, Array] = {}
 
+    def done(point: Array) -> Performance:
+        changed = pulled(drive, dict(zip(names, point, strict=True)))
+        return performance(changed, follow, direction=requirements.direction)
+
     def slack(point: Array) -> Array:
         key = point.tobytes()
         if key not in known:
-            known[key] = _slack(drive, requirements, follow, dict(zip(names, point, strict=True)))
+            try:
+                known[key] = np.array(list(requirements.slacks(done(point)).values()))
+            except (ParameterError, DomainError):
+                # as far from all requirements as no drive that can be simulated is
+                known[key] = np.full(len(requirements.given), -1e3)
         return known[key]
 
     before = performance(drive, follow, direction=requirements.direction)
     point = smallest_change(slack, low, high)
     if point is None:
-        raise InputError(_unreachable(drive, requirements, follow, ranges, known))
+        words = ", ".join(f"{name} x {pair[0]:g} to {pair[1]:g}" for name, pair in ranges.items())
+        points = np.array([np.frombuffer(key) for key in known])
+        reached = _reached(requirements, points, np.array(list(known.values())), done)
+        raise InputError(f"Within {words} the {drive.name} {reached}.")
     factors = {name: float(factor) for name, factor in zip(names, point, strict=True)}
-    changed = pulled(drive, factors)
     alone = {name: smallest_alone(slack, low, high, k) for k, name in enumerate(names)}
-    after = performance(changed, follow, direction=requirements.direction)
-    return Sizing(factors, changed, before, after, alone)
+    return Sizing(factors, pulled(drive, factors), before, done(point), alone)
 
 
-def _slack(
-    drive: Drive, requirements: Requirements, follow: Wanted | None, factors: Mapping[str, float]
-) -> Array:
-    try:
-        found = performance(pulled(drive, factors), follow, direction=requirements.direction)
-    except (ParameterError, DomainError):
-        # as far from all requirements as no drive that can be simulated is
-        return np.full(len(_required(requirements)), -1e3)
-    return np.array(list(requirements.slacks(found).values()))
-
-
-def _required(requirements: Requirements) -> tuple[str, ...]:
-    return tuple(
-        name
-        for name in ("speed", "acceleration", "tracking_error")
-        if getattr(requirements, name) is not None
-    )
-
-
-def _unreachable(
-    drive: Drive,
-    requirements: Requirements,
-    follow: Wanted | None,
-    ranges: Mapping[str, Range],
-    known: Mapping[bytes, Array],
+def _reached(
+    required: Requirements, points: Array, slacks: Array, done: Callable[[Array], Performance]
 ) -> str:
     """What is reachable instead, of all points that were tried."""
-    points = np.array([np.frombuffer(key) for key in known])
-    slacks = np.array(list(known.values()))
-    words = ", ".join(f"{name} x {low:g} to {high:g}" for name, (low, high) in ranges.items())
-    names = _required(requirements)
 
-    def at(index: int) -> Performance:
-        factors = dict(zip(ranges, points[index], strict=True))
-        return performance(pulled(drive, factors), follow, direction=requirements.direction)
+    def said(name: str, index: int) -> str:
+        words, unit, _ = REQUIRED[name]
+        reached, limit = (np.degrees(getattr(x, name)) for x in (done(points[index]), required))
+        shown = "deg/s²" if unit == "rad/s^2" else "deg/s"
+        return f"{words} {reached:.4g} {shown} (required {limit:.4g})"
 
-    missed = [k for k in range(len(names)) if slacks[:, k].max() < 0.0]
+    best = slacks.argmax(axis=0)
+    missed = [k for k in range(len(required.given)) if slacks[best[k], k] < 0.0]
+    names = list(required.given)
     if missed:
-        reached = [
-            _said(names[k], getattr(at(int(slacks[:, k].argmax())), names[k]), requirements)
-            for k in missed
-        ]
-        return f"Within {words} the {drive.name} reaches {', and '.join(reached)}."
-    best = at(int(slacks.min(axis=1).argmax()))
-    reached = [_said(name, getattr(best, name), requirements) for name in names]
+        return f"reaches {', and '.join(said(names[k], int(best[k])) for k in missed)}"
+    nearest = int(slacks.min(axis=1).argmax())
     return (
-        f"Within {words} the {drive.name} meets each requirement, but not all at once: nearest is "
-        f"{', '.join(reached)}."
+        "meets each requirement, but not all at once: nearest is "
+        f"{', '.join(said(name, nearest) for name in names)}"
     )
-
-
-def _said(name: str, reached: float, requirements: Requirements) -> str:
-    required = np.degrees(getattr(requirements, name))
-    unit = "deg/s²" if name == "acceleration" else "deg/s"
-    words = {
-        "speed": "a speed of",
-        "acceleration": "an acceleration of",
-        "tracking_error": "a tracking error of",
-    }[name]
-    return f"{words} {np.degrees(reached):.4g} {unit} (required {required:.4g})"
-
-
-def _ratio(found: float, required: float) -> float:
-    return float(np.log(max(found, 1e-300) / required))
-
-
-def _check(requirements: Requirements, ranges: Mapping[str, Range], follow: Wanted | None) -> None:
-    if not ranges:
-        raise InputError("Name at least one lever that may be moved, such as orifice.")
-    if requirements.tracking_error is not None and follow is None:
-        raise InputError("A tracking error can only be required with a speed to follow.")
-    for name, (low, high) in ranges.items():
-        find_lever(name)
-        if not (0.0 <= low <= 1.0 <= high < np.inf and low < high):
-            raise InputError(
-                f"The factors on {name} must reach from at most 1 to at least 1, not from {low:g} "
-                f"to {high:g}."
-            )
 
 
 def levers_table(found: Sizing) -> Table:
     """How far each lever moves, and how far it would have to by itself."""
-    made = Table(
-        "",
-        (
-            Column("lever"),
-            Column("factor", ".4f"),
-            Column("change", "+z.2%"),
-            Column("enough by itself", ".4f", none="no"),
-        ),
-    )
+    heads = Column("lever"), Column("factor", ".4f"), Column("change", "+z.2%")
+    made = Table("", (*heads, Column("enough by itself", ".4f", none="no")))
     for name, factor in found.factors.items():
         made.add(name, factor, factor - 1.0, found.alone[name])
     return made
@@ -406,11 +346,7 @@ def performance_table(found: Sizing, required: Requirements) -> Table:
     """What is required, what the drive does as it is, and what it does when changed."""
     columns = (Column(each, ".2f") for each in ("required", "as it is", "changed"))
     made = Table("", (Column(""), *columns, UNIT))
-    for name, sign, unit in (
-        ("speed", ">=", "rad/s"),
-        ("acceleration", ">=", "rad/s^2"),
-        ("tracking_error", "<=", "rad/s"),
-    ):
+    for name, (_, unit, sign) in REQUIRED.items():
         before, after = getattr(found.before, name), getattr(found.after, name)
         if before is None or after is None:
             continue
@@ -421,7 +357,7 @@ def performance_table(found: Sizing, required: Requirements) -> Table:
 
 
 def typed_factors(
-    found: Sizing, drive: Drive, required: Requirements, follow: Wanted | None
+    found: Sizing, drive: Drive, required: Requirements, follow: Trial | None
 ) -> dict[str, float]:
     """Factors that someone can type: short, and still enough.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from math import ceil, log
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -10,33 +11,31 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.compensation import InverseMap, inverse_map
+from swashplate.analysis.outcomes import rms_difference
 from swashplate.drive import Drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import InputError
 from swashplate.linear import FEWEST_STEPS, SLOWEST_CYCLE, slowest_lag
+from swashplate.results import Result
 from swashplate.tables import Cell, Column, Table
 
 if TYPE_CHECKING:
-    import polars
-
     from swashplate.simulation.result import Simulation
 
-# --- tracking -------------------------------------------------------------------------------------
-
-
 Array = NDArray[np.float64]
+
+# --- what the inverse map buys --------------------------------------------------------------------
 
 
 class TrackingError(NamedTuple):
     """Speed less the wanted speed over a record. [rad/s]"""
 
     rms: float
-    largest: float
-    """Magnitude."""
+    largest: float  # Magnitude.
 
 
 @dataclass(frozen=True, eq=False)
-class Tracked:
+class Tracked(Result):
     """One way to command a wanted speed, and how the drive then follows."""
 
     name: str
@@ -45,73 +44,28 @@ class Tracked:
 
 
 @dataclass(frozen=True, eq=False)
-class Improvement:
+class Improvement(Result):
     """A wanted speed commanded in several ways, the plainest first."""
 
-    name: str
-    """Name of the drive."""
-    time: Array
-    """(n,). [s]"""
-    wanted: Array
-    """(n,). [rad/s]"""
+    name: str  # Name of the drive.
+    time: Array  # (n,). [s]
+    wanted: Array  # (n,). [rad/s]
     ways: tuple[Tracked, ...]
-
-    def to_polars(self) -> polars.DataFrame:
-        """Table of time, wanted speed, and voltage and speed of each way, SI."""
-        import polars as pl
-
-        columns = {"time": self.time, "wanted_speed": self.wanted}
-        for way in self.ways:
-            assert way.run.voltage is not None
-            label = way.name.replace(" ", "_")
-            columns[f"voltage_{label}"] = way.run.voltage
-            columns[f"speed_{label}"] = way.run.shaft_speed
-        return pl.DataFrame(columns)
-
-
-def tracking_error(speed: ArrayLike, wanted: ArrayLike) -> TrackingError:
-    """Root mean square and largest magnitude of the difference of two speeds.
-
-    Parameters
-    ----------
-    speed, wanted : (n,) array_like
-        [rad/s]
-
-    Raises
-    ------
-    InputError
-        If they are not of one length, or a number is not finite.
-    """
-    done, asked = np.asarray(speed, dtype=np.float64), np.asarray(wanted, dtype=np.float64)
-    if done.shape != asked.shape or done.ndim != 1 or done.size == 0:
-        raise InputError(
-            f"The speed has shape {done.shape} and the wanted speed {asked.shape}; both must be "
-            "one row of as many samples."
-        )
-    if not (np.isfinite(done).all() and np.isfinite(asked).all()):
-        raise InputError("Speed and wanted speed must be finite everywhere.")
-    difference = done - asked
-    return TrackingError(
-        float(np.sqrt(np.mean(difference * difference))), float(np.abs(difference).max())
-    )
 
 
 def proportional_command(inverse: InverseMap, wanted: ArrayLike) -> Array:
     """Voltage of a controller that knows nothing of the drive but its full speed each way. [V]
 
-    A straight line each way from 0 V at standstill to the saturation voltage at the limit. [V]
+    A straight line each way from 0 V at standstill to the saturation voltage at the limit.
     """
-    speed = np.asarray(wanted, dtype=np.float64)
-    low, high = inverse.limits
-    up = inverse.plus.voltage[-1] / high
-    down = inverse.minus.voltage[0] / low
+    speed, (low, high) = np.asarray(wanted, dtype=np.float64), inverse.limits
+    up, down = inverse.plus.voltage[-1] / high, inverse.minus.voltage[0] / low
     return np.asarray(np.where(speed >= 0.0, up * speed, down * speed))
 
 
 def wanted_of_stick(inverse: InverseMap, voltage: ArrayLike) -> Array:
     """Speed that a stick asks for: in proportion, ±10 V for the full speed of that way. [rad/s]"""
-    volts = np.asarray(voltage, dtype=np.float64)
-    low, high = inverse.limits
+    volts, (low, high) = np.asarray(voltage, dtype=np.float64), inverse.limits
     return np.asarray(np.where(volts >= 0.0, 0.1 * high * volts, -0.1 * low * volts))
 
 
@@ -158,49 +112,38 @@ def improvement(
     ways = []
     for name, voltage in commands.items():
         run = drive.simulate(voltage, rate)
-        ways.append(Tracked(name, run, tracking_error(run.shaft_speed, wanted)))
+        largest = float(np.abs(run.shaft_speed - wanted).max())
+        error = TrackingError(rms_difference(run.shaft_speed, wanted), largest)
+        ways.append(Tracked(name, run, error))
     return Improvement(drive.name, ways[0].run.time, wanted, tuple(ways))
 
 
 # --- largest sine ---------------------------------------------------------------------------------
 
-
-AMPLITUDES = 40
-"""Amplitudes that are tried from the top speed down before one is refined."""
-SMALLEST = 1e-2
-"""Smallest amplitude tried, as part of the top speed."""
-CLOSE = 1e-3
-"""Relative width at which an amplitude counts as found."""
-FORGOTTEN = 8.0
-"""Lags that a simulation lasts before the cycle that is looked at."""
+AMPLITUDES = 40  # Amplitudes that are tried from the top speed down before one is refined.
+SMALLEST = 1e-2  # Smallest amplitude tried, as part of the top speed.
+CLOSE = 1e-3  # Relative width at which an amplitude counts as found.
+FORGOTTEN = 8.0  # Lags that a simulation lasts before the cycle that is looked at.
 
 
 @dataclass(frozen=True, eq=False)
-class LargestSine:
+class LargestSine(Result):
     """Largest amplitude of speed followed at each frequency, (f,); 0 where none is.
 
     The error is the rms of speed less wanted speed over a cycle, by the rms of the wanted sine.
     """
 
-    name: str
-    """Name of the drive."""
-    error: float
-    """The chosen error. [1]"""
-    frequencies: Array
-    """[Hz]"""
+    name: str  # Name of the drive.
+    error: float  # The chosen error. [1]
+    frequencies: Array  # [Hz]
     shifted: Array
     """Amplitude with the lag forgiven: against the wanted sine shifted in time by as much as suits
     the drive best. For a command that is known ahead, or where being late does no harm. [rad/s]"""
-    in_time: Array
-    """Amplitude with the lag counted: against the wanted sine itself. [rad/s]"""
+    in_time: Array  # Amplitude with the lag counted: against the wanted sine itself. [rad/s]
 
-    def to_polars(self) -> polars.DataFrame:
-        """Table in SI, a row a frequency."""
-        import polars as pl
-
-        return pl.DataFrame(
-            {"frequency": self.frequencies, "shifted": self.shifted, "in_time": self.in_time}
-        )
+    def table(self) -> Table:
+        """The largest sine at each frequency."""
+        return sine_table(self)
 
 
 def largest_sine(drive: Drive, frequencies: ArrayLike, error: float = 0.1) -> LargestSine:
@@ -255,21 +198,17 @@ def _at(
     drive: Drive, inverse: InverseMap, frequency: float, settling: float, error: float
 ) -> tuple[float, float]:
     """Amplitudes with the lag forgiven and counted. [rad/s]"""
-    low, high = inverse.limits
-    top = min(-low, high)
-    known: dict[float, tuple[float, float]] = {}
+    top = min(map(abs, inverse.limits))
 
+    @cache
     def errors(amplitude: float) -> tuple[float, float]:
-        if amplitude not in known:
-            known[amplitude] = sine_errors(drive, inverse, amplitude, frequency, settling)
-        return known[amplitude]
+        return sine_errors(drive, inverse, amplitude, frequency, settling)
 
     grid = np.geomspace(top, SMALLEST * top, AMPLITUDES).tolist()
-    found = []
+    found = [0.0, 0.0]
     for which in (0, 1):
         followed = next((n for n, a in enumerate(grid) if errors(a)[which] <= error), None)
         if followed is None:
-            found.append(0.0)
             continue
         good, bad = grid[followed], grid[max(followed - 1, 0)]
         while log(bad / good) > CLOSE:
@@ -278,25 +217,16 @@ def _at(
                 good = middle
             else:
                 bad = middle
-        found.append(good)
+        found[which] = good
     return found[0], found[1]
 
 
 def sine_errors(
     drive: Drive, inverse: InverseMap, amplitude: float, frequency: float, settling: float
 ) -> tuple[float, float]:
-    """Errors of a sine of speed by its rms, the lag forgiven and counted.
+    """Errors of a sine of speed by its rms, the lag forgiven and counted. [1]
 
-    Parameters
-    ----------
-    drive : Drive
-        The drive.
-    inverse : InverseMap
-        Makes the voltage of the wanted speed.
-    amplitude, frequency : float
-        Of the wanted speed. [rad/s, Hz]
-    settling : float
-        Time before the cycle that counts. [s]
+    Of an amplitude [rad/s] and a frequency [Hz], after a time to settle [s].
 
     Notes
     -----
@@ -315,10 +245,8 @@ def sine_errors(
     rest = speed - mean - np.imag(first * np.exp(1j * turn))
     other = 2.0 * float(mean**2 + np.mean(rest**2))
     shifted, in_time = (abs(first) - amplitude) ** 2, abs(first - amplitude) ** 2
-    return (
-        float(np.sqrt(other + shifted)) / amplitude,
-        float(np.sqrt(other + in_time)) / amplitude,
-    )
+    forgiven, counted = (float(np.sqrt(other + each)) / amplitude for each in (shifted, in_time))
+    return forgiven, counted
 
 
 def sine_table(sines: LargestSine) -> Table:

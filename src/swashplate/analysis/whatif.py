@@ -14,13 +14,14 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result
 from swashplate.simulation.result import Simulation
 from swashplate.tables import UNIT, Column, Table
 
-# --- levers ---------------------------------------------------------------------------------------
-
-
 Array = NDArray[np.float64]
+Range = tuple[float, float]  # Lowest and highest factor on a lever. [1]
+
+# --- levers ---------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,7 @@ class Lever:
     name: str
     powers: Mapping[str, float]
     """By symbol or column: the parameter is multiplied by the factor to this power."""
-    meaning: str
-    """What it is, and what the model takes it for."""
+    meaning: str  # What it is, and what the model takes it for.
 
 
 def _both_ways(name: str, symbols: Mapping[str, float], meaning: str) -> list[Lever]:
@@ -86,18 +86,11 @@ _LEVERS = (
     ),
 )
 
-LEVERS: Mapping[str, Lever] = {each.name: each for each in _LEVERS}
-"""Levers by name."""
+LEVERS: Mapping[str, Lever] = {each.name: each for each in _LEVERS}  # Levers by name.
 
 
 def find_lever(name: str) -> Lever:
-    """A lever by name; a parameter's symbol or column is one, too.
-
-    Raises
-    ------
-    InputError
-        If there is none of that name.
-    """
+    """A lever by name, or a parameter by its symbol or column; another one is an `InputError`."""
     if name in LEVERS:
         return LEVERS[name]
     if name in CATALOGUE or name in COLUMNS:
@@ -112,23 +105,47 @@ def find_lever(name: str) -> Lever:
     )
 
 
-def column_factors(factors: Mapping[str, ArrayLike]) -> dict[str, Array]:
-    """Factors on single parameters that factors on levers come to.
+def check_ranges(ranges: Mapping[str, Range], around: float | None = None) -> None:
+    """Refuse, in an `InputError`, no lever, an unknown one, or factors that do not rise from 0 on.
+
+    With `around` they must also have this factor between them.
+    """
+    if not ranges:
+        raise InputError("Name at least one lever, such as orifice.")
+    for name, (low, high) in ranges.items():
+        find_lever(name)
+        if around is not None and not (0.0 <= low <= around <= high < np.inf and low < high):
+            raise InputError(
+                f"The factors on {name} must reach from at most {around:g} to at least {around:g}, "
+                f"not from {low:g} to {high:g}."
+            )
+        if not 0.0 <= low < high < np.inf:
+            raise InputError(
+                f"The factors on {name} must rise from 0 or more, not {low:g} to {high:g}."
+            )
+
+
+def pulled_columns(
+    numbers: Mapping[str, float], factors: Mapping[str, ArrayLike]
+) -> dict[str, Array]:
+    """Values of the parameters that levers move, as `Drive.simulate_many` takes them.
 
     Parameters
     ----------
+    numbers : mapping of str to float
+        Every value of the drive by column. [SI]
     factors : mapping of str to float or (m,) array_like
         By lever. Levers that move the same parameter multiply. [1]
 
     Returns
     -------
-    dict of str to array
-        By column such as ``Z16_plus``. [1]
+    dict of str to (m,) array
+        By column such as ``Z16_plus``. [SI]
 
     Raises
     ------
     InputError
-        For an unknown lever or a factor that is negative or NaN.
+        For an unknown lever, a factor that is negative or NaN, or 0 times infinity.
     """
     columns: dict[str, Array] = {}
     for name, given in factors.items():
@@ -139,79 +156,39 @@ def column_factors(factors: Mapping[str, ArrayLike]) -> dict[str, Array]:
         for symbol, power in lever.powers.items():
             for column in columns_of([symbol]):
                 columns[column] = columns.get(column, np.ones(())) * factor**power
-    return columns
+    with np.errstate(invalid="ignore"):
+        made = {name: np.asarray(numbers[name] * factor) for name, factor in columns.items()}
+    for name, values in made.items():
+        if np.isnan(values).any():  # 0 times inf
+            bad = columns[name][np.isnan(values)].flat[0]
+            raise InputError(
+                f"{name} is {numbers[name]:g}, which the factor {bad:g} cannot change."
+            )
+    return made
 
 
 def pulled(drive: Drive, factors: Mapping[str, float]) -> Drive:
-    """The drive with its levers moved.
+    """The drive with its levers moved, e.g. by ``{"orifice": 1.5, "pump": 1.5}``.
 
-    Parameters
-    ----------
-    drive : Drive
-        As it is.
-    factors : mapping of str to float
-        By lever, e.g. ``{"orifice": 1.5, "pump": 1.5}``. [1]
-
-    Raises
-    ------
-    InputError
-        For an unknown lever or an impossible factor.
-    ParameterError
-        If what comes out breaks a rule.
+    Raises an `InputError` as `pulled_columns`, and a `ParameterError` if what comes out breaks a
+    rule.
     """
-    numbers = drive.parameters.numbers
-    return drive.replace(
-        **{
-            column: _product(column, numbers[column], float(factor))
-            for column, factor in column_factors(factors).items()
-        }
-    )
+    moved = pulled_columns(drive.parameters.numbers, factors)
+    return drive.replace(**{column: float(value) for column, value in moved.items()})
 
 
-def pulled_columns(
-    numbers: Mapping[str, float], factors: Mapping[str, ArrayLike]
-) -> dict[str, Array]:
-    """Values of the parameters that levers move, one for each of many settings.
-
-    Parameters
-    ----------
-    numbers : mapping of str to float
-        Every value of the drive by column.
-    factors : mapping of str to (m,) array_like
-        By lever. [1]
-
-    Returns
-    -------
-    dict of str to (m,) array
-        As `Drive.simulate_many` takes them. [the columns' units]
-    """
-    return {
-        column: np.asarray(numbers[column] * factor)
-        for column, factor in column_factors(factors).items()
-    }
-
-
-def _product(column: str, value: float, factor: float) -> float:
-    product = value * factor
-    if np.isnan(product):  # 0 times inf
-        raise InputError(f"{column} is {value:g}, which the factor {factor:g} cannot change.")
-    return product
-
-
-# --- whatif ---------------------------------------------------------------------------------------
-
+# --- before and after -----------------------------------------------------------------------------
 
 AS_IS, CHANGED = "as it is", "changed"
 
 
 @dataclass(frozen=True, eq=False)
-class Variant:
+class Variant(Result):
     """A drive over the trial's command."""
 
     drive: Drive
     run: Simulation
-    values: Array
-    """(K,) its outcomes, NaN where there is none."""
+    values: Array  # (K,) its outcomes, NaN where there is none.
 
     @property
     def speed_limits(self) -> tuple[float, float]:
@@ -220,11 +197,12 @@ class Variant:
 
 
 @dataclass(frozen=True, eq=False)
-class WhatIf:
+class WhatIf(Result):
     """A drive before and after."""
 
-    factors: Mapping[str, float]
-    """By lever."""
+    figure = "plot_whatif"
+
+    factors: Mapping[str, float]  # By lever.
     trial: Trial
     outcomes: tuple[Outcome, ...]
     variants: Mapping[str, Variant]
@@ -250,6 +228,10 @@ class WhatIf:
             if np.isnan(value)
         )
 
+    def table(self) -> Table:
+        """Speed limits and outcomes of the drive as it is and changed."""
+        return before_and_after(self)
+
 
 def what_if(
     drive: Drive,
@@ -265,9 +247,9 @@ def what_if(
     drive : Drive
         As it is.
     factors : mapping of str to float
-        By lever, see `levers.LEVERS`, e.g. ``{"orifice": 1.5, "pump": 1.5}``. [1]
+        By lever, see `LEVERS`, e.g. ``{"orifice": 1.5, "pump": 1.5}``. [1]
     trial : Trial
-        The command, see `trial.trial`; both drives begin at rest.
+        The command, see `outcomes.trial`; both drives begin at rest.
     outcomes : sequence of str
         Names in `outcomes.OUTCOMES`.
 
@@ -311,29 +293,24 @@ def levers_table() -> Table:
 def before_and_after(result: WhatIf, widths: Mapping[str, Array] | None = None) -> Table:
     """Speed limits and outcomes of the drive as it is and changed.
 
-    Parameters
-    ----------
-    result : WhatIf
-        What was compared.
-    widths : mapping of str to (2 + m,) array-like, optional
-        By variant, half of the interval of each speed limit and of each outcome, SI, as
-        `monte_carlo.half_widths` gives them.
+    `widths` are half of the intervals of both speed limits and of each outcome, (2 + K,) by
+    variant, as `monte_carlo.half_widths` gives them. [SI]
     """
     error = () if widths is None else (Column("±", "z.2f", none="none"),)
-    names = ("as it is", "changed")
-    columns = [each for name in names for each in (Column(name, "z.2f", none="none"), *error)]
+    columns = [
+        each for name in (AS_IS, CHANGED) for each in (Column(name, "z.2f", none="none"), *error)
+    ]
     made = Table("", (Column(""), *columns, Column("change", "+z.1%"), UNIT))
     rows = [("speed limit, positive", "rad/s"), ("speed limit, negative", "rad/s")]
     rows += [(each.words, each.unit) for each in result.outcomes]
-    values = [
-        [*map(float, variant.speed_limits), *map(float, variant.values)]
-        for variant in (result.before, result.after)
-    ]
     for k, (words, unit) in enumerate(rows):
-        before, after = (each[k] for each in values)
-        cells = [before, after]
-        if widths is not None:
-            cells = [before, float(widths[AS_IS][k]), after, float(widths[CHANGED][k])]
+        cells: list[float | None] = []
+        for name in (AS_IS, CHANGED):
+            variant = result.variants[name]
+            cells.append(float([*variant.speed_limits, *variant.values][k]))
+            cells += [] if widths is None else [float(widths[name][k])]
+        before, after = cells[0], cells[1 if widths is None else 2]
+        assert after is not None
         change = after / before - 1.0 if before else None
         spec = {"s": "z.3f", "1": "z.2%"}.get(unit, "")
         made.add(words, *cells, change, unit="" if unit == "1" else unit, spec=spec)

@@ -8,34 +8,43 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import schema
 from swashplate.campaign.encoder import ambiguous_gaps, unwrap_counts
-from swashplate.campaign.experiment import Channel, Encoder, Experiment, InputSignal, Source
+from swashplate.campaign.experiment import Channel, Encoder, Experiment, InputSignal
+from swashplate.campaign.reading import (
+    Columns,
+    Reading,
+    read_signal,
+    wanted_columns,
+    windows,
+)
 from swashplate.campaign.recognition import recognise
-from swashplate.campaign.schema import applying, conversion, inside
+from swashplate.campaign.schema import applying, inside
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.errors import FileError, InputError
-from swashplate.logs import Column, Log, check_stamps, open_log, unit_of
-from swashplate.units import to_si
+from swashplate.errors import InputError
+from swashplate.logs import Log, open_log
+from swashplate.results import Result, figures
+from swashplate.tables import Column as Head
+from swashplate.tables import Table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from swashplate.drive import Drive
 
 Array = NDArray[np.float64]
 
 LISTED = 12
 """Runs that a sentence names."""
-SINCE_1970 = 1e8
-"""Stamps that begin beyond this are seconds of a calendar and are counted from the first. [s]"""
 
 
 @dataclass(frozen=True, eq=False)
-class Campaign:
+class Campaign(Result):
     """Experiments on one machine, SI. Iterate it, or take one by its name.
 
     Examples
@@ -83,9 +92,31 @@ class Campaign:
                 continue
             place = f"{path}: run {number} ({run.file})"
             log = open_log(folder / run.file, options=file.format)
-            experiments += read_run(place, name, run, file.axes, log)
+            tested = axes_of(place, run, file.axes)
+            for part in windows(tested.values(), log, run.span):
+                experiments += read_run(place, name, run, file.axes, part)
         title = file.title or Path(path).resolve().parent.name
         return cls(Path(path), title, file.virtual, file.axes, tuple(experiments), tuple(ignored))
+
+    def table(self) -> Table:
+        """Its experiments: axis, role, manoeuvre, length and channels."""
+        columns = (Head("run"), Head("axis"), Head("role"), Head("manoeuvre"))
+        made = Table(self.title, (*columns, Head("s", ".4g"), Head("channels", wrap=True)))
+        for each in self:
+            made.add(
+                each.name,
+                each.axis,
+                each.role,
+                each.maneuver,
+                each.duration,
+                ", ".join(each.channels),
+            )
+        return made
+
+    def plot(self, **how: Any) -> list[Figure]:
+        """Figures of all runs, as of `swashplate.report.figures.plot_campaign`."""
+        drawn: list[Figure] = figures().plot_campaign(self, **{"title": self.title, **how})
+        return drawn
 
     def __iter__(self) -> Iterator[Experiment]:
         return iter(self.experiments)
@@ -216,8 +247,8 @@ def read_run(
     FileError, InputError, ParameterError
         For the first thing that is wrong; the sentence names file, column and row.
     """
-    tested = _axes_of(place, run, axes)
-    columns = _Columns(log, [each for axis in tested.values() for each in _wanted(axis)])
+    tested = axes_of(place, run, axes)
+    columns = Columns(log, [each for axis in tested.values() for each in wanted_columns(axis)])
     return [
         each
         for key, axis in tested.items()
@@ -227,9 +258,7 @@ def read_run(
     ]
 
 
-def _axes_of(
-    place: str, run: schema.Run, axes: Mapping[str, schema.Axis]
-) -> dict[str, schema.Axis]:
+def axes_of(place: str, run: schema.Run, axes: Mapping[str, schema.Axis]) -> dict[str, schema.Axis]:
     """The axes that a run tests, with what differs in it."""
     for name in (*run.only, *run.axes):
         if name not in axes:
@@ -277,14 +306,15 @@ def _merged(content: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 
 
 def _experiments(
-    name: str, run_name: str, key: str, run: schema.Run, axis: schema.Axis, columns: _Columns
+    name: str, run_name: str, key: str, run: schema.Run, axis: schema.Axis, columns: Columns
 ) -> Iterator[Experiment]:
     """One experiment, or several where a counter's position across a gap is not known."""
-    drive = _read("the input", axis.input, axis, columns, run.span)
+    drive = read_signal("the input", axis.input, axis, columns, run.span)
     assert drive is not None  # an input without samples is refused
-    signals, notes, cuts = {}, [], dict[float, str]()
+    log, signals, cuts = columns.log, {}, dict[float, str]()
+    notes = [log.cut] if log.cut else []
     for channel, entry in axis.channels.items():
-        read = _read(f"channel '{channel}'", entry, axis, columns, run.span)
+        read = read_signal(f"channel '{channel}'", entry, axis, columns, run.span)
         if read is None:
             notes.append(f"'{channel}' has no sample here and is left out of this run")
             continue
@@ -312,20 +342,20 @@ def _experiments(
         if np.isfinite(end):
             said.append(f"split at {end:.4g} s, from where it is a run of its own: {cuts[end]}")
         yield _experiment(
-            name if part == 0 else f"{name} from {begin:.4g} s",
+            f"{name} from {piece.time[0]:.6g} s" if part or log.cut else name,
             (run_name, key, run, axis),
             piece,
             kept,
             tuple(said),
-            split=part > 0,
+            split=part > 0 or log.resumes,
         )
 
 
 def _experiment(
     name: str,
     of: tuple[str, str, schema.Run, schema.Axis],
-    drive: _Read,
-    signals: Mapping[str, _Read],
+    drive: Reading,
+    signals: Mapping[str, Reading],
     notes: tuple[str, ...],
     *,
     split: bool,
@@ -417,119 +447,3 @@ def _weights(
     for window in ignored:
         product[inside(window, time)] = 0.0
     return product
-
-
-# --- the signals of a log -------------------------------------------------------------------------
-
-
-class _Columns:
-    """The wanted columns of one log, read together."""
-
-    def __init__(self, log: Log, wanted: list[tuple[str, str]]) -> None:
-        self.log = log
-        self.found: dict[str, Column] = {}
-        for name, what in wanted:
-            try:
-                self.found[name] = log.find(name)
-            except InputError as error:
-                raise InputError(f"For {what}: {error}") from None
-        self.values = log.read(list(self.found))
-
-
-def _wanted(axis: schema.Axis) -> Iterator[tuple[str, str]]:
-    """Columns that an axis needs, and what for."""
-    signals: dict[str, schema.Signal] = {"the input": axis.input}
-    signals |= {f"channel '{name}'": channel for name, channel in axis.channels.items()}
-    for what, signal in signals.items():
-        yield signal.column, what
-        for clock in (signal.time, axis.time):
-            if clock is not None and clock.column is not None:
-                yield clock.column, f"the time of {what}"
-
-
-class _Read(NamedTuple):
-    """A signal out of the log, in SI, on its stamps."""
-
-    unit: str
-    time: Array
-    values: Array
-    source: Source
-    factor: float
-    """Size of one of the signal's units in SI."""
-    limits: tuple[float, float] | None
-    dropped: int
-
-    def within(self, begin: float, end: float) -> _Read:
-        """The part from one instant to before another [s]."""
-        kept = (self.time >= begin) & (self.time < end)
-        return self._replace(time=self.time[kept], values=self.values[kept])
-
-
-def _read(
-    what: str,
-    signal: schema.Input | schema.Channel,
-    axis: schema.Axis,
-    columns: _Columns,
-    span: schema.Window | None,
-) -> _Read | None:
-    """A signal as the campaign file says; None for a channel all of whose samples are missing."""
-    column, numbers = columns.found[signal.column], columns.values[signal.column]
-    said = f"{columns.log.path}: column '{column.name}' ({what})"
-    time = _stamps(signal.time or axis.time, axis.time, columns, numbers.size)
-    if time.size != numbers.size:
-        raise FileError(f"{said} has {numbers.size} samples, but its time {time.size}.")
-    kept = np.ones(numbers.size, dtype=np.bool_) if span is None else inside(span, time)
-    missing = kept & ~np.isfinite(numbers)
-    if missing.any() and signal.missing == "refuse":
-        rows = np.flatnonzero(missing) + 1
-        others = f" and {rows.size - 1} others" if rows.size > 1 else ""
-        raise FileError(
-            f"{said} has no finite number in data row {rows[0]}{others}; mend the log, or say "
-            "missing = 'drop' to leave such samples out."
-        )
-    if isinstance(signal, schema.Channel) and missing.any() and missing.sum() == kept.sum():
-        return None
-    kept &= ~missing
-    if np.count_nonzero(kept) < 2:
-        raise FileError(
-            f"{said} has {np.count_nonzero(kept)} samples that can be used, but needs two at least."
-        )
-    first = schema.KINDS[signal.kind].units[:1] or ("1",)
-    unit = signal.unit or unit_of(column, signal.column, first[0])
-    si, factor, zero = conversion(signal.kind, unit, said)
-    # an encoder's sign belongs to the scale of its counts, see `Encoder`
-    sign = 1 if signal.kind == "encoder_counts" else signal.sign
-    written = sign * (signal.scale * numbers[kept] + signal.offset)
-    limits = signal.limits
-    return _Read(
-        si,
-        np.ascontiguousarray(time[kept]),
-        factor * written + zero,
-        Source(columns.log.path, column.name),
-        factor,
-        None if limits is None else (factor * limits[0] + zero, factor * limits[1] + zero),
-        int(np.count_nonzero(missing)),
-    )
-
-
-def _stamps(clock: schema.Clock, main: schema.Clock, columns: _Columns, size: int) -> Array:
-    """Increasing time stamps of a signal; those of a calendar from the axis's first one on. [s]"""
-    if clock.rate is not None:
-        return clock.offset + np.arange(size) / clock.rate
-    numbers, factor = _clock(clock, columns)
-    check_stamps(columns.log, columns.found[clock.column or ""].name, numbers)
-    begin, of_main = _clock(main, columns) if main.column is not None else (numbers, factor)
-    if of_main * begin[0] < SINCE_1970:
-        return factor * numbers + clock.offset
-    # the difference first: a float64 keeps a thousandth of a millisecond of such a stamp
-    since: Array = numbers - begin[0] * of_main / factor
-    return factor * since + clock.offset
-
-
-def _clock(clock: schema.Clock, columns: _Columns) -> tuple[Array, float]:
-    """Numbers of a column of time, and the size of their unit [s]."""
-    assert clock.column is not None  # the schema sees to a column or a rate
-    column, numbers = columns.found[clock.column], columns.values[clock.column]
-    unit = clock.unit or unit_of(column, clock.column, "s")
-    factor = to_si(1.0, unit, "s", f"{columns.log.path}: column '{column.name}' (the time)")
-    return numbers, factor

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,12 @@ from numpy.typing import NDArray
 from swashplate.campaign.recognition import Recognised
 from swashplate.campaign.schema import ChannelKind, InitialState, InputKind, Role
 from swashplate.errors import InputError
+from swashplate.results import Result, Tabular, figures
+from swashplate.tables import UNIT, Column, Table
+
+if TYPE_CHECKING:
+    import polars
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -47,7 +53,7 @@ class Encoder(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class InputSignal:
+class InputSignal(Result):
     """What drove the axis."""
 
     kind: InputKind
@@ -74,7 +80,7 @@ class InputSignal:
 
 
 @dataclass(frozen=True, eq=False)
-class Channel:
+class Channel(Result):
     """One measured signal on its own time stamps."""
 
     name: str
@@ -110,7 +116,7 @@ class Channel:
 
 
 @dataclass(frozen=True, eq=False)
-class Experiment:
+class Experiment(Tabular):
     """One run of one axis."""
 
     name: str
@@ -147,6 +153,41 @@ class Experiment:
     def of_kind(self, *kinds: ChannelKind) -> tuple[Channel, ...]:
         """Its channels of some kinds."""
         return tuple(each for each in self.channels.values() if each.kind in kinds)
+
+    def _signals(self) -> list[tuple[str, InputSignal | Channel]]:
+        return [("input", self.input), *self.channels.items()]
+
+    def to_polars(self) -> polars.DataFrame:
+        """The input and every channel on its own stamps, a row a sample.
+
+        Columns ``signal``, ``time`` [s], ``value``, ``unit``, and ``weight``: 0 where a sample is
+        ignored, null for the input.
+        """
+        import polars as pl
+
+        frames = []
+        for name, each in self._signals():
+            weight = each.weight if isinstance(each, Channel) else [None] * each.time.size
+            frame = pl.DataFrame({"time": each.time, "value": each.values})
+            words = pl.lit(name).alias("signal"), pl.lit(each.unit).alias("unit")
+            frame = frame.select(words[0], "time", "value", words[1])
+            frames.append(frame.with_columns(pl.Series("weight", weight, pl.Float64)))
+        return pl.concat(frames)
+
+    def table(self) -> Table:
+        """Its input and channels: kind, samples, smallest and largest value."""
+        numbers = Column("samples", "d", "1"), Column("lowest", ".4g"), Column("highest", ".4g")
+        title = f"{self.name}, {self.maneuver}, {self.role}"
+        made = Table(title, (Column("channel"), Column("kind"), *numbers, UNIT))
+        for name, each in self._signals():
+            ends = float(each.values.min()), float(each.values.max())
+            made.add(name, each.kind, each.values.size, *ends, unit=each.unit)
+        return made
+
+    def plot(self, **how: Any) -> Figure:
+        """Figure of its input and channels, as of `swashplate.report.figures.plot_campaign`."""
+        figure: Figure = figures().plot_campaign([self], **how)[0]
+        return figure
 
     @property
     def maneuver(self) -> str:

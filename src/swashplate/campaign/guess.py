@@ -22,7 +22,8 @@ from swashplate.campaign.schema import ChannelKind
 from swashplate.drive import Drive
 from swashplate.equations.cache import kernel
 from swashplate.errors import InputError
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.parameter_set import ParameterSet, set_of
+from swashplate.results import short
 from swashplate.tables import UNIT, Cell, Column, Table
 
 Array = NDArray[np.float64]
@@ -58,6 +59,9 @@ FAR_STOP = 0.39
 
 class Guess(NamedTuple):
     """What logs show at first sight; both ways of a pair as magnitudes, plus first."""
+
+    def __repr__(self) -> str:
+        return short(self)
 
     axis: str
     unit: str
@@ -376,7 +380,7 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     )
 
 
-def fit_configuration(guess: Guess, start: ParameterSet) -> str:
+def fit_configuration(guess: Guess, start: ParameterSet | Drive) -> str:
     """Text of a fit configuration that frees what was guessed, with bounds about it."""
     lines = [
         f"# Read off the logs of the axis '{guess.axis}' by `swashplate guess`: what they show is",
@@ -394,7 +398,7 @@ def fit_configuration(guess: Guess, start: ParameterSet) -> str:
         if not guess.command[way]:
             lines.append(f"# no run goes {side}: its numbers are those of the other way, fixed")
             continue
-        gain = start.numbers[f"G1_{side}"]
+        gain = set_of(start).numbers[f"G1_{side}"]
         # so that more command never means less current, whatever the gain within its bounds
         curved = 0.2 * gain / guess.command[way]
         lines += [

@@ -21,6 +21,7 @@ from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.schema import applying, inside
 from swashplate.campaign.stamps import StampStatistics, stamp_statistics
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result
 from swashplate.tables import Column, Table
 from swashplate.units import display_unit
 
@@ -56,7 +57,7 @@ NAMED = 6
 
 
 @dataclass(frozen=True)
-class Quality:
+class Quality(Result):
     """What one signal of one experiment is like; of a channel what is not ignored."""
 
     experiment: str

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, m
 
 from swashplate.errors import InputError
 from swashplate.logs import TextOptions
+from swashplate.results import short
 from swashplate.units import speed_unit, to_si
 
 InputKind = Literal["voltage", "current", "other"]
@@ -203,6 +204,9 @@ class Input(Signal):
 class Channel(Signal):
     """A signal that was measured."""
 
+    def __repr__(self) -> str:
+        return short(self)
+
     kind: ChannelKind = Field(description="What it measures.")
     counts_per_turn: Positive | None = Field(
         None, description="Counts for one turn of the encoder's shaft, quadrature included."
@@ -237,6 +241,9 @@ class Channel(Signal):
 
 class Axis(Entry):
     """One drive of the machine: its model, its input and what is measured of it."""
+
+    def __repr__(self) -> str:
+        return short(self)
 
     drive: str | None = Field(
         None, description="A packaged drive, or a parameter file beside this one."

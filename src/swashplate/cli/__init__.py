@@ -8,6 +8,7 @@ import gc
 import io
 import os
 import sys
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -27,7 +28,7 @@ from swashplate.cli import (
 )
 from swashplate.cli.options import command
 from swashplate.cli.terminal import say_error
-from swashplate.errors import SwashplateError
+from swashplate.errors import FileError, InputError, SwashplateError
 
 HELP = """\
 Hydrostatic drives: from a joystick's voltage to the speed of the shaft.
@@ -144,6 +145,16 @@ for name, panel, function, examples in (
         command(app, name, examples, panel)(function)
 
 
+def _check_surroundings() -> None:
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
+    if not epoch.isdecimal():
+        raise InputError(f"SOURCE_DATE_EPOCH is '{epoch}', no number of seconds since 1970")
+    try:
+        Path.cwd()
+    except OSError:
+        raise InputError("The current folder does not exist any more; go to another") from None
+
+
 def main() -> None:
     """Run the command line."""
     # the matrices are tall and thin, so that threads of the linear algebra mostly wait for each
@@ -154,7 +165,18 @@ def main() -> None:
     # a process that lives for seconds need not look for cycles among what its libraries define:
     # that takes a fifth of a fit, and a second more at the end
     gc.set_threshold(50_000, 20, 50)
+    # figures are drawn into files: what a user's own notebooks draw with is of no concern here
+    os.environ.pop("MPLBACKEND", None)
     try:
+        _check_surroundings()
         app(prog_name="swashplate")
+    except InputError as error:
+        say_error(error)
+        sys.exit(2)
+    except OSError as error:  # such as a full disk behind > FILE
+        say_error(FileError(f"The output cannot be written: {error.strerror or error}"))
+        # what is left in the buffer could not be written either
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(2)
     finally:
         gc.freeze()

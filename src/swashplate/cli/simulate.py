@@ -70,7 +70,7 @@ def simulate(
     """
     files = Outputs((out, TABLE), (plot, FIGURE))
     with working("Simulating"):
-        from swashplate.analysis.runs import run_tables
+        from swashplate.analysis.outcomes import run_tables
 
         name, run = simulated(drive.chosen, command, sampling)
         tables, title = run_tables(run), f"{drive.title}, {name}"
@@ -105,7 +105,7 @@ def compare(
     files = Outputs((out, TABLE), (plot, FIGURE))
     least_substeps(rate)  # a rate out of range is refused before anything is sampled
     with working("Simulating"):
-        from swashplate.analysis.runs import rms_difference, side_by_side
+        from swashplate.analysis.outcomes import rms_difference, side_by_side
         from swashplate.tables import quantity
 
         drives = _labelled(first, second)
@@ -113,7 +113,7 @@ def compare(
         voltage = command.sample(rate)
         runs = {label: drive.simulate(voltage, rate) for label, drive in drives.items()}
         made = side_by_side(drives, runs)
-        rms = rms_difference(*runs.values())
+        rms = rms_difference(*(run.shaft_speed for run in runs.values()))
     title = f"{' and '.join(runs)}, {command.name}"
     files.write(out, "Voltage and both speeds, in SI", lambda path: _write_speeds(runs, path))
     files.draw(plot, "plot_comparison", runs, title=title)
@@ -200,7 +200,7 @@ def tour(
     Writes one table a run, such as hoist/step +9 V.csv, and two figures: all
     runs at a glance, and the settled speeds over the voltage. Takes some seconds.
     """
-    from swashplate.analysis.runs import overview_table
+    from swashplate.analysis.outcomes import overview_table
     from swashplate.drive import Drive
     from swashplate.maneuvers import source_tests
     from swashplate.parameters.files import AXES

@@ -92,7 +92,11 @@ def note(text: str) -> None:
 def say_error(error: Exception) -> None:
     """Print what went wrong as one line on standard error."""
     sentence = " ".join(str(error).split()).rstrip(".")
-    side.print(f"Error: {sentence}.", soft_wrap=True)
+    # the name of a file may hold what steers a terminal
+    shown = "".join(
+        each if each.isprintable() else "\N{REPLACEMENT CHARACTER}" for each in sentence
+    )
+    side.print(f"Error: {shown}.", soft_wrap=True)
 
 
 def working(text: str) -> AbstractContextManager[Status]:

@@ -33,7 +33,7 @@ from swashplate.cli.words import (
     trial_of,
 )
 from swashplate.errors import DomainError, InputError
-from swashplate.tables import FIGURE, TABLE, Form, quantity
+from swashplate.tables import FIGURE, TABLE, quantity
 
 if TYPE_CHECKING:
     from swashplate.analysis.limits import LimitShares
@@ -88,7 +88,6 @@ PULLED = (
     "plussing",
 )
 OUTCOMES = ("final_speed", "rise_time", "largest_acceleration", "tracking_error", "creep")
-INVERSE_MAP = Form("an inverse map", (".toml", ".csv", ".parquet"), (".pq",))
 
 Direction = Literal["both", "positive", "negative"]
 
@@ -154,11 +153,11 @@ def _say_envelope(
     plot: Path | None,
 ) -> None:
     with working("Measuring"):
-        from swashplate.analysis.envelope import envelope, envelope_table
+        from swashplate.analysis.capability import envelope
         from swashplate.analysis.tracking import largest_sine, sine_table
 
         found, refusal = envelope(drive.chosen), ""
-        tables = [envelope_table(found)]
+        tables = [found.table()]
         try:
             tables.append(sine_table(largest_sine(drive.chosen, frequencies, error)))
         except DomainError as no_inverse:
@@ -182,7 +181,7 @@ def _say_shares(
     plot: Path | None,
 ) -> None:
     with working("Simulating"):
-        from swashplate.analysis.limits import limit_shares, share_table
+        from swashplate.analysis.limits import limit_shares
 
         name, run = simulated(drive.chosen, command, sampling)
         assert run.voltage is not None  # the command line simulates voltages only
@@ -200,7 +199,7 @@ def _say_shares(
     note(f"{title}: {error} rms from a drive without limits")
     for line in drive.changes:
         note(line)
-    shares = share_table(found)
+    shares = found.acting()
     if shares.rows:
         show(shares)
     for sentence in found.sentences():
@@ -368,7 +367,7 @@ def size(
     pump, from half to twice, unless others are named.
     """
     from swashplate.analysis import sizing
-    from swashplate.analysis.outcomes import proportional_speed, wanted
+    from swashplate.analysis.outcomes import trial
 
     files = Outputs((out, None))
     if (tracking_deg_s is None) != (maneuver is None):
@@ -381,7 +380,7 @@ def size(
         follow, ranges = None, ranges_of(levers or SIZED, sizing.WIDEST)
         if maneuver is not None:
             voltage = maneuver_of(maneuver, choice.chosen).sample()
-            follow = wanted(proportional_speed(choice.chosen, voltage))
+            follow = trial(choice.chosen, voltage)
         found = sizing.size(choice.chosen, required, ranges, follow=follow)
     files.write(out, "Changed drive", found.drive.to_toml)
     note(choice.title)
@@ -506,10 +505,10 @@ def compensate(
     what a stick does, compares three controllers in simulation: a straight
     line, the map, and the map with the drive's lag made up for.
     """
-    files = Outputs((out, INVERSE_MAP), (plot, FIGURE))
-    with working("Inverting"):
-        from swashplate.analysis import compensation, tracking
+    from swashplate.analysis import compensation, tracking
 
+    files = Outputs((out, compensation.INVERSE_MAP), (plot, FIGURE))
+    with working("Inverting"):
         found = compensation.inverse_map(drive.chosen, points)
         tables = [compensation.map_table(found), compensation.map_limits_table(found)]
         if speeds_deg_s:

@@ -9,11 +9,12 @@ from math import isfinite, isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from swashplate.documents import parse_toml, read_text
 from swashplate.errors import FileError, InputError
 
 if TYPE_CHECKING:
     from swashplate.analysis.outcomes import Trial
-    from swashplate.analysis.sensitivity import Range
+    from swashplate.analysis.whatif import Range
     from swashplate.campaign import Campaign, Experiment
     from swashplate.cli.options import Sampling
     from swashplate.drive import Drive
@@ -59,10 +60,8 @@ def file_kind(path: Path) -> str:
     if path.name.lower().endswith((*SUFFIXES, ".xlsx", ".xls")):
         return "log"
     try:
-        import tomllib
-
-        found = tomllib.loads(path.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError):
+        found = parse_toml(read_text(path), str(path))
+    except FileError:
         return ""
     marks = {"runs": "campaign", "stages": "setup", "control_card": "drive", "pump_motor": "drive"}
     return next((kind for mark, kind in marks.items() if mark in found), "")
@@ -158,7 +157,6 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
     """
     from dataclasses import replace
 
-    from swashplate.documents import parse_toml, read_text
     from swashplate.identification.own_model import ModelSetup
 
     setup = ModelSetup.from_file(file)

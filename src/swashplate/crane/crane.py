@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from swashplate.analysis.capability import dead_zone
 from swashplate.analysis.compensation import InverseMap, inverse_map
-from swashplate.analysis.envelope import dead_zone
 from swashplate.crane.control import Control, settings_of
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
 from swashplate.crane.loop import BOOM_OUT, DIRECT, FINE, ROPE_OUT, ROWS, Fixed, Loop

@@ -15,12 +15,12 @@ from swashplate.crane.loop import ROWS
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.stick import AXES
 from swashplate.errors import InputError
+from swashplate.results import Tabular
 from swashplate.simulation.result import Limit, Simulation
 from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.figure import Figure
 
     from swashplate.crane.crane import Crane, Pose
 
@@ -33,7 +33,7 @@ SETTLED = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class CraneRun:
+class CraneRun(Tabular):
     """Signals of one run at 512 Hz; positions are inertial, z up, in m."""
 
     crane: Crane = field(repr=False)
@@ -51,6 +51,8 @@ class CraneRun:
     """Half periods of the load that the shaper takes."""
     mass: float
     """Of the load. [kg]"""
+
+    figure = "plot_crane"
 
     def __repr__(self) -> str:
         return (
@@ -183,9 +185,10 @@ class CraneRun:
         run = self.drive(axis)
         return {each.name.lower(): float(run.active(each).mean()) for each in Limit if each.name}
 
-    def summary(self) -> Table:
-        """What the run amounts to, as a table of one row; `run_table` compares several."""
-        return run_table({self.actuation: self})
+    def tables(self) -> list[Table]:
+        """What the run amounts to, and what limits its drives."""
+        runs = {self.actuation: self}
+        return [run_table(runs), *([] if self.actuation == "ideal" else [limit_table(runs)])]
 
     def to_polars(self) -> polars.DataFrame:
         """All signals, a row for each sample, in SI."""
@@ -196,12 +199,6 @@ class CraneRun:
         columns |= {name: self.out[:, i] for i, name in enumerate(ROWS)}
         columns["swing"] = np.radians(self.swing_deg)
         return pl.DataFrame(columns)
-
-    def plot(self) -> Figure:
-        """Figure of the run; see `swashplate.report.figures.plot_crane`."""
-        from swashplate.report.figures import plot_crane
-
-        return plot_crane(self)
 
 
 def run_table(runs: Mapping[str, CraneRun]) -> Table:

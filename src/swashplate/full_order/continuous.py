@@ -31,15 +31,14 @@ from swashplate.models.full_order import (
 )
 from swashplate.models.machine import Machine
 from swashplate.models.pump import solenoid_force
+from swashplate.results import Result, short
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-Holds = tuple[int, int, int]
-"""Spool, relief valve, swash plate."""
+Holds = tuple[int, int, int]  # Spool, relief valve, swash plate.
 
 N_STATES = len(Motion._fields)
-LOOKS = 4
-"""Points a sample at which a step is searched for an event."""
+LOOKS = 4  # Points a sample at which a step is searched for an event.
 SHORT = -1e-12
 """Margin below which a limit has been reached or let go; a restart on a limit has none, but for
 rounding. [1, rad]"""
@@ -55,8 +54,7 @@ LONG_SAMPLES, SHORT_SAMPLES = 4, 1
 """Longest step where the force is smooth, and where it is not, in samples."""
 KINK = 1e-4
 """Change of the force's slope from one sample to the next that counts as none, times step. [N]"""
-SHORTEST = 16
-"""Samples below which a smooth stretch is not worth a restart of the solver."""
+SHORTEST = 16  # Samples below which a smooth stretch is not worth a restart of the solver.
 
 
 @generating
@@ -83,7 +81,7 @@ def state_matrix(state: Array, force: float, p: Machine, options: PlantOptions) 
 
 
 @dataclass(frozen=True)
-class Modes:
+class Modes(Result):
     """Eigenvalues of the linearised model, told apart by the states that take part in them."""
 
     eigenvalues: Complex
@@ -150,6 +148,9 @@ class Feed(NamedTuple):
 
 class Case(NamedTuple):
     """What is integrated."""
+
+    def __repr__(self) -> str:
+        return short(self)
 
     p: Plant
     k: PlantConstants

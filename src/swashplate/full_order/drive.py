@@ -40,16 +40,11 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
 Method = Literal["march", "radau"]
 
-RESOLUTION = 1.0
-"""Largest product of a sub-step and the fastest natural frequency."""
-STABLE = 2.0
-"""The same where the march is no longer stable."""
-LEAST_SUBSTEPS = 8
-"""Sub-steps a sample that kinks of the flow, at the orifices' limits, are worth."""
-MOST_SUBSTEPS = 20_000
-"""Sub-steps a sample, beyond which the solver is the better way."""
-LOOSEST = 1e-3
-"""Largest relative tolerance."""
+RESOLUTION = 1.0  # Largest product of a sub-step and the fastest natural frequency.
+STABLE = 2.0  # The same where the march is no longer stable.
+LEAST_SUBSTEPS = 8  # Sub-steps a sample that kinks of the flow, at the orifices' limits, are worth.
+MOST_SUBSTEPS = 20_000  # Sub-steps a sample, beyond which the solver is the better way.
+LOOSEST = 1e-3  # Largest relative tolerance.
 
 
 class Integration(TypedDict, total=False):
@@ -120,6 +115,11 @@ class FullOrderSimulation(Signals):
     states: Array
     """(n, 5) the states on that grid, in the order of `swashplate.models.full_order.Motion`."""
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The signals that it has: ``"time"`` and `SIGNALS`."""
+        return ("time", *SIGNALS)
+
     def __repr__(self) -> str:
         return f"FullOrderSimulation({self.name!r}, {self.time.size} samples, {self.method})"
 
@@ -189,8 +189,7 @@ class FullOrderSimulation(Signals):
         return pl.DataFrame(columns)
 
 
-HOLDS = ("spool_hold", "relief_hold", "plate_hold")
-"""Limits that can hold."""
+HOLDS = ("spool_hold", "relief_hold", "plate_hold")  # Limits that can hold.
 
 
 def _beyond(values: Array, lower: float, upper: float) -> Flags:
@@ -397,10 +396,6 @@ class FullOrderDrive:
         force = float(interpreted(solenoid_force)(float(current), self.plant.solenoids))
         at = np.array(state.motion)
         return modes_of(state_matrix(at, force, self.plant.machine, self.options()))
-
-    def eigenvalues(self, current: float = 0.0) -> NDArray[np.complex128]:
-        """Eigenvalues of the five states about an equilibrium, see `modes`. [rad/s]"""
-        return self.modes(current).eigenvalues
 
     def sensitivities(
         self,

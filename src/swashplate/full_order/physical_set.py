@@ -26,18 +26,19 @@ from swashplate.errors import InputError, ParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine
 from swashplate.parameters.definitions import Definition, definition_of
-from swashplate.parameters.files import AXES, written
+from swashplate.parameters.files import AXES, Entry, parameter_of, written
 from swashplate.parameters.files import load_preset as load_parameters
 from swashplate.parameters.parameter_set import (
     Change,
+    HasParameters,
     Pair,
     Parameter,
     ParameterSet,
     Value,
+    set_of,
     value_of,
 )
 from swashplate.parameters.rules import out_of_range, range_sentence
-from swashplate.parameters.schema import Entry
 from swashplate.tables import Column, Table
 from swashplate.units import chosen_unit, to_si, unit_text
 
@@ -67,8 +68,7 @@ IN_PLACE_OF: Mapping[str, str] = {
     "piston_damping": "swash_damping_ratio",
 }
 """Quantities that may be chosen in place of a frequency or a damping ratio."""
-AGREES = 1e-9
-"""Relative difference up to which a given value agrees with the one that follows."""
+AGREES = 1e-9  # Relative difference up to which a given value agrees with the one that follows.
 
 
 @dataclass(frozen=True)
@@ -310,7 +310,7 @@ def chosen_quantity(name: str) -> Definition:
 
 
 def from_lumped(
-    parameters: ParameterSet,
+    lumped: ParameterSet | HasParameters,
     like: str | None = None,
     *,
     name: str | None = None,
@@ -322,7 +322,7 @@ def from_lumped(
 
     Parameters
     ----------
-    parameters : ParameterSet
+    lumped : ParameterSet or Drive
         The lumped parameters that the set shall have, Z6 apart.
     like : str, optional
         Packaged set whose assumed values count where nothing is chosen; by default see
@@ -346,6 +346,7 @@ def from_lumped(
     ParameterError
         If lumps contradict each other or a chosen value; the sentence names them.
     """
+    parameters = set_of(lumped)
     owner = parameters.name if name is None else name
     assumed = load_choices(nearest_set(parameters.name) if like is None else like)
     given = chosen_over(assumed, {**(entries or {}), **chosen})
@@ -550,20 +551,10 @@ def si_value(quantity: Definition, number: float, unit: str) -> float:
 
 def _entries(contents: PhysicalFile) -> dict[str, Parameter]:
     known = quantity_of if contents.lumps is None else chosen_quantity
-    return {name: _value(known(name), entry) for name, entry in contents.physical.items()}
-
-
-def _value(quantity: Definition, entry: Entry) -> Parameter:
-    """One entry of a file, in SI."""
-    if entry.bounds is not None:
-        raise ParameterError(
-            f"{quantity.symbol} has bounds; leave them out, a fit is given its own."
-        )
-    given = entry.value if isinstance(entry.value, list) else [entry.value]
-    first, *second = (si_value(quantity, number, entry.unit) for number in given)
-    change = (first, second[0]) if second else first
-    value = value_of(quantity.symbol, quantity, change)
-    return Parameter(quantity, value, entry.source, entry.status)
+    for name, entry in contents.physical.items():
+        if entry.bounds is not None:
+            raise ParameterError(f"{name} has bounds; leave them out, a fit is given its own.")
+    return {name: parameter_of(known(name), entry) for name, entry in contents.physical.items()}
 
 
 # --- for people -----------------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.model import EquationModel
 from swashplate.parameters.definitions import is_column
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.results import Result
 from swashplate.simulation.instance import START_PRESSURE, at_every_rate
 from swashplate.simulation.residuals import Own, Ready, made_ready
 from swashplate.simulation.run import check_voltage, simulate_drive
@@ -112,7 +113,7 @@ class Forces:
     minus: tuple[float, float, float, float]
     """Of the negative direction, as magnitudes. [A]"""
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the eight forces."""
         return tuple(f"force_{side}_{k}" for side in ("plus", "minus") for k in (1, 2, 3, 4))
@@ -233,7 +234,7 @@ CURRENTS: tuple[ChannelKind, ...] = (
 
 
 @dataclass(frozen=True, eq=False)
-class DriveModel(EquationModel):
+class DriveModel(Result, EquationModel):
     """A drive whose parameters are the unknowns, by columns such as ``"Z16_plus"``.
 
     Besides columns it knows ``"force_plus_1"`` ... (see `Forces`), ``"start_pressure"`` of an

@@ -21,13 +21,13 @@ from swashplate.identification.identifiability import (
     identifiability,
     listed,
 )
-from swashplate.identification.linearised import LinearisedFit, linearised_fit
-from swashplate.identification.problem import Problem
+from swashplate.identification.problem import LinearisedFit, Problem, linearised_fit
 from swashplate.identification.setup import Free, GivenForces, Setup, Stage
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.unknowns import Unknown
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, OWN, REFINEMENTS
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
+from swashplate.results import Result
 from swashplate.simulation.result import Limit, Simulation
 from swashplate.simulation.run import simulate_drive, simulate_pump
 
@@ -190,7 +190,7 @@ def _alone(name: str, share: Array, runs: Sequence[str], what: str) -> list[str]
 
 
 @dataclass(frozen=True, eq=False)
-class Excitation:
+class Excitation(Result):
     """How much each run moves with each unknown."""
 
     runs: tuple[str, ...]
@@ -227,7 +227,7 @@ def excitation(fit: LinearisedFit) -> Excitation:
 
 
 @dataclass(frozen=True, eq=False)
-class Outlook:
+class Outlook(Result):
     """What the runs can tell of a stage's unknowns, at the nominal values: known before a fit."""
 
     stage: Stage
@@ -327,15 +327,17 @@ class Outlook:
         return seconds
 
 
-def outlook(stage: Stage, parameters: ParameterSet, experiments: Sequence[Experiment]) -> Outlook:
+def outlook(
+    stage: Stage, nominal: ParameterSet | HasParameters, experiments: Sequence[Experiment]
+) -> Outlook:
     """What runs can tell of a stage's unknowns, before any fit.
 
     Parameters
     ----------
     stage : Stage
         What is free and what is fitted.
-    parameters : ParameterSet
-        Nominal values; best those that `fit.smooth` makes, as a fit takes them.
+    nominal : ParameterSet or Drive
+        Nominal values; best those that `fitting.smooth` makes, as a fit takes them.
     experiments : sequence of Experiment
         The runs to fit.
 
@@ -346,6 +348,7 @@ def outlook(stage: Stage, parameters: ParameterSet, experiments: Sequence[Experi
     DomainError
         If the model does not hold at the nominal values.
     """
+    parameters = set_of(nominal)
     problem = stage_problem(stage, parameters, experiments)
     model = problem.model
     assert isinstance(model, DriveModel)
@@ -363,7 +366,7 @@ COMMENT = 96
 
 
 @dataclass(frozen=True)
-class Proposal:
+class Proposal(Result):
     """What to change in one stage so that the runs determine all that is free."""
 
     stage: Stage

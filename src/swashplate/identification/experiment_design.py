@@ -17,21 +17,22 @@ from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import CURRENTS, SIGNALS
-from swashplate.identification.linearised import (
+from swashplate.identification.intervals import uncertainty
+from swashplate.identification.problem import (
     TOLERANCE,
+    Problem,
     linearised_fit,
     triangular_factor,
     whitening,
 )
-from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Free, Setup, Stage
 from swashplate.identification.staging import stage_problem
-from swashplate.identification.uncertainty import uncertainty
 from swashplate.identification.unknowns import Unknowns
 from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
 from swashplate.parameters.definitions import CATALOGUE, find
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result, short
 
 Array = NDArray[np.float64]
 
@@ -169,7 +170,7 @@ def interval(problem: Problem, channel: str) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class Bench(Result):
     """A drive, what is to be found of it, and what is known so far: where candidates are tried."""
 
     parameters: ParameterSet
@@ -325,6 +326,9 @@ WORTH = 1e-3
 class Candidate(NamedTuple):
     """A test that could be made."""
 
+    def __repr__(self) -> str:
+        return short(self)
+
     name: str
     derivatives: Array
     """(m, K) of what it would measure by the solver's vector, over the noise's deviation; or their
@@ -356,7 +360,7 @@ class Gain(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Advice:
+class Advice(Result):
     """One candidate, judged."""
 
     candidate: str
@@ -477,6 +481,9 @@ def default_maneuvers() -> tuple[Maneuver, ...]:
 
 class SensorAdvice(NamedTuple):
     """A sensor that could be added to a test."""
+
+    def __repr__(self) -> str:
+        return short(self)
 
     sensor: Sensor
     maneuver: str

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from hashlib import blake2b
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,19 +19,31 @@ from swashplate.drive import Drive
 from swashplate.equations import Model as Equations
 from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial
-from swashplate.identification.data_checks import check_sound, refuse_unsound
+from swashplate.identification.data_checks import check_model, check_sound, refuse_unsound
 from swashplate.identification.drive_model import DriveModel, at_rate_of
+from swashplate.identification.intervals import weighed
 from swashplate.identification.lack_of_fit import measurement_error
 from swashplate.identification.model import Model, OwnModel
 from swashplate.identification.own_model import ModelParameters, ModelSetup, Range
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Setup, Stage
-from swashplate.identification.solving import Loss, Progress, Solution, solve
+from swashplate.identification.solving import (
+    Loss,
+    Progress,
+    Solution,
+    StartResult,
+    sobol_starts,
+    solve,
+    solve_from,
+)
 from swashplate.identification.staging import Parameters, stage_problem, with_estimates
-from swashplate.identification.starts import StartResult, sobol_starts, solve_from
-from swashplate.identification.uncertainty import weighed
 from swashplate.identification.unknowns import Unknown
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.results import Result
+
+if TYPE_CHECKING:
+    from swashplate.identification.assessment import Assessment
+    from swashplate.tables import Table
 
 P = TypeVar("P", bound=Parameters)
 Array = NDArray[np.float64]
@@ -54,7 +66,7 @@ class Search:
 
 
 @dataclass(frozen=True, eq=False)
-class StageFit:
+class StageFit(Result):
     """What one stage found."""
 
     stage: Stage
@@ -85,7 +97,7 @@ class StageFit:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Fit(Result):
     """A fitted drive, or model of one's own, and how it came about."""
 
     setup: Setup
@@ -103,6 +115,35 @@ class Fit:
     def drive(self) -> Drive:
         """The fitted drive; refused where a model of one's own was fitted."""
         return self.stages[-1].drive
+
+    @cached_property
+    def assessments(self) -> tuple[Assessment, ...]:
+        """What the data tell of each stage's unknowns, and how well the runs are followed."""
+        from swashplate.identification.assessment import assess
+
+        return assess(self.stages)
+
+    def tables(self) -> list[Table]:
+        """Estimates with their intervals, stage by stage, then the errors of each fitted run."""
+        from swashplate.identification.tables import estimates_table, runs_tables
+
+        runs = [quality for each in self.assessments for quality in each.runs]
+        return [*map(estimates_table, self.assessments), *runs_tables(runs)]
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """How each stage ended, what its estimates lack, and what stayed fixed."""
+        from swashplate.identification.tables import fixed_line
+
+        said = list(self.doubts)
+        for each in self.assessments:
+            solution = each.stage.solution
+            said.append(
+                f"{each.stage.stage.name}: {solution.message} after {solution.evaluations} "
+                "evaluations."
+            )
+            said += [*each.identifiability.sentences(), *each.uncertainty.sentences()]
+        return (*said, fixed_line(self))
 
     @property
     def interrupted(self) -> bool:
@@ -184,6 +225,7 @@ def fit(
             entries = free if isinstance(free, Mapping) else {}
             named = tuple(channels), dict(noise or {}), dict(fixed or {})
             own = ModelSetup(own, entries, "", *named)
+        doubts = refuse_unsound(check_model(experiments, own))
         nominal = own.nominal(experiments)
         setup = own.setup
     else:
@@ -261,17 +303,7 @@ def _from_elsewhere(
         others = solve_from(problem, starts, tolerance=tolerance, max_evaluations=max_evaluations)
     except KeyboardInterrupt:  # before the first of them ended
         others = ()
-    nominal = StartResult(
-        0,
-        tuple(map(float, problem.start)),
-        tuple(map(float, found.vector)),
-        found.start_cost,
-        found.cost,
-        found.evaluations,
-        found.converged,
-        found.message,
-        found.seconds,
-    )
+    nominal = StartResult.of(0, problem.start, found)
     return nominal, *(replace(each, number=each.number + 1) for each in others)
 
 

@@ -21,6 +21,7 @@ from swashplate.equations.marching.observation import Observation, ObservedRecor
 from swashplate.equations.marching.observation import Own as EngineOwn
 from swashplate.equations.marching.record import Record, even_rate, gridded
 from swashplate.errors import DomainError, InputError
+from swashplate.results import Result, short
 from swashplate.simulation.residuals import Ready
 
 Array = NDArray[np.float64]
@@ -62,6 +63,9 @@ class Model(Protocol):
 
 class Linearised(NamedTuple):
     """A channel's simulated samples and their derivatives."""
+
+    def __repr__(self) -> str:
+        return short(self)
 
     values: Array
     """(m,)"""
@@ -344,7 +348,7 @@ def _shifts(
 
 
 @dataclass(frozen=True, eq=False)
-class OwnModel(EquationModel):
+class OwnModel(Result, EquationModel):
     """A model of equations whose parameters, by their paths, are the unknowns.
 
     ``"start.PATH"`` is a number of the state at the first sample, by its path or as `free_start` of

@@ -25,6 +25,7 @@ from swashplate.identification.setup import (
 )
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 Range = tuple[float, float, float] | tuple[float, float, float, str]
@@ -36,7 +37,7 @@ BY_ORDER = 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class ModelSetup:
+class ModelSetup(Result):
     """What is to be found of a model of one's own: to it what `Setup` is to a drive.
 
     Parameters
@@ -226,7 +227,7 @@ class ModelSetup:
 
 
 @dataclass(frozen=True, eq=False)
-class ModelParameters:
+class ModelParameters(Result):
     """The numbers of a model of one's own: to it what `ParameterSet` is to a drive."""
 
     setup: ModelSetup

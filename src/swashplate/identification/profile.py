@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
-from swashplate.identification.linearised import LinearisedFit
-from swashplate.identification.problem import Problem
+from swashplate.identification.problem import LinearisedFit, Problem
 from swashplate.identification.solving import Evaluation, solve
 from swashplate.identification.unknowns import Vector
+from swashplate.results import Result
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Assessment
@@ -102,7 +102,7 @@ class Point(NamedTuple):
 
 
 @dataclass(eq=False)
-class ProfileSide:
+class ProfileSide(Result):
     """One side of a profile, outwards."""
 
     minimise: Minimise
@@ -201,7 +201,7 @@ class ProfileSide:
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class Profile(Result):
     """Least cost as a function of one unknown."""
 
     index: int

@@ -13,6 +13,7 @@ from swashplate.campaign import ChannelKind
 from swashplate.campaign.schema import NotNegative, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.errors import ParameterError
+from swashplate.results import short
 
 if TYPE_CHECKING:
     from tomlkit.items import InlineTable
@@ -88,6 +89,9 @@ class InputWeight(Window):
 class Stage(Entry):
     """One fit: a part of the drive against its channels."""
 
+    def __repr__(self) -> str:
+        return short(self)
+
     name: str
     part: Literal["card", "pump", "chain", "model"] = Field(
         description="What is simulated: the control card, pump and motor, the whole chain; 'model' "
@@ -131,6 +135,9 @@ class Stage(Entry):
 
 class Setup(Entry):
     """A fit in one stage or several, each starting from what the ones before found."""
+
+    def __repr__(self) -> str:
+        return short(self)
 
     title: str = ""
     stages: tuple[Stage, ...] = Field(min_length=1)

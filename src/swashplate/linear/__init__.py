@@ -19,7 +19,6 @@ from swashplate.linear.model import UNITS as UNITS
 from swashplate.linear.model import Coulomb as Coulomb
 from swashplate.linear.model import LinearDrive as LinearDrive
 from swashplate.linear.model import LinearModel as LinearModel
-from swashplate.linear.model import pade_polynomials as pade_polynomials
 from swashplate.linear.operating_point import DeadZoneError as DeadZoneError
 from swashplate.linear.operating_point import Input as Input
 from swashplate.linear.operating_point import OperatingPoint as OperatingPoint

@@ -20,8 +20,9 @@ from swashplate.linear.drive import slowest_lag
 from swashplate.models.pump import Pump
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Tabular
 from swashplate.simulation.instance import check_filter_stability, instance_of, without_ripple
-from swashplate.tables import Column, Table, Tabular
+from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
     import polars
@@ -42,14 +43,11 @@ SweptOutput = Literal[
 
 SWEPT_OUTPUTS: tuple[SweptOutput, ...] = get_args(SweptOutput)
 
-SLOWEST_CYCLE = 1e-3
-"""Lowest frequency. [Hz]"""
+SLOWEST_CYCLE = 1e-3  # Lowest frequency. [Hz]
 FEWEST_STEPS, MOST_STEPS = 8, 1_000_000
 """Steps of a cycle, which bound the frequencies from both sides."""
-MOST_BLOCKS = 96
-"""Blocks of cycles after which an answer that still changes is given up."""
-STILL = 1e-12
-"""Answers below this part of the output's size are none."""
+MOST_BLOCKS = 96  # Blocks of cycles after which an answer that still changes is given up.
+STILL = 1e-12  # Answers below this part of the output's size are none.
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +56,8 @@ class FrequencyResponse(Tabular):
 
     A row for each amplitude, a column for each frequency.
     """
+
+    figure = "plot_bode"
 
     name: str
     """Name of the drive."""
@@ -118,32 +118,21 @@ class FrequencyResponse(Tabular):
                 f"{nearest:.6g} Hz."
             )
         near = slice(k, k + 1)
-        return replace(
-            self,
-            frequencies=self.frequencies[near],
-            ratio=self.ratio[:, near],
-            distortion=self.distortion[:, near],
-            mean=self.mean[:, near],
-            cycles=self.cycles[:, near],
-        )
+        rows = {n: getattr(self, n)[:, near] for n in ("ratio", "distortion", "mean", "cycles")}
+        return replace(self, frequencies=self.frequencies[near], **rows)
 
     def to_polars(self) -> polars.DataFrame:
         """Table in SI, a row for each amplitude and frequency; no phase where nothing moves."""
         import polars as pl
 
         shape = self.ratio.shape
-        table = pl.DataFrame(
-            {
-                "amplitude": np.repeat(self.amplitudes, shape[1]),
-                "frequency": np.tile(self.frequencies, shape[0]),
-                "gain": self.gain.ravel(),
-                "phase": self.phase.ravel(),
-                "distortion": self.distortion.ravel(),
-                "mean": self.mean.ravel(),
-                "cycles": self.cycles.ravel(),
-            }
-        )
-        return table.with_columns(pl.col("phase").fill_nan(None))
+        columns = {
+            "amplitude": np.repeat(self.amplitudes, shape[1]),
+            "frequency": np.tile(self.frequencies, shape[0]),
+        }
+        for name in ("gain", "phase", "distortion", "mean", "cycles"):
+            columns[name] = getattr(self, name).ravel()
+        return pl.DataFrame(columns).with_columns(pl.col("phase").fill_nan(None))
 
 
 # --- sweep ----------------------------------------------------------------------------------------
@@ -253,14 +242,9 @@ def _settled(
 
 def _size(pump: Pump, output: SweptOutput) -> float:
     """Natural size of a signal, beside which rounding is told from motion."""
-    sizes: dict[str, float] = {
-        "shaft_speed": pump.Z10,
-        "stroker_pressure": 1.0 / pump.Z1,
-        "solenoid_force": pump.Z4**0.5 / pump.Z5,
-        "spool_position": pump.Z5,
-        "orifice_opening": pump.Z5,
-    }
-    return sizes.get(output, 1.0)
+    spool = dict.fromkeys(("spool_position", "orifice_opening"), pump.Z5)
+    sizes = {"shaft_speed": pump.Z10, "stroker_pressure": 1.0 / pump.Z1, **spool}
+    return sizes.get(output, pump.Z4**0.5 / pump.Z5 if output == "solenoid_force" else 1.0)
 
 
 def _harmonic(signal: Array, size: float) -> tuple[complex, float, float]:
@@ -295,25 +279,21 @@ def response_table(response: FrequencyResponse) -> Table:
         From voltage to the shaft's speed, at one frequency (`FrequencyResponse.at`).
     """
     (frequency,) = response.frequencies
-    made = Table(
-        "",
-        (
-            Column("amplitude", "g", "V"),
-            Column("gain", ".3f", "rad/s/V", none="none"),
-            Column("phase", "z.1f", "deg"),
-            Column("lag", "z.1f", "ms"),
-            Column("distortion %", ".1f"),
-            Column("mean speed", "z.2f", "rad/s"),
-        ),
+    heads = (
+        ("amplitude", "g", "V"),
+        ("gain", ".3f", "rad/s/V", "none"),
+        ("phase", "z.1f", "deg"),
+        ("lag", "z.1f", "ms"),
+        ("distortion %", ".1f"),
+        ("mean speed", "z.2f", "rad/s"),
     )
-    for k, amplitude in enumerate(response.amplitudes):
-        mean = float(response.mean[k, 0])
-        if not response.moves[k, 0]:
-            made.add(float(amplitude), None, None, None, None, mean)
-            continue
-        phase = float(response.phase[k, 0])
-        lag = -1e3 * phase / (2.0 * np.pi * frequency)
-        distortion = 100.0 * float(response.distortion[k, 0])
-        answer = (float(response.gain[k, 0]), np.degrees(phase), lag, distortion)
-        made.add(float(amplitude), *answer, mean)
+    made = Table("", tuple(Column(*each) for each in heads))
+    for k, amplitude in enumerate(map(float, response.amplitudes)):
+        answer: tuple[float | None, ...] = (None,) * 4
+        if response.moves[k, 0]:
+            phase = float(response.phase[k, 0])
+            lag = -1e3 * phase / (2.0 * np.pi * frequency)
+            distortion = 100.0 * float(response.distortion[k, 0])
+            answer = (float(response.gain[k, 0]), np.degrees(phase), lag, distortion)
+        made.add(amplitude, *answer, float(response.mean[k, 0]))
     return made

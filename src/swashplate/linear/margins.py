@@ -16,10 +16,8 @@ ComplexArray = NDArray[np.complex128]
 Response = Callable[[Array], ComplexArray]
 
 _POINTS = 4000
-_DECADES = 9
-"""The search begins so many decades below the fastest frequency."""
-_TURN = 0.05
-"""Largest turn of the delay's phase from one point of the search to the next. [rad]"""
+_DECADES = 9  # The search begins so many decades below the fastest frequency.
+_TURN = 0.05  # Largest turn of the delay's phase from one point of the search to the next. [rad]
 _MOST_POINTS = 2_000_000
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from importlib import import_module
-from math import comb, factorial, log
+from math import log
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -50,8 +50,6 @@ UNITS = {
     "supply_pressure": "Pa",
 }
 """SI unit of each input, output and state of a drive's continuous model."""
-HIGHEST_PADE = 8
-"""Above, the approximant's coefficients span more decades than double precision has digits."""
 LINEAR_MODEL = Form("a linear model", (".toml", ".json"))
 
 
@@ -64,26 +62,19 @@ class LinearModel:
     the inputs u comes late by `delay`.
     """
 
-    A: Array
-    """(n, n)"""
-    B: Array
-    """(n, k)"""
-    C: Array
-    """(m, n)"""
-    D: Array
-    """(m, k)"""
+    A: Array  # (n, n)
+    B: Array  # (n, k)
+    C: Array  # (m, n)
+    D: Array  # (m, k)
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     """The first is the one that loops, gains and responses are about unless told otherwise."""
     outputs: tuple[str, ...]
     delay: float
     """What stands exactly before the first input; of a sampled model whole samples. [s]"""
-    sample_time: float | None
-    """Interval of a sampled model, None of a continuous one. [s]"""
-    name: str
-    """Name of the machine."""
-    memory: tuple[str, ...]
-    """States that are inputs of earlier samples."""
+    sample_time: float | None  # Interval of a sampled model, None of a continuous one. [s]
+    name: str  # Name of the machine.
+    memory: tuple[str, ...]  # States that are inputs of earlier samples.
 
     def __repr__(self) -> str:
         time = "continuous" if self.sample_time is None else f"sampled at {self.sample_time:g} s"
@@ -254,54 +245,35 @@ class LinearModel:
         first = int(np.argmax(numerator != 0.0)) if numerator.any() else n
         return numerator[first:], denominator
 
-    def _with_delay(self, order: int | None) -> tuple[Matrices, tuple[str, ...]]:
-        """Matrices and names of the states, with the delay inside; `order` as in `to_scipy`."""
+    def _exported(self, without_delay: bool) -> tuple[Matrices, tuple[str, ...]]:
+        """Matrices and names of the states, whole samples of delay among them."""
         matrices = self.A, self.B, self.C, self.D
         if self.sample_time is not None:
-            if order is not None:
-                raise InputError(
-                    "A sampled model has its delay exactly, as states; leave pade out."
-                )
-            return with_line(matrices, self.states, self.input, self._late)
-        if self.delay == 0.0 or order == 0:
-            return matrices, self.states
-        if order is None:
+            late = round(self.delay / self.sample_time)
+            return with_line(matrices, self.states, self.input, late)
+        if self.delay != 0.0 and not without_delay:
             raise InputError(
                 f"The model has a delay of {self.delay:g} s, which no state space holds exactly; "
-                "say pade=2 for an approximant of that order, or pade=0 to leave the delay out."
+                "say without_delay=True and put an approximant before it, python-control's pade "
+                "for example, or take a sampled model (discrete), which has it as states."
             )
-        names = tuple(f"delay_{k}" for k in range(1, order + 1))
-        return in_series(_pade_states(self.delay, order), matrices), (*names, *self.states)
+        return matrices, self.states
 
-    @property
-    def _late(self) -> int:
-        """Whole samples of delay."""
-        return round(self.delay / self.sample_time) if self.sample_time is not None else 0
-
-    def to_scipy(self, pade: int | None = None) -> StateSpace:
+    def to_scipy(self, *, without_delay: bool = False) -> StateSpace:
         """The model as `scipy.signal.StateSpace`, continuous or sampled.
 
-        Parameters
-        ----------
-        pade : int, optional
-            Order of the Padé approximant for a continuous model's delay, 0 to leave the delay
-            out; must be said where there is one. A sampled model's delay is exact, as states.
+        A sampled model's delay is exact, as states. A continuous one's must be left out by
+        `without_delay`; it is refused in an `InputError` otherwise.
         """
         from scipy.signal import StateSpace
 
-        matrices, _ = self._with_delay(pade)
+        matrices, _ = self._exported(without_delay)
         sampled = {} if self.sample_time is None else {"dt": self.sample_time}
         return StateSpace(*matrices, **sampled)
 
-    def to_control(
-        self,
-        form: Literal["state_space", "transfer_function"] = "state_space",
-        pade: int | None = None,
-    ) -> Any:
-        """The model as python-control's StateSpace or TransferFunction; `pade` as in `to_scipy`."""
-        if form not in ("state_space", "transfer_function"):
-            raise InputError(f"form is '{form}'; it is 'state_space' or 'transfer_function'.")
-        matrices, states = self._with_delay(pade)
+    def to_control(self, *, without_delay: bool = False) -> Any:
+        """The model as python-control's StateSpace with named signals; as `to_scipy`."""
+        matrices, states = self._exported(without_delay)
         try:
             control = import_module("control")
         except ImportError:
@@ -309,25 +281,8 @@ class LinearModel:
                 "python-control is not installed: pip install swashplate[control]; to_scipy needs "
                 "nothing more."
             ) from None
-        dt = self.sample_time or 0
         named = {"inputs": list(self.inputs), "outputs": list(self.outputs), "name": self.name}
-        if form == "state_space":
-            return control.ss(*matrices, dt, states=list(states), **named)
-        one = np.ones(1)
-        before, after = one, one
-        if self.sample_time is not None:
-            after = np.eye(1, self._late + 1)[0]
-        elif self.delay != 0.0 and pade:
-            before, after = pade_polynomials(self.delay, pade)
-        numerators: list[Any] = []
-        denominators: list[Any] = []
-        for output in self.outputs:
-            own = [self.transfer_function(output, name) for name in self.inputs]
-            late = [(before, after), *((one, one) for _ in self.inputs[1:])]
-            pairs = list(zip(own, late, strict=True))
-            numerators.append([np.polymul(a, b) for (a, _), (b, _) in pairs])
-            denominators.append([np.polymul(a, b) for (_, a), (_, b) in pairs])
-        return control.tf(numerators, denominators, dt, **named)
+        return control.ss(*matrices, self.sample_time or 0, states=list(states), **named)
 
     def content(self) -> dict[str, Any]:
         """What is written of a model, as plain numbers, strings and lists; SI."""
@@ -414,58 +369,17 @@ class LinearDrive(LinearModel):
 # --- delays ---------------------------------------------------------------------------------------
 
 
-def pade_polynomials(delay: float, order: int) -> tuple[Array, Array]:
-    """Numerator and denominator of the Padé approximant of e^(-s delay), highest power first.
-
-    The delay is in s; the order, 1 to 8, is the degree of both.
-    """
-    powers = np.arange(order, -1, -1)
-    denominator = _pade_coefficients(order)[::-1] * delay**powers
-    return denominator * (-1.0) ** powers, denominator
-
-
-def _pade_states(delay: float, order: int) -> Matrices:
-    """The same as a state space, its states scaled so that the coefficients are of one size."""
-    coefficients = _pade_coefficients(order)
-    sign = (-1.0) ** np.arange(order + 1)
-    through = sign[-1]
-    A = np.eye(order, k=1)
-    A[-1] = -coefficients[:-1]
-    B = np.zeros((order, 1))
-    B[-1, 0] = 1.0
-    C = ((sign - through) * coefficients)[np.newaxis, :-1]
-    return A / delay, B / delay, C, np.array([[through]])
-
-
-def _pade_coefficients(order: int) -> Array:
-    """Coefficients of the denominator in p = s delay, lowest first, the highest being 1."""
-    if not 1 <= order <= HIGHEST_PADE:
-        raise InputError(
-            f"The order of a Padé approximant is {order}, but must be 1 to {HIGHEST_PADE}, or 0 "
-            "to leave the delay out."
-        )
-    return np.array(
-        [comb(order, k) * factorial(2 * order - k) / factorial(order) for k in range(order + 1)]
-    )
-
-
 def with_line(
     matrices: Matrices, states: tuple[str, ...], input: str, whole: int
 ) -> tuple[Matrices, tuple[str, ...]]:
     """Matrices and names of the states with whole samples of delay before the first input."""
     if whole == 0:
         return matrices, states
-    A = np.eye(whole, k=-1)
-    line = A, np.eye(whole, 1), np.eye(1, whole, whole - 1), np.zeros((1, 1))
+    A, B, C, D = matrices
+    n, others = A.shape[0], np.zeros((whole, B.shape[1] - 1))
+    line, last, first = np.eye(whole, k=-1), np.eye(1, whole, whole - 1), np.eye(whole, 1)
+    longer = np.block([[line, np.zeros((whole, n))], [B[:, :1] @ last, A]])
+    into = np.block([[first, others], [np.zeros((n, 1)), B[:, 1:]]])
+    out = np.hstack((D[:, :1] @ last, C)), np.hstack((np.zeros_like(D[:, :1]), D[:, 1:]))
     names = tuple(f"{input}_{k}" for k in range(1, whole + 1))
-    return in_series(line, matrices), (*names, *states)
-
-
-def in_series(first: Matrices, second: Matrices) -> Matrices:
-    """A single-input system before the first input of another one."""
-    A1, B1, C1, D1 = first
-    A2, B2, C2, D2 = second
-    n, others = A1.shape[0], np.zeros((A1.shape[0], B2.shape[1] - 1))
-    A = np.block([[A1, np.zeros((n, A2.shape[0]))], [B2[:, :1] @ C1, A2]])
-    B = np.block([[B1, others], [B2[:, :1] @ D1, B2[:, 1:]]])
-    return A, B, np.hstack((D2[:, :1] @ C1, C2)), np.hstack((D2[:, :1] @ D1, D2[:, 1:]))
+    return (longer, into, *out), (*names, *states)

@@ -30,10 +30,8 @@ Input = Literal[
 ]
 
 INPUTS: tuple[Input, ...] = get_args(Input)
-COMMANDS = INPUTS[:3]
-"""Of which one moves at a time; the others can move beside it."""
-_SEARCHED = 4001
-"""Voltages among which a speed is looked for, before the place is found exactly."""
+COMMANDS = INPUTS[:3]  # Of which one moves at a time; the others can move beside it.
+_SEARCHED = 4001  # Voltages among which a speed is looked for, before the place is found exactly.
 _DECIMALS = 4
 """Of the voltage that is proposed; rounded away from 0 V, so that it does have a model."""
 

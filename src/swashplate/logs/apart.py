@@ -1,8 +1,9 @@
-"""Formats that are read in a process of their own, because a damaged file can end or hang it.
+"""Binary formats are read in a process of their own, because a damaged file can end or hang it.
 
 At some damage Polars aborts the whole process that reads a Parquet file, the HDF5 library goes
 round in circles, asammdf prints what it meets. A second process, started at the first such file and
-kept for the next, can be ended instead, and has a limit to its memory.
+kept for the next, can be ended instead, has a limit to its memory, and turns whatever a library
+raises into one sentence.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ import subprocess
 import sys
 import tempfile
 import threading
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
-from importlib import import_module
 from pathlib import Path
 from typing import IO, Any, cast
 from weakref import finalize
@@ -24,8 +25,7 @@ from weakref import finalize
 import numpy as np
 
 from swashplate.errors import FileError, InputError, SwashplateError
-from swashplate.logs.damage import INFLATION, printable
-from swashplate.logs.log import Array, Column, Log
+from swashplate.logs.log import Array, Column, Log, printable, reader_of, said
 
 _PATIENCE = 30.0
 """How long a small file may take [s]."""
@@ -35,23 +35,26 @@ _LEAVE = 1.0
 _START = "import sys; sys.path[:] = {path!r}; from swashplate.logs.apart import serve; serve()"
 
 
-def open_apart(module: str, path: Path) -> Log:
+def open_apart(reader: str, path: Path) -> Log:
     """Look into a file as a reader of this package does, in the other process.
 
     Parameters
     ----------
-    module : str
-        Name of the reader's module: ``"parquet"``.
+    reader : str
+        Its name, as `reader_of` takes it.
 
     Raises
     ------
     FileError
         As the reader does; or if the file ended the process, or took too long.
     """
-    told = _Other.ask(module, path, None)[0]
+    told = _Other.ask(reader, path)[0]
 
     def load(positions: Sequence[int]) -> list[Array]:
-        return _Other.ask(module, path, list(positions))[1]
+        return _Other.ask(reader, path, positions)[1]
+
+    def part(positions: Sequence[int], first: int, last: int) -> list[Array]:
+        return _Other.ask(reader, path, positions, (first, last))[1]
 
     return Log(
         path,
@@ -61,6 +64,8 @@ def open_apart(module: str, path: Path) -> Log:
         tuple(told["comments"]),
         tuple(told["notes"]),
         told["left_out"],
+        part=part if told["in_parts"] else None,
+        rows=told["rows"],
     )
 
 
@@ -84,44 +89,43 @@ class _Other:
 
     @classmethod
     def ask(
-        cls, module: str, path: Path, positions: list[int] | None
+        cls,
+        reader: str,
+        path: Path,
+        positions: Sequence[int] | None = None,
+        rows: tuple[int, int] | None = None,
     ) -> tuple[dict[str, Any], list[Array]]:
         """What the other process has to say of a file, and these columns of it."""
+        question: dict[str, Any] = {
+            "reader": reader,
+            "path": str(path.absolute()),
+            "said": str(path),
+        }
+        question |= {"positions": positions and list(positions), "rows": rows}
         with cls.lock:
-            if cls.running is None:
-                try:
-                    cls.running = cls()
-                except OSError as error:
-                    raise FileError(
-                        f"{path} is read in a process of its own, which cannot be started: "
-                        f"{error.strerror}."
-                    ) from None
-            other = cls.running
             try:
-                said, arrays = other._answer(module, path, positions)
-            except (
-                BaseException
-            ):  # also at Ctrl-C: what is half said must not meet the next question
+                cls.running = other = cls.running or cls()
+            except OSError as error:
+                raise FileError(
+                    f"{path} is read in a process of its own, which cannot be started: "
+                    f"{error.strerror}."
+                ) from None
+            try:
+                answer, arrays = other._answer(path, question)
+            except BaseException:
+                # also at Ctrl-C: what is half said must not meet the next question
                 cls.running = None
                 other._end()
                 raise
-        if "error" in said:
-            raise (InputError if said["kind"] == "InputError" else FileError)(said["error"])
-        return said, arrays
+        if "error" in answer:
+            raise (InputError if answer["kind"] == "InputError" else FileError)(answer["error"])
+        return answer, arrays
 
-    def _answer(
-        self, module: str, path: Path, positions: list[int] | None
-    ) -> tuple[dict[str, Any], list[Array]]:
-        asked = {
-            "module": module,
-            "path": str(path),
-            "folder": str(Path.cwd()),
-            "positions": positions,
-        }
+    def _answer(self, path: Path, question: dict[str, Any]) -> tuple[dict[str, Any], list[Array]]:
         source = cast(io.BufferedReader, self._process.stdout)
         sink = cast(io.BufferedWriter, self._process.stdin)
         try:
-            sink.write(json.dumps(asked).encode() + b"\n")
+            sink.write(json.dumps(question).encode() + b"\n")
             sink.flush()
         except BrokenPipeError:
             raise FileError(self._what_ended(path)) from None
@@ -140,14 +144,14 @@ class _Other:
             )
         if not line.endswith(b"\n"):
             raise FileError(self._what_ended(path))
-        said = json.loads(line)
+        answer = json.loads(line)
         arrays = []
-        for count in said.get("counts", []):
+        for count in answer.get("counts", []):
             array = np.empty(count)
             if source.readinto(array.view(np.uint8).data) < array.nbytes:
                 raise FileError(self._what_ended(path))
             arrays.append(array)
-        return said, arrays
+        return answer, arrays
 
     def _what_ended(self, path: Path) -> str:
         self._process.wait()
@@ -175,6 +179,8 @@ def _ended(process: subprocess.Popen[bytes], errors: IO[bytes]) -> None:
 
 _SPARE = 3 << 30
 """Memory that reading takes at least, most of it addresses alone. [byte]"""
+_INFLATION = 1032
+"""No more bytes than this come out of one byte of zlib's; Parquet's codecs are no better."""
 _USED = Path("/proc/self/statm")
 
 
@@ -182,43 +188,45 @@ def serve() -> None:
     """Answer questions: a line of JSON each, answered by a line and the arrays asked for."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print must not get between the answers
+    warnings.simplefilter("ignore")
+    from swashplate.logs.dialect import TextOptions
+
     last: tuple[object, Log] | None = None
     for line in sys.stdin.buffer:
         asked = json.loads(line)
-        os.chdir(asked["folder"])
-        path = Path(asked["path"])
+        path, reader = Path(asked["path"]), reader_of(asked["reader"])
+        arrays: Sequence[Array] = []
+        answer: dict[str, Any]
         try:
-            from swashplate.logs.text import TextOptions
-
-            reader = import_module(f"swashplate.logs.{asked['module']}")
             _limit_memory(path)
-            known = (asked["module"], path.resolve(), path.stat().st_mtime_ns, path.stat().st_size)
+            known = (asked["reader"], path, path.stat().st_mtime_ns, path.stat().st_size)
             if last is None or last[0] != known:
                 last = None
                 last = known, reader.open(path, TextOptions())
-            arrays = [] if asked["positions"] is None else last[1].load(asked["positions"])
-            _answer(answers, _told(last[1]), arrays)
-        except SwashplateError as error:
+            log = last[1]
+            if asked["positions"] is not None:
+                log = log.between(*asked["rows"]) if asked["rows"] else log
+                arrays = log.load(asked["positions"])
+            answer = {key: getattr(log, key) for key in ("format", "columns", "comments", "notes")}
+            answer |= {"left_out": dict(log.left_out), "rows": log.rows}
+            answer |= {"in_parts": log.part is not None}
+        except (KeyboardInterrupt, SystemExit):
+            raise
+        except BaseException as error:
+            # libraries raise all there is at a broken byte, and Polars what is not an Exception
+            what = str(error)
+            if not isinstance(error, SwashplateError):
+                what = (
+                    f"{path} cannot be read as {reader.name}, it is damaged or of another kind: "
+                    f"{said(error)}."
+                )
             kind = "InputError" if isinstance(error, InputError) else "FileError"
-            _answer(answers, {"error": str(error), "kind": kind}, [])
-
-
-def _told(log: Log) -> dict[str, Any]:
-    return {
-        "format": log.format,
-        "columns": log.columns,
-        "comments": log.comments,
-        "notes": log.notes,
-        "left_out": dict(log.left_out),
-    }
-
-
-def _answer(answers: Any, told: dict[str, Any], arrays: Sequence[Array]) -> None:
-    told["counts"] = [array.size for array in arrays]
-    answers.write(json.dumps(told).encode() + b"\n")
-    for array in arrays:
-        answers.write(array.view(np.uint8).data)
-    answers.flush()
+            answer, arrays = {"error": what.replace(str(path), asked["said"]), "kind": kind}, []
+        answer["counts"] = [array.size for array in arrays]
+        answers.write(json.dumps(answer).encode() + b"\n")
+        for array in arrays:
+            answers.write(np.ascontiguousarray(array).view(np.uint8).data)
+        answers.flush()
 
 
 def _limit_memory(path: Path) -> None:
@@ -228,6 +236,6 @@ def _limit_memory(path: Path) -> None:
     import resource
 
     used = int(_USED.read_text().split()[0]) * resource.getpagesize()
-    most = used + _SPARE + INFLATION * path.stat().st_size
+    most = used + _SPARE + _INFLATION * path.stat().st_size
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
     resource.setrlimit(resource.RLIMIT_AS, (most if hard < 0 else min(most, hard), hard))

@@ -1,10 +1,11 @@
-"""What a log file is: named columns with units, read on demand, and checked before use."""
+"""Logs: files of named columns with units, opened by their ending, read on demand and checked."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from importlib import import_module, metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol, runtime_checkable
 
@@ -12,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import FileError, InputError
-from swashplate.logs.damage import printable
-from swashplate.units import to_si
+from swashplate.units import speed_unit, to_si
 
 if TYPE_CHECKING:
-    from swashplate.logs.text import TextOptions
+    from swashplate.logs.dialect import TextOptions
 
 Array = NDArray[np.float64]
 
@@ -50,6 +50,18 @@ class Log:
         What was assumed or skipped, one sentence each.
     left_out : mapping of str to str
         What the file has besides and cannot be read as numbers: name and reason.
+    stream : callable, optional
+        Given such positions, reads those columns piece after piece; where the format can do so.
+    part : callable, optional
+        Given such positions, a first row and the one behind the last, reads these rows.
+    rows : int, optional
+        How many there are, where that is known without reading; of text, about.
+    first : int
+        Rows of the file that come before those of `load`.
+    cut : str
+        Of a part of a file, which one it is; else empty.
+    resumes : bool
+        Of a part, whether it begins in the midst of a motion.
     """
 
     path: Path
@@ -59,6 +71,16 @@ class Log:
     comments: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     left_out: Mapping[str, str] = field(default_factory=dict)
+    stream: Callable[[Sequence[int]], Iterator[list[Array]]] | None = field(
+        default=None, repr=False
+    )
+    part: Callable[[Sequence[int], int, int], Sequence[Array]] | None = field(
+        default=None, repr=False
+    )
+    rows: int | None = None
+    first: int = 0
+    cut: str = ""
+    resumes: bool = False
 
     def __post_init__(self) -> None:
         """Make all that may get into a sentence printable: names are what a file says they are."""
@@ -117,6 +139,22 @@ class Log:
         arrays = dict(zip(unique, self.load(unique), strict=True))
         return {name: arrays[position] for name, position in positions.items()}
 
+    def between(self, first: int, last: int) -> Log:
+        """The log of a part of the rows, from the first (counted from 0) to before the last.
+
+        Only of a log that has `part`, which goes on to count from the file's first row.
+        """
+        part = self.part
+        assert part is not None
+        return replace(
+            self,
+            load=lambda positions: part(positions, first, last),
+            stream=None,
+            rows=last - first,
+            first=first,
+            cut=f"rows {first + 1} to {last} of {self.rows}",
+        )
+
     def _position(self, wanted: str) -> int:
         try:
             return find_column(self.columns, wanted, self.path)
@@ -127,6 +165,14 @@ class Log:
                         f"{self.path}: '{name}' cannot be read as numbers: {reason}."
                     ) from None
             raise
+
+
+class Format(NamedTuple):
+    """A reader of this package, as `Reader` has it."""
+
+    name: str
+    suffixes: tuple[str, ...]
+    open: Callable[[Path, TextOptions], Log]
 
 
 @runtime_checkable
@@ -151,6 +197,263 @@ class Reader(Protocol):
             If it is not of this format or damaged.
         """
         ...
+
+
+# --- files ----------------------------------------------------------------------------------------
+
+
+def printable(text: str) -> str:
+    """A text for a sentence: what cannot be printed is replaced."""
+    return "".join(each if each.isprintable() else "�" for each in text)
+
+
+def said(error: BaseException) -> str:
+    """The first sentence of an error's message, or what it is."""
+    if isinstance(error, MemoryError):
+        return "it asks for more memory than there is"
+    lines = str(error).strip().splitlines()
+    first = printable(lines[0]) if lines else ""
+    sentence = re.split(r"[.!?;](?:\s|$)", first, maxsplit=1)[0].strip()[:200]
+    return sentence or type(error).__name__
+
+
+def check_file(path: Path) -> int:
+    """Size in bytes of a file that can be read.
+
+    Raises
+    ------
+    FileError
+        If it is missing, a folder, not readable or empty.
+    """
+    try:
+        if path.is_dir():
+            reason = "is a folder, not a log"
+        elif path.exists() and not path.is_file():
+            reason = "is no ordinary file"
+        else:
+            with path.open("rb") as file:
+                size = file.seek(0, 2)
+            reason = "" if size else "is empty"
+    except FileNotFoundError:
+        raise FileError(f"There is no file {path}.") from None
+    except (OSError, ValueError) as error:
+        reason = f"cannot be read: {getattr(error, 'strerror', None) or said(error)}"
+    if reason:
+        raise FileError(f"{path} {reason}.")
+    return size
+
+
+_KINDS = {
+    b"\x89HDF\r\n\x1a\n": "HDF5",
+    b"PAR1": "Parquet",
+    b"TDSm": "TDMS",
+    b"MDF     ": "MDF",
+    b"UnFinMF ": "MDF",
+    b"MATLAB 5.0 MAT-file": "MATLAB",
+    b"MATLAB 7.3 MAT-file": "MATLAB",
+    b"PK\x03\x04": "Excel or zip",
+    b"\xd0\xcf\x11\xe0": "Excel",
+    b"\x1f\x8b": "gzip",
+    b"\x28\xb5\x2f\xfd": "zstd",
+    b"\xfd7zXZ": "xz",
+    b"\x80\x02": "Python pickle",
+    b"\x80\x03": "Python pickle",
+    b"\x80\x04": "Python pickle",
+    b"\x80\x05": "Python pickle",
+    b"\x93NUMPY": "NumPy",
+    b"%PDF-": "PDF",
+}
+
+
+def check_kind(path: Path, *expected: str) -> None:
+    """Refuse a file whose first bytes are those of another kind, and say of which.
+
+    Parameters
+    ----------
+    expected : str
+        Kinds that are right, by name; a file of no known kind passes.
+    """
+    with path.open("rb") as file:
+        first = file.read(32)
+    for magic, kind in _KINDS.items():
+        if first.startswith(magic) and kind not in expected:
+            raise FileError(
+                f"{path} ends in '{path.suffix}' but holds {kind}; rename or convert it."
+            )
+
+
+def left_out_notes(left_out: Mapping[str, str]) -> tuple[str, ...]:
+    """What is left out of a file and why, one sentence each."""
+    return tuple(f"'{each}' is left out: {reason}." for each, reason in left_out.items())
+
+
+def check_any(
+    path: Path, columns: Collection[object], what: str, left_out: Mapping[str, str]
+) -> None:
+    """Refuse a file without columns of numbers, and say what it has instead."""
+    if not columns:
+        why = "".join(f"; '{each}': {reason}" for each, reason in left_out.items())[:300]
+        raise FileError(f"{path} has no {what} of numbers{why}.")
+
+
+# --- opening --------------------------------------------------------------------------------------
+
+_READERS = {
+    "text.TEXT": (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".log"),
+    "channels.PARQUET": (".parquet", ".pq"),
+    "arrays.MATLAB": (".mat",),
+    "arrays.HDF5": (".h5", ".hdf5", ".hdf", ".he5"),
+    "channels.TDMS": (".tdms",),
+    "channels.MDF": (".mf4", ".mdf"),
+}
+"""Reader of each format and the endings of its files: they are imported when one is opened."""
+
+_TRUSTED = ("text.TEXT",)
+"""Others have libraries that cannot be trusted with a damaged file: see `apart`."""
+
+SUFFIXES = tuple(suffix for suffixes in _READERS.values() for suffix in suffixes)
+"""Endings of files that swashplate reads itself."""
+
+GROUP = "swashplate.readers"
+"""Entry points by which other packages offer readers for more endings."""
+
+
+def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
+    """Look into a log file; columns are read when they are asked for.
+
+    Parameters
+    ----------
+    path : path
+        Its ending says what it is: text (CSV and its kin), Parquet, MATLAB (all versions), HDF5,
+        TDMS, MDF 4, or what an installed package reads.
+    options : TextOptions, optional
+        How a text file is written, where that cannot be told from it.
+
+    Returns
+    -------
+    Log
+        Its columns by name, and `Log.read`.
+
+    Raises
+    ------
+    FileError
+        If it is missing, empty, of an unknown or another kind, damaged, or needs an extra that is
+        not installed; one sentence, which names the file.
+    """
+    from swashplate.logs.dialect import TextOptions
+
+    source = Path(path)
+    suffix = source.suffix.lower()
+    name = next((name for name, suffixes in _READERS.items() if suffix in suffixes), None)
+    reader = _other(source) if name is None else None
+    check_file(source)
+    if name is not None and name not in _TRUSTED:
+        from swashplate.logs.apart import open_apart
+
+        return open_apart(name, source)
+    return (reader or reader_of(name or "")).open(source, options or TextOptions())
+
+
+def reader_of(name: str) -> Reader:
+    """The reader of a format of this package, imported by its name: ``"channels.PARQUET"``."""
+    module, _, constant = name.partition(".")
+    reader: Reader = getattr(import_module(f"swashplate.logs.{module}"), constant)
+    return reader
+
+
+def _other(path: Path) -> Reader:
+    suffix = path.suffix.lower()
+    others = _others()
+    for other in others:
+        if suffix in other.suffixes:
+            return other
+    if path.is_dir():
+        raise FileError(f"{path} is a folder, not a log.")
+    known = ", ".join((*SUFFIXES, *(each for other in others for each in other.suffixes)))
+    raise FileError(f"{path} ends in '{path.suffix}'; a log is read from {known}.")
+
+
+def _others() -> list[Reader]:
+    readers = []
+    for entry in metadata.entry_points(group=GROUP):
+        try:
+            reader = entry.load()
+        except (ImportError, AttributeError) as error:
+            raise FileError(
+                f"The reader '{entry.name}' of {entry.value} cannot be loaded: {error}."
+            ) from None
+        if not isinstance(reader, Reader):
+            raise FileError(
+                f"The reader '{entry.name}' of {entry.value} is none: it needs name, suffixes and "
+                "open."
+            )
+        readers.append(reader)
+    return readers
+
+
+class Series(NamedTuple):
+    """A time series read from a file, SI."""
+
+    time: Array
+    values: Array
+
+
+def read_series(
+    path: str | Path,
+    column: str,
+    unit: str,
+    *,
+    time_column: str = "time",
+    options: TextOptions | None = None,
+) -> Series:
+    """Read time stamps and one column of a log, in SI.
+
+    Parameters
+    ----------
+    path : path
+        A log as `open_log` reads it. A column may carry its unit: ``time [ms]``, ``voltage_mV``,
+        in a row of units or in an attribute.
+    column, unit : str
+        Column wanted, with or without its unit, and the SI unit wanted.
+    time_column : str
+        Column of the time stamps.
+    options : TextOptions, optional
+        As in `open_log`.
+
+    Returns
+    -------
+    Series
+        Time [s], increasing, and values, all finite, each of shape (n,).
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read, a cell is no number, a number is missing or not finite, or time
+        stamps do not increase; the sentence names file, column and row.
+    InputError
+        If a column is missing or its unit wrong; the sentence lists what there is.
+    """
+    log = open_log(path, options=options)
+    read = log.read([time_column, column])
+    time, values = read[time_column], read[column]
+    if time.size != values.size:
+        raise FileError(
+            f"{log.path}: '{time_column}' has {time.size} rows and '{column}' has {values.size}; "
+            "they must have as many."
+        )
+    check_stamps(log, time_column, time)
+    check_finite(log, column, values)
+    stamps = check_duration(log, f"column '{time_column}'", _si(log, time_column, "s", time))
+    return Series(stamps, _si(log, column, unit, values))
+
+
+def _si(log: Log, wanted: str, si: str, values: Array) -> Array:
+    found = log.find(wanted)
+    unit = unit_of(found, wanted, si)
+    unit = speed_unit(unit) if si == "rad/s" else unit
+    what = f"{log.path}: column '{found.name}'"
+    zero, one = (to_si(value, unit, si, what) for value in (0.0, 1.0))
+    return values * one if zero == 0.0 else values * (one - zero) + zero
 
 
 # --- columns by name, and their units -------------------------------------------------------------
@@ -271,8 +574,8 @@ def check_stamps(log: Log, column: str, stamps: Array) -> None:
     late = np.flatnonzero(np.diff(stamps) <= 0.0)
     if not late.size:
         return
-    row = int(late[0])
-    before, after = float(stamps[row]), float(stamps[row + 1])
+    before, after = map(float, stamps[late[0] : late[0] + 2])
+    row = log.first + int(late[0])
     what = (
         f"has {before!r} twice, in data rows {row + 1} and {row + 2}"
         if before == after
@@ -280,6 +583,27 @@ def check_stamps(log: Log, column: str, stamps: Array) -> None:
     )
     others = f", the first of {late.size} such rows" if late.size > 1 else ""
     raise FileError(f"{log.path}: column '{column}' {what}{others}; time stamps must increase.")
+
+
+SHORTEST, LONGEST = 1e-6, 1e10
+"""A record lasts longer than the one and less than the other, three centuries. [s]"""
+
+
+def check_duration(log: Log, source: str, time: Array) -> Array:
+    """Increasing time stamps [s], which must span what a record may last.
+
+    Raises
+    ------
+    FileError
+        The sentence names the file, and the source as it is given.
+    """
+    span = float(time[-1]) - float(time[0]) if time.size > 1 else 1.0
+    if not SHORTEST < span < LONGEST:
+        raise FileError(
+            f"{log.path}: its {time.size} rows last {span:.3g} s by {source}; check the unit or "
+            "the rate."
+        )
+    return time
 
 
 def check_finite(log: Log, column: str, values: Array) -> None:
@@ -304,65 +628,21 @@ def check_finite(log: Log, column: str, values: Array) -> None:
     missing = np.flatnonzero(np.isnan(values))
     if missing.size:
         raise FileError(
-            f"{log.path}: column '{column}' is empty or NaN in {_rows(missing)}; "
+            f"{log.path}: column '{column}' is empty or NaN in {_rows(log, missing)}; "
             "a number must be in every row."
         )
     infinite = np.flatnonzero(np.isinf(values))
     if infinite.size:
         raise FileError(
             f"{log.path}: column '{column}' holds {float(values[infinite[0]])!r} in "
-            f"{_rows(infinite)}; numbers must be finite."
+            f"{_rows(log, infinite)}; numbers must be finite."
         )
 
 
-def _rows(wrong: np.ndarray[tuple[int, ...], np.dtype[np.intp]]) -> str:
+def _rows(log: Log, wrong: NDArray[np.intp]) -> str:
     """The first run of rows, and how many there are besides."""
-    first = int(wrong[0])
+    first = log.first + int(wrong[0])
     gaps = np.flatnonzero(np.diff(wrong) > 1)
     run = int(gaps[0]) + 1 if gaps.size else wrong.size
     rows = f"data row {first + 1}" if run == 1 else f"data rows {first + 1} to {first + run}"
     return rows if run == wrong.size else f"{rows} and {wrong.size - run} more"
-
-
-# --- signals of arrays ----------------------------------------------------------------------------
-
-MOST = 4096
-"""Signals in one matrix; one with more of both rows and columns is a picture or a map."""
-
-
-class Signal(NamedTuple):
-    """One signal of an array: all of a vector, or a row or a column of a matrix."""
-
-    name: str
-    axis: int | None
-    """Dimension along which it is chosen, None for a vector."""
-    place: int
-    """Position along that dimension, from 0."""
-
-
-def signals(name: str, shape: tuple[int, ...], *, matlab: bool) -> list[Signal] | str:
-    """Signals of an array, or why there are none.
-
-    Parameters
-    ----------
-    name : str
-        Of the array.
-    shape : tuple of int
-        In the order of its own language. The longer dimension is taken for the time.
-    matlab : bool
-        Whether signals are called ``x(1,:)`` and ``x(:,1)`` as in MATLAB or ``x[0,:]`` and
-        ``x[:,0]`` as in Python.
-    """
-    if 0 in shape:
-        return "it is empty"
-    if len(shape) > 2:
-        return f"it has {len(shape)} dimensions"
-    if len(shape) < 2 or 1 in shape:
-        return [Signal(name, None, 0)]
-    rows, columns = shape
-    axis, count = (1, columns) if rows >= columns else (0, rows)
-    if count > MOST:
-        return f"it is a matrix of {rows} by {columns}"
-    first = 1 if matlab else 0
-    form = ("({},:)", "(:,{})") if matlab else ("[{},:]", "[:,{}]")
-    return [Signal(name + form[axis].format(place + first), axis, place) for place in range(count)]

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from swashplate.errors import InputError
+from swashplate.results import Result
 
 # --- curves ---------------------------------------------------------------------------------------
 
@@ -25,8 +26,7 @@ NEAR = 1e-9
 Decimal durations do not add up exactly (0.1 + 0.2 > 0.3), and a step must not miss the sample meant
 for it.
 """
-HALVINGS = 60
-"""Of the slope of a return until it is found, to the last bits."""
+HALVINGS = 60  # Of the slope of a return until it is found, to the last bits.
 
 
 def interval(starts: npt.ArrayLike, time: Array) -> npt.NDArray[np.intp]:
@@ -251,7 +251,7 @@ class Piece:
 
 
 @dataclass(frozen=True, eq=False)
-class Maneuver:
+class Maneuver(Result):
     """A voltage command of finite length; call it with times to have the voltage.
 
     Attributes
@@ -416,3 +416,19 @@ def settled(
     """Rest, the pieces until `end` [s], and the return if there is time left until `length` [s]."""
     command = Maneuver(name, end, (Piece(0.0, Line()), *pieces), abs(amplitude))
     return returned(command, name, length) if end < length else command
+
+
+def sampled(command: npt.ArrayLike | Maneuver, rate: float) -> npt.ArrayLike:
+    """Samples of a manoeuvre at a rate [Hz], anything else as it is.
+
+    Raises
+    ------
+    InputError
+        For words: a manoeuvre's are read by `parse`.
+    """
+    if isinstance(command, str):
+        raise InputError(
+            f"The voltage is the text '{command}': give samples, or a manoeuvre such as "
+            f"maneuvers.parse('{command}')."
+        )
+    return command.sample(rate) if isinstance(command, Maneuver) else command

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import groupby
 from types import MappingProxyType
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Protocol
 
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError, ParameterError
@@ -21,6 +21,7 @@ from swashplate.parameters.definitions import (
     unknown_parameter,
 )
 from swashplate.parameters.rules import check_bounds, check_options, check_rules
+from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table
 
 PressureRoot = Literal["published", "symmetric"]
@@ -41,7 +42,7 @@ Change = float | tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Parameter:
+class Parameter(Result):
     """One parameter of a set."""
 
     definition: Definition
@@ -318,3 +319,17 @@ def value_of(
     assert isinstance(old.value, Pair)
     side = name.removeprefix(definition.symbol + "_")
     return old.value._replace(**{side: number})
+
+
+class HasParameters(Protocol):
+    """A drive, or whatever else has a parameter set."""
+
+    @property
+    def parameters(self) -> ParameterSet:
+        """The set."""
+        ...
+
+
+def set_of(given: ParameterSet | HasParameters) -> ParameterSet:
+    """A parameter set as it is, or that of a drive."""
+    return given if isinstance(given, ParameterSet) else given.parameters

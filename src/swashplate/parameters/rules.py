@@ -32,8 +32,7 @@ Mask = NDArray[np.bool_]
 Broken = tuple[Mask, Callable[[int], str]]
 """Sets that break a rule, and the sentence for one of them."""
 
-FULL_VOLTAGE = 10.0
-"""Largest command, either way. [V]"""
+FULL_VOLTAGE = 10.0  # Largest command, either way. [V]
 VOLTAGES = np.linspace(0.0, FULL_VOLTAGE, 101)
 """Commands at which the static rules are checked. [V]"""
 SIDES = ("plus", "minus")

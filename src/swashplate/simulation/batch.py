@@ -28,6 +28,7 @@ from swashplate.executors import Executor, Threads
 from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import broken_rules
+from swashplate.results import Result
 from swashplate.simulation.instance import (
     PATHS,
     SIDES,
@@ -62,7 +63,7 @@ SAMPLES_A_FILE = 2**23
 
 
 @dataclass(frozen=True)
-class SquaredError:
+class SquaredError(Result):
     """Cost of a set: Σ weight · (output - measured)² over the record's samples."""
 
     measured: ArrayLike
@@ -74,7 +75,7 @@ class SquaredError:
 
 
 @dataclass(frozen=True, eq=False)
-class Batch:
+class Batch(Result):
     """Results of many sets, in the order of the sets.
 
     A set that breaks a rule or leaves the model's domain does not stop the others: its cost is

@@ -21,6 +21,7 @@ from swashplate.equations.marching.run import Instance, Start
 from swashplate.errors import InputError
 from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.results import Result
 from swashplate.simulation.instance import (
     PATHS,
     START_PRESSURE,
@@ -30,6 +31,7 @@ from swashplate.simulation.instance import (
 )
 from swashplate.simulation.result import Named, Simulation
 from swashplate.simulation.run import Driver, simulate_drive, start_states, started_at
+from swashplate.tables import count
 
 Array = NDArray[np.float64]
 
@@ -217,7 +219,7 @@ def _columns(found: Sensitivities, signal: str) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivities:
+class Sensitivities(Result):
     """Derivatives of the outputs by parameters, one column for each of `names`.
 
     The unit of a column is the output's over the parameter's, both SI. At a switch (the edge of a
@@ -233,7 +235,7 @@ class Sensitivities:
     """Columns such as ``Z16_plus``, in the order asked for."""
 
     def __repr__(self) -> str:
-        return f"Sensitivities({self.simulation!r}, by {', '.join(self.names)})"
+        return f"Sensitivities({self.simulation!r}, by {count(len(self.names), 'parameter')})"
 
     @cached_property
     def simulation(self) -> Simulation:

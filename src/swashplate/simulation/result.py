@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from enum import IntFlag
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,11 +16,13 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.marching.march import Stored
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Instance, observe_kernel
+from swashplate.errors import InputError
 from swashplate.models.pump import Pump
-from swashplate.tables import Tabular
+from swashplate.results import Tabular, figures
 
 if TYPE_CHECKING:
     import polars
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -101,6 +104,29 @@ class Signals(Tabular):
     record: Record
     """The input on the march's grid."""
 
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """The signals that it has, in the order of the chain, behind ``"time"``."""
+
+    def __getitem__(self, signal: str) -> Array:
+        """A signal by its name, SI: ``run["shaft_speed"]``.
+
+        Raises
+        ------
+        InputError
+            If there is none of that name.
+        """
+        if signal not in self.names:
+            near = get_close_matches(str(signal), self.names, 1)
+            meant = f"did you mean {near[0]}? It" if near else "it"
+            raise InputError(
+                f"A run of {self.name} has no signal '{signal}': {meant} has "
+                f"{', '.join(self.names)}."
+            )
+        found: Array = getattr(self, signal)
+        return found
+
     @abstractmethod
     def fine(self, signal: str) -> Array:
         """A signal on the march's grid, `substeps` points a sample."""
@@ -144,6 +170,13 @@ class Simulation(Signals):
     def __repr__(self) -> str:
         samples = (self.record.values.size - 1) // self.record.substeps + 1
         return f"Simulation({self.name!r}, {samples} samples at {self.record.rate:g} Hz)"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The signals that it has: `SIGNALS`, with refinements the motor's, behind ``"time"``."""
+        there = SIGNALS if self.driven_by_voltage else SIGNALS[1:]
+        motor = MOTOR if self.pump.motor_constant > 0.0 else MOTOR[:1] if self.refined else ()
+        return ("time", *there, *motor)
 
     @property
     def driven_by_voltage(self) -> bool:
@@ -281,21 +314,36 @@ class Simulation(Signals):
         """
         import polars as pl
 
-        columns: dict[str, NDArray[np.generic]] = {"time": self.time}
-        for signal in SIGNALS:
-            values = getattr(self, signal)
-            if values is not None:
-                columns[signal] = values
+        chain = [name for name in self.names if name not in MOTOR]
+        columns: dict[str, NDArray[np.generic]] = {name: self[name] for name in chain}
         for limit in Limit:
             columns[f"limit_{str(limit.name).lower()}"] = self.active(limit)
-        if self.refined:
-            columns["motor_torque"] = self.motor_torque
-            if self.motor_pressure_drop is not None:
-                columns["motor_pressure_drop"] = self.motor_pressure_drop
-        return pl.DataFrame(columns)
+        return pl.DataFrame(columns | {name: self[name] for name in self.names if name in MOTOR})
 
-    def plot(self) -> Figure:
-        """Figure of the chain's signals with the active limits shaded."""
-        from swashplate.report.figures import plot_simulation
+    def plot(
+        self,
+        signals: Sequence[str] = (),
+        *,
+        ax: Axes | Sequence[Axes] | None = None,
+        label: str = "",
+        **how: Any,
+    ) -> Figure:
+        """Figure of the chain with its active limits shaded, or of some signals alone.
 
-        return plot_simulation(self)
+        Parameters
+        ----------
+        signals : sequence of str
+            Names as of `names`, a panel each; by default the chain.
+        ax : matplotlib axes or sequence of them, optional
+            Where to draw the signals, one for each.
+        label : str
+            Of the curves, for a legend.
+        **how :
+            Without signals as of `swashplate.report.figures.plot_simulation`.
+        """
+        if isinstance(signals, str):
+            signals = (signals,)
+        if signals or ax is not None:
+            chosen = signals or ("shaft_speed",)
+            return cast("Figure", figures().plot_signals(self, chosen, ax=ax, label=label))
+        return cast("Figure", figures().plot_simulation(self, **how))

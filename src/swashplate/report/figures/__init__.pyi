@@ -20,6 +20,7 @@ from .linear import plot_bode as plot_bode
 from .simulation import plot_comparison as plot_comparison
 from .simulation import plot_full_order as plot_full_order
 from .simulation import plot_maneuvers_overview as plot_maneuvers_overview
+from .simulation import plot_signals as plot_signals
 from .simulation import plot_simulation as plot_simulation
 from .steady import plot_steady_map as plot_steady_map
 

@@ -13,14 +13,25 @@ from matplotlib.patches import Patch
 from matplotlib.typing import ColorType
 from numpy.typing import ArrayLike
 
-from swashplate.analysis.compensation import InverseMap
-from swashplate.analysis.envelope import AcceleratedBy, AccelerationCurve, Envelope, Way
-from swashplate.analysis.limits import LimitTimeline, limit_timeline
-from swashplate.analysis.monte_carlo import Bands
-from swashplate.analysis.outcomes import Outcome, outcome_unit
-from swashplate.analysis.sensitivity import OneAtATime, SobolIndices
-from swashplate.analysis.tracking import Improvement, proportional_command
-from swashplate.analysis.whatif import AS_IS, CHANGED, WhatIf
+from swashplate.analysis import (
+    AS_IS,
+    CHANGED,
+    AcceleratedBy,
+    AccelerationCurve,
+    Bands,
+    Envelope,
+    Improvement,
+    InverseMap,
+    LimitTimeline,
+    OneAtATime,
+    Outcome,
+    SobolIndices,
+    Way,
+    WhatIf,
+    limit_timeline,
+    outcome_unit,
+    proportional_command,
+)
 from swashplate.errors import InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.lines import (

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from swashplate.errors import InputError
 from swashplate.full_order import Comparison
+from swashplate.linear import UNITS
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.lines import (
     NARROW,
@@ -53,11 +54,23 @@ from swashplate.report.style import (
     write_title,
     zero_line,
 )
-from swashplate.simulation.result import Limit, Simulation
+from swashplate.simulation.result import Limit, Signals, Simulation
 from swashplate.units import display_unit
 
 Flags = NDArray[np.int8]
 Stops = tuple[float, float]
+SIGNAL_UNITS = {
+    **UNITS,
+    "time": "s",
+    "current_positive": "A",
+    "current_negative": "A",
+    "shaft_position": "rad",
+    "spool_velocity": "m/s",
+    "swash_rate": "rad/s",
+    "valve_flow": "m^3/s",
+    "pump_flow": "m^3/s",
+}
+"""SI unit of each signal of a run."""
 
 # --- one simulation -------------------------------------------------------------------------------
 
@@ -112,6 +125,51 @@ def plot_simulation(simulation: Simulation, *, title: str | None = None) -> Figu
     if run.voltage is not None:
         panels.insert(0, Panel("voltage", "V", (Trace(run.voltage, INK),)))
     return _chain(panels, run.time, run.name if title is None else title)
+
+
+def plot_signals(
+    run: Signals,
+    signals: Sequence[str],
+    *,
+    ax: Axes | Sequence[Axes] | None = None,
+    label: str = "",
+) -> Figure:
+    """Figure of some signals of a run over time, one below the other, or in axes of one's own.
+
+    Parameters
+    ----------
+    run : Simulation or FullOrderSimulation
+        What to show.
+    signals : sequence of str
+        Names, as of ``run[name]``.
+    ax : matplotlib axes or sequence of them, optional
+        One for each signal; by default a new figure's.
+    label : str
+        Of the curves, for a legend.
+
+    Raises
+    ------
+    InputError
+        For a signal that the run has not, or another number of axes.
+    """
+    values = [run[name] for name in signals]
+    if ax is None:
+        figure = new_figure(7.2, 0.7 + 1.6 * len(signals))
+        axes = list(figure.subplots(len(signals), 1, sharex=True, squeeze=False)[:, 0])
+    else:
+        axes = [ax] if isinstance(ax, Axes) else list(ax)
+    if len(axes) != len(signals):
+        raise InputError(
+            f"There are {len(axes)} axes for {len(signals)} signals: give one for each."
+        )
+    for place, name, value in zip(axes, signals, values, strict=True):
+        unit = display_unit(SIGNAL_UNITS[name], float(np.abs(value).max()) or inf)
+        place.plot(run.time, unit.factor * value, label=label or None)
+        place.set_ylabel(unit.label(name.replace("_", " ")))
+    axes[-1].set_xlabel("time (s)")
+    whole = axes[0].get_figure(root=True)
+    assert isinstance(whole, Figure)
+    return whole
 
 
 def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -16,24 +15,21 @@ from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Instance, Part, observe_kernel
 from swashplate.models.pump import PumpOptions
 from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.results import Result, Tabular, short
 from swashplate.simulation.instance import instance_of
 from swashplate.simulation.run import pressure_limits, settled_state
 from swashplate.tables import UNIT, Cell, Column, Table
-from swashplate.units import display_unit
 
 if TYPE_CHECKING:
     import polars
 
-# --- steady edges ---------------------------------------------------------------------------------
-
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-GRID = 200
-"""Parts into which an interval is cut at each refinement."""
-CLOSE = 1e-12
-"""Width at which an edge counts as found. [V]"""
+# --- steady edges ---------------------------------------------------------------------------------
+
+GRID = 200  # Parts into which an interval is cut at each refinement.
+CLOSE = 1e-12  # Width at which an edge counts as found. [V]
 NEARLY_FULL = (1.0 - 1e-9) * FULL_VOLTAGE
 """An edge beyond is none: the speed grows up to full voltage. [V]"""
 
@@ -41,26 +37,15 @@ NEARLY_FULL = (1.0 - 1e-9) * FULL_VOLTAGE
 class Edge(NamedTuple):
     """A voltage up to which something holds on the way from 0 V, and the next one beyond it."""
 
-    inside: float
-    """[V]"""
-    outside: float | None
-    """None where it holds up to full voltage. [V]"""
+    inside: float  # [V]
+    outside: float | None  # None where it holds up to full voltage. [V]
 
 
 def edge(holds: Callable[[Array], Mask], end: float) -> Edge:
-    """The last command on the way from 0 V to `end` before something first fails to hold.
+    """The last command on the way from 0 V to `end` [V] before something first fails to hold.
 
-    Parameters
-    ----------
-    holds : callable
-        Commands [V] to whether it holds, element by element.
-    end : float
-        Where to stop, with its sign. [V]
-
-    Returns
-    -------
-    Edge
-        Both sides of it, at most 1e-12 V apart; 0 V inside where it does not even hold there.
+    `holds` says of commands [V], element by element, whether it does. Both sides of the edge, at
+    most 1e-12 V apart; 0 V inside where it does not even hold there.
     """
     low, high, found = 0.0, end, False
     while abs(high - low) > CLOSE:
@@ -78,31 +63,15 @@ def edge(holds: Callable[[Array], Mask], end: float) -> Edge:
 
 
 def dead_zone(drive: Drive, way: float) -> Edge:
-    """Commands that leave the current within the solenoids' dead zone Z17, so that no force acts.
-
-    Parameters
-    ----------
-    drive : Drive
-        Whose card and solenoids are meant.
-    way : float
-        +1 or -1.
-    """
+    """Commands of one way, +1 or -1, whose current stays within Z17, so that no force acts."""
     dead = drive.parameters.numbers["Z17"]
-
-    def is_dead(volts: Array) -> Mask:
-        return np.asarray(np.abs(drive.steady_current(volts)) <= dead)
-
-    return edge(is_dead, way * FULL_VOLTAGE)
+    return edge(lambda volts: np.abs(drive.steady_current(volts)) <= dead, way * FULL_VOLTAGE)
 
 
 def saturation(drive: Drive, way: float) -> float | None:
     """Command beyond which the steady speed stays as it is, None where it grows up to ±10 V. [V]"""
     full = drive.steady_speed(way * FULL_VOLTAGE)
-
-    def changes(volts: Array) -> Mask:
-        return np.asarray(drive.steady_speed(volts) != full)
-
-    found = edge(changes, way * FULL_VOLTAGE)
+    found = edge(lambda volts: drive.steady_speed(volts) != full, way * FULL_VOLTAGE)
     if found.outside is None or abs(found.inside) > NEARLY_FULL:
         return None
     return found.outside
@@ -110,26 +79,24 @@ def saturation(drive: Drive, way: float) -> float | None:
 
 # --- acceleration ---------------------------------------------------------------------------------
 
-
 AcceleratedBy = Literal["valve", "spool stop", "orifice"]
 
 CODES: tuple[AcceleratedBy, ...] = ("valve", "spool stop", "orifice")
 """What sets the flow to the stroking piston: the opening that the solenoids can give, the spool's
 stop Z14, or the in-line orifice Z16."""
 
-INSIDE = 1e-9
-"""Part of the range of pressure by which a curve ends before it."""
+INSIDE = 1e-9  # Part of the range of pressure by which a curve ends before it.
 
 
 class AccelerationCurve(NamedTuple):
     """Acceleration over the speed under one held command, (n,) each."""
 
-    speed: Array
-    """Rising. [rad/s]"""
-    acceleration: Array
-    """With its sign. [rad/s²]"""
-    by: tuple[AcceleratedBy, ...]
-    """What sets it."""
+    def __repr__(self) -> str:
+        return short(self)
+
+    speed: Array  # Rising. [rad/s]
+    acceleration: Array  # With its sign. [rad/s²]
+    by: tuple[AcceleratedBy, ...]  # What sets it.
 
 
 def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> AccelerationCurve:
@@ -153,11 +120,8 @@ def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> Accel
     AccelerationCurve
         The ends lie a hair's breadth inside, where the plate still moves.
     """
-    instance = instance_of(drive.parameters, False)
-    low, high = (
-        settled_state(instance, drive.steady_current(way * FULL_VOLTAGE)).pressure
-        for way in (-1.0, 1.0)
-    )
+    instance, ends = instance_of(drive.parameters, False), (-FULL_VOLTAGE, FULL_VOLTAGE)
+    low, high = (settled_state(instance, drive.steady_current(each)).pressure for each in ends)
     inside = INSIDE * (high - low)
     return _curve(drive, voltage, np.linspace(low + inside, high - inside, points))
 
@@ -207,11 +171,8 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
 
 # --- envelope -------------------------------------------------------------------------------------
 
-
-GAIN_POINTS = 401
-"""Commands between dead zone and saturation at which the gain is taken."""
-LOW, HIGH = 0.1, 0.9
-"""Parts of the change of speed between which a rise time counts."""
+GAIN_POINTS = 401  # Commands between dead zone and saturation at which the gain is taken.
+LOW, HIGH = 0.1, 0.9  # Parts of the change of speed between which a rise time counts.
 SHORTEST, LONGEST = 8.0, 256.0
 """A step lasts so long at first, and at most, until the speed has come to stay. [s]"""
 
@@ -219,43 +180,36 @@ SHORTEST, LONGEST = 8.0, 256.0
 class Times(NamedTuple):
     """How fast a full step is answered. [s]"""
 
-    rise: float
-    """From 10 % to 90 % of the change of speed."""
-    reach: float
-    """From the command to 90 % of the change."""
+    rise: float  # From 10 % to 90 % of the change of speed.
+    reach: float  # From the command to 90 % of the change.
 
 
 @dataclass(frozen=True)
-class Way:
+class Way(Result):
     """What a drive can do one way; everything carries that way's sign, gains are positive. SI."""
 
-    dead_zone: float
-    """Largest command that moves nothing. [V]"""
+    dead_zone: float  # Largest command that moves nothing. [V]
     smallest_speed: float
     """Steady speed just beyond it: nothing slower can be held, save the creep. [rad/s]"""
     gain: float | None
     """Mean slope of the steady map from the dead zone to saturation or ±10 V. [rad/(s V)]"""
-    gain_range: tuple[float, float] | None
-    """Smallest and largest slope there. [rad/(s V)]"""
+    gain_range: tuple[float, float] | None  # Smallest and largest slope there. [rad/(s V)]
     saturation_voltage: float | None
     """Command beyond which the speed stays; None where it grows up to ±10 V. [V]"""
-    top_speed: float
-    """Steady speed at ±10 V. [rad/s]"""
+    top_speed: float  # Steady speed at ±10 V. [rad/s]
     speed_limit: float
     """Speed with the swash plate at its stop, or where Z15 holds the pressure. [rad/s]"""
-    acceleration: float
-    """At rest, under ±10 V. [rad/s²]"""
-    accelerated_by: AcceleratedBy
-    """What sets it."""
-    starting: Times | None
-    """From rest under a step to ±10 V; None where nothing moves."""
-    stopping: Times | None
-    """From there after the command is gone."""
+    acceleration: float  # At rest, under ±10 V. [rad/s²]
+    accelerated_by: AcceleratedBy  # What sets it.
+    starting: Times | None  # From rest under a step to ±10 V; None where nothing moves.
+    stopping: Times | None  # From there after the command is gone.
 
 
 @dataclass(frozen=True, eq=False)
-class Envelope:
+class Envelope(Tabular):
     """What a drive can do."""
+
+    figure = "plot_envelope"
 
     name: str
     """Name of the drive."""
@@ -268,61 +222,59 @@ class Envelope:
     released: AccelerationCurve
     """Acceleration over the speed with the stick let go."""
 
+    def table(self) -> Table:
+        """Dead zone, gains, limits and times of both ways."""
+        ways, values = (self.plus, self.minus), ("z.3f", "", "none")
+        heads = (
+            Column("Envelope", key="quantity"),
+            *(
+                Column(name, *values, key=key)
+                for name, key in (("positive", "plus"), ("negative", "minus"))
+            ),
+        )
+        made = Table("", (*heads, UNIT))
+        for key, words, unit, spec in QUANTITIES:
+            made.add(Cell(key, words), *(_read(way, key) for way in ways), unit=unit, spec=spec)
+            if key == "acceleration":
+                by = (Cell(None, way.accelerated_by) for way in ways)
+                made.add(Cell("accelerated_by", "... set by the"), *by)
+        both = self.creep, Cell(self.creep, "")
+        made.add(Cell("creep", "creep at 0 V"), *both, unit="rad/s", section=True)
+        return made
+
     def to_polars(self) -> polars.DataFrame:
-        """Table in SI: ``quantity``, ``unit``, ``plus``, ``minus``; null where there is none."""
+        """Table in SI: ``quantity``, ``plus``, ``minus``, ``unit``; null where there is none."""
         import polars as pl
 
-        rows = [
-            (quantity, unit, *(read(way) for way in (self.plus, self.minus)))
-            for quantity, unit, read in QUANTITIES
-        ]
-        rows.insert(0, ("creep", "rad/s", self.creep, self.creep))
-        names = dict.fromkeys(("quantity", "unit"), pl.String)
-        return pl.DataFrame(
-            rows, schema=names | dict.fromkeys(("plus", "minus"), pl.Float64), orient="row"
-        )
-
-    def write(self, path: str | Path) -> None:
-        """Write the table of `to_polars` as CSV or Parquet, by the path's ending.
-
-        Raises
-        ------
-        FileError
-            For another ending or a place that cannot be written.
-        """
-        from swashplate.tables import write_table
-
-        write_table(self.to_polars(), path)
+        return self.table().to_polars().filter(pl.col("unit") != "")
 
 
-def _time_of(
-    step: Literal["starting", "stopping"], which: Literal["rise", "reach"]
-) -> Callable[[Way], float | None]:
-    def read(way: Way) -> float | None:
-        times = way.starting if step == "starting" else way.stopping
-        if times is None:
-            return None
-        return times.rise if which == "rise" else times.reach
-
-    return read
-
-
-QUANTITIES: tuple[tuple[str, str, Callable[[Way], float | None]], ...] = (
-    ("dead_zone", "V", lambda way: way.dead_zone),
-    ("smallest_speed", "rad/s", lambda way: way.smallest_speed),
-    ("gain", "rad/(s V)", lambda way: way.gain),
-    ("smallest_gain", "rad/(s V)", lambda way: way.gain_range and way.gain_range[0]),
-    ("largest_gain", "rad/(s V)", lambda way: way.gain_range and way.gain_range[1]),
-    ("saturation_voltage", "V", lambda way: way.saturation_voltage),
-    ("top_speed", "rad/s", lambda way: way.top_speed),
-    ("speed_limit", "rad/s", lambda way: way.speed_limit),
-    ("acceleration", "rad/s^2", lambda way: way.acceleration),
-    ("starting_rise", "s", _time_of("starting", "rise")),
-    ("starting_reach", "s", _time_of("starting", "reach")),
-    ("stopping_rise", "s", _time_of("stopping", "rise")),
-    ("stopping_reach", "s", _time_of("stopping", "reach")),
+QUANTITIES = (
+    ("dead_zone", "dead zone up to", "V", ""),
+    ("smallest_speed", "smallest speed", "rad/s", ""),
+    ("gain", "gain, mean", "rad/s/V", ""),
+    ("smallest_gain", "gain, smallest", "rad/s/V", ""),
+    ("largest_gain", "gain, largest", "rad/s/V", ""),
+    ("saturation_voltage", "saturation voltage", "V", ".2f"),
+    ("top_speed", "speed at full voltage", "rad/s", ""),
+    ("speed_limit", "speed limit", "rad/s", ""),
+    ("acceleration", "acceleration at rest", "rad/s^2", "z.2f"),
+    ("starting_rise", "starting, 10 to 90 %", "s", ""),
+    ("starting_reach", "starting, to 90 %", "s", ""),
+    ("stopping_rise", "stopping, 10 to 90 %", "s", ""),
+    ("stopping_reach", "stopping, to 90 %", "s", ""),
 )
-"""Rows of the table: name, unit and where the value is."""
+"""Rows of the table: name in a file and in words, unit and format."""
+
+
+def _read(way: Way, key: str) -> float | None:
+    step, _, part = key.partition("_")
+    if step in ("starting", "stopping"):
+        return getattr(getattr(way, step), part, None)
+    if key.endswith("_gain"):
+        return None if way.gain_range is None else way.gain_range[key == "largest_gain"]
+    value: float | None = getattr(way, key)
+    return value
 
 
 def envelope(drive: Drive) -> Envelope:
@@ -401,41 +353,3 @@ def _times(drive: Drive, before: float, after: float) -> Times | None:
             return Times(high - low, high)
         length *= 2.0
     return None
-
-
-def envelope_table(found: Envelope) -> Table:
-    """Dead zone, gains, limits and times of both ways."""
-    ways = (found.plus, found.minus)
-    made = Table(
-        "",
-        (
-            Column("Envelope"),
-            Column("positive", "z.3f", none="none"),
-            Column("negative", "z.3f", none="none"),
-            UNIT,
-        ),
-    )
-    gain = display_unit("rad/s/V").factor
-
-    def range_of(way: Way) -> Cell:
-        if way.gain_range is None:
-            return Cell(None, "none")
-        return Cell(None, " to ".join(f"{gain * each:.3f}" for each in way.gain_range))
-
-    made.add("dead zone up to", *(way.dead_zone for way in ways), unit="V")
-    made.add("smallest speed", *(way.smallest_speed for way in ways), unit="rad/s")
-    made.add("gain, mean", *(way.gain for way in ways), unit="rad/s/V")
-    made.add("gain, range", *map(range_of, ways), unit="rad/s/V")
-    saturation = (way.saturation_voltage for way in ways)
-    made.add("saturation voltage", *saturation, unit="V", spec=".2f")
-    made.add("speed at full voltage", *(way.top_speed for way in ways), unit="rad/s")
-    made.add("speed limit", *(way.speed_limit for way in ways), unit="rad/s")
-    acceleration = (way.acceleration for way in ways)
-    made.add("acceleration at rest", *acceleration, unit="rad/s^2", spec="z.2f")
-    made.add("... set by the", *(way.accelerated_by for way in ways))
-    for step in ("starting", "stopping"):
-        times: list[Times | None] = [getattr(way, step) for way in ways]
-        made.add(f"{step}, 10 to 90 %", *(t and t.rise for t in times), unit="s")
-        made.add(f"{step}, to 90 %", *(t and t.reach for t in times), unit="s")
-    made.add("creep at 0 V", found.creep, "", unit="rad/s", section=True)
-    return made

@@ -7,16 +7,15 @@ import polars as pl
 import pytest
 
 from swashplate import Drive, FileError, InputError
-from swashplate.analysis.compensation import inverse_map
-from swashplate.analysis.envelope import (
-    Edge,
+from swashplate.analysis import (
     Envelope,
     acceleration_curve,
-    edge,
     envelope,
+    inverse_map,
+    largest_sine,
+    sine_errors,
     speed_limits,
 )
-from swashplate.analysis.tracking import largest_sine, sine_errors
 
 
 @pytest.fixture(scope="module")
@@ -25,45 +24,28 @@ def found() -> dict[str, Envelope]:
 
 
 @pytest.mark.parametrize(
-    ("name", "up", "down", "digit"),
-    [("hoist", 196.0, -185.0, 0.05), ("slew", 4.242, -4.292, 5e-4), ("luff", 155.9, -190.8, 0.05)],
+    ("name", "limits", "digit", "saturated", "at_rest"),
+    [
+        ("hoist", (196.0, -185.0), 0.05, (7.87, -7.41), (136.8, -177.8)),
+        ("slew", (4.242, -4.292), 5e-4, (5.30, -5.62), (5.81, -5.87)),
+        ("luff", (155.9, -190.8), 0.05, (None, None), (35.9, -88.9)),
+    ],
 )
-def test_speed_limits(found, name, up, down, digit) -> None:
-    each = found[name]
-    assert np.degrees(each.plus.speed_limit) == pytest.approx(up, abs=digit)
-    assert np.degrees(each.minus.speed_limit) == pytest.approx(down, abs=digit)
-    assert speed_limits(Drive.preset(name)) == (each.minus.speed_limit, each.plus.speed_limit)
-
-
-@pytest.mark.parametrize(
-    ("name", "up", "down"), [("hoist", 7.87, -7.41), ("slew", 5.30, -5.62), ("luff", None, None)]
-)
-def test_saturation_voltages(found, name, up, down) -> None:
-    for way, expected in ((found[name].plus, up), (found[name].minus, down)):
-        if expected is None:
-            assert way.saturation_voltage is None
-        else:
-            assert way.saturation_voltage == pytest.approx(expected, abs=0.005)
-            assert way.top_speed == way.speed_limit
-
-
-@pytest.mark.parametrize(
-    ("name", "up", "down", "digit"),
-    [("hoist", 136.8, 177.8, 0.05), ("slew", 5.81, 5.87, 0.005), ("luff", 35.9, 88.9, 0.05)],
-)
-def test_acceleration_at_rest(found, name, up, down, digit) -> None:
-    each, Z = found[name], Drive.preset(name).parameters.numbers
-    assert np.degrees(each.plus.acceleration) == pytest.approx(up, abs=digit)
-    assert np.degrees(each.minus.acceleration) == pytest.approx(-down, abs=digit)
-    assert each.plus.accelerated_by == each.minus.accelerated_by == "orifice"
+def test_kruse_s_limits(found, name, limits, digit, saturated, at_rest) -> None:
+    each, drive = found[name], Drive.preset(name)
+    Z, ways = drive.parameters.numbers, (each.plus, each.minus)
+    assert np.degrees([way.speed_limit for way in ways]) == pytest.approx(limits, abs=digit)
+    assert speed_limits(drive) == (each.minus.speed_limit, each.plus.speed_limit)
+    close = max(0.1 * digit, 0.005) if name == "slew" else 0.05
+    assert np.degrees([way.acceleration for way in ways]) == pytest.approx(at_rest, abs=close)
     closed = Z["Z10"] * Z["Z1"] * Z["Z8"] * sqrt(Z["Z9"] / 2.0) / (1.0 + Z["Z6"])
     assert each.plus.acceleration == pytest.approx(closed * Z["Z16_plus"], rel=1e-12)
     assert each.minus.acceleration == pytest.approx(-closed * Z["Z16_minus"], rel=1e-12)
-
-
-def test_creep(found) -> None:
-    assert np.degrees(found["hoist"].creep) == pytest.approx(3.09, abs=0.005)
-    assert found["slew"].creep == found["luff"].creep == 0.0
+    assert np.degrees(each.creep) == pytest.approx(3.09 if name == "hoist" else 0.0, abs=0.005)
+    for way, expected in zip(ways, saturated, strict=True):
+        assert way.accelerated_by == "orifice"
+        assert way.saturation_voltage == (expected and pytest.approx(expected, abs=0.005))
+        assert expected is None or way.top_speed == way.speed_limit
 
 
 def test_dead_zone(found, hoist: Drive) -> None:
@@ -145,15 +127,12 @@ def test_what_sets_the_acceleration(hoist: Drive) -> None:
     assert "valve" in let_go.by  # near standstill the feedback has almost closed it
 
 
-def test_relief_limits_the_speed(hoist: Drive) -> None:
+def test_other_drives(hoist: Drive) -> None:
     weak = hoist.replace(Z15=0.3e6)
     Z = weak.parameters.numbers
     limit = Z["Z10"] * np.arctan(Z["Z1"] * 0.3e6)
     assert envelope(weak).plus.speed_limit == pytest.approx(limit, rel=1e-9)
-
-
-def test_a_drive_that_never_leaves_its_dead_zone(hoist: Drive) -> None:
-    dead = envelope(hoist.replace(Z17=5.0))
+    dead = envelope(hoist.replace(Z17=5.0))  # never leaves its dead zone
     for way in (dead.plus, dead.minus):
         assert abs(way.dead_zone) == 10.0
         assert way.gain is way.saturation_voltage is way.starting is None
@@ -171,15 +150,6 @@ def test_table(found, tmp_path) -> None:
     assert pl.read_csv(tmp_path / "luff.csv").height == table.height
     with pytest.raises(FileError, match=".csv or .parquet"):
         found["luff"].write(tmp_path / "luff.txt")
-
-
-def test_edges() -> None:
-    """The last place at which something holds, on the way from zero."""
-    found = edge(lambda volts: np.abs(volts) <= np.pi, -10.0)
-    assert found.inside == pytest.approx(-np.pi, abs=2e-12)
-    assert found.outside < -np.pi <= found.inside
-    assert edge(lambda volts: volts == volts, 10.0) == Edge(10.0, None)
-    assert edge(lambda volts: volts < -1.0, 10.0) == Edge(0.0, 0.0)
 
 
 def test_sines_of_a_linear_drive() -> None:
@@ -208,7 +178,6 @@ def test_the_orifice_bounds_fast_sines(hoist: Drive) -> None:
     assert (found.in_time <= found.shifted).all()
     assert found.shifted[3] == 0.0
     assert largest_sine(hoist, 0.3, error=0.3).shifted[0] > found.shifted[1]
-    assert found.to_polars().columns == ["frequency", "shifted", "in_time"]
 
 
 @pytest.mark.parametrize(

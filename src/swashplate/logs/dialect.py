@@ -1,0 +1,618 @@
+"""Dialect of a text log: encoding, delimiter, decimal sign, names, units and first row of data."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Literal, NamedTuple
+
+from swashplate.errors import FileError, InputError
+from swashplate.logs.log import Column, check_kind, printable, split_unit
+
+_NAMED = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "spaces": " ", "bar": "|"}
+COMMENTS = ("#", "%", "//")
+"""What comment lines begin with where the user does not say."""
+
+
+@dataclass(frozen=True)
+class TextOptions:
+    """Layout of a text log; what is None is told from the file. Other formats take no notice.
+
+    Parameters
+    ----------
+    delimiter : str, optional
+        One character, or ``"comma"``, ``"semicolon"``, ``"tab"``, ``"bar"``, ``"space"`` (any
+        number of spaces and tabs), or ``"none"`` for a single column.
+    decimal : {".", ","}, optional
+        Decimal sign.
+    comment : str, optional
+        What lines begin with that are skipped; ``""`` if there are none. Told from the file, it
+        is any of ``#``, ``%`` and ``//``.
+    header_row : int, optional
+        Line of the column names, the first is 1; 0 if there is none, the columns are then called
+        ``column 1``, ``column 2`` and so on. Data begin below.
+    encoding : str, optional
+        Such as ``"latin-1"`` or ``"utf-16"``.
+
+    Raises
+    ------
+    InputError
+        If one of them makes no sense.
+    """
+
+    delimiter: str | None = None
+    decimal: Literal[".", ","] | None = None
+    comment: str | None = None
+    header_row: int | None = None
+    encoding: str | None = None
+
+    # pydantic, where this is a part of a larger schema: a misspelt key is refused
+    __pydantic_config__: ClassVar[Any] = {"extra": "forbid"}
+
+    def __post_init__(self) -> None:
+        """Check them."""
+        delimiter = self.delimiter
+        if delimiter is not None and delimiter != "none" and delimiter not in _NAMED:
+            if len(delimiter) != 1 or not delimiter.isascii() or delimiter in '\r\n"\0':
+                raise InputError(
+                    f"delimiter must be one character, 'tab', 'space' or 'none', not {delimiter!r}."
+                )
+            if delimiter.isalnum() or delimiter in "+-.":
+                raise InputError(f"delimiter {delimiter!r} is a part of numbers; name another.")
+        if self.decimal not in (None, ".", ","):
+            raise InputError(f"decimal must be '.' or ',', not {self.decimal!r}.")
+        if self.header_row is not None and self.header_row < 0:
+            raise InputError(
+                f"header_row must be the line of the header, or 0, not {self.header_row!r}."
+            )
+        if self.encoding is not None:
+            try:
+                "".encode(self.encoding)  # zlib and the like are codecs, too, but not of text
+            except (LookupError, UnicodeError, ValueError):
+                raise InputError(
+                    f"encoding {self.encoding!r} is unknown; take 'utf-8', 'latin-1' or 'utf-16'."
+                ) from None
+
+    @property
+    def delimiters(self) -> tuple[str | None, ...]:
+        """Delimiters that may be: the one given, or all that are looked for; None is no one."""
+        if self.delimiter is None:
+            return (",", ";", "\t", " ", "|", None)
+        return (None if self.delimiter == "none" else _NAMED.get(self.delimiter, self.delimiter),)
+
+    @property
+    def marks(self) -> tuple[str, ...]:
+        """What comment lines begin with."""
+        return COMMENTS if self.comment is None else tuple(filter(None, [self.comment]))
+
+
+# --- encoding -------------------------------------------------------------------------------------
+
+_BYTE_ORDER = {
+    codecs.BOM_UTF8: "utf-8",
+    codecs.BOM_UTF16_LE: "utf-16-le",
+    codecs.BOM_UTF16_BE: "utf-16-be",
+}
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")
+
+
+def encoding_of(path: Path, given: str | None) -> tuple[str, int]:
+    """Canonical name of a text file's encoding, and the bytes of its byte-order mark.
+
+    What is not given is told by a byte-order mark, by the zeros that UTF-16 has between Latin
+    letters, as UTF-8, or else as Latin-1.
+
+    Raises
+    ------
+    FileError
+        If the file is no text.
+    """
+    with path.open("rb") as file:
+        head = file.read(1 << 16)
+    marks = ((len(mark), name) for mark, name in _BYTE_ORDER.items() if head.startswith(mark))
+    mark, marked = next(marks, (0, None))
+    name = codecs.lookup(given).name.removesuffix("-sig") if given else marked or _guessed(head)
+    name = (marked or "utf-16-le") if name == "utf-16" else name
+    try:
+        text = codecs.getincrementaldecoder(name)("strict").decode(head[mark:])
+    except UnicodeError as error:
+        check_kind(path)
+        raise FileError(f"{path} is no text in {name}: {error}.") from None
+    control = _CONTROL.search(text)
+    if control:
+        check_kind(path)
+        line = len(re.findall(r"\r\n|\n|\r", text[: control.start()])) + 1
+        what = "a NUL byte" if control[0] == "\0" else f"the byte {ord(control[0]):#04x}"
+        raise FileError(f"{path} has {what} in line {line}; it is damaged or no text file.")
+    return name, mark
+
+
+def _guessed(head: bytes) -> str:
+    even, odd = head[0::2].count(0), head[1::2].count(0)
+    if odd > 0.4 * len(head[1::2]) and even == 0:
+        return "utf-16-le"
+    if even > 0.4 * len(head[0::2]) and odd == 0:
+        return "utf-16-be"
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return "iso8859-1"
+    return "utf-8"
+
+
+# --- cells ----------------------------------------------------------------------------------------
+
+_EXPONENT = r"(?:[eE][+-]?\d+)?"
+_NUMBER = {
+    ".": re.compile(rf"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+){_EXPONENT}", re.ASCII),
+    ",": re.compile(rf"[+-]?[0-9]+(?:,[0-9]+)?{_EXPONENT}", re.ASCII),
+}
+SIGNS = "+-"
+NOT_A_NUMBER = ("nan", "na", "n/a", "#n/a", "null", "nan(ind)", "1.#qnan", "1.#ind", "1.#nan")
+"""Texts for a missing number, lower case and without sign: NaN as several programs write it."""
+INFINITE = ("inf", "infinity", "1.#inf")
+
+_CLOCK = r"\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9})?"
+_ZONE = r"(?: ?(?:Z|[+-]\d{2}:?\d{2}))?"
+_HALF = r" ?[AaPp]\.?[Mm]\.?"
+_DATES = (
+    (rf"\d{{4}}-\d{{2}}-\d{{2}} {_CLOCK}(?:{_HALF})?{_ZONE}", "%Y-%m-%d %H:%M:%S%.f"),
+    (rf"\d{{4}}-\d{{2}}-\d{{2}}T{_CLOCK}{_ZONE}", "%Y-%m-%dT%H:%M:%S%.f"),
+    (rf"\d{{4}}/\d{{2}}/\d{{2}} {_CLOCK}(?:{_HALF})?", "%Y/%m/%d %H:%M:%S%.f"),
+    (rf"\d{{2}}\.\d{{2}}\.\d{{4}} {_CLOCK}", "%d.%m.%Y %H:%M:%S%.f"),
+    # who writes AM and PM writes the month first
+    (rf"\d{{1,2}}/\d{{1,2}}/\d{{4}} {_CLOCK}{_HALF}", "%m/%d/%Y %H:%M:%S%.f"),
+    (rf"{_CLOCK}(?:{_HALF})?", "%H:%M:%S%.f"),
+)
+"""Forms that can be read in one way only; 03/04/2026 is none of them."""
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """Whether a cell, stripped, is a number or a text for a missing one."""
+    if _NUMBER[decimal].fullmatch(cell):
+        return True
+    bare = cell.lstrip(SIGNS).lower()
+    return bare in NOT_A_NUMBER or bare in INFINITE or (not bare and len(cell) > 1)
+
+
+def date_form(cell: str) -> str | None:
+    """Format of a cell, stripped, that is a date with a clock time, or a clock time."""
+    return next((way for form, way in _DATES if re.fullmatch(form, cell, re.ASCII)), None)
+
+
+def shown(cell: str) -> str:
+    """A cell for a sentence: short and printable."""
+    text = printable(cell.strip())
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+# --- delimiter and decimal sign -------------------------------------------------------------------
+
+_SAID = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces", "|": "bars"}
+_THREE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+_HEADED = 0.5
+"""Added to a score if the line of text above the rows, the header, has as many fields as they."""
+_DELIMITED = 0.25
+"""Added if it has several, but another number of them."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How the rows of a text file are to be taken apart."""
+
+    delimiter: str | None
+    """One character; a space stands for any number of spaces and tabs; None is one column."""
+    decimal: str
+    width: int
+    """Fields in a row."""
+    numeric: tuple[bool, ...]
+    """Which of them are numbers, as far as a sample of rows shows."""
+    rows: int = 0
+    """Rows of the sample that fit."""
+    score: float = 0.0
+    """Their share times the share of their characters in numbers; more with a header."""
+
+    def split(self, line: str) -> list[str]:
+        """Cells of a line, stripped."""
+        return _split(line, self.delimiter)
+
+    def is_blank(self, line: str) -> bool:
+        """Whether a line is no row; one of nothing but delimiters is a row of empty cells."""
+        if self.delimiter == "\t" and len(self.split(line)) == self.width:
+            return False
+        return not line.strip()
+
+    def fits(self, cells: Sequence[str]) -> bool:
+        """Whether there are numbers wherever the sample has, and as many cells."""
+        if len(cells) != self.width:
+            return False
+        numbers = [cell for cell, numeric in zip(cells, self.numeric, strict=True) if numeric]
+        return any(numbers) and all(is_number(cell, self.decimal) for cell in numbers if cell)
+
+    def has_number(self, cells: Sequence[str]) -> bool:
+        """Whether there is a number in a column of numbers."""
+        return any(
+            numeric and is_number(cell, self.decimal)
+            for cell, numeric in zip(cells, self.numeric, strict=False)
+        )
+
+    def names(self, text: str) -> list[str]:
+        """Cells of a header; where spaces delimit, the one before a unit does not."""
+        if self.delimiter == " ":
+            text = re.sub(r"[ \t]+([\[(])", "\0\\1", text)
+        return [cell.replace("\0", " ") for cell in self.split(text)]
+
+    def __str__(self) -> str:
+        """What it is, for people."""
+        one = "one column" if self.delimiter is None else f"'{self.delimiter}'"
+        point = "comma" if self.decimal == "," else "point"
+        return f"CSV, {_SAID.get(self.delimiter or '', one)}, decimal {point}"
+
+
+def _split(line: str, delimiter: str | None) -> list[str]:
+    if delimiter is None:
+        return [line.strip().strip('"')]
+    if delimiter == " ":
+        line = line.replace("\t", " ").strip()
+    if '"' in line:
+        try:
+            cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+            return [cell.strip() for cell in cells]
+        except (csv.Error, StopIteration):
+            pass
+    return line.split() if delimiter == " " else [cell.strip() for cell in line.split(delimiter)]
+
+
+def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layout:
+    """Delimiter and decimal sign under which a sample of lines makes most sense as rows of numbers.
+
+    Comments and blank lines must not be among the lines; header lines may.
+
+    Raises
+    ------
+    FileError
+        If there are no rows of numbers, or if two readings are as good as each other.
+    """
+    quoted = any('"' in line for line in lines)
+    tried = (
+        _tried(lines, delimiter, decimal, alone=options.delimiter is not None)
+        for delimiter in options.delimiters
+        for decimal in ((options.decimal,) if options.decimal else (".", ","))
+        if delimiter != decimal or quoted or None not in (options.delimiter, options.decimal)
+    )
+    trials = [trial for trial in tried if trial is not None]
+    if not trials:
+        given = [f"{key} {getattr(options, key)!r}" for key in ("delimiter", "decimal")]
+        given = [each for each in given if not each.endswith("None")]
+        with_them = f" with {' and '.join(given)}" if given else ""
+        count = f"{len(lines)} line" + "s" * (len(lines) > 1)
+        raise FileError(f"{path} has no rows of numbers{with_them}, only {count} of text.")
+    tabbed = max((trial.rows for trial in trials if trial.delimiter == "\t"), default=0)
+    # a tab between numbers delimits them, whatever spaces there are in names
+    trials = [each for each in trials if each.delimiter != " " or each.rows > tabbed]
+    best = max(trial.score for trial in trials)
+    equal = [trial for trial in trials if trial.score > best - 1e-9]
+    if len({trial.delimiter for trial in equal}) > 1:
+        row = next((line for line in lines if "," in line), lines[0])
+        readings = " or as ".join(str(trial).removeprefix("CSV, ") for trial in equal)
+        raise FileError(
+            f"{path} can be read in more than one way, '{shown(row)}' as {readings}; "
+            "give 'delimiter' or 'decimal' as an option."
+        )
+    chosen = equal[0]  # with a point: where both signs are alike, there are whole numbers alone
+    if options.decimal is None and chosen.delimiter != ",":
+        _check_decimals(lines, chosen, trials, path)
+    return chosen
+
+
+def _tried(lines: Sequence[str], delimiter: str | None, decimal: str, alone: bool) -> Layout | None:
+    rows = [_split(line, delimiter) for line in lines]
+    marks = [[cell != "" and is_number(cell, decimal) for cell in row] for row in rows]
+    counts = Counter(len(row) for row, mark in zip(rows, marks, strict=True) if any(mark))
+    if not counts:
+        return None
+    texts = {len(row) for row, mark in zip(rows, marks, strict=True) if not any(mark)}
+    # as many fields as most rows have; among equals, as many as a header has, then as the first
+    width = max(counts, key=lambda each: (counts[each], each in texts))
+    if width == 1 and delimiter is not None and not alone:
+        return None
+    fitting = [
+        list(zip(row, mark, strict=True))
+        for row, mark in zip(rows, marks, strict=True)
+        if len(row) == width and any(mark)
+    ]
+    numeric = tuple(_mostly([row[i] for row in fitting]) for i in range(width))
+    layout = Layout(delimiter, decimal, width, numeric)
+    begin = next((place for place, row in enumerate(rows) if layout.fits(row)), None)
+    if begin is None:
+        return None
+    number = sum(len(cell) for row in fitting for cell, is_one in row if is_one)
+    total = sum(len(cell) for row in fitting for cell, _ in row)
+    score = len(fitting) / (len(rows) - begin) * number / total
+    header = next((len(rows[i]) for i in reversed(range(begin)) if not any(marks[i])), 0)
+    if header > 1:
+        score += _HEADED if header == width else _DELIMITED
+    return Layout(delimiter, decimal, width, numeric, len(fitting), score)
+
+
+def _mostly(cells: Sequence[tuple[str, bool]]) -> bool:
+    filled = [number for cell, number in cells if cell]
+    return bool(filled) and 2 * sum(filled) >= len(filled)
+
+
+def _check_decimals(
+    lines: Sequence[str], chosen: Layout, layouts: Sequence[Layout], path: Path
+) -> None:
+    """Refuse numbers that the other decimal sign would make other numbers."""
+    for other in layouts:
+        if (other.delimiter, other.width) == (chosen.delimiter, chosen.width) and any(
+            theirs and not ours for theirs, ours in zip(other.numeric, chosen.numeric, strict=True)
+        ):
+            raise FileError(
+                f"{path} has decimal points in some columns and decimal commas in others; "
+                "give 'decimal' as an option."
+            )
+    cells = [
+        cell
+        for line in lines
+        for cell, numeric in zip(chosen.split(line), chosen.numeric, strict=False)
+        if numeric and "," in cell and is_number(cell, ",")
+    ]
+    if chosen.decimal == "," and cells and all(_THREE.fullmatch(cell) for cell in cells):
+        raise FileError(
+            f"{path} has numbers like '{cells[0]}', where the comma may be a decimal sign or "
+            "separate thousands; give 'decimal' as an option."
+        )
+
+
+# --- what stands above the rows -------------------------------------------------------------------
+
+MARKER = "***End_of_Header***"
+"""LabVIEW ends both of its headers so."""
+_KEPT = 200  # lines before the data that are kept as comments
+Units = tuple[str | None, ...]
+
+
+class Line(NamedTuple):
+    """A line of the file."""
+
+    number: int
+    """The first is 1."""
+    text: str
+
+
+class Heading(NamedTuple):
+    """What the first lines of a file say."""
+
+    columns: tuple[Column, ...]
+    first: int
+    """Line of the first row of data; the first line of the file is 1."""
+    comments: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def read_heading(
+    lines: Sequence[Line], layout: Layout, options: TextOptions, path: Path
+) -> Heading:
+    """Find the names, the units and the first row of data in the first lines of a file.
+
+    Raises
+    ------
+    FileError
+        If there is no row of numbers, or the header has another number of fields than the rows.
+    """
+    marks = options.marks
+    filled = [line for line in lines if not layout.is_blank(line.text)]
+    comments = [line for line in filled if marks and line.text.lstrip().startswith(marks)]
+    plain = sorted({*filled}.difference(comments))
+    names: list[str] = []
+    units: Units | None = None
+    used = 0
+    if options.header_row:
+        plain, names, units = _below(options.header_row, filled, plain, marks, layout, path)
+        first = 0
+    else:
+        first = _first_row(plain, layout, path)
+        if options.header_row is None:
+            names, units, used = _names_and_units(plain[:first], layout, path)
+    preamble = plain[: first - used]
+    said = [line for line in comments if line.number < plain[first].number]
+    notes = []
+    if not names and options.header_row is None:
+        names, units, number = _commented_names(said, marks, layout)
+        notes.append(
+            f"The names of the columns are from the comment in line {number}."
+            if names
+            else "There is no header; the columns are called by their positions."
+        )
+    if preamble:
+        numbers = ", ".join(str(line.number) for line in preamble[:20])
+        notes.append(f"Taken as text above the table: line {numbers}.")
+    units = units or _labview_units([line.text for line in preamble], layout.width)
+    cells = layout.split(plain[first].text)
+    columns = _columns(names, units, layout, cells)
+    for place, (column, cell) in enumerate(zip(columns, cells, strict=False)):
+        if date_form(cell):
+            columns[place] = column._replace(unit="s")
+            notes.append(f"'{column.name}' holds dates, read as seconds since the first.")
+    if len(set(names)) < len(names):
+        notes.append("Columns of the same name are numbered: 'name #1', 'name #2'.")
+    told = sorted([*preamble, *said])[:_KEPT]
+    words = tuple(line.text.strip().rstrip("\t;, ") for line in told)
+    return Heading(tuple(columns), plain[first].number, words, tuple(notes))
+
+
+def _first_row(plain: Sequence[Line], layout: Layout, path: Path) -> int:
+    """Position of the first row of data among the lines that are neither empty nor comments."""
+    rows = [layout.split(line.text) for line in plain]
+    first = next((place for place, row in enumerate(rows) if layout.fits(row)), None)
+    if first is None:
+        raise FileError(f"{path} has no rows of numbers in its first {len(plain)} lines.")
+    # a damaged row above it is a row all the same: it must be refused, not taken for a title
+    top = first
+    while top and (layout.has_number(rows[top - 1]) or not any(rows[top - 1])):
+        top -= 1
+    if top == first or len(rows[top]) != layout.width:
+        return top
+    if top and _may_be_names(plain[top - 1], layout):
+        return top + 1 if units_of(rows[top]) is not None else top
+    # names that are numbers, such as those of channels
+    named = any(cell and not is_number(cell, layout.decimal) for cell in rows[top])
+    return top + 1 if named else top
+
+
+def _may_be_names(line: Line, layout: Layout) -> bool:
+    if not line.text.strip() or line.text.startswith(MARKER):
+        return False
+    return len(layout.names(line.text)) == layout.width
+
+
+def _names_and_units(
+    above: Sequence[Line], layout: Layout, path: Path
+) -> tuple[list[str], Units | None, int]:
+    """Names, units and how many of the lines directly above the data are these."""
+    if not above or above[-1].text.startswith(MARKER):
+        return [], None, 0
+    names = layout.names(above[-1].text)
+    if len(names) == layout.width:
+        units = units_of(names)
+        if units is not None and len(above) > 1 and _may_be_names(above[-2], layout):
+            return layout.names(above[-2].text), units, 2
+        return names, None, 1
+    trimmed = _as_wide(names, layout)
+    if len(trimmed) == layout.width:
+        return trimmed, None, 1
+    if len(names) == 1 or above[-1].text.rstrip().endswith((":", ".")):
+        return [], None, 0  # a title
+    hint = ""
+    if layout.delimiter == "," and layout.width >= 2 * len(names) - 1:
+        hint = " Do decimal commas stand between commas? Export it with semicolons."
+    raise FileError(
+        f"{path} has {len(names)} names in line {above[-1].number}, but {layout.width} fields in "
+        f"the rows below.{hint}"
+    )
+
+
+def _as_wide(names: list[str], layout: Layout) -> list[str]:
+    """Names for as many fields as the rows have, if a harmless difference is all there is."""
+    if len(names) == layout.width + 1 and names[-1] in ("", "Comment"):
+        return names[:-1]  # LabVIEW leaves room for a comment
+    if len(names) == layout.width - 1 and not layout.numeric[-1]:
+        return [*names, ""]  # a delimiter at the end of each row
+    return names
+
+
+def _below(
+    number: int,
+    filled: Sequence[Line],
+    plain: Sequence[Line],
+    marks: tuple[str, ...],
+    layout: Layout,
+    path: Path,
+) -> tuple[list[Line], list[str], Units | None]:
+    """Rows, names and units where the user said in which line the names are."""
+    header = next((line for line in filled if line.number == number), None)
+    if header is None:
+        raise FileError(f"{path} has no header in line {number}: it is empty or too far down.")
+    text = header.text.lstrip()
+    for mark in marks:
+        text = text.removeprefix(mark)
+    names = _as_wide(layout.names(text), layout)
+    if len(names) != layout.width:
+        raise FileError(
+            f"{path} has {len(names)} names in line {number}, but {layout.width} fields in "
+            "the rows."
+        )
+    rows = [line for line in plain if line.number > number]
+    units = units_of(layout.split(rows[0].text)) if rows else None
+    rows = rows[1:] if units else rows
+    if not rows:
+        raise FileError(f"{path} has no rows below line {number}.")
+    return rows, names, units
+
+
+def _commented_names(
+    comments: Sequence[Line], marks: tuple[str, ...], layout: Layout
+) -> tuple[list[str], Units | None, int]:
+    """Names in the last comment above the data, as NumPy writes them, units and line; or none."""
+    if not comments or layout.width == 1:
+        return [], None, 0
+    texts = [line.text.lstrip() for line in comments[-2:]]
+    for mark in marks:
+        texts = [text.removeprefix(mark) for text in texts]
+    above, names = layout.names(texts[0]), layout.names(texts[-1])
+    if len(names) != layout.width:
+        return [], None, 0
+    units = units_of(names)
+    if units is not None and len(texts) > 1 and len(above) == layout.width:
+        return above, units, comments[-2].number
+    named = all(names) and not layout.has_number(names)
+    return (names, None, comments[-1].number) if named else ([], None, 0)
+
+
+def _columns(
+    names: Sequence[str], units: Units | None, layout: Layout, cells: Sequence[str]
+) -> list[Column]:
+    called = [name or f"column {place}" for place, name in enumerate(names, 1)] or [
+        f"column {place}" for place in range(1, layout.width + 1)
+    ]
+    if names and not names[-1] and not layout.numeric[-1] and not cells[-1]:
+        called.pop()  # a delimiter at the end of each line
+    columns, counts, seen = [], Counter(called), Counter[str]()
+    for place, name in enumerate(called):
+        seen[name] += 1
+        unique = printable(f"{name} #{seen[name]}" if counts[name] > 1 else name)
+        columns.append(Column(unique, split_unit(name)[1] or (units[place] if units else None)))
+    return columns
+
+
+_KNOWN = frozenset(
+    """
+    s sec secs second seconds ms msec us µs μs min minute minutes h hr hour hours
+    hz khz mhz 1/s v mv kv volt volts a ma amp amps ampere amperes ohm ω
+    pa hpa kpa mpa bar mbar psi atm n kn mn lbf nm knm j kj w kw hp ps
+    m mm cm km um µm μm in inch inches ft rad mrad deg degree degrees ° grad gon
+    rev revs revolution revolutions turn turns rpm l ml cc g kg t lb
+    k c °c degc celsius f °f degf kelvin
+    % percent ppm count counts cts inc incs adc bit bits lsb digit digits pulse pulses
+    - – − 1 none n/a dimensionless
+    """.split()  # noqa: SIM905 - a list of so many strings is unreadable
+)
+_SHORT = 4
+"""Letters that a word may have that is taken for a unit because of its neighbours."""
+_PARTS = re.compile(r"[\s*/·.()^²³0-9-]+")
+_BRACKETS = re.compile(r"\[.*\]|\(.*\)")
+
+
+def units_of(cells: Sequence[str]) -> Units | None:
+    """Units of a row of them, None where a cell is empty; or None if it is no such row."""
+    filled = [cell for cell in cells if cell]
+    # a short word of another language may stand among units, such as Imp for pulses
+    others = [cell for cell in filled if not _is_unit(cell)]
+    if 2 * len(others) >= len(filled) or any(len(cell) > _SHORT for cell in others):
+        return None
+    return tuple(
+        cell[1:-1].strip() if _BRACKETS.fullmatch(cell) else cell or None for cell in cells
+    )
+
+
+def _is_unit(cell: str) -> bool:
+    if _BRACKETS.fullmatch(cell) or cell.lower() in _KNOWN:
+        return True
+    parts = [part for part in _PARTS.split(cell.lower()) if part]
+    return bool(parts) and all(part in _KNOWN for part in parts)
+
+
+def _labview_units(lines: Sequence[str], width: int) -> Units | None:
+    """Units in the header of LabVIEW's measurement files, whose first column is the time."""
+    for line in lines:
+        label, *units = line.rstrip().split("\t")
+        if label == "Y_Unit_Label" and len(units) < width:
+            padded = [*units, *[""] * (width - 1 - len(units))]
+            return ("s", *(unit or None for unit in padded))
+    return None

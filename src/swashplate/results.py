@@ -1,0 +1,179 @@
+"""Results as Python shows them: a line at the prompt, tables in a notebook, frames elsewhere.
+
+A class that inherits `Result` has a short ``repr`` whatever arrays it holds. Where it has
+``tables()`` or ``table()``, a notebook shows these and `Result.summary` prints them; where the
+class names its `figure`, `Result.plot` draws it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from swashplate.errors import InputError
+from swashplate.tables import Table, write_table
+
+if TYPE_CHECKING:
+    import polars
+
+LONGEST = 320
+"""Characters of a repr at most: four lines of a terminal."""
+SPELT_OUT = 4
+"""Items of a sequence, or numbers of an array, that are shown one by one."""
+
+
+def short(value: object) -> str:
+    """What `repr` says of a result: its fields, arrays by their shape, others by their names."""
+    if is_dataclass(value):
+        names = [each.name for each in fields(value) if each.repr]
+    else:  # a model of pydantic's, or a named tuple
+        kind: Any = type(value)
+        names = list(getattr(kind, "model_fields", ()) or getattr(kind, "_fields", ()))
+    said, room = [], LONGEST - len(type(value).__name__) - 8
+    for name in names:
+        said.append(f"{name}={_brief(getattr(value, name))}")
+        if sum(map(len, said)) + 2 * len(said) > room:
+            said[-1] = "..."
+            break
+    return f"{type(value).__name__}({', '.join(said)})"
+
+
+def _brief(value: Any) -> str:
+    """A value in a few words."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, str | bytes | Path):
+        text = repr(str(value) if isinstance(value, Path) else value)
+        return text if len(text) <= 60 else f"{text[:56]}...{text[-1]}"
+    if hasattr(value, "shape") and hasattr(value, "dtype"):
+        if value.ndim == 1 and value.size <= SPELT_OUT:
+            return f"[{', '.join(map(_brief, value.tolist()))}]"
+        return f"<{' x '.join(map(str, value.shape))} {value.dtype}>"
+    if type(value).__module__.partition(".")[0] == "swashplate":
+        name = getattr(value, "name", None)
+        return f"{type(value).__name__}({repr(name) if isinstance(name, str) else '...'})"
+    if isinstance(value, Mapping):
+        keys = ", ".join(map(str, value))
+        return f"{{{keys if len(keys) <= 60 else f'{len(value)} entries'}}}"
+    if isinstance(value, Sequence | Set):
+        return _items(list(value))
+    text = object.__repr__(value) if callable(value) else repr(value)
+    return text if len(text) <= 60 and not callable(value) else f"<{type(value).__name__}>"
+
+
+def _items(items: list[Any]) -> str:
+    plain = all(isinstance(each, str | int | float) for each in items)
+    if plain and len(items) <= SPELT_OUT:
+        return f"[{', '.join(map(_brief, items))}]"
+    return f"<{len(items)} {type(items[0]).__name__}>" if items else "[]"
+
+
+class Result:
+    """A result that shows itself: shortly as text, with its tables where it has some."""
+
+    figure: ClassVar[str] = ""
+    """The figure of `swashplate.report.figures` that shows it, empty for none."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Keep the inherited repr, in whose place a dataclass would write one of its own."""
+        super().__init_subclass__(**options)
+        if "__repr__" not in cls.__dict__:
+            cls.__repr__ = cls.__repr__  # type: ignore[method-assign]
+
+    def __repr__(self) -> str:
+        return short(self)
+
+    def _tables(self) -> list[Table]:
+        made = getattr(self, "tables", None) or getattr(self, "table", None)
+        found = made() if callable(made) else []
+        return [found] if isinstance(found, Table) else list(found)
+
+    def _repr_html_(self) -> str | None:
+        made = self._tables()
+        return "".join(each._repr_html_() for each in made) if made else None
+
+    def summary(self) -> str:
+        """Text with its tables in the units that people read, and what follows from them."""
+        said = getattr(self, "sentences", ())
+        lines = "\n".join(f"- {each}" for each in (said() if callable(said) else said))
+        parts = [repr(self), *map(str, self._tables()), lines]
+        return "\n\n".join(each for each in parts if each)
+
+    def plot(self, **how: Any) -> Any:
+        """Matplotlib figure of it; keywords as of the figure's function.
+
+        Raises
+        ------
+        InputError
+            If nothing draws such a result.
+        """
+        if not self.figure:
+            raise InputError(f"There is no figure of a {type(self).__name__}.")
+        return getattr(figures(), self.figure)(self, **how)
+
+
+class Tabular(Result, ABC):
+    """A result that is a table of columns, SI."""
+
+    @abstractmethod
+    def to_polars(self) -> polars.DataFrame:
+        """The table, SI."""
+
+    def to_pandas(self) -> Any:
+        """The table of `to_polars` as a ``pandas.DataFrame``.
+
+        Raises
+        ------
+        InputError
+            If pandas is not installed.
+        """
+        return _library("pandas").DataFrame(self.to_polars().to_dict(as_series=False))
+
+    def to_xarray(self) -> Any:
+        """The table of `to_polars` as an ``xarray.Dataset`` along its first column.
+
+        Raises
+        ------
+        InputError
+            If xarray is not installed.
+        """
+        along, *others = (each for each in self.to_polars().iter_columns())
+        data = {each.name: (along.name, each.to_numpy()) for each in others}
+        return _library("xarray").Dataset(data, {along.name: along.to_numpy()})
+
+    def _repr_html_(self) -> str | None:
+        frame = self.to_polars()
+        return super()._repr_html_() or str(frame._repr_html_())
+
+    def write(self, path: str | Path) -> None:
+        """Write the table of `to_polars` as CSV or Parquet, by the path's ending.
+
+        The file appears whole or not at all: it is written beside and renamed.
+
+        Raises
+        ------
+        FileError
+            For another ending, or a folder that cannot be written.
+        """
+        write_table(self.to_polars(), path)
+
+
+def figures() -> Any:
+    """The package of figures, imported when one is drawn."""
+    from swashplate.report import figures
+
+    return figures
+
+
+def _library(name: str) -> Any:
+    from importlib import import_module
+
+    try:
+        return import_module(name)
+    except ImportError:
+        raise InputError(
+            f"{name} is not installed: install it ('pip install {name}'), or use to_polars()."
+        ) from None

@@ -1,0 +1,274 @@
+"""Results as Python shows them: at the prompt, in a notebook, in other libraries' frames."""
+
+import importlib
+import inspect
+import pkgutil
+import re
+import sys
+import tomllib
+import types
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import swashplate
+from swashplate import Campaign, Drive, FullOrderDrive, InputError, SquaredError, maneuvers
+from swashplate.analysis import (
+    Requirements,
+    envelope,
+    inverse_map,
+    largest_sine,
+    limit_shares,
+    one_at_a_time,
+    ranges_of,
+    size,
+    trial,
+    what_if,
+)
+from swashplate.campaign import examine, guess_drive, rig
+from swashplate.full_order import compare
+from swashplate.identification import (
+    Fit,
+    Stage,
+    Wanted,
+    fit,
+    judge_fit,
+    load_setup,
+    outlook,
+    predict,
+)
+from swashplate.results import LONGEST
+
+API = Path(__file__).parents[1] / "docs" / "api.toml"
+TESTS = [maneuvers.step(volts, stop=3.0, length=4.0) for volts in (4.0, -5.0, 9.0)]
+FREE = ("G1", "J", "Z10", "Z8")
+
+
+class Work(NamedTuple):
+    """A campaign, a fit of it and what was found out about it."""
+
+    campaign: Campaign
+    fitted: Fit
+    judged: Any
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
+    path = rig.write(rig.run("hoist", TESTS, seed=1), tmp_path_factory.mktemp("tests") / "logs")
+    campaign = Campaign.from_toml(path)
+    usual = load_setup("hoist")
+    stages = [
+        Stage(**{**each.model_dump(exclude={"forces", "free"}), "free": free})
+        for each in usual.stages
+        for free in [{name: each.free[name] for name in FREE if name in each.free}]
+    ]
+    setup = usual.model_copy(update={"stages": stages})
+    runs = campaign.select(role="fit")
+    hoist = Drive.preset("hoist")
+    fitted = fit(hoist, campaign, setup)
+    judged = judge_fit(campaign, "hoist", runs, hoist.parameters, setup, fitted, Wanted())
+    return Work(campaign, fitted, judged)
+
+
+def public_classes() -> dict[str, type]:
+    """Every class of the API reference, by its name there."""
+    found = {}
+    for page in tomllib.loads(API.read_text("utf-8"))["page"]:
+        for entry in page["objects"]:
+            name = entry if isinstance(entry, str) else entry["name"]
+            module, _, attribute = name.rpartition(".")
+            made = getattr(importlib.import_module(module), attribute)
+            if inspect.isclass(made) and not issubclass(made, BaseException):
+                found[name] = made
+    return found
+
+
+def reached(roots: Iterable[object]) -> dict[type, int]:
+    """The longest repr of each of the package's classes among objects and all that they hold."""
+    longest: dict[type, int] = {}
+    left, seen = list(roots), set[int]()
+    while left:
+        each = left.pop()
+        if id(each) in seen or isinstance(each, str | np.ndarray | type | types.FunctionType):
+            continue
+        seen.add(id(each))
+        if type(each).__module__.startswith("swashplate"):
+            longest[type(each)] = max(longest.get(type(each), 0), len(repr(each)))
+            left += getattr(each, "__dict__", {}).values()
+        if isinstance(each, dict | types.MappingProxyType):
+            left += each.values()
+        elif isinstance(each, list | tuple):
+            left += each
+    return longest
+
+
+def analyses(drive: Drive) -> list[Any]:
+    """What the package of analyses finds out about a drive."""
+    voltage = TESTS[0].sample()
+    once = trial(drive, voltage)
+    return [
+        envelope(drive),
+        limit_shares(drive, voltage),
+        what_if(drive, {"orifice": 1.5}, once),
+        size(drive, Requirements(speed=3.5), {"pump": (1.0, 2.0)}),
+        inverse_map(drive),
+        largest_sine(drive, (0.1,)),
+        one_at_a_time(drive, ranges_of(["orifice"]), once, outcomes=["final_speed", "rise_time"]),
+    ]
+
+
+def test_every_public_class_has_a_short_repr(work: Work) -> None:
+    hoist = Drive.preset("hoist")
+    voltage = TESTS[0].sample()
+    response = hoist.frequency_response([0.3, 1.0], [2.0])
+    five = FullOrderDrive.preset("hoist")
+    runs = work.campaign.select(role="fit")
+    sizes = reached(
+        [
+            *work,
+            hoist,
+            hoist.simulate(voltage),
+            hoist.sensitivities(voltage),
+            hoist.simulate_many({"Z16": [1e-4, 2e-4]}, voltage=voltage),
+            hoist.stepper(),
+            hoist.linearize(1.5),
+            response,
+            SquaredError(voltage),
+            five,
+            five.simulate(voltage),
+            compare(five, five.drive.simulate(voltage)),
+            outlook(work.fitted.setup.stages[0], hoist, runs),
+            guess_drive(runs),
+            *analyses(hoist),
+            examine(runs[0]),
+            swashplate.Threads(),
+            swashplate.Processes(),
+            swashplate.Dask("tcp://scheduler:8786"),
+        ]
+    )
+    # numbers of the machine and of its equations, and settings of the march, are spelt out
+    own = {kind: n for kind, n in sizes.items() if ".models" not in kind.__module__}
+    own = {kind: n for kind, n in own.items() if ".equations" not in kind.__module__}
+    assert {kind: n for kind, n in own.items() if n > LONGEST + 40} == {}
+    for name, kind in public_classes().items():
+        # a dataclass's own repr will do where there is nothing but numbers and words
+        if hasattr(kind.__repr__, "__wrapped__") and kind not in sizes:
+            kinds = {str(each) for each in getattr(kind, "__annotations__", {}).values()}
+            assert all(re.fullmatch(r"((float|int|str|bool|None)( \| )?)+", k) for k in kinds), name
+
+
+def test_a_run_is_read_by_its_signals_names() -> None:
+    hoist = Drive.preset("hoist")
+    run = hoist.simulate(TESTS[0])
+    assert run["shaft_speed"] is run.shaft_speed
+    assert all(run[name].shape == run.time.shape for name in run.names)
+    with pytest.raises(InputError, match=r"no signal 'shaft_sped': did you mean shaft_speed\?"):
+        run["shaft_sped"]
+    current = hoist.simulate_current(run.current)
+    assert "voltage" not in current.names
+    full = FullOrderDrive.preset("hoist").simulate(TESTS[0].sample())
+    assert full["pump_flow"] is full.pump_flow
+
+
+def test_a_maneuver_stands_where_a_voltage_does() -> None:
+    hoist, command = Drive.preset("hoist"), TESTS[1]
+    samples = command.sample(256.0)
+    same = np.array_equal
+    assert same(hoist.simulate(command, 256.0)["current"], hoist.simulate(samples, 256.0).current)
+    found = hoist.sensitivities(command, parameters=["Z8"]).shaft_speed
+    assert same(found, hoist.sensitivities(command.sample(), parameters=["Z8"]).shaft_speed)
+    many = hoist.simulate_many({"Z8": [1.6e6]}, voltage=command).output
+    given = hoist.simulate_many({"Z8": [1.6e6]}, voltage=command.sample()).output
+    assert many is not None
+    assert given is not None
+    assert same(many, given)
+    with pytest.raises(InputError, match=r"maneuvers\.parse\('step:9'\)"):
+        hoist.simulate("step:9")
+
+
+def test_frames_of_other_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = Drive.preset("hoist").simulate(TESTS[0])
+    pytest.importorskip("pandas")
+    frame = run.to_pandas()
+    assert list(frame.columns) == run.to_polars().columns
+    assert np.array_equal(frame["shaft_speed"], run.shaft_speed)
+    # what xarray is called with, whether it is installed or not
+
+    def dataset(data: dict[str, Any], coordinates: dict[str, Any]) -> tuple[Any, Any]:
+        return data, coordinates
+
+    monkeypatch.setitem(sys.modules, "xarray", types.SimpleNamespace(Dataset=dataset))
+    data, along = run.to_xarray()
+    assert list(along) == ["time"]
+    assert data["shaft_speed"][0] == "time"
+    assert np.array_equal(data["shaft_speed"][1], run.shaft_speed)
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(InputError, match="xarray is not installed"):
+        run.to_xarray()
+
+
+def test_a_figure_of_chosen_signals() -> None:
+    run = Drive.preset("hoist").simulate(TESTS[0])
+    assert len(run.plot().axes) > 4
+    two = run.plot(["shaft_speed", "stroker_pressure"])
+    assert [each.get_ylabel() for each in two.axes] == [
+        "shaft speed (deg/s)",
+        "stroker pressure (bar)",
+    ]
+    axes = Figure().subplots()
+    run.plot("shaft_speed", ax=axes, label="as it is")
+    Drive.preset("hoist").scale(Z10=1.2).simulate(TESTS[0]).plot(ax=axes, label="faster")
+    assert [each.get_label() for each in axes.lines] == ["as it is", "faster"]
+    assert np.allclose(axes.lines[0].get_ydata(), np.degrees(run.shaft_speed))
+    with pytest.raises(InputError, match="1 axes for 2 signals"):
+        run.plot(["current", "shaft_speed"], ax=axes)
+
+
+def test_summaries_and_tables_of_a_notebook(work: Work) -> None:
+    said = work.fitted.summary()
+    for words in ("Stage card", "Stage pump", "lower 95 %", "Fixed at their nominal values: V_dz"):
+        assert words in said
+    assert f"{work.fitted.drive['Z10'].value:.4f}"[:5] in said
+    html = work.fitted._repr_html_()
+    assert html is not None
+    assert html.count("<table>") == len(work.fitted.tables()) == 4
+    assert work.judged.verdict.headline in work.judged.summary()
+    assert "step +4 V" in work.campaign.summary()
+    assert "V_dz" in Drive.preset("hoist").summary()
+    run = work.campaign.experiments[0]
+    assert "encoder_counts" in run.summary()
+    frame = run.to_polars()
+    assert frame["signal"].unique(maintain_order=True).to_list() == ["input", *run.channels]
+    assert frame.height == run.input.time.size + sum(c.time.size for c in run.channels.values())
+    assert isinstance(run.plot(), Figure)
+    assert isinstance(work.campaign.plot()[0], Figure)
+
+
+def test_analyses_show_their_tables_and_figures() -> None:
+    found = analyses(Drive.preset("hoist"))
+    assert all(each.summary().count("\n") > 2 for each in found)
+    drawn = [each for each in found if each.figure and not hasattr(each, "single")]
+    assert len(drawn) >= 3
+    assert all(isinstance(each.plot(), Figure) for each in drawn)
+    with pytest.raises(InputError, match="no figure of a Sizing"):
+        next(each for each in found if type(each).__name__ == "Sizing").plot()
+
+
+def test_a_drive_stands_where_a_set_does(work: Work) -> None:
+    hoist = Drive.preset("hoist")
+    runs = work.campaign.select(role="fit")
+    by_drive, by_set = predict(hoist, runs), predict(hoist.parameters, runs)
+    assert np.array_equal(by_drive[0].simulated, by_set[0].simulated)
+
+
+@pytest.mark.parametrize(
+    "package", [each.name for each in pkgutil.iter_modules(swashplate.__path__) if each.ispkg]
+)
+def test_dir_of_a_package_shows_what_is_public(package: str) -> None:
+    module = importlib.import_module(f"swashplate.{package}")
+    named = [name for name in public_classes() if name.startswith(f"swashplate.{package}.")]
+    assert {name.split(".")[2] for name in named} <= set(dir(module))
