@@ -43,7 +43,8 @@ from swashplate.crane.rope import GRAVITY, Air, first_step, rope_step
 from swashplate.drive import Drive
 from swashplate.equations import equation, inlined, instance_of, kernel
 from swashplate.equations.code import generating
-from swashplate.equations.marching.march import Stored, advance_source
+from swashplate.equations.marching.march import advance_source
+from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.run import Instance, check_domain, module
 from swashplate.equations.model import Model
 from swashplate.parameters.rules import FULL_VOLTAGE
