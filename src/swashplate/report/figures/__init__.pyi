@@ -8,6 +8,7 @@ from .analysis import plot_sobol as plot_sobol
 from .analysis import plot_tornado as plot_tornado
 from .analysis import plot_whatif as plot_whatif
 from .campaign import plot_campaign as plot_campaign
+from .crane import plot_crane as plot_crane
 from .fit import plot_fit as plot_fit
 from .fit import plot_overlay as plot_overlay
 from .fit import plot_waterfall as plot_waterfall
