@@ -55,7 +55,7 @@ LINEAR = {"interpolation": "linear"}
         (lambda: "twice" * maneuvers.rest(1), "factor must be a number"),
         (lambda: maneuvers.rest(1.3).sample(), "rest 1.3 s lasts 1.3 s, at 512 Hz 665.6 samples"),
         (lambda: maneuvers.rest(1).time(0), "rate must be positive"),
-        (lambda: maneuvers.source_tests("boom"), "'boom': Kruse (2001) has hoist, slew, luff"),
+        (lambda: maneuvers.source_tests("boom"), "'boom': Kruse .2001. has hoist, slew, luff"),
     ],
 )
 def test_errors_say_what_is_wrong(make, message):
