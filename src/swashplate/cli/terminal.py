@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Protocol
@@ -13,9 +14,12 @@ from rich import box
 from rich.console import Console
 from rich.status import Status
 
+from swashplate.errors import FileError
 from swashplate.tables import UNIT, Column, Form, Table, check_place, ending
 
 BEGUN = perf_counter()
+FORCED: ContextVar[bool] = ContextVar("FORCED", default=False)
+"""Whether older files may be replaced: --force."""
 LINE, BETWEEN = 80, 2
 """Characters of a line, and those between two columns."""
 # names of files and manoeuvres are printed as they are, whatever brackets and colons they hold
@@ -182,6 +186,20 @@ def waiting(seconds: float | None, sort: str = "about") -> str:
     return f"{sort} {seconds / 60.0:.0f} min left"
 
 
+def check_free(*paths: Path) -> None:
+    """Refuse to replace a file, or to mix with what a folder holds, unless --force says so.
+
+    Raises
+    ------
+    FileError
+        For the first that is there.
+    """
+    for path in () if FORCED.get() else paths:
+        if path.is_file() or (path.is_dir() and any(path.iterdir())):
+            what = "is not empty" if path.is_dir() else "exists already"
+            raise FileError(f"{path} {what}; name another place, or replace it with --force.")
+
+
 class Outputs:
     """Files of a command: refused before anything is computed, and named when all is printed."""
 
@@ -196,13 +214,15 @@ class Outputs:
         Raises
         ------
         FileError
-            For a wrong ending, a folder that does not exist, or a folder in the file's place.
+            For a wrong ending, a folder that does not exist, a folder in the file's place, or a
+            file that is there already, unless --force is given.
         """
         for path, form in wanted:
             if path is not None and form is not None:
                 ending(path, form)
             if path is not None:
                 check_place(path)
+                check_free(path)
         self._lines: list[str] = []
 
     def write(self, path: Path | None, what: str, write: Callable[[Path], object]) -> None:

@@ -264,6 +264,8 @@ def _change(option: str, word: str) -> tuple[str, Change]:
         )
         raise InputError(f"{option} cannot read '{word}'; write it as {examples}.")
     numbers, unit = read
+    if not scaled and _is_lever(name):
+        raise InputError(f"{name} is a lever, which has no value of its own: --scale {name}=1.5.")
     if not (scaled and _is_lever(name)):
         definition = find(name)
         if unit:
