@@ -208,7 +208,7 @@ WRITTEN = {"out", "plot", "write", "pdf", "figures"}
 def command(
     app: typer.Typer, name: str, examples: str, panel: str | None = None
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Register a command with its examples, its groups of options spread, --force and units added."""
+    """Register a command with its examples, its groups spread, --force and units added."""
 
     def register(function: Callable[..., None]) -> Callable[..., None]:
         hints = get_type_hints(function, include_extras=True)
