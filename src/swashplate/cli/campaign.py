@@ -198,7 +198,7 @@ def check(
     virtual = " (virtual)" if campaign.virtual else ""
     note(f"{campaign.title}{virtual}: {len(campaign)} experiments ({counted})")
     tables = {each.name: quality_table(each, qualities[each.name]) for each in campaign}
-    widths = widths_of(tables.values())
+    widths = widths_of(tables.values()) if tables else []
     for experiment in campaign:
         show_in(widths, tables[experiment.name])
         for text in experiment.notes:

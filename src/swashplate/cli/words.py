@@ -32,6 +32,8 @@ DRIVE = "drive.toml"
 """The drive in a folder that a fit wrote."""
 NUMBERS = "parameters.toml"
 """What a fit of a model of one's own writes in the place of a drive."""
+UNFELT, FEELING = "load_torque", ("motor_leakage", "motor_constant")
+"""A load, and what makes the speed depend on it."""
 SURPRISING = 1000.0
 """Factor from which a value that is set is questioned."""
 
@@ -208,7 +210,12 @@ def _is_lever(name: str) -> bool:
 
 def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
     """A line for each parameter of two sets that differs, with a question where it surprises."""
-    lines = []
+    added = [
+        each for each in after.values() if each.symbol not in {b.symbol for b in before.values()}
+    ]
+    lines = [f"{each.symbol} ({each.name}): {each.value:g} {each.unit}" for each in added]
+    if UNFELT in {each.symbol for each in added} and not set(FEELING) & set(after.refinements):
+        lines.append(f"! {UNFELT} changes nothing without {' or '.join(FEELING)}: set one as well.")
     for old in before.values():
         new = after[old.symbol]
         if new.value == old.value:
