@@ -123,7 +123,7 @@ TESTS = (
 )
 
 
-EXCITE_SETUP = """
+BOTH_PARTS = """
 [[stages]]
 name = "card"
 part = "card"
@@ -140,11 +140,11 @@ free.Z13 = { relative = [0.5, 2.0], log = true }
 
 
 @pytest.fixture
-def excite_campaign(done: Words, tmp_path: Path) -> str:
+def steps_up(done: Words, tmp_path: Path) -> str:
     """Two positive steps of a hoist, of which one reaches the stop."""
     done("rig", "hoist", "--out", "virtual", *TESTS)
-    (tmp_path / "setup.toml").write_text(EXCITE_SETUP, "utf-8")
-    return "virtual/excite_campaign.toml"
+    (tmp_path / "setup.toml").write_text(BOTH_PARTS, "utf-8")
+    return "virtual/campaign.toml"
 
 
 def row(said: str, unknown: str) -> list[str]:
@@ -152,8 +152,8 @@ def row(said: str, unknown: str) -> list[str]:
     return re.split(r"  +", line.strip())
 
 
-def test_each_unknown_has_a_row(done: Words, excite_campaign: str) -> None:
-    said = done("excitation", excite_campaign, "--setup", "setup.toml")
+def test_each_unknown_has_a_row(done: Words, steps_up: str) -> None:
+    said = done("excitation", steps_up, "--setup", "setup.toml")
     assert row(said, "J_plus")[-1] == "##"
     needs, seconds, effect, runs = row(said, "J_minus")
     assert (needs, seconds, effect, runs) == ("a command beyond the dead zone", "0", "0", "..")
@@ -168,10 +168,10 @@ def test_each_unknown_has_a_row(done: Words, excite_campaign: str) -> None:
 
 
 def test_the_proposal_can_be_written_and_fitted(
-    done: Words, excite_campaign: str, tmp_path: Path
+    done: Words, steps_up: str, tmp_path: Path
 ) -> None:
     setup = ("--setup", "setup.toml")
-    said = done("excitation", excite_campaign, *setup, "--write", "mine.toml", "--out", "runs.csv")
+    said = done("excitation", steps_up, *setup, "--write", "mine.toml", "--out", "runs.csv")
     assert "Set-up: mine.toml" in said
     card, pump = load_setup(tmp_path / "mine.toml").stages
     assert list(card.free) == ["J_plus", "lim1_plus"]
@@ -181,29 +181,29 @@ def test_the_proposal_can_be_written_and_fitted(
     known = table.filter(pl.col("share") > 0.0)
     shares = known.group_by("stage", "unknown").agg(pl.col("share").sum())
     assert shares["share"].to_list() == pytest.approx([1.0] * shares.height)
-    again = done("excitation", excite_campaign, "--setup", "mine.toml")
+    again = done("excitation", steps_up, "--setup", "mine.toml")
     assert "The set-up can stay as it is." in again
-    done("fit", excite_campaign, "--setup", "mine.toml", "--out", "fitted", "--no-report")
+    done("fit", steps_up, "--setup", "mine.toml", "--out", "fitted", "--no-report")
 
 
 def test_doubts_are_said_first(done: Words, tmp_path: Path) -> None:
     idle = ("--maneuver", "step:0.1,start=0.5,stop=1,length=2")
     done("rig", "hoist", "--out", "virtual", "--severity", "clean", *TESTS, *idle)
-    (tmp_path / "setup.toml").write_text(EXCITE_SETUP, "utf-8")
-    said = done("excitation", "virtual/excite_campaign.toml", "--setup", "setup.toml")
+    (tmp_path / "setup.toml").write_text(BOTH_PARTS, "utf-8")
+    said = done("excitation", "virtual/campaign.toml", "--setup", "setup.toml")
     assert said.startswith("! hoist_step_0.1_V: its command stays between 0 and 0.1 V")
 
 
-def test_excite_refusals(refused: Words, excite_campaign: str, tmp_path: Path) -> None:
+def test_refusals_of_excitation(refused: Words, steps_up: str, tmp_path: Path) -> None:
     assert "no axis 'boom'; it has hoist" in refused(
-        "excitation", excite_campaign, "--axis", "boom"
+        "excitation", steps_up, "--axis", "boom"
     )
-    assert "no packaged set-up 'boom'" in refused("excitation", excite_campaign, "--setup", "boom")
+    assert "no packaged set-up 'boom'" in refused("excitation", steps_up, "--setup", "boom")
     (tmp_path / "none.toml").write_text(
         '[[stages]]\nname = "pump"\npart = "pump"\nfree.Z14 = { relative = [0.5, 2.0] }\n', "utf-8"
     )
-    said = refused("excitation", excite_campaign, "--setup", "none.toml", "--write", "mine.toml")
+    said = refused("excitation", steps_up, "--setup", "none.toml", "--write", "mine.toml")
     assert "The runs determine none of the unknowns" in said
     assert ".txt" in refused(
-        "excitation", excite_campaign, "--setup", "setup.toml", "--out", "t.txt"
+        "excitation", steps_up, "--setup", "setup.toml", "--out", "t.txt"
     )

@@ -210,10 +210,12 @@ def _is_lever(name: str) -> bool:
 
 def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
     """A line for each parameter of two sets that differs, with a question where it surprises."""
-    added = [
-        each for each in after.values() if each.symbol not in {b.symbol for b in before.values()}
+    known = {each.symbol for each in before.values()}
+    added = [each for each in after.values() if each.symbol not in known]
+    lines = [
+        f"{each.symbol} ({each.name}): {'/'.join(f'{v:g}' for v in each.values)} {each.unit}"
+        for each in added
     ]
-    lines = [f"{each.symbol} ({each.name}): {each.value:g} {each.unit}" for each in added]
     if UNFELT in {each.symbol for each in added} and not set(FEELING) & set(after.refinements):
         lines.append(f"! {UNFELT} changes nothing without {' or '.join(FEELING)}: set one as well.")
     for old in before.values():
