@@ -167,9 +167,7 @@ def test_each_unknown_has_a_row(done: Words, steps_up: str) -> None:
     assert "J_plus = {relative = [0.5, 2.0]}" in said
 
 
-def test_the_proposal_can_be_written_and_fitted(
-    done: Words, steps_up: str, tmp_path: Path
-) -> None:
+def test_the_proposal_can_be_written_and_fitted(done: Words, steps_up: str, tmp_path: Path) -> None:
     setup = ("--setup", "setup.toml")
     said = done("excitation", steps_up, *setup, "--write", "mine.toml", "--out", "runs.csv")
     assert "Set-up: mine.toml" in said
@@ -195,15 +193,11 @@ def test_doubts_are_said_first(done: Words, tmp_path: Path) -> None:
 
 
 def test_refusals_of_excitation(refused: Words, steps_up: str, tmp_path: Path) -> None:
-    assert "no axis 'boom'; it has hoist" in refused(
-        "excitation", steps_up, "--axis", "boom"
-    )
+    assert "no axis 'boom'; it has hoist" in refused("excitation", steps_up, "--axis", "boom")
     assert "no packaged set-up 'boom'" in refused("excitation", steps_up, "--setup", "boom")
     (tmp_path / "none.toml").write_text(
         '[[stages]]\nname = "pump"\npart = "pump"\nfree.Z14 = { relative = [0.5, 2.0] }\n', "utf-8"
     )
     said = refused("excitation", steps_up, "--setup", "none.toml", "--write", "mine.toml")
     assert "The runs determine none of the unknowns" in said
-    assert ".txt" in refused(
-        "excitation", steps_up, "--setup", "setup.toml", "--out", "t.txt"
-    )
+    assert ".txt" in refused("excitation", steps_up, "--setup", "setup.toml", "--out", "t.txt")

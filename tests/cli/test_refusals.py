@@ -157,7 +157,7 @@ def test_nothing_is_written_beside_a_figure_that_cannot_be(refused, typed, plot)
     [
         ("simulate hoist rest:1 --out {}", "a.csv"),
         ("simulate hoist rest:1 --plot {}", "a.png"),
-        ("whatif hoist --scale pump=1.1 --maneuver rest:1 --out {}", "a.toml"),
+        ("whatif hoist --scale pump=1.1 --maneuver step:1 --out {}", "a.toml"),
         ("compensate hoist --points 5 --out {}", "a.csv"),
         ("tour --out {}", "overview.png"),
         ("rig hoist --maneuver rest:1 --out {}", "logs/a.csv"),

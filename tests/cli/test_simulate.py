@@ -355,4 +355,4 @@ def test_a_person_who_waits_sees_a_bar(run, monkeypatch):
 
 def test_a_folder_that_cannot_be_made(refused, tmp_path):
     (tmp_path / "file").write_text("")
-    assert "file/hoist cannot be made: Not a directory" in refused("tour", "--out", "file")
+    assert "Error: file cannot be made: " in refused("tour", "--out", "file")

@@ -331,9 +331,10 @@ def rig(
     """Write a virtual test campaign: logs, campaign.toml and, apart, the truth.
 
     A drive with known parameters is simulated over the tests of Kruse (2001)
-    and read by instruments with chosen errors. --set and --scale change the drive
-    that is simulated, not the one that a fit starts from. Fit it as you would your
-    machine's logs, then look into truth/. Every file says that it is virtual.
+    and read by instruments with chosen errors. --set and --scale change the
+    drive that is simulated, not the one that a fit starts from. Fit it as you
+    would your machine's logs, then look into truth/. Every file says that it is
+    virtual.
     """
     from swashplate.campaign import rig as bench
     from swashplate.tables import Column, Table

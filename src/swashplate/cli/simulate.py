@@ -19,7 +19,7 @@ from swashplate.cli.options import (
 )
 from swashplate.cli.terminal import Outputs, check_free, note, progress, say, show, working
 from swashplate.cli.words import drive_of, maneuver_of, simulated
-from swashplate.tables import FIGURE, TABLE, made_folder
+from swashplate.tables import FIGURE, TABLE, check_folder, made_folder
 
 if TYPE_CHECKING:
     from swashplate.drive import Drive
@@ -206,6 +206,7 @@ def tour(
     from swashplate.maneuvers import source_tests
     from swashplate.parameters.files import AXES
 
+    check_folder(out)
     check_free(out)
     drives = {axis: Drive.preset(axis) for axis in AXES}
     tests = {axis: source_tests(axis) for axis in AXES}
