@@ -18,16 +18,12 @@ then the shorter code.
 """
 
 import argparse
-import csv
 import math
 import os
-import sys
 import tempfile
 import time
 from collections import defaultdict
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 
@@ -35,6 +31,7 @@ from statistics import median
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import numpy as np
+from campaigns import read, run_missing
 from faults import true_error
 
 NOISES = {
@@ -72,8 +69,9 @@ FIELDS = (
 )
 
 
-def campaign(axis, case, seed, compared):
+def campaign(_, item):
     """Rows of one campaign: an unknown and a method each, with truth, estimate and interval."""
+    axis, case, seed, compared = item
     return own_campaign(seed) if axis == "own" else drive_campaign(axis, case, seed, compared)
 
 
@@ -81,12 +79,12 @@ def drive_campaign(axis, case, seed, compared):
     """Rows of a campaign of a drive."""
     from swashplate import Campaign, Drive
     from swashplate.campaign import rig
+    from swashplate.identification.acceptance import verdict
     from swashplate.identification.assessment import assess
     from swashplate.identification.fitting import fit
     from swashplate.identification.setup import load_setup
     from swashplate.identification.staging import drawn, true_value
     from swashplate.identification.validation import predict
-    from swashplate.identification.verdict import verdict
 
     setup, nominal = load_setup(axis), Drive.preset(axis)
     # campaigns of two cells share neither machine nor noise
@@ -198,7 +196,7 @@ VALVE_FREE = {
 
 def candidates(assessments):
     """Methods beside the product's: name, drive, and for each stage its estimates."""
-    from swashplate.identification.uncertainty import estimates, with_handed
+    from swashplate.identification.intervals import estimates, with_handed
 
     made = []
     for method in METHODS:
@@ -257,12 +255,12 @@ def autocovariance(fit):
             middle += level * columns.T @ filtered
     matrix = fit.whitening @ (0.5 * (middle + middle.T)) @ fit.whitening.T
     free = np.full(fit.variables.count, float(fit.spare_samples))
-    return covariance_of("coloured", fit, matrix, free), np.zeros(fit.variables.count)
+    return covariance_of(fit, matrix, free), np.zeros(fit.variables.count)
 
 
 def autocovariance_without_lines(fit):
     """The same with spectral lines removed from the residuals beforehand."""
-    from swashplate.identification.spectral_lines import without_lines
+    from swashplate.identification.noise import without_lines
 
     return autocovariance(without_lines(fit)[0])
 
@@ -296,7 +294,7 @@ def leverage_corrected(power):
             squares += np.sum(seen**2, axis=0)
         free = np.divide(2.0 * total**2, squares, out=np.ones_like(total), where=squares > 0.0)
         matrix = fit.whitening @ middle @ fit.whitening.T
-        found = covariance_of("coloured", fit, matrix, np.maximum(free, 1.0))
+        found = covariance_of(fit, matrix, np.maximum(free, 1.0))
         return found, np.zeros(fit.variables.count)
 
     return method
@@ -324,7 +322,7 @@ def prewhitened_scores(fit):
         middle += recolour[:, None] * total * recolour
     matrix = fit.whitening @ middle @ fit.whitening.T
     free = np.full(fit.variables.count, float(fit.spare_samples))
-    return covariance_of("coloured", fit, matrix, free), np.zeros(fit.variables.count)
+    return covariance_of(fit, matrix, free), np.zeros(fit.variables.count)
 
 
 def autoregression(colour, samples):
@@ -361,8 +359,8 @@ def autoregression(colour, samples):
 
 def generalised(fit):
     """Generalised least squares: one Gauss-Newton step on residuals whitened by an AR model."""
-    from swashplate.identification.linearised import triangular_factor, whitening
     from swashplate.identification.noise import covariance_of, grid_of, noise_colours, unweighted
+    from swashplate.identification.problem import triangular_factor, whitening
 
     rows, count = [], fit.variables.count
     for colour in noise_colours(fit):
@@ -388,7 +386,7 @@ def generalised(fit):
     inverse, _ = whitening(triangle[:, :count], fit.variables.free, fit.tolerance)
     shift = -inverse @ (inverse.T @ (triangle[:, :count].T @ triangle[:, -1]))
     free = np.full(count, float(fit.spare_samples))
-    return covariance_of("white", fit, inverse @ inverse.T, free), shift
+    return covariance_of(fit, inverse @ inverse.T, free), shift
 
 
 def smoothed_spectrum(fit):
@@ -534,31 +532,9 @@ def main():
         if axis != "own" or case == "realistic"
     ]
     begun = time.perf_counter()
-    with (
-        wanted.out.open("a", newline="") as stream,
-        ProcessPoolExecutor(wanted.jobs, mp_context=get_context("spawn")) as pool,
-    ):
-        writer = csv.writer(stream)
-        if not kept:
-            writer.writerow(FIELDS)
-        futures = [pool.submit(campaign, *each) for each in todo]
-        for number, future in enumerate(as_completed(futures), 1):
-            writer.writerows(future.result())
-            stream.flush()
-            spent = time.perf_counter() - begun
-            left = spent / number * (len(todo) - number)
-            print(f"\r{number} of {len(todo)}, {left:.0f} s left ", end="", file=sys.stderr)
-    print(file=sys.stderr)
+    run_missing(campaign, todo, wanted.jobs, wanted.out, FIELDS)
     report(read(wanted.out))
     print(f"\n{len(todo)} campaigns in {time.perf_counter() - begun:.0f} s.")
-
-
-def read(path):
-    """Rows that were written before."""
-    if not path.exists():
-        return []
-    with path.open(newline="") as stream:
-        return list(csv.DictReader(stream))
 
 
 if __name__ == "__main__":

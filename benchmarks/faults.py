@@ -10,15 +10,10 @@ simulated.
 """
 
 import argparse
-import csv
 import os
-import sys
 import tempfile
-import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 
@@ -26,6 +21,7 @@ from statistics import median
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import numpy as np
+from campaigns import read, run_missing
 
 RATE = 512.0
 NEW = {
@@ -223,11 +219,13 @@ FIELDS = (
 )
 
 
-def campaign(name, axis, seed):
+def campaign(_, item):
     """One row: what check, fit and validate say of a campaign, and how wrong the fit is."""
+    name, axis, seed = item
     from swashplate import Campaign, Drive
     from swashplate.campaign import rig
     from swashplate.errors import SwashplateError
+    from swashplate.identification.acceptance import verdict
     from swashplate.identification.assessment import assess
     from swashplate.identification.data_checks import check_runs
     from swashplate.identification.fitting import fit, smooth
@@ -235,7 +233,6 @@ def campaign(name, axis, seed):
     from swashplate.identification.setup import load_setup
     from swashplate.identification.staging import true_value
     from swashplate.identification.validation import predict
-    from swashplate.identification.verdict import verdict
 
     fault, nominal = FAULTS[name], Drive.preset(axis)
     tests, machine = simulated_campaign(fault, axis, seed)
@@ -246,7 +243,7 @@ def campaign(name, axis, seed):
         found = len(check_runs(runs, smooth(nominal.parameters)))
         result = fit(nominal.parameters, runs, load_setup(axis), threads=1)
     except SwashplateError as error:
-        return (name, axis, seed, "refused", "Not usable", 2, "", str(error), "", "", "B", "")
+        return [(name, axis, seed, "refused", "Not usable", 2, "", str(error), "", "", "B", "")]
     assessments, drive = assess(result.stages), result.parameters
     predicted = predict(drive, held)
     judged = verdict(assessments, predicted, planned=[s.name for s in result.setup.stages])
@@ -271,10 +268,11 @@ def campaign(name, axis, seed):
     code = 0 if judged.usable else 1
     judged = verdict((), predicted)
     validated = "predicts" if judged.usable else judged.grade
-    return (
+    row = (
         name, axis, seed, f"{found} findings" if found else "-", judged.grade, code, ratio, cause,
         error, worst, kind, validated,
     )  # fmt: skip
+    return [row]
 
 
 def most(rows, field):
@@ -339,30 +337,8 @@ def main():
         if seed < (wanted.sound if name == "none" else wanted.campaigns)
         and (name, axis, seed) not in done
     ]
-    begun = time.perf_counter()
-    with (
-        wanted.out.open("a", newline="") as stream,
-        ProcessPoolExecutor(wanted.jobs, mp_context=get_context("spawn")) as pool,
-    ):
-        writer = csv.writer(stream)
-        if not kept:
-            writer.writerow(FIELDS)
-        futures = [pool.submit(campaign, *each) for each in todo]
-        for number, future in enumerate(as_completed(futures), 1):
-            writer.writerow(future.result())
-            stream.flush()
-            left = (time.perf_counter() - begun) / number * (len(todo) - number)
-            print(f"\r{number} of {len(todo)}, {left:.0f} s left ", end="", file=sys.stderr)
-    print(file=sys.stderr)
+    run_missing(campaign, todo, wanted.jobs, wanted.out, FIELDS)
     report(read(wanted.out))
-
-
-def read(path):
-    """Rows that were written before."""
-    if not path.exists():
-        return []
-    with path.open(newline="") as stream:
-        return list(csv.DictReader(stream))
 
 
 if __name__ == "__main__":

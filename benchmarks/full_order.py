@@ -82,7 +82,7 @@ def validity() -> Iterator[str]:
     """For which manoeuvres the one-state model will do."""
     yield "| axis | manoeuvre | largest, % | rms, % | step error at 512 Hz, % | within |"
     yield "|---|---|--:|--:|--:|---|"
-    found = pl.concat([validity_of(FullOrderDrive.preset(name)) for name in AXES])
+    found = pl.concat([validity_of(FullOrderDrive.preset(name)).to_polars() for name in AXES])
     for row in found.iter_rows(named=True):
         within = "0.1 %" if row["within_0_1_percent"] else "1 %" * row["within_1_percent"]
         yield (

@@ -23,8 +23,8 @@ from swashplate.executors import Processes
 from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import load_setup
+from swashplate.identification.solving import sobol_starts, solve_from
 from swashplate.identification.staging import stage_problem
-from swashplate.identification.starts import sobol_starts, solve_from
 
 REACHED = 1.001
 """A start within a thousandth of the lowest cost has reached it."""

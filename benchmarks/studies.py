@@ -14,8 +14,8 @@ from swashplate.campaign import rig
 from swashplate.executors import Processes
 from swashplate.full_order.drive import FullOrderDrive
 from swashplate.identification.assessment import assess
-from swashplate.identification.bootstrap import bootstraps_of
 from swashplate.identification.fitting import fit
+from swashplate.identification.resampling import bootstraps_of
 from swashplate.identification.setup import load_setup
 from swashplate.identification.validation import predict
 from swashplate.report.fit_report import write_fit_report

@@ -19,8 +19,7 @@ from pydantic import BaseModel
 from swashplate.campaign import CampaignFile
 from swashplate.cli import EPILOG, HELP, app
 from swashplate.identification.setup import Setup
-from swashplate.parameters.definitions import CATALOGUE, REFINEMENTS, Block, Definition
-from swashplate.parameters.schema import SetFile
+from swashplate.parameters import CATALOGUE, REFINEMENTS, Block, Definition, SetFile
 
 HERE = Path(__file__).parent
 

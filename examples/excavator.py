@@ -21,8 +21,7 @@ from swashplate import Campaign, Channel, Drive, Experiment
 from swashplate.equations import Model, Tap, equation
 from swashplate.identification import DriveModel, OwnModel, Prior, Problem, Unknown, Unknowns
 from swashplate.identification.model import EquationModel
-from swashplate.identification.solving import solve
-from swashplate.identification.starts import sobol_starts
+from swashplate.identification.solving import sobol_starts, solve
 
 # %% What is given
 CAMPAIGN = Path(__file__).with_name("excavator.toml")

@@ -12,14 +12,7 @@ import numpy as np
 
 from reproduction.bench import SEVERITY, Bench
 from reproduction.content import Cell, Table
-from swashplate.campaign import Experiment
-from swashplate.drive import Drive
-from swashplate.errors import InputError
-from swashplate.identification.assessment import RunQuality
-from swashplate.identification.fitting import Search, fit
-from swashplate.identification.setup import load_setup
-from swashplate.identification.staging import drawn
-from swashplate.identification.validation import (
+from reproduction.source_errors import (
     SOURCE_RULES,
     ComparedRun,
     LargestError,
@@ -27,10 +20,15 @@ from swashplate.identification.validation import (
     error_tables,
     kept_by,
     kind_of,
-    predict,
     source_rules,
-    with_speeds,
 )
+from swashplate.campaign import Experiment
+from swashplate.drive import Drive
+from swashplate.errors import InputError
+from swashplate.identification.fitting import Search, fit
+from swashplate.identification.setup import load_setup
+from swashplate.identification.staging import drawn
+from swashplate.identification.validation import RunQuality, predict, with_speeds
 from swashplate.parameters.parameter_set import ParameterSet
 
 SPREAD = 0.02

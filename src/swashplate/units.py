@@ -118,6 +118,12 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
         ) from None
 
 
+def scaling(unit: str, si: str, what: str) -> tuple[float, float]:
+    """Factor and zero of a unit, SI = factor x + zero; arguments and errors as of `to_si`."""
+    zero = to_si(0.0, unit, si, what)
+    return to_si(1.0, unit, si, what) - zero, zero
+
+
 # --- units that people read -----------------------------------------------------------------------
 
 

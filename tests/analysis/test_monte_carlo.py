@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError, ParameterError, maneuvers
-from swashplate.analysis.monte_carlo import (
+from swashplate.analysis import (
     Deviations,
     bands,
     draw_deviations,
@@ -17,11 +17,10 @@ from swashplate.analysis.monte_carlo import (
 )
 from swashplate.campaign import Campaign, rig
 from swashplate.errors import FileError
-from swashplate.identification.assessment import assess
+from swashplate.identification.assessment import assess, save_fit
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Free, Setup, load_setup
-from swashplate.identification.storing import save_fit
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.maneuvers import source_tests
 

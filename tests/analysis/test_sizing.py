@@ -2,9 +2,19 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError, maneuvers
-from swashplate.analysis import sizing
-from swashplate.analysis.outcomes import Performance, Trial, command_for, performance, trial
-from swashplate.analysis.sizing import WIDEST, Requirements, size, smallest_alone, smallest_change
+from swashplate.analysis import (
+    WIDEST,
+    Performance,
+    Requirements,
+    Trial,
+    command_for,
+    performance,
+    size,
+    sizing,
+    smallest_alone,
+    smallest_change,
+    trial,
+)
 
 BOX = np.full(2, 0.5), np.full(2, 2.0)
 

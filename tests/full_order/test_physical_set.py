@@ -1,16 +1,28 @@
-"""Physical sets: their lumps, their files, and what is refused."""
+"""Physical sets: their lumps, completed for any drive, their files, and what is refused."""
 
 import pickle
-from math import inf, pi, tan
+from math import atan, inf, pi, sqrt
 from pathlib import Path
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from swashplate import Drive, FileError, ParameterError
-from swashplate.full_order import PhysicalSet, from_lumped
-from swashplate.full_order.physical_set import QUANTITIES
+from swashplate import (
+    Drive,
+    FileError,
+    FullOrderDrive,
+    InputError,
+    ParameterError,
+    PhysicalSet,
+)
+from swashplate.full_order import QUANTITIES, from_lumped
 
 AXES = ("hoist", "slew", "luff")
+SCALED = ("Z1", "Z3", "Z4", "Z5", "Z6", "Z8", "Z9", "Z10", "Z13", "Z14", "Z15", "Z16", "Z18")
+LIGHT = {"spool_mass": 1e-3, "piston_mass": 0.05}
+"""Masses that leave something for the rest of what swings, whatever the lumps."""
 
 
 @pytest.mark.parametrize("name", AXES)
@@ -36,11 +48,14 @@ def _pair(value: object, published: object) -> object:
 
 
 @pytest.mark.parametrize("name", AXES)
-def test_everything_in_a_preset_is_marked_assumed(name: str) -> None:
-    physical = PhysicalSet.preset(name)
-    assert list(physical) == list(QUANTITIES)
-    assert {entry.status for entry in physical.values()} == {"assumed"}
-    assert physical.numbers["air_fraction"] == 0.0  # not in the file
+def test_a_packaged_drive_gives_the_packaged_set(name: str) -> None:
+    full, packaged = FullOrderDrive.from_drive(Drive.preset(name)), PhysicalSet.preset(name)
+    assert full.physical.numbers == packaged.numbers
+    assert list(packaged) == list(QUANTITIES)
+    assert {entry.status for entry in full.physical.values()} == {"assumed"}
+    assert {entry.status for entry in packaged.values()} == {"assumed"}
+    assert packaged.numbers["air_fraction"] == 0.0  # not in the file
+    assert full.physical["oil_volume"].source == "stroking cylinder and lines"
 
 
 def test_hoist_by_hand() -> None:
@@ -73,71 +88,149 @@ def test_gravity_moves_the_pressures_reference_and_nothing_else() -> None:
     assert {k for k in before if before[k] != after[k]} == {"Z9", "Z11", "Z12"}
 
 
-def check_lumps(physical: PhysicalSet, drive: Drive) -> None:
-    """The lumps at the drive's own Z6 are the drive's."""
-    numbers = drive.parameters.numbers
-    for symbol, lump in physical.to_lumped(numbers["Z6"]).items():
-        values = lump if isinstance(lump, tuple) else (lump,)
-        for column, value in zip(drive[symbol].definition.columns, values, strict=False):
-            assert value == pytest.approx(numbers[column], rel=1e-9, abs=0.0), column
+def lumps_by_hand(n: dict, Z6: float) -> dict[str, float]:
+    """Kruse eqs. 6.56 to 6.70, written out from the symbols of the source."""
+    A, d4, k_r, V, B = (
+        n[each]
+        for each in ("piston_area", "swash_arm", "return_spring_rate", "oil_volume", "bulk_modulus")
+    )
+    gauge = (1.0 + Z6) / (1.0 + A**2 * B / (k_r * V))
+    P0 = n["motor_constant"] * n["load_torque"] * n["pumping_area"] * n["pumping_arm"] / (A * d4)
+    gain = n["motor_constant"] * n["pump_flow_gain"]
+    return {
+        "Z1": A / (k_r * d4),
+        "Z3": d4 / n["control_arm"],
+        "Z4": (n["feedback_spring_rate"] * n["feedback_spring_arm"] ** 2) ** 2,
+        "Z5": n["spool_arm"],
+        "Z7": n["piston_leakage"] * B / V * gauge,
+        "Z8": n["valve_flow_gain"] * B / V * gauge,
+        "Z9": n["supply_pressure"] - P0,
+        "Z10": gain,
+        "Z11": n["motor_leakage"] * n["load_torque"],
+        "Z12": n["motor_leakage"] * gain * n["load_inertia"],
+        "Z13_plus": n["swash_stop_plus"],
+        "Z13_minus": n["swash_stop_minus"],
+        "Z14": n["spool_stroke"],
+        "Z15": n["relief_pressure"],
+        "Z16_plus": n["orifice_opening_plus"],
+        "Z16_minus": n["orifice_opening_minus"],
+        "Z18": n["plussing"],
+    }
 
 
-def test_completing_keeps_leakages() -> None:
-    drive = Drive.preset("hoist").replace(Z7=0.5, Z11=0.01, Z12=0.03)
-    load = {"load_torque": 2e3, "load_inertia": 0.03 / 12.396 / (0.01 / 2e3)}
-    physical = from_lumped(drive.parameters, **load)
-    check_lumps(physical, drive)
-    with pytest.raises(ParameterError, match="Z11 makes motor_leakage 5e-06 .* but Z12 makes"):
-        from_lumped(drive.parameters, **{**load, "load_inertia": 100.0})
-    with pytest.raises(ParameterError, match="Z12 is 0.03, but without load_inertia"):
-        from_lumped(drive.parameters, load_torque=2e3, load_inertia=0.0)
+@given(
+    st.dictionaries(
+        st.sampled_from(SCALED),
+        st.floats(0.8, 1.25),
+    ),
+    st.sampled_from(AXES),
+)
+def test_a_fitted_like_set_lands_on_its_own_lumps(factors: dict, like: str) -> None:
+    drive = Drive.preset("hoist").scale(**factors).replace(Z7=0.4).renamed("mine")
+    full = FullOrderDrive.from_drive(drive, like, oil_volume=1e-4, **LIGHT)
+    n = drive.parameters.numbers
+    for column, value in lumps_by_hand(full.physical.numbers, n["Z6"]).items():
+        assert value == pytest.approx(n[column], rel=1e-9, abs=0.0), column
+    assert full.drive is drive
+    reduced = full.reduced.parameters.numbers
+    assert {each: reduced[each] for each in n} == pytest.approx(dict(n), rel=1e-9, abs=0.0)
+    assert full.physical.name == "mine"
 
 
-def test_completing_with_inertias_in_place_of_frequencies() -> None:
-    parameters = Drive.preset("hoist").parameters
-    physical = from_lumped(parameters, feedback_arm_inertia=2e-6, swash_inertia=0.02)
-    n = physical.numbers
-    assert (n["feedback_arm_inertia"], n["swash_inertia"]) == (2e-6, 0.02)
+def test_what_is_chosen_is_marked_and_the_rest_assumed() -> None:
+    hoist = Drive.preset("hoist")
+    chosen = {"oil_volume": 1e-4, "motor_constant": 200.0, "load_torque": 2e3}
+    full = FullOrderDrive.from_drive(hoist, **chosen)
+    of_user = {name for name, entry in full.physical.items() if entry.status == "user"}
+    assert of_user == set(chosen)
+    assert {entry.status for entry in full.physical.values()} == {"user", "assumed"}
+    # half the oil is twice as stiff: Z6 = A_s² B/(k_r V)
+    before = PhysicalSet.preset("hoist").to_lumped()["Z6"]
+    assert full.physical.to_lumped()["Z6"] == pytest.approx(2.0 * before, rel=1e-12)
+    # the load is held by the motor's pressure: K_mf C_g
+    run = full.simulate(np.zeros(64))
+    assert run.motor_pressure_drop[0] == pytest.approx(200.0 * 2e3, rel=1e-12)
+
+
+def test_like_is_the_axis_of_the_name_or_the_hoist() -> None:
+    slew = Drive.preset("slew")
+    mass = PhysicalSet.preset("slew").numbers["spool_mass"]
+    assert FullOrderDrive.from_drive(slew).physical.numbers["spool_mass"] == mass == 0.01
+    hoist = Drive.preset("hoist").renamed("winch 7")
+    assert FullOrderDrive.from_drive(hoist).physical.numbers["spool_mass"] == 0.04
+    assert FullOrderDrive.from_drive(hoist, "slew").physical.numbers["spool_mass"] == mass
+    with pytest.raises(ParameterError, match="no packaged physical set 'crane'; there are hoist"):
+        FullOrderDrive.from_drive(hoist, "crane")
+
+
+def test_an_inertia_takes_the_place_of_its_frequency() -> None:
+    hoist = Drive.preset("hoist")
+    chosen = {"feedback_arm_inertia": 2e-6, "piston_damping": 90.0, "swash_inertia": 0.02}
+    full = FullOrderDrive.from_drive(hoist, **chosen)
+    assert {name: full.physical.numbers[name] for name in chosen} == chosen
+    # ω = √(k_f d3²/J) with √Z4 = k_f d3²
+    swings = 2e-6 + 0.04 * 0.0079568**2
+    modes = full.modes()
+    hertz = sqrt(sqrt(0.053604) / swings) / (2.0 * pi)
+    assert modes.frequency_hz(modes.spool) == pytest.approx(hertz, rel=0.02)
     # ζ = b/(2 √(k m)) in the angle of the plate
-    spring = n["return_spring_rate"] * 0.08**2
-    inertia = 0.02 + n["piston_mass"] * 0.08**2
+    n = from_lumped(hoist.parameters, swash_inertia=0.02).numbers
+    spring, inertia = n["return_spring_rate"] * 0.08**2, 0.02 + n["piston_mass"] * 0.08**2
     ratio = n["piston_damping"] * 0.08**2 / (2.0 * (spring * inertia) ** 0.5)
     assert ratio == pytest.approx(0.3)
-    assert physical["swash_inertia"].status == "user"
-    assert from_lumped(parameters, control_arm=0.08 / 0.62542).numbers == pytest.approx(
-        from_lumped(parameters).numbers
-    )
+    # one that follows from the lumps may be given where it agrees
+    agreeing = from_lumped(hoist.parameters, control_arm=0.08 / 0.62542).numbers
+    assert agreeing == pytest.approx(from_lumped(hoist.parameters).numbers)
+    with pytest.raises(ParameterError, match="feedback_arm_inertia and spool_frequency are both"):
+        FullOrderDrive.from_drive(hoist, feedback_arm_inertia=2e-6, spool_frequency=250.0)
+    with pytest.raises(ParameterError, match="piston_damping and swash_damping_ratio are both"):
+        from_lumped(hoist.parameters, piston_damping=90.0, swash_damping_ratio=0.2)
 
 
 @pytest.mark.parametrize(
-    ("chosen", "sentence"),
+    ("changes", "chosen", "sentence"),
     [
-        (
-            {"spool_mass": 0.0},
-            r"hoist: spool_mass \(mass of the spool\) is 0 kg, but must be above",
-        ),
-        ({"oil_volume": -1e-4}, r"oil_volume .* is -0.0001 m\^3, but must be above 0"),
-        ({"bulk_modulus": inf}, "bulk_modulus .* is inf Pa, but must be above 0"),
-        ({"spool_mass": 0.1}, "spool_mass on spool_arm alone has 6.331e-06 kg m², but spool_freq"),
-        ({"piston_mass": 2.0}, "choose a smaller mass or a lower frequency"),
-        ({"control_arm": 0.2}, "control_arm is given as 0.2 m, but 0.127914042 follows from Z3"),
-        ({"load_torque": 1e9}, "the load holds a stroker pressure of .* Pa at rest"),
-        ({"valve_gain": 1.0}, r"no quantity 'valve_gain' \(did you mean valve_flow_gain\?\)"),
-        ({"oil_volume": (1e-4, 2e-4)}, "oil_volume has one value, not a plus and a minus one"),
-        ({"oil_volume": "big"}, r"oil_volume must be a number in m\^3"),
+        ({}, {"spool_mas": 0.1}, "no quantity 'spool_mas'"),
+        ({}, {"valve_gain": 1.0}, r"'valve_gain' \(did you mean valve_flow_gain\?\)"),
+        ({}, {"spool_mass": 0.0}, r"mine: spool_mass \(mass of the spool\) is 0 kg, but must"),
+        ({}, {"oil_volume": -1.0}, r"mine: oil_volume .* is -1 m\^3, but must be above 0"),
+        ({}, {"oil_volume": (1e-4, 2e-4)}, "oil_volume has one value, not a plus and a minus one"),
+        ({}, {"oil_volume": "big"}, r"oil_volume must be a number in m\^3"),
+        ({}, {"bulk_modulus": inf}, "bulk_modulus .* is inf Pa, but must be above 0"),
+        ({}, {"spool_mass": 0.1}, "spool_mass on spool_arm alone has 6.331e-06 kg m², but spool_f"),
+        ({}, {"piston_mass": 2.0}, "choose a smaller mass or a lower frequency"),
+        ({}, {"control_arm": 0.2}, "control_arm is given as 0.2 m, but 0.127914042 follows from"),
+        ({}, {"load_torque": 1e8}, "the load holds a stroker pressure of .* Pa at rest"),
+        ({"Z2": 0.01}, {}, "mine: Z2 is 0.01, but a physical set has Z2 = 0"),
+        ({"Z11": 0.01}, {}, "Z11 is 0.01, but without load_torque no speed is lost to it"),
+        ({"Z12": 0.03}, {"load_inertia": 0.0}, "Z12 is 0.03, but without load_inertia"),
+        ({"Z14": inf}, {}, "spool_stroke .* is inf m, but must be above 0"),
     ],
 )
-def test_contradictions_are_one_sentence(chosen: dict, sentence: str) -> None:
+def test_what_no_machine_has_is_refused(changes: dict, chosen: dict, sentence: str) -> None:
+    drive = Drive.preset("hoist").replace(**changes).renamed("mine")
     with pytest.raises(ParameterError, match=sentence):
-        from_lumped(Drive.preset("hoist").parameters, **chosen)
+        FullOrderDrive.from_drive(drive, **chosen)
 
 
-def test_lumps_that_no_machine_has() -> None:
-    hoist = Drive.preset("hoist")
-    with pytest.raises(ParameterError, match="Z2 is 0.01, but a physical set has Z2 = 0"):
-        from_lumped(hoist.replace(Z2=0.01).parameters)
-    with pytest.raises(ParameterError, match="spool_stroke .* is inf m, but must be above 0"):
-        from_lumped(hoist.replace(Z14=inf).parameters)
+def test_the_inertia_that_agrees_is_said() -> None:
+    drive = Drive.preset("hoist").replace(Z7=0.5, Z11=0.01, Z12=0.03)
+    with pytest.raises(ParameterError, match=r"for example load_inertia = [\d.]+ kg") as refusal:
+        FullOrderDrive.from_drive(drive, load_torque=2e3)
+    said = float(str(refusal.value).partition("load_inertia = ")[2].split()[0])
+    # K_mL = Z11/C_g and Z12 = K_mL Z10 C_i
+    assert said == pytest.approx(0.03 / (0.01 / 2e3 * 12.396), rel=1e-11)
+    full = FullOrderDrive.from_drive(drive, load_torque=2e3, load_inertia=said)
+    assert full.physical.numbers["motor_leakage"] == pytest.approx(5e-6)
+
+
+def test_refinements_are_refused() -> None:
+    rough = Drive.preset("hoist").replace(spool_friction=1.0)
+    with pytest.raises(InputError, match="Full-order drives do not know refinements, but spool_f"):
+        FullOrderDrive.from_drive(rough)
+    with pytest.raises(InputError, match="hoist: Full-order drives .* spool_friction is on; take"):
+        FullOrderDrive(rough, PhysicalSet.preset("hoist"))
+    assert FullOrderDrive.from_drive(rough.plain).drive == Drive.preset("hoist")
 
 
 def test_changes() -> None:
@@ -151,19 +244,12 @@ def test_changes() -> None:
     assert pickle.loads(pickle.dumps(hoist)) == hoist
     with pytest.raises(ParameterError, match="epsilon is 0, but must be above 0"):
         hoist.scaled(0.0)
+    n = hoist.numbers
+    past = atan(n["control_arm"] / n["swash_arm"]) + 0.01  # where the arm lies at 90°
     with pytest.raises(ParameterError, match="turn the feedback arm past 90°"):
-        hoist.replace(swash_stop=(atan_of_control(hoist) + 0.01, 0.2))
+        hoist.replace(swash_stop=(past, 0.2))
     with pytest.raises(ParameterError, match="no value for spool_arm"):
         PhysicalSet("mine", "", {})
-
-
-def atan_of_control(physical: PhysicalSet) -> float:
-    """Angle at which the feedback arm lies at 90°: tan α = control_arm/swash_arm."""
-    from math import atan
-
-    angle = atan(physical.numbers["control_arm"] / physical.numbers["swash_arm"])
-    assert tan(angle) > 1.0
-    return angle
 
 
 def test_files(tmp_path: Path) -> None:
@@ -199,4 +285,18 @@ def test_files(tmp_path: Path) -> None:
     )
     mine = PhysicalSet.from_toml(own)
     assert mine.numbers["oil_volume"] == pytest.approx(1e-4)
-    check_lumps(mine, Drive.preset("hoist"))
+    assert mine.to_lumped(0.073926)["Z8"] == pytest.approx(1651400.0, rel=1e-9)
+
+
+def test_a_file_s_hertz_are_turns(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(
+        'name = "own"\nlumps = "hoist"\n[physical]\n'
+        'spool_frequency = { value = 40, unit = "Hz" }\nspool_mass = { value = 40, unit = "g" }\n',
+        "utf-8",
+    )
+    own, packaged = PhysicalSet.from_toml(path).numbers, PhysicalSet.preset("hoist").numbers
+    assert own["feedback_arm_inertia"] == pytest.approx(packaged["feedback_arm_inertia"])
+    path.write_text(path.read_text("utf-8").replace('"Hz"', '"kHz/bar"'), "utf-8")
+    with pytest.raises(ParameterError, match="own.toml: spool_frequency .* does not measure"):
+        PhysicalSet.from_toml(path)

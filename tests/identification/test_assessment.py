@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from swashplate.errors import InputError
-from swashplate.identification.assessment import measures, pooled_measures, residual_test
+from swashplate.identification.validation import measures, pooled_measures, residual_test
 
 MEASURED = np.array([0.0, 2.0, 4.0, 6.0])
 SIMULATED = np.array([1.0, 2.0, 4.0, 5.0])
@@ -157,8 +157,6 @@ def test_constants_are_verdicts(residual: np.ndarray, command: np.ndarray, said:
     ("arguments", "said"),
     [
         ((TIME[:3], WHITE[:3], COMMAND[:3]), "3 samples tell nothing"),
-        ((TIME, WHITE[:5], COMMAND), "do not belong together"),
-        ((TIME, np.full(N, np.nan), COMMAND), "must be finite"),
     ],
 )
 def test_what_cannot_be_tested_is_refused(arguments: tuple, said: str) -> None:

@@ -5,17 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
+from tests.identification.linear import linear_fit, unknowns_of
 
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import (
     NoiseColour,
-    correlation_length,
-    flat_top,
     grid_of,
     noise_colours,
     pair_sums,
 )
-from swashplate.identification.unknowns import Unknowns
+from swashplate.identification.problem import LinearisedRun
 
 
 def first_order(n: int, rho: float, seed: int) -> np.ndarray:
@@ -34,14 +32,7 @@ def colour(*residuals: np.ndarray, time: np.ndarray | None = None) -> NoiseColou
         )
         for k, each in enumerate(residuals)
     ]
-    return noise_colours(LinearisedFit.of(runs, Unknowns.of(["p"], [1.0])))[0]
-
-
-def test_a_gap_stays_empty_on_the_grid() -> None:
-    grid = grid_of(np.array([0.0, 0.1, 0.2, 0.5, 0.6]))
-    assert grid.places.tolist() == [0, 1, 2, 5, 6]
-    assert grid.step == pytest.approx(0.1)
-    assert grid.spread(np.arange(1.0, 6.0)).tolist() == [1, 2, 3, 0, 0, 4, 5]
+    return noise_colours(linear_fit(runs, unknowns_of(["p"], [1.0])))[0]
 
 
 def test_a_day_without_samples_costs_no_memory() -> None:
@@ -75,38 +66,11 @@ def test_pair_sums_are_those_of_a_double_loop(steps: list, lags: int) -> None:
         assert sums[lag] == pytest.approx(sum(pairs), abs=1e-10)
 
 
-def test_moving_average_noise_ends_where_it_ends() -> None:
-    # taps 1, 1, 1: γ = 3, 2, 1, 0, 0, ...
-    autocovariance = np.array([3.0, 2.0, 1.0] + [0.0] * 60)
-    assert correlation_length(autocovariance, np.full(63, 1000.0)) == 2
-
-
-def test_no_noise_and_white_noise_have_no_length() -> None:
-    assert correlation_length(np.zeros(10), np.full(10, 9.0)) == 0
-    assert correlation_length(np.array([1.0] + [0.0] * 9), np.full(10, 9.0)) == 0
-    assert correlation_length(np.array([1.0]), np.ones(1)) == 0
-
-
-def test_first_order_noise_ends_in_its_band() -> None:
-    # where ρ^k falls below 2 √((1 + 2 Σ ρ²)/n), the sum being nearly the infinite one
-    rho, n = 0.98, 100_000
-    exact = rho ** np.arange(2000.0)
-    band = 2.0 * np.sqrt((1.0 + 2.0 * rho**2 / (1.0 - rho**2)) / n)
-    expected = int(np.log(band) / np.log(rho))
-    assert correlation_length(exact, np.full(2000, float(n))) == pytest.approx(expected, abs=1)
-
-
-def test_taper_keeps_the_length_and_ends_at_twice_that() -> None:
-    assert flat_top(np.array([0.0, 5.0, 10.0, 15.0, 20.0, 30.0]), 10.0).tolist() == pytest.approx(
-        [1.0, 1.0, 1.0, 0.5, 0.0, 0.0]
-    )
-
-
 @pytest.mark.parametrize("rho", [0.0, 0.5, 0.9, 0.98])
-def test_effective_samples_of_first_order_noise(rho: float) -> None:
+def test_inflation_by_first_order_noise(rho: float) -> None:
     n = 100_000
     found = colour(*[first_order(n, rho, seed) for seed in range(2)])
-    assert found.effective_samples(n) == pytest.approx(n * (1.0 - rho) / (1.0 + rho), rel=0.1)
+    assert found.inflation == pytest.approx((1.0 + rho) / (1.0 - rho), rel=0.1)
 
 
 def test_a_gap_does_not_change_the_colour() -> None:
@@ -131,8 +95,8 @@ def test_a_drift_is_called_so() -> None:
 
 
 def test_one_sample_and_no_residual_are_worth_what_they_are() -> None:
-    assert colour(np.array([0.3])).effective_samples(1) == 1.0
-    assert colour(np.zeros(100)).effective_samples(100) == 100.0
+    assert colour(np.array([0.3])).inflation == 1.0
+    assert colour(np.zeros(100)).inflation == 1.0
 
 
 def test_channels_and_steps_have_their_own_colours() -> None:
@@ -143,7 +107,7 @@ def test_channels_and_steps_have_their_own_colours() -> None:
         LinearisedRun("b", "speed", np.arange(100) / 100.0, residual, jacobian),
         LinearisedRun("c", "speed", np.arange(100) / 512.0, residual, jacobian),
     ]
-    found = noise_colours(LinearisedFit.of(runs, Unknowns.of(["p"], [1.0])))
+    found = noise_colours(linear_fit(runs, unknowns_of(["p"], [1.0])))
     assert [(each.channel, each.members) for each in found] == [
         ("speed", (0, 3)),
         ("current", (1,)),
@@ -155,5 +119,5 @@ def test_weights_do_not_colour_the_noise() -> None:
     noise = first_order(4000, 0.8, 2)
     weight = np.where(np.arange(4000) < 400, 10.0, 1.0)
     run = LinearisedRun("a", "v", np.arange(4000.0), weight * noise, np.ones((4000, 1)), weight)
-    found = noise_colours(LinearisedFit.of([run], Unknowns.of(["p"], [1.0])))[0]
+    found = noise_colours(linear_fit([run], unknowns_of(["p"], [1.0])))[0]
     np.testing.assert_allclose(found.correlation, colour(noise).correlation, rtol=1e-12)

@@ -5,17 +5,17 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from tests.identification.linear import linear_fit, unknowns_of
 
 from swashplate import Experiment
 from swashplate.errors import InputError
 from swashplate.executors import Serial
 from swashplate.identification.assessment import Assessment
-from swashplate.identification.bootstrap import Bootstrap, NoiseDraws, bootstraps_of
 from swashplate.identification.fitting import StageFit
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import spectral_covariance
-from swashplate.identification.problem import Problem
+from swashplate.identification.problem import LinearisedFit, LinearisedRun, Problem
 from swashplate.identification.profile import profiles_of
+from swashplate.identification.resampling import Bootstrap, NoiseDraws, bootstraps_of
 from swashplate.identification.setup import Free, Stage
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
@@ -39,7 +39,7 @@ def regression(noise: np.ndarray) -> LinearisedFit:
         LinearisedRun(f"run {k}", "speed", TIME, each + DESIGN @ estimate, DESIGN)
         for k, each in enumerate(noise)
     ]
-    return LinearisedFit.of(runs, Unknowns.of("ab", [2.0, 1.0]))
+    return linear_fit(runs, unknowns_of("ab", [2.0, 1.0]))
 
 
 def test_estimates_from_draws_scatter_as_the_covariance_says() -> None:
@@ -81,7 +81,7 @@ def test_samples_over_a_gap_are_hardly_related() -> None:
     kept = np.r_[0:100, 1500:1600]
     run = LinearisedRun("gap", "speed", TIME[kept], slow[kept], np.ones((200, 1)))
     whole = LinearisedRun("whole", "speed", TIME, slow, np.ones((N, 1)))
-    draws = NoiseDraws(LinearisedFit.of([run, whole], Unknowns.of("a", [1.0])), seed=2)
+    draws = NoiseDraws(linear_fit([run, whole], unknowns_of("a", [1.0])), seed=2)
     pairs = np.array([draws.differences(k)[0][[98, 99, 100]] for k in range(300)])
     correlation = np.corrcoef(pairs.T)
     assert correlation[0, 1] > 0.9
@@ -89,7 +89,7 @@ def test_samples_over_a_gap_are_hardly_related() -> None:
 
 
 def test_quantiles_by_hand() -> None:
-    found = Bootstrap(Unknowns.of("a", [1.0]), np.arange(101.0)[:, None], np.ones(1, bool), 0, 0)
+    found = Bootstrap(unknowns_of("a", [1.0]), np.arange(101.0)[:, None], np.ones(1, bool), 0, 0)
     assert found.intervals(0.9)[0] == pytest.approx((5.0, 95.0))
     unknown = Bootstrap(found.variables, found.vectors, np.zeros(1, bool), 3, 0)
     assert unknown.intervals() == (None,)
@@ -97,7 +97,7 @@ def test_quantiles_by_hand() -> None:
 
 
 def test_too_few_draws_are_refused() -> None:
-    found = Bootstrap(Unknowns.of("a", [1.0]), np.arange(10.0)[:, None], np.ones(1, bool), 0, 0)
+    found = Bootstrap(unknowns_of("a", [1.0]), np.arange(10.0)[:, None], np.ones(1, bool), 0, 0)
     with pytest.raises(InputError, match="10 draws do not reach the ends"):
         found.intervals()
     with pytest.raises(InputError, match="between 0 and 1"):

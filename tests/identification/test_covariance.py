@@ -1,12 +1,10 @@
 """Covariances by hand, and what refuses to be one."""
 
 import numpy as np
-import pytest
+from tests.identification.linear import linear_fit, unknowns_of
 
-from swashplate.errors import InputError
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import white_noise_covariance
-from swashplate.identification.unknowns import Unknowns
+from swashplate.identification.problem import LinearisedFit, LinearisedRun
 
 RNG = np.random.default_rng(3)
 
@@ -18,9 +16,7 @@ def run(name: str, n: int, columns: int = 2, time: np.ndarray | None = None) -> 
 
 def fit(*runs: LinearisedRun, **more: object) -> LinearisedFit:
     count = runs[0].jacobian.shape[1]
-    return LinearisedFit.of(
-        runs, Unknowns.of([f"p{k}" for k in range(count)], np.ones(count)), **more
-    )
+    return linear_fit(runs, unknowns_of([f"p{k}" for k in range(count)], np.ones(count)), **more)
 
 
 def test_white_noise_errors_are_the_textbooks() -> None:
@@ -33,25 +29,3 @@ def test_white_noise_errors_are_the_textbooks() -> None:
     found = white_noise_covariance(made)
     np.testing.assert_allclose(found.standard_errors, [1.1247, 0.1179], atol=5e-5)
     assert found.degrees_of_freedom.tolist() == [9.0, 9.0]
-    assert "too small" in found.label
-
-
-def test_undetermined_and_bounded_unknowns_have_no_number() -> None:
-    base = run("a", 60, columns=4)
-    base.jacobian[:, 1] = base.jacobian[:, 0]
-    variables = Unknowns.of("abcd", np.ones(4), at_bound=[0, 0, 1, 0])
-    found = white_noise_covariance(LinearisedFit.of([base], variables))
-    assert np.isinf(found.standard_errors[:2]).all()
-    assert found.standard_errors[2] == 0.0
-    assert 0.0 < found.standard_errors[3] < 1.0
-    assert np.isfinite(found.correlation).all()
-
-
-def test_too_few_samples_tell_no_errors() -> None:
-    with pytest.raises(InputError, match="leave nothing to tell the noise from"):
-        white_noise_covariance(fit(run("a", 2)))
-
-
-def test_no_residual_has_no_error() -> None:
-    made = fit(run("a", 50)._replace(residual=np.zeros(50)))
-    assert white_noise_covariance(made).standard_errors.tolist() == [0.0, 0.0]

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from swashplate import Campaign, Channel, Drive, Experiment, InputError, maneuvers
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
-from swashplate.identification.assessment import Measures
-from swashplate.identification.cross_validation import (
+from swashplate.identification.fitting import fit
+from swashplate.identification.resampling import (
     CrossValidation,
     Fold,
     FoldEstimate,
@@ -23,9 +23,8 @@ from swashplate.identification.cross_validation import (
     cross_validate,
     deal,
 )
-from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Setup
-from swashplate.identification.validation import pooled, predict
+from swashplate.identification.validation import Measures, predict
 
 SOURCE = Source(Path("log.csv"), "column")
 SETUP = Setup.model_validate(
@@ -219,16 +218,3 @@ def test_a_fold_that_cannot_be_fitted_says_why(campaign: Campaign) -> None:
     assert failed.held == (first.name,)
     assert "The stage 'card' fits" in failed.failure
     assert any("could not be fitted: The stage 'card'" in s for s in found.sentences())
-
-
-def test_pooled_measures_match_those_of_the_predictions(
-    campaign: Campaign, found: CrossValidation
-) -> None:
-    qualities = []
-    for fold in found.folds:
-        others = [each for each in campaign if each.name not in fold.held]
-        parameters = fit(Drive.preset("hoist").parameters, others, SETUP).parameters
-        qualities += predict(parameters, [campaign[name] for name in fold.held])
-    for name, expected in pooled(qualities).items():
-        assert found.measures[name].rmse == pytest.approx(expected.rmse, rel=1e-9)
-        assert found.measures[name].spread == pytest.approx(expected.spread, rel=1e-9)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.identification.linear import linear_fit, unknowns_of
 
 from swashplate import Channel, Drive, Experiment, InputError, maneuvers
 from swashplate.campaign.experiment import InputSignal, Source
@@ -22,9 +23,9 @@ from swashplate.identification.excitation import (
     proposed_setup,
 )
 from swashplate.identification.fitting import smooth
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
+from swashplate.identification.problem import LinearisedRun
 from swashplate.identification.setup import Free, GivenForces, Setup, Stage, load_setup, setup_text
-from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.unknowns import Unknown
 
 HOIST = Drive(smooth(Drive.preset("hoist").parameters))
 SOURCE = Source(Path("log.csv"), "speed")
@@ -66,7 +67,7 @@ def test_shares_by_hand() -> None:
         LinearisedRun("ramp", "speed", np.arange(2.0), np.zeros(2), first),
         LinearisedRun("step", "speed", np.arange(1.0), np.zeros(1), second),
     ]
-    found = excitation(LinearisedFit.of(runs, Unknowns.of(["Z8", "Z13", "Z14"], np.ones(3))))
+    found = excitation(linear_fit(runs, unknowns_of(["Z8", "Z13", "Z14"], np.ones(3))))
     np.testing.assert_allclose(found.share, [[0.9, 1.0, 0.0], [0.1, 0.0, 0.0]])
     np.testing.assert_allclose(found.sensitivity[0], [0.03 / np.sqrt(2.0), 0.01 / np.sqrt(2.0), 0])
     assert found.sentences() == (

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.identification.linear import unknowns_of
 
 from swashplate import Campaign, Channel, Drive, Experiment, maneuvers
 from swashplate.campaign import rig
@@ -28,9 +29,8 @@ from swashplate.identification.experiment_design import (
 )
 from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import Free, GivenPrior, Setup, Stage, load_setup
-from swashplate.identification.unknowns import Unknowns
 
-AB = Unknowns.of("ab", np.ones(2))
+AB = unknowns_of("ab", np.ones(2))
 
 
 def diagonal(*errors: float) -> np.ndarray:
@@ -84,7 +84,7 @@ def test_a_candidate_that_mixes_known_and_unknown_tells_of_the_unknown_alone() -
 
 def test_the_order_is_that_of_determinants_computed_apart() -> None:
     rng = np.random.default_rng(8)
-    variables = Unknowns.of("abcd", np.ones(4))
+    variables = unknowns_of("abcd", np.ones(4))
     present = rng.normal(size=(30, 4))
     candidates = [Candidate(f"c{k}", rng.normal(size=(20, 4)) * (k + 1)) for k in range(5)]
     gains = {
@@ -105,7 +105,7 @@ def test_from_nothing() -> None:
 
 
 def test_an_unknown_at_its_bound_counts_as_known() -> None:
-    variables = Unknowns.of("ab", np.ones(2), at_bound=[1, 0])
+    variables = unknowns_of("ab", np.ones(2), at_bound=[1, 0])
     (found,) = advise(np.zeros((0, 2)), [Candidate("sum", np.array([[1.0, 4.0]]))], variables)
     assert [gain.name for gain in found.gains] == ["b"]
     assert found.gains[0].after == pytest.approx(0.25)
@@ -212,7 +212,7 @@ def test_a_plan_takes_both_stops_in_turn() -> None:
 
 def test_a_plan_by_hand() -> None:
     """After the first choice its like is worth little: the plan turns to the other unknown."""
-    variables = Unknowns.of("ab", np.ones(2))
+    variables = unknowns_of("ab", np.ones(2))
     rows = {"a": [[10.0, 0.0]], "a again": [[9.0, 0.0]], "b": [[0.0, 1.0]], "rest": [[0.0, 0.0]]}
     candidates = [Candidate(name, np.array(row)) for name, row in rows.items()]
     plan = in_turn(np.diag([1.0, 1.0]), candidates, variables, 4)

@@ -4,18 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.identification.linear import unknowns_of
 
 from swashplate import Drive
 from swashplate.campaign import rig
 from swashplate.campaign.campaign import Campaign
 from swashplate.identification.assessment import assess
 from swashplate.identification.fitting import Fit, fit
+from swashplate.identification.intervals import Handed, slopes_by_earlier, with_handed
 from swashplate.identification.noise import Covariance
 from swashplate.identification.setup import load_setup
 from swashplate.identification.solving import solve
 from swashplate.identification.staging import stage_problem
-from swashplate.identification.uncertainty import Handed, slopes_by_earlier, with_handed
-from swashplate.identification.unknowns import Unknowns
 from swashplate.maneuvers import source_tests
 
 
@@ -75,12 +75,9 @@ def test_quoted_intervals_take_it_in(staged: tuple[Campaign, Fit]) -> None:
 def test_variances_add_up_and_so_do_degrees_of_freedom() -> None:
     """By hand: 4 + (0.5² 9 + 1² 1) = 7.25, each part with 8 degrees of freedom."""
     known = np.ones(1, dtype=bool)
-    own = Covariance(
-        "coloured", Unknowns.of(["p"], [1.0]), np.array([[4.0]]), known, np.array([8.0])
-    )
+    own = Covariance(unknowns_of(["p"], [1.0]), np.array([[4.0]]), known, np.array([8.0]))
     earlier = Covariance(
-        "coloured",
-        Unknowns.of(["a", "b"], [1.0, 1.0]),
+        unknowns_of(["a", "b"], [1.0, 1.0]),
         np.diag([9.0, 1.0]),
         np.ones(2, dtype=bool),
         np.array([8.0, 8.0]),

@@ -4,19 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.identification.linear import unknowns_of
 
 from swashplate.errors import InputError
+from swashplate.identification.intervals import Estimate, estimates
 from swashplate.identification.noise import Covariance
-from swashplate.identification.uncertainty import Estimate, estimates
-from swashplate.identification.unknowns import Unknowns
 
 
 def covariance(freedom: float = np.inf, **more: object) -> Covariance:
-    variables = Unknowns.of(
+    variables = unknowns_of(
         ["plain", "positive"], [3.0, 2.0], scales=[10.0, 1.0], logarithmic=[False, True], **more
     )
     matrix = np.diag([0.01, 0.04])
-    return Covariance("coloured", variables, matrix, np.ones(2, bool), np.full(2, freedom))
+    return Covariance(variables, matrix, np.ones(2, bool), np.full(2, freedom))
 
 
 def test_intervals_by_hand() -> None:
@@ -46,9 +46,7 @@ def test_at_a_bound_there_is_no_interval() -> None:
 
 def test_undetermined_there_is_none_either() -> None:
     base = covariance()
-    found = estimates(
-        Covariance("coloured", base.variables, base.matrix, np.array([False, True]), np.ones(2))
-    )
+    found = estimates(Covariance(base.variables, base.matrix, np.array([False, True]), np.ones(2)))
     assert found[0].status == "undetermined"
     assert found[0].standard_error is None
     assert found[1].status == "estimated"

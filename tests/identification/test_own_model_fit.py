@@ -149,6 +149,34 @@ def test_what_a_range_means() -> None:
     assert ModelSetup(servo, {"lag": own}, fixed={"gain": 1.0}).free["lag"] is own
 
 
+def changed(experiment: Experiment, values: np.ndarray, name: str = "") -> Experiment:
+    place = replace(experiment["place"], values=values, noise=0.01)
+    channels = {**experiment.channels, "place": place}
+    return replace(experiment, name=name or experiment.name, channels=channels)
+
+
+def test_data_are_checked_before_the_search() -> None:
+    first, second = RUNS
+    holed = np.where(np.arange(COUNT) == 50, np.nan, first["place"].values)
+    with pytest.raises(
+        InputError, match="one: 'place' is not finite in 1 sample, the first at 1 s"
+    ):
+        fit(servo, [changed(first, holed), second], FREE, noise=NOISE)
+    twice = fit(servo, [*RUNS, replace(first, name="copy")], FREE, noise=NOISE)
+    (said,) = twice.doubts
+    assert said.startswith("copy has the samples of one, to the last bit, and counts twice")
+    still = fit(servo, [*RUNS, changed(first, np.zeros(COUNT), "still")], FREE, noise=NOISE)
+    (said,) = still.doubts
+    assert said.startswith("still: 'place' never changes, though the input does")
+    idle = [replace(each, input=replace(each.input, values=np.zeros(COUNT))) for each in RUNS]
+    fixed = {"lag": 0.3}
+    with pytest.raises(
+        InputError, match="servo: no run depends on any of gain; free what the runs"
+    ):
+        fit(servo, idle, {"gain": FREE["gain"]}, noise=NOISE, fixed=fixed)
+    assert fit(servo, RUNS, FREE, noise=NOISE).doubts == ()
+
+
 def test_refusals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match="A dict is no model"):
         fit({}, RUNS, FREE)

@@ -10,10 +10,9 @@ from scipy.signal import lfilter
 
 from swashplate import Experiment
 from swashplate.campaign.experiment import Channel, InputSignal, Source
-from swashplate.identification.linearised import linearised_fit
-from swashplate.identification.problem import Problem
+from swashplate.identification.intervals import estimates, prior_sentences, uncertainty, weighed
+from swashplate.identification.problem import Problem, linearised_fit
 from swashplate.identification.solving import solve
-from swashplate.identification.uncertainty import estimates, prior_sentences, uncertainty, weighed
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns
 
 COUNT, MEMORY = 40_000, 0.95

@@ -8,10 +8,9 @@ from scipy.optimize import least_squares
 from tests.identification.test_prior_weights import problem
 
 from swashplate import InputError
-from swashplate.identification.linearised import linearised_fit
-from swashplate.identification.problem import Problem
+from swashplate.identification.intervals import uncertainty
+from swashplate.identification.problem import Problem, linearised_fit
 from swashplate.identification.solving import Loss, influence, solve
-from swashplate.identification.uncertainty import uncertainty
 from swashplate.identification.unknowns import Unknown, Unknowns
 
 

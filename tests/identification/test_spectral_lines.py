@@ -2,15 +2,11 @@
 
 import numpy as np
 import pytest
+from tests.identification.linear import linear_fit, unknowns_of
 
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
-from swashplate.identification.spectral_lines import (
-    SpectralLine,
-    line_sentences,
-    without_lines,
-)
-from swashplate.identification.uncertainty import uncertainty
-from swashplate.identification.unknowns import Unknowns
+from swashplate.identification.intervals import uncertainty
+from swashplate.identification.noise import SpectralLine, line_sentences, without_lines
+from swashplate.identification.problem import LinearisedFit, LinearisedRun
 
 RUNS, N, RATE = 4, 4096, 512.0
 TIME = np.arange(N) / RATE
@@ -28,7 +24,7 @@ def fitted(noise: np.ndarray, weight: np.ndarray | None = None) -> tuple[Lineari
         LinearisedRun(f"run {k}", "current", TIME, w * (e + DESIGN @ estimate), rows, weight)
         for k, e in enumerate(noise)
     ]
-    return LinearisedFit.of(runs, Unknowns.of("abc", np.ones(3))), estimate
+    return linear_fit(runs, unknowns_of("abc", np.ones(3))), estimate
 
 
 def ripple(rng: np.random.Generator, level: np.ndarray | float = 1.0) -> np.ndarray:
@@ -78,7 +74,7 @@ def test_white_noise_and_short_runs_have_no_lines() -> None:
     # one campaign in a hundred may have one by chance
     assert sum(len(each) for each in found) <= 1
     short = LinearisedRun("short", "current", TIME[:100], np.ones(100), DESIGN[:100])
-    assert without_lines(LinearisedFit.of([short], Unknowns.of("abc", np.ones(3))))[1] == ()
+    assert without_lines(linear_fit([short], unknowns_of("abc", np.ones(3))))[1] == ()
 
 
 def test_errors_are_those_of_the_noise_under_a_ripple() -> None:

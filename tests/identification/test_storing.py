@@ -10,13 +10,19 @@ import pytest
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError, maneuvers
 from swashplate.campaign import rig
-from swashplate.identification.assessment import Measures, assess
-from swashplate.identification.cross_validation import CrossValidation, Fold, FoldEstimate, HeldRun
+from swashplate.identification.assessment import (
+    StageProfile,
+    assess,
+    fingerprint,
+    load_fit,
+    save_fit,
+)
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profile import Point, Profile
+from swashplate.identification.resampling import CrossValidation, Fold, FoldEstimate, HeldRun
 from swashplate.identification.setup import Setup
-from swashplate.identification.starts import StartResult
-from swashplate.identification.storing import StageProfile, fingerprint, load_fit, save_fit
+from swashplate.identification.solving import StartResult
+from swashplate.identification.validation import Measures
 
 SETUP = Setup.model_validate(
     {

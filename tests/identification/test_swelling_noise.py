@@ -1,10 +1,10 @@
 """Noise that differs along the runs: what a stationary estimate misses."""
 
 import numpy as np
+from tests.identification.linear import linear_fit, unknowns_of
 
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
 from swashplate.identification.noise import Covariance, band_score_covariance
-from swashplate.identification.unknowns import Unknowns
+from swashplate.identification.problem import LinearisedFit, LinearisedRun
 
 RUNS, N = 6, 5120
 TIME = np.arange(N) / 512.0
@@ -21,7 +21,7 @@ def fitted(noise: np.ndarray, pulses: np.ndarray) -> tuple[LinearisedFit, np.nda
         LinearisedRun(f"run {k}", "current", TIME, e + design @ estimate, design)
         for k, e in enumerate(noise)
     ]
-    return LinearisedFit.of(runs, Unknowns.of("ab", np.ones(2))), estimate
+    return linear_fit(runs, unknowns_of("ab", np.ones(2))), estimate
 
 
 def scattered(
@@ -57,13 +57,3 @@ def test_a_ripple_that_meets_every_pulse_at_the_same_phase() -> None:
 def test_noise_that_comes_with_every_pulse() -> None:
     scatter, found = scattered("with every pulse", LONG)
     assert 0.8 < mean_error(found)[0] / scatter[0] < 1.25
-
-
-def test_white_noise_is_what_it_was() -> None:
-    """By hand: 1/√Σ over the pulses' samples, as the mean over all takes next to nothing away."""
-    _, found = scattered("white", LONG, draws=20)
-    by_hand = 1.0 / np.sqrt(LONG.sum() * RUNS * (1.0 - LONG.mean()))
-    np.testing.assert_allclose(mean_error(found)[0], by_hand, rtol=0.15)
-    # slow derivatives lie in a band or two of six runs: two degrees of freedom each
-    freedom = np.mean([each.degrees_of_freedom[0] for each in found])
-    assert 8.0 < freedom < 40.0

@@ -2,6 +2,7 @@ from math import log
 
 import numpy as np
 import pytest
+from tests.identification.linear import unknowns_of
 
 from swashplate import InputError, ParameterError
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
@@ -67,18 +68,10 @@ def test_bounds_that_are_reached() -> None:
     assert unknowns.at(np.array([0.1, 1.9])).at_bound.tolist() == [0, 0]
 
 
-def test_values_never_leave_the_bounds() -> None:
-    unknown = bounded("b", 0.3, relative=(0.1, 3.0), log=True)
-    for bound in Unknowns((unknown,)).bounds:
-        assert unknown.low <= unknown.to_value(float(bound[0])) <= unknown.high
-
-
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
         (lambda: bounded("Z2", 0.0, relative=(0.5, 2.0)), "Z2 is nominally 0.*absolute bounds"),
-        (lambda: bounded("a", 1.0), "a needs bounds"),
-        (lambda: bounded("a", 1.0, relative=(1, 2), absolute=(0, 2)), "one of them"),
         (lambda: bounded("a", 5.0, absolute=(0.0, 2.0)), "begins at 5, outside its bounds 0 and 2"),
         (lambda: bounded("a", 1.0, absolute=(2.0, 0.0)), "lower one first"),
         (lambda: bounded("a", 1.0, absolute=(0.0, 2.0), log=True), "above 0"),
@@ -94,53 +87,21 @@ def test_what_is_refused(make, sentence: str) -> None:
         make()
 
 
-def test_vector_and_values_are_inverses() -> None:
-    variables = Unknowns.of(
-        ["Z8", "Z18", "offset"], [2.0, 0.0, -3.0], scales=[1.0, 5.0, 2.0],
-        logarithmic=[True, False, False],
-    )  # fmt: skip
-    np.testing.assert_allclose(variables.vector, [np.log(2.0), 0.0, -1.5])
-    np.testing.assert_allclose(variables.to_values(variables.vector), [2.0, 0.0, -3.0])
-    # d exp(u)/du is the value, d (u scale)/du the scale
-    np.testing.assert_allclose(variables.slopes, [2.0, 5.0, 2.0])
-
-
-def test_scales_default_to_the_values_sizes() -> None:
-    np.testing.assert_array_equal(Unknowns.of(["a", "b"], [-4.0, 0.0]).scales, [4.0, 1.0])
-
-
 def test_unbounded_vectors_give_no_nan() -> None:
-    variables = Unknowns.of(["a", "b"], [1.0, 1.0], logarithmic=[True, False])
+    variables = unknowns_of(["a", "b"], [1.0, 1.0], logarithmic=[True, False])
     assert variables.to_values(np.array([np.inf, np.inf])).tolist() == [np.inf, np.inf]
     assert variables.to_values(np.array([-np.inf, -np.inf])).tolist() == [0.0, -np.inf]
 
 
-@pytest.mark.parametrize(
-    ("names", "values", "more", "said"),
-    [
-        ([], [], {}, "at least one unknown"),
-        (["a", "a"], [1.0, 2.0], {}, "a appears twice"),
-        (["a", "b"], [1.0], {}, "2 unknowns need as many values"),
-        (["a"], [np.nan], {}, "a = nan"),
-        (["a"], [1.0], {"scales": [0.0]}, "scale"),
-        (["a"], [-1.0], {"logarithmic": [True]}, "no logarithm"),
-        (["a"], [1.0], {"at_bound": [0, 1]}, "as many at_bound"),
-    ],
-)
-def test_wrong_unknowns_are_refused(names: list, values: list, more: dict, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        Unknowns.of(names, values, **more)
-
-
 def test_an_unknown_is_found_by_name() -> None:
-    variables = Unknowns.of(["a", "b"], [1.0, 2.0])
+    variables = unknowns_of(["a", "b"], [1.0, 2.0])
     assert variables.index("b") == 1
     with pytest.raises(InputError, match="no unknown c; there are a, b"):
         variables.index("c")
 
 
 def test_released_unknowns_stay_where_they_are() -> None:
-    made = Unknowns.of(
+    made = unknowns_of(
         "abc", [2.0, -3.0, 1.0], logarithmic=[True, False, False], at_bound=[-1, 1, 0]
     )
     free = made.released

@@ -8,15 +8,22 @@ import pytest
 
 from swashplate import Drive, Experiment
 from swashplate.campaign.experiment import InputSignal
-from swashplate.identification.assessment import Assessment, RunQuality, compared
-from swashplate.identification.criteria import Criterion, listed, part_of_range, percent
+from swashplate.identification.acceptance import (
+    Criterion,
+    Statement,
+    Verdict,
+    part_of_range,
+    percent,
+    verdict,
+)
+from swashplate.identification.assessment import Assessment
 from swashplate.identification.fitting import StageFit
+from swashplate.identification.identifiability import listed
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Stage
-from swashplate.identification.solving import solve
-from swashplate.identification.starts import StartResult
+from swashplate.identification.solving import StartResult, solve
 from swashplate.identification.unknowns import Unknown, Unknowns
-from swashplate.identification.verdict import Statement, Verdict, verdict
+from swashplate.identification.validation import RunQuality, compared
 
 TIME = np.linspace(0.0, 4.0, 81)
 WAVE = 10.0 * np.sin(2.0 * np.pi * TIME[:-1] / 4.0)

@@ -1,20 +1,13 @@
 """The continuous model: lags and gains against closed forms and differences of steady states."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from swashplate import DomainError, Drive, InputError
-
-
-@pytest.mark.parametrize(("name", "tau"), [("hoist", 0.1214), ("slew", 0.2066), ("luff", 0.2015)])
-def test_the_source_s_time_constant(name: str, tau: float) -> None:
-    # the source's small motion starts from a closed valve and a plate upright: no plussing
-    model = Drive.preset(name).replace(Z18=0.0).linearize(current=0.0, input="solenoid_force")
-    assert model.time_constant == pytest.approx(tau, abs=5e-5)
-    assert model.states == ("stroker_pressure",)
-    np.testing.assert_allclose(model.poles, [-1.0 / model.time_constant])
+from swashplate.linear import DeadZoneError
 
 
 def test_the_closed_form_of_the_hoist_s_lag(hoist: Drive) -> None:
@@ -164,3 +157,41 @@ def test_a_literal_sign_has_no_tangent() -> None:
     with pytest.raises(InputError, match="has no slope"):
         literal.linearize(2.0, coulomb="tangent")
     assert literal.linearize(2.0).gain == slew.linearize(2.0).gain
+
+
+# --- dead zones -----------------------------------------------------------------------------------
+
+
+def proposed(drive: Drive, voltage: float) -> float:
+    with pytest.raises(DeadZoneError) as refused:
+        drive.linearize(voltage)
+    (volts,) = re.findall(r"linearise at ([+-][0-9.]+) V or beyond", refused.value.instead)
+    return float(volts)
+
+
+@pytest.mark.parametrize("name", ["hoist", "slew", "luff"])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_what_is_proposed_is_the_first_that_has_a_model(name: str, way: float) -> None:
+    drive = Drive.preset(name)
+    volts = proposed(drive, way * 0.05)
+    assert np.sign(volts) == way
+    assert drive.linearize(volts).gain > 0.0
+    with pytest.raises(DeadZoneError):
+        drive.linearize(volts - way * 2e-4)
+
+
+def test_it_is_where_the_current_leaves_the_solenoids_dead_zone() -> None:
+    hoist = Drive.preset("hoist")
+    volts = proposed(hoist, 0.15)
+    assert hoist.steady_current(volts) > hoist["Z17"].value > hoist.steady_current(volts - 2e-4)
+
+
+def test_a_side_that_nothing_leaves() -> None:
+    dead = Drive.preset("hoist").replace(Z17=5.0)
+    with pytest.raises(DeadZoneError, match=r"no voltage up to \+10 V leaves it"):
+        dead.linearize(1.0)
+
+
+def test_a_current() -> None:
+    with pytest.raises(DeadZoneError, match="linearise beyond ±0.27867 A, or the pump alone with"):
+        Drive.preset("hoist").linearize(current=0.2)

@@ -175,47 +175,51 @@ STRUCTURE = {
 }
 
 
-@pytest.mark.parametrize("form", ["4", "5", "5 packed"])
-def test_matlab(tmp_path, form):
-    contents = dict(STRUCTURE)
-    if form != "4":
-        contents["s"] = {"t": TIME, "deep": {"x": NOISE}}
-    file = tmp_path / "log.mat"
-    scipy.io.savemat(file, contents, format=form[0], do_compression="packed" in form, oned_as="row")
+def matrix(name: str, form: str, array: np.ndarray, first: int = 0) -> dict[str, np.ndarray]:
+    """Columns of a matrix by their names."""
+    return {name + form.format(k + first): array[:, k] for k in range(array.shape[1])}
+
+
+def holds(file, expected, *, units=None, form=None, left_out=None, comments=None):
+    """Check what a file holds: all of its columns and, where given, what else it says."""
     log = open_log(file)
-    assert log.format == f"MATLAB {form[0]}"
-    expected = {
-        **{
-            name: np.ravel(STRUCTURE[name])
-            for name in ("t", "column", "one", "whole", "single", "on")
-        },
-        **{f"x(:,{i + 1})": NOISE[:, i] for i in range(3)},
-        **{f"y({i + 1},:)": NOISE[:, i] for i in range(3)},
-    }
-    if form != "4":
-        expected |= {"s.t": TIME, **{f"s.deep.x(:,{i + 1})": NOISE[:, i] for i in range(3)}}
     read = log.read([column.name for column in log.columns])
     assert read.keys() == expected.keys()
     for name, array in expected.items():
         same(read[name], array)
+    assert {c.name: c.unit for c in log.columns if c.unit} == (units or {})
+    assert log.left_out == (left_out or {})
+    assert form in (None, log.format)
+    assert comments in (None, log.comments)
+
+
+@pytest.mark.parametrize("form", ["4", "5", "5 packed"])
+def test_matlab(tmp_path, form):
+    deep = {"s": {"t": TIME, "deep": {"x": NOISE}}} if form != "4" else {}
+    file = tmp_path / "log.mat"
+    packed = "packed" in form
+    contents = STRUCTURE | deep
+    scipy.io.savemat(file, contents, format=form[0], do_compression=packed, oned_as="row")
+    vectors = ("t", "column", "one", "whole", "single", "on")
+    expected = {name: np.ravel(STRUCTURE[name]) for name in vectors}
+    expected |= matrix("x", "(:,{})", NOISE, 1) | matrix("y", "({},:)", NOISE, 1)
+    if deep:
+        expected |= {"s.t": TIME} | matrix("s.deep.x", "(:,{})", NOISE, 1)
+    holds(file, expected, form=f"MATLAB {form[0]}")
 
 
 def test_matlab_keeps_its_largest_integers_as_near_as_doubles_go(tmp_path):
     numbers = np.array([2**53, 2**62 + 1, -(2**63)], dtype=np.int64)
     scipy.io.savemat(tmp_path / "log.mat", {"i": numbers})
-    same(open_log(tmp_path / "log.mat").read(["i"])["i"], [2.0**53, 2.0**62, -(2.0**63)])
+    holds(tmp_path / "log.mat", {"i": [2.0**53, 2.0**62, -(2.0**63)]})
 
 
 def test_matlab_73(tmp_path):
     """As MATLAB writes it: HDF5 behind a header of 512 bytes, dimensions in reverse."""
     file = tmp_path / "log.mat"
+    arrays = {"t": TIME[:, None], "x": NOISE.T, "y": NOISE, "s/u": TIME[None]}
     with h5py.File(file, "w", userblock_size=512) as written:
-        for name, array in {
-            "t": TIME[:, None],
-            "x": NOISE.T,
-            "y": NOISE,
-            "s/u": TIME[None],
-        }.items():
+        for name, array in arrays.items():
             written.create_dataset(name, data=array, chunks=True, compression="gzip")
             written[name].attrs["MATLAB_class"] = np.bytes_("double")
         written["s"].attrs["MATLAB_class"] = np.bytes_("struct")
@@ -228,19 +232,10 @@ def test_matlab_73(tmp_path):
     content = bytearray(file.read_bytes())
     content[:128] = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
     file.write_bytes(content)
-    log = open_log(file)
-    assert log.format == "MATLAB 7.3"
-    assert log.left_out == {"n": "it is a MATLAB text", "e": "it is empty"}
-    expected = {
-        "t": TIME,
-        "s.u": TIME,
-        **{f"x(:,{i + 1})": NOISE[:, i] for i in range(3)},
-        **{f"y({i + 1},:)": NOISE[:, i] for i in range(3)},
-    }
-    read = log.read([column.name for column in log.columns])
-    assert read.keys() == expected.keys()
-    for name, array in expected.items():
-        same(read[name], array)
+    expected = {"t": TIME, "s.u": TIME}
+    expected |= matrix("x", "(:,{})", NOISE, 1) | matrix("y", "({},:)", NOISE, 1)
+    left_out = {"n": "it is a MATLAB text", "e": "it is empty"}
+    holds(file, expected, form="MATLAB 7.3", left_out=left_out)
 
 
 @pytest.mark.parametrize(
@@ -257,24 +252,12 @@ def test_hdf5(tmp_path, options):
         written.create_dataset("y", data=np.ascontiguousarray(NOISE.T), **options)
         written["table"] = np.rec.fromarrays([TIME, NOISE[:, 0]], names="t,u")
         written["on"] = NOISE[:, 0] > 0.0
-    log = open_log(file)
-    assert log.comments == ("operator: me",)
-    units = {column.name: column.unit for column in log.columns}
-    assert units["/run/time [ms]"] == "ms"
-    assert [units[f"/run/x[:,{i}]"] for i in range(3)] == ["V", "A", "bar"]
-    expected = {
-        "/run/time [ms]": TIME,
-        "/run/counts": np.arange(60),
-        "/on": NOISE[:, 0] > 0.0,
-        "/table.t": TIME,
-        "/table.u": NOISE[:, 0],
-        **{f"/run/x[:,{i}]": NOISE[:, i] for i in range(3)},
-        **{f"/y[{i},:]": NOISE[:, i] for i in range(3)},
-    }
-    read = log.read(list(units))
-    assert read.keys() == expected.keys()
-    for name, array in expected.items():
-        same(read[name], array)
+    expected = {"/run/time [ms]": TIME, "/run/counts": np.arange(60), "/on": NOISE[:, 0] > 0.0}
+    expected |= {"/table.t": TIME, "/table.u": NOISE[:, 0]}
+    expected |= matrix("/run/x", "[:,{}]", NOISE) | matrix("/y", "[{},:]", NOISE)
+    units = {"/run/time [ms]": "ms", "/run/counts": "1"}
+    units |= {"/run/x[:,0]": "V", "/run/x[:,1]": "A", "/run/x[:,2]": "bar"}
+    holds(file, expected, units=units, comments=("operator: me",))
 
 
 def test_tdms(tmp_path):
@@ -292,20 +275,14 @@ def test_tdms(tmp_path):
                     ChannelObject("run", "note", ["a"]),
                 ]
             )
-    log = open_log(file)
-    assert log.comments == ("operator: me",)
-    assert log.left_out == {"note": "it holds text"}
-    assert log.columns == (
-        Column("voltage", "V"),
-        Column("counts", None),
-        Column("single", None),
-        Column("time", "s"),
-    )
-    read = log.read(["voltage", "counts", "single", "time"])
-    same(read["voltage"], NOISE[:, 0])
-    same(read["counts"], np.arange(60))
-    same(read["single"], NOISE[:, 1].astype(np.float32))
-    same(read["time"], 2.0 + 0.125 * np.arange(60))
+    expected = {
+        "voltage": NOISE[:, 0],
+        "counts": np.arange(60),
+        "single": NOISE[:, 1].astype(np.float32),
+        "time": 2.0 + 0.125 * np.arange(60),
+    }
+    left_out, units = {"note": "it holds text"}, {"voltage": "V", "time": "s"}
+    holds(file, expected, units=units, left_out=left_out, comments=("operator: me",))
 
 
 def test_tdms_of_several_groups_and_dates(tmp_path):
@@ -319,45 +296,35 @@ def test_tdms_of_several_groups_and_dates(tmp_path):
                 ChannelObject("slow", "voltage", NOISE[:9, 1]),
             ]
         )
-    log = open_log(file)
-    names = ["fast/voltage", "fast/stamp", "slow/voltage"]
-    assert [column.name for column in log.columns] == names
-    read = log.read(names)
-    same(read["fast/voltage"], NOISE[:, 0])
-    same(read["fast/stamp"], np.arange(60) / 8.0)
-    same(read["slow/voltage"], NOISE[:9, 1])
+    expected = {"fast/voltage": NOISE[:, 0], "fast/stamp": np.arange(60) / 8.0}
+    expected |= {"slow/voltage": NOISE[:9, 1]}
+    holds(file, expected, units={"fast/stamp": "s"})
 
 
 @pytest.mark.parametrize("compression", [0, 2])
 def test_mdf(tmp_path, compression):
-    file = tmp_path / "log.mf4"
-    invalid = np.arange(60) % 7 == 0
+    file, whole = tmp_path / "log.mf4", np.arange(60, dtype=np.uint8)
+    invalid = whole % 7 == 0
     with MDF(version="4.10") as written:
         written.append(
             [
                 Signal(NOISE[:, 0], TIME, name="voltage", unit="V"),
-                Signal(np.arange(60, dtype=np.uint16), TIME, name="counts"),
-                Signal(
-                    np.arange(60, dtype=np.uint8),
-                    TIME,
-                    name="scaled",
-                    conversion={"a": 0.5, "b": 1.0},
-                ),
+                Signal(whole.astype(np.uint16), TIME, name="counts"),
+                Signal(whole, TIME, name="scaled", conversion={"a": 0.5, "b": 1.0}),
                 Signal(NOISE[:, 2], TIME, name="gaps", invalidation_bits=invalid),
                 Signal(np.array([b"on"] * 60), TIME, name="note", encoding="utf-8"),
             ]
         )
         written.save(file, overwrite=True, compression=compression)
-    log = open_log(file)
-    assert log.left_out == {"note": "it holds text or bytes"}
-    units = {column.name: column.unit for column in log.columns}
-    assert units == {"time": "s", "voltage": "V", "counts": None, "scaled": None, "gaps": None}
-    read = log.read(list(units))
-    same(read["time"], TIME)
-    same(read["voltage"], NOISE[:, 0])
-    same(read["counts"], np.arange(60))
-    same(read["scaled"], 0.5 * np.arange(60) + 1.0)
-    same(read["gaps"], np.where(invalid, np.nan, NOISE[:, 2]))
+    expected = {
+        "time": TIME,
+        "voltage": NOISE[:, 0],
+        "counts": whole,
+        "scaled": 0.5 * whole + 1.0,
+        "gaps": np.where(invalid, np.nan, NOISE[:, 2]),
+    }
+    left_out = {"note": "it holds text or bytes"}
+    holds(file, expected, units={"time": "s", "voltage": "V"}, left_out=left_out)
 
 
 def test_mdf_of_several_groups(tmp_path):
@@ -366,8 +333,6 @@ def test_mdf_of_several_groups(tmp_path):
         written.append([Signal(NOISE[:, 0], TIME, name="voltage")])
         written.append([Signal(NOISE[:9, 1], TIME[:9], name="pressure")])
         written.save(file, overwrite=True)
-    read = open_log(file).read(["group 0/time", "voltage", "group 1/time", "group 1/pressure"])
-    same(read["group 0/time"], TIME)
-    same(read["voltage"], NOISE[:, 0])
-    same(read["group 1/time"], TIME[:9])
-    same(read["group 1/pressure"], NOISE[:9, 1])
+    expected = {"group 0/time": TIME, "group 0/voltage": NOISE[:, 0]}
+    expected |= {"group 1/time": TIME[:9], "group 1/pressure": NOISE[:9, 1]}
+    holds(file, expected, units={"group 0/time": "s", "group 1/time": "s"})

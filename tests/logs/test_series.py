@@ -124,44 +124,35 @@ def written(path: Path, text: str) -> Path:
     return path
 
 
-def test_plain_columns_are_si(tmp_path):
-    path = written(tmp_path / "log.csv", "time,voltage,note\n0,1.5,a\n0.1,2,b\n")
-    series = read_series(path, "voltage", "V")
-    assert list(series.time) == [0.0, 0.1]
-    assert list(series.values) == [1.5, 2.0]
-
-
 @pytest.mark.parametrize(
-    "header",
+    ("text", "column", "unit", "options", "time", "values"),
     [
-        "time [ms],voltage [mV]",
-        "time (ms),voltage (mV)",
-        "time_ms,voltage_mV",
-        "time,voltage\nms,mV",
+        ("time,voltage,note\n0,1.5,a\n0.1,2,b\n", "voltage", "V", {}, [0.0, 0.1], [1.5, 2.0]),
+        *(
+            (f"{header}\n0,1500\n100,2000\n", "voltage", "V", {}, [0.0, 0.1], [1.5, 2.0])
+            for header in (
+                "time [ms],voltage [mV]",
+                "time (ms),voltage (mV)",
+                "time_ms,voltage_mV",
+                "time,voltage\nms,mV",
+            )
+        ),
+        ("time,oil [degC]\n0,0\n1,20.5\n", "oil", "K", {}, [0.0, 1.0], [273.15, 293.65]),
+        ("t,u [mV]\n0,1500\n1,1\n", "u [mV]", "V", {"time_column": "t"}, [0, 1], [1.5, 0.001]),
+        (
+            "t;u\n0;1,500\n1;2,500\n",
+            "u",
+            "V",
+            {"time_column": "t", "options": TextOptions(decimal=",")},
+            [0, 1],
+            [1.5, 2.5],
+        ),
     ],
 )
-def test_units_are_converted(tmp_path, header):
-    path = written(tmp_path / "log.csv", f"{header}\n0,1500\n100,2000\n")
-    series = read_series(path, "voltage", "V")
-    np.testing.assert_allclose(series.time, [0.0, 0.1])
-    np.testing.assert_allclose(series.values, [1.5, 2.0])
-
-
-def test_units_with_another_zero(tmp_path):
-    path = written(tmp_path / "log.csv", "time,oil [degC]\n0,0\n1,20.5\n")
-    np.testing.assert_allclose(read_series(path, "oil", "K").values, [273.15, 293.65])
-
-
-def test_columns_by_their_full_name(tmp_path):
-    path = written(tmp_path / "log.csv", "t,u [mV]\n0,1500\n1,1\n")
-    series = read_series(path, "u [mV]", "V", time_column="t")
-    np.testing.assert_allclose(series.values, [1.5, 0.001])
-
-
-def test_options_of_text(tmp_path):
-    path = written(tmp_path / "log.csv", "t;u\n0;1,500\n1;2,500\n")
-    series = read_series(path, "u", "V", time_column="t", options=TextOptions(decimal=","))
-    assert list(series.values) == [1.5, 2.5]
+def test_series_are_si(tmp_path, text, column, unit, options, time, values):
+    series = read_series(written(tmp_path / "log.csv", text), column, unit, **options)
+    np.testing.assert_allclose(series.time, time, rtol=1e-14)
+    np.testing.assert_allclose(series.values, values, rtol=1e-14)
 
 
 def test_parquet(tmp_path):

@@ -1,3 +1,5 @@
+"""Manoeuvres as objects: sampled, scaled, joined, added, returned, within their amplitude."""
+
 import math
 import pickle
 from dataclasses import replace
@@ -29,12 +31,6 @@ def test_slope_is_the_derivative(m):
     t, h = np.linspace(0.0, m.length, 500)[1:-1] + math.pi / 1000, 1e-4
     differences = (m(t - 2 * h) - 8 * m(t - h) + 8 * m(t + h) - m(t + 2 * h)) / (12 * h)
     np.testing.assert_allclose(m.slope(t), differences, atol=1e-9)
-
-
-def test_pieces_follow_one_another():
-    m = maneuvers.rest(2.0) + maneuvers.step(3.0, stop=2.0, length=3.0) + maneuvers.rest(1.0)
-    assert m.length == 6.0
-    assert m.sample(2.0).tolist() == [0, 0, 0, 0, 0, 0, 3, 3, 0, 0, 0, 0, 0]
 
 
 def test_a_jump_is_not_missed_where_durations_round():
@@ -99,21 +95,6 @@ def test_time_stamps_go_with_the_samples():
     assert maneuvers.rest(0.0).sample().tolist() == [0.0]
 
 
-def test_sampling_calls_each_curve_once():
-    sizes = []
-
-    class Counted:
-        def __call__(self, time):
-            sizes.append(time.size)
-            return np.zeros_like(time)
-
-        slope = __call__
-
-    pieces = (maneuvers.Piece(0.0, Counted()), maneuvers.Piece(10.0, Counted()))
-    maneuvers.Maneuver("counted", 30.0, pieces).sample()
-    assert sizes == [5120, 10241]
-
-
 @pytest.mark.parametrize(
     ("m", "name"),
     [
@@ -140,3 +121,216 @@ def test_names(m, name):
 @pytest.mark.parametrize("m", SMOOTH.values(), ids=SMOOTH.keys())
 def test_manoeuvres_travel_to_other_processes(m):
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(m))(3.0), m(3.0))
+
+
+def rise(m, at, side, h=1e-5):
+    """One-sided difference of second order: an estimate of the slope that knows no formula."""
+    return side * (-3 * m(at) + 4 * m(at + side * h) - m(at + 2 * side * h)) / (2 * h)
+
+
+RETURNING = {
+    "ramp": (maneuvers.ramp(1.0), 10.5),
+    "sine": (maneuvers.sine(9.0, 0.3, length=20.0), 17.5),
+    "stairs": (maneuvers.stairs([3.0, -5.0]), 5.0),
+    "chirp": (maneuvers.chirp(4.0, 0.05, 0.1), 57.5),
+    "multisine": (maneuvers.multisine(5.0, (0.05, 0.5, 9)), 57.5),
+    "recorded": (
+        maneuvers.recorded([0, 1, 3], [0, 6, 5], interpolation="linear")
+        + maneuvers.spline_return(2.0),
+        3.0,
+    ),
+}
+
+
+@pytest.mark.parametrize(("m", "end"), RETURNING.values(), ids=RETURNING.keys())
+def test_return_continues_voltage_and_slope_and_ends_at_rest(m, end):
+    assert m(end - 1e-8) == pytest.approx(m(end), abs=1e-6)
+    assert rise(m, end, -1) == pytest.approx(rise(m, end, +1), abs=1e-7)
+    assert m.slope(end) == pytest.approx(rise(m, end, +1), abs=1e-7)
+    assert m(m.length) == 0.0
+    assert m.slope(m.length) == 0.0
+
+
+def test_return_of_a_fast_command_stays_within_its_amplitude():
+    m = maneuvers.chirp(4.0, 0.05, 2.0)  # the help's example
+    before, end = m(57.5 - 1e-9), 57.5
+    assert m(end) == pytest.approx(before, abs=1e-6)
+    # steeper than the return may start, which then just reaches the amplitude, at one instant
+    assert abs(rise(m, end, -1)) > abs(m.slope(end)) > 0.0
+    assert m.slope(end) * rise(m, end, -1) > 0.0
+    back = m(np.linspace(end, m.length, 100_001))
+    assert np.abs(back).max() == pytest.approx(4.0, rel=1e-8)
+    assert (np.abs(back) == np.abs(back).max()).sum() < 10
+    assert (m(m.length), m.slope(m.length)) == (0.0, 0.0)
+
+
+def test_return_from_what_states_no_amplitude_does_not_exceed_its_end():
+    class Line:
+        def __call__(self, time):
+            return 2.0 * time
+
+        def slope(self, time):
+            return np.full_like(time, 2.0)
+
+    own = maneuvers.Maneuver("own", 3.0, (maneuvers.Piece(0.0, Line()),))
+    assert (own + maneuvers.spline_return(2.0))(np.linspace(0.0, 5.0, 1001)).max() == 6.0
+
+
+def test_return_is_the_cubic_of_its_end_conditions():
+    ramp = maneuvers.ramp(2.0, start=0.0, settle=None, length=3.0)
+    m = ramp + maneuvers.spline_return(2.0)
+    # V = a + b t + c t² + d t³ with V(0) = 6, V'(0) = 2, V(2) = V'(2) = 0.
+    c, d = np.linalg.solve([[4.0, 8.0], [4.0, 12.0]], [-10.0, -2.0])
+    t = np.linspace(0.0, 2.0, 21)
+    np.testing.assert_allclose(m(3.0 + t), 6 + 2 * t + c * t**2 + d * t**3, atol=1e-13)
+    np.testing.assert_allclose(m.slope(3.0 + t), 2 + 2 * c * t + 3 * d * t**2, atol=1e-13)
+
+
+@given(volts, st.floats(0.01, 3.0), st.floats(0.1, 20.0), st.floats(0.1, 20.0))
+def test_any_return_ends_exactly_at_rest(amplitude, frequency, active, settle):
+    length = 1.0 + active + settle
+    m = maneuvers.sine(amplitude, frequency, settle=settle, length=length)
+    assert m.length == length
+    assert (m(length), m.slope(length)) == (0.0, 0.0)
+    hold = maneuvers.stairs([amplitude], dwell=active, settle=None)
+    m = hold + maneuvers.spline_return(settle)
+    assert m.length == hold.length + settle
+    assert (m(m.length), m.slope(m.length)) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("before", "settle"), [(0.1, 0.2), (0.4, 0.7), (0.2, 7.9), (5.9, 6.2)])
+def test_lengths_are_exact_where_the_return_is_longer_than_what_precedes_it(before, settle):
+    # The length is a rounded sum, (0.1 + 0.2) − 0.1 > 0.2, and its last stamp may lie before it,
+    # 0.3 < 0.1 + 0.2: at both the return is over, to the last bit.
+    hold = maneuvers.stairs([5.0], dwell=before, start=0.0, settle=None)
+    sine = maneuvers.sine(3.0, 0.2, start=0.0, settle=settle, length=before + settle)
+    for m in (hold + maneuvers.spline_return(settle), sine):
+        assert m.length == before + settle
+        assert (m(m.length), m.slope(m.length)) == (0.0, 0.0)
+        assert m.sample(10.0).size == round(10 * (before + settle)) + 1
+        assert m.sample(10.0)[-1] == 0.0
+
+
+def test_superposed_voltages_add_up_over_the_longest():
+    hold = maneuvers.stairs([2.0], dwell=2.0, start=0.0, settle=0)
+    m = maneuvers.superpose(hold, maneuvers.step(1.0, stop=4.0, length=5.0))
+    assert m.length == 5.0
+    assert m.sample(1.0).tolist() == [2.0, 3.0, 1.0, 1.0, 0.0, 0.0]
+
+
+def test_superposed_keeps_its_end_within_a_longer_one():
+    # (0.1 + 0.3) − 0.1 > 0.3: the end of the whole lies after that of its part.
+    hold = maneuvers.stairs([2.0], dwell=0.3, start=0.0, settle=0)
+    m = maneuvers.rest(0.1) + maneuvers.superpose(hold, hold)
+    assert m.sample(10.0).tolist() == [0.0, 4.0, 4.0, 4.0, 4.0]
+
+
+seconds = st.floats(0.01, 8.0)
+hertz = st.floats(0.01, 20.0)
+levels = st.lists(volts, min_size=1, max_size=5)
+
+
+@st.composite
+def windows(draw):
+    start, settle = draw(st.floats(0.0, 2.0)), draw(st.none() | st.floats(0.0, 5.0))
+    length = start + (settle or 0.0) + draw(seconds)
+    return {"start": start, "settle": settle, "length": length}
+
+
+@st.composite
+def records(draw):
+    values = draw(st.lists(volts, min_size=2, max_size=6))
+    gaps = draw(st.lists(seconds, min_size=len(values), max_size=len(values)))
+    how = draw(st.sampled_from(["previous", "linear"]))
+    return maneuvers.recorded(np.cumsum(gaps), values, interpolation=how)
+
+
+def of_one_kind():
+    """Manoeuvre and the amplitude that its name says."""
+    return st.one_of(
+        seconds.map(lambda duration: (maneuvers.rest(duration), 0.0)),
+        volts.map(lambda v: (maneuvers.step(v), abs(v))),
+        st.builds(
+            lambda slope, limit, window: (maneuvers.ramp(slope, limit=limit, **window), limit),
+            st.floats(-50.0, 50.0),
+            st.floats(0.1, 10.0),
+            windows(),
+        ),
+        st.builds(
+            lambda v, f, window: (maneuvers.sine(v, f, **window), abs(v)), volts, hertz, windows()
+        ),
+        st.builds(
+            lambda v, f, g, window: (maneuvers.chirp(v, f, g, **window), abs(v)),
+            volts,
+            hertz,
+            hertz,
+            windows(),
+        ),
+        st.builds(
+            lambda v, f, seed, window: (maneuvers.multisine(v, f, seed=seed, **window), abs(v)),
+            volts,
+            st.lists(hertz, min_size=1, max_size=6),
+            st.integers(0, 9),
+            windows(),
+        ),
+        st.builds(
+            lambda v, dwell, settle: (maneuvers.stairs(v, dwell, settle=settle), max(map(abs, v))),
+            levels,
+            seconds,
+            st.floats(0.0, 5.0),
+        ),
+        records().map(lambda m: (m, m.amplitude)),
+    )
+
+
+def together(parts):
+    return st.one_of(
+        st.tuples(parts, parts).map(lambda p: (p[0][0] + p[1][0], max(p[0][1], p[1][1]))),
+        st.tuples(parts, parts).map(
+            lambda p: (maneuvers.superpose(p[0][0], p[1][0]), p[0][1] + p[1][1])
+        ),
+        st.tuples(parts, st.floats(-2.0, 2.0)).map(lambda p: (p[1] * p[0][0], abs(p[1]) * p[0][1])),
+        st.tuples(parts, seconds).map(lambda p: (p[0][0] + maneuvers.spline_return(p[1]), p[0][1])),
+    )
+
+
+@given(st.recursive(of_one_kind(), together, max_leaves=4), st.floats(0.001, 1.0))
+def test_no_voltage_exceeds_the_amplitude_at_any_rate(made, fraction):
+    m, amplitude = made
+    assert m.amplitude == pytest.approx(amplitude, rel=1e-12)
+    # a grid over all of it, the ends included, and one of another spacing beside it
+    for time in (
+        np.linspace(0.0, m.length, 4001),
+        np.arange(0.0, m.length, 0.01 * fraction + 1e-3),
+    ):
+        assert np.abs(m(time)).max() <= m.amplitude
+
+
+@given(volts, hertz, windows(), st.sampled_from([10.0, 512.0, 4096.0]))
+def test_slope_of_a_return_is_the_derivative_wherever_it_is(amplitude, frequency, window, rate):
+    # a voltage that were only cut off at the amplitude would not follow its slope
+    m = maneuvers.sine(amplitude, frequency, **window)
+    end, settle = m.length - (window["settle"] or 0.0), window["settle"] or 0.0
+    if settle < 0.1:
+        return
+    time = end + settle * (np.arange(1, rate) / rate)
+    h = 1e-5 * settle
+    differences = (m(time + h) - m(time - h)) / (2.0 * h)
+    scale = max(np.abs(m.slope(time)).max(), 1e-6)
+    np.testing.assert_allclose(m.slope(time), differences, atol=1e-5 * scale)
+
+
+@pytest.mark.parametrize("text", ["chirp:4,0.05,2", "sine:6.5,3", "multisine:4,0.1:2:8"])
+def test_examples_of_the_command_line_stay_within(text):
+    m = maneuvers.parse(text)
+    peak = np.abs(m.sample()).max()
+    assert 0.999 * m.amplitude < peak <= m.amplitude == float(text.split(":")[1].split(",")[0])
+
+
+@pytest.mark.parametrize("axis", ["hoist", "slew", "luff"])
+def test_returns_of_the_source_start_with_the_slope_that_they_find(axis):
+    for run in maneuvers.source_tests(axis).values():
+        last, before = run.pieces[-1], run.pieces[-2]
+        if last.start < run.length and not run.name.startswith("step"):
+            slope = before.curve.slope(np.array([last.start - before.start]))
+            assert run.slope(last.start) == pytest.approx(slope[0], rel=1e-12)

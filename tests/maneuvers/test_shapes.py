@@ -1,6 +1,13 @@
+"""Manoeuvres by name: shapes, recordings, Kruse's tests, and the words of the command line."""
+
+import math
+
+import numpy as np
+import polars as pl
 import pytest
 
-from swashplate import maneuvers
+from swashplate import InputError, maneuvers
+from swashplate.logs import TextOptions
 
 
 def test_step_is_on_from_its_start_to_before_its_stop():
@@ -61,3 +68,223 @@ def test_without_settle_nothing_returns(settle):
     # 2.75 periods of 0.1 Hz after 1 s: the trough, at which this one ends.
     sine = maneuvers.sine(3.0, 0.1, settle=settle, length=28.5)
     assert sine(28.5) == pytest.approx(-3.0, rel=1e-14)
+
+
+def test_sine_starts_at_one_second_and_peaks_a_quarter_period_later():
+    m = maneuvers.sine(6.5, 0.1, length=30.0)
+    expected = [0.0, 0.0, 6.5, 0.0, -6.5]
+    np.testing.assert_allclose(m([0.5, 1.0, 3.5, 6.0, 8.5]), expected, atol=1e-14)
+    assert m.slope(1.0) == pytest.approx(6.5 * math.tau * 0.1, rel=1e-15)
+    # The return begins at 27.5 s: 2.65 periods.
+    assert m(27.5) == pytest.approx(6.5 * math.sin(math.tau * 2.65), rel=1e-13)
+
+
+def test_chirp_sweeps_its_frequency_evenly():
+    m = maneuvers.chirp(4.0, 0.5, 0.1, start=1.0, settle=2.0, length=23.0)
+    # Phase after t seconds, in turns: 0.5 t − 0.01 t²; 4 at 10 s and 6 at 20 s, where it is slow.
+    np.testing.assert_allclose(m([1.0, 11.0, 21.0]), [0.0, 0.0, 0.0], atol=1e-13)
+    expected = 4.0 * math.tau * np.array([0.5, 0.3, 0.1])
+    np.testing.assert_allclose(m.slope([1.0, 11.0, 21.0]), expected, rtol=1e-12)
+
+
+def test_multisine_has_the_frequencies_it_was_given_equally_large():
+    # 20 s active: 0.25, 0.6 and 1.5 Hz are its lines 5, 12 and 30.
+    m = maneuvers.multisine(5.0, [0.25, 0.6, 1.5], settle=2.0, length=23.0)
+    spectrum = np.abs(np.fft.rfft(m.sample()[512 : 512 * 21]))
+    assert np.flatnonzero(spectrum > 1e-6 * spectrum.max()).tolist() == [5, 12, 30]
+    np.testing.assert_allclose(spectrum[[5, 12, 30]], spectrum[5], rtol=1e-10)
+
+
+def test_multisine_band_is_rounded_to_whole_periods():
+    m = maneuvers.multisine(5.0, (0.11, 0.52, 4), settle=2.0, length=23.0)
+    # 0.11, 0.2467, 0.3833 and 0.52 Hz make 2.2, 4.93, 7.67 and 10.4 periods in 20 s.
+    spectrum = np.abs(np.fft.rfft(m.sample()[512 : 512 * 21]))
+    assert np.flatnonzero(spectrum > 1e-6 * spectrum.max()).tolist() == [2, 5, 8, 10]
+    assert m(1.0) == pytest.approx(m(21.0), rel=1e-12)
+    assert m.slope(1.0) == pytest.approx(m.slope(21.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_multisine_peaks_at_its_amplitude(seed):
+    m = maneuvers.multisine(5.0, (0.05, 2.0, 20), seed=seed)
+    peak = np.abs(m(np.linspace(1.0, 57.5, 200_001))).max()
+    assert 5.0 * (1 - 2e-4) < peak <= 5.0
+
+
+def test_multisine_is_its_seed():
+    first = maneuvers.multisine(5.0, (0.05, 1.0, 10), seed=1).sample()
+    np.testing.assert_array_equal(first, maneuvers.multisine(5.0, (0.05, 1.0, 10), seed=1).sample())
+    assert np.abs(first - maneuvers.multisine(5.0, (0.05, 1.0, 10), seed=2).sample()).max() > 1.0
+
+
+def test_recorded_holds_the_previous_row():
+    m = maneuvers.recorded([5.0, 6.0, 8.0], [1.0, 3.0, -1.0], interpolation="previous")
+    assert m.length == 3.0
+    assert m([0.0, 0.999, 1.0, 2.999, 3.0]).tolist() == [1.0, 1.0, 3.0, 3.0, -1.0]
+    assert not m.slope([0.0, 1.0, 2.0, 3.0]).any()
+
+
+def test_recorded_joins_its_rows():
+    m = maneuvers.recorded([0.0, 1.0, 3.0], [1.0, 3.0, -1.0], interpolation="linear")
+    assert m([0.0, 0.5, 1.0, 2.0, 3.0]).tolist() == [1.0, 2.0, 3.0, 1.0, -1.0]
+    assert m.slope([0.0, 0.5, 1.0, 2.0, 3.0]).tolist() == [2.0, 2.0, -2.0, -2.0, -2.0]
+
+
+def test_recorded_gives_back_its_rows_at_their_stamps():
+    # 3·0.1 is more than 3/10: the row must be found all the same.
+    log = pl.DataFrame({"time": np.arange(50) * 0.1, "voltage": np.arange(50.0)})
+    m = maneuvers.recorded(log["time"], log["voltage"], interpolation="previous")
+    assert m.sample(10.0).tolist() == log["voltage"].to_list()
+
+
+def test_recorded_keeps_a_copy():
+    voltage = np.array([1.0, 2.0])
+    m = maneuvers.recorded([0.0, 1.0], voltage, interpolation="linear")
+    voltage[:] = 7.0
+    assert m(0.0) == 1.0
+
+
+def test_recorded_wants_to_be_told_how_to_interpolate():
+    with pytest.raises(TypeError, match="interpolation"):
+        maneuvers.recorded([0, 1], [0, 1])
+
+
+def test_recorded_can_end_at_a_whole_sample():
+    m = maneuvers.recorded([0.0, 1.0, 1.37], [1.0, 2.0, 3.0], interpolation="previous", length=1.5)
+    assert m.sample(10.0).tolist() == [1.0] * 10 + [2.0] * 4 + [3.0] * 2
+    cut = maneuvers.recorded([0.0, 1.37], [1.0, 3.0], interpolation="previous", length=1.0)
+    assert cut.sample(10.0).tolist() == [1.0] * 11
+
+
+def test_recorded_file(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("t [ms],stick [mV]\n0,0\n500,4000\n2000,-1500\n", "utf-8")
+    m = maneuvers.recorded_file(path, interpolation="linear", column="stick", time_column="t")
+    assert m.name == "log.csv"
+    assert m.length == 2.0
+    assert m([0.25, 2.0]).tolist() == [2.0, -1.5]
+
+
+def test_recorded_file_with_options(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time;voltage\n0;1,250\n1;2,500\n", "utf-8")
+    options = TextOptions(decimal=",")
+    m = maneuvers.recorded_file(path, interpolation="previous", options=options)
+    assert m([0.0, 1.0]).tolist() == [1.25, 2.5]
+
+
+def test_a_manoeuvre_of_months_is_refused():
+    with pytest.raises(InputError, match=r"5\.12e\+09 samples, more than the 1e\+08"):
+        maneuvers.rest(1e7).sample(512.0)
+
+
+def test_hoist_has_the_thirteen_runs_of_the_source():
+    runs = maneuvers.source_tests("hoist")
+    sizes = {name: run.sample().size for name, run in runs.items()}
+    assert sizes == {
+        "ramp +1 V/s": 6657,
+        "ramp -1 V/s": 6657,
+        "step +4 V": 5121,
+        "step -4 V": 5121,
+        "step +6.5 V": 5121,
+        "step -6.5 V": 5121,
+        "step +9 V": 5121,
+        "step -9 V": 5121,
+        "sine 4 V 0.1 Hz": 15361,
+        "sine 6.5 V 0.1 Hz": 15361,
+        "sine 9 V 0.1 Hz": 15361,
+        "sine 6.5 V 0.3 Hz": 10241,
+        "sine 9 V 0.3 Hz": 10241,
+    }
+    assert sum(sizes.values()) == 110_605
+    assert all(run.name == name for name, run in runs.items())
+
+
+def test_slew_and_luff_have_the_runs_of_the_source():
+    lengths = {
+        axis: {name: run.length for name, run in maneuvers.source_tests(axis).items()}
+        for axis in ("slew", "luff")
+    }
+    assert lengths["slew"] == {
+        "ramp +1 V/s": 13.0,
+        "step +2 V": 10.0,
+        "sine 4 V 0.05 Hz": 40.0,
+        "sine 4 V 0.1 Hz": 30.0,
+        "sine 6 V 0.05 Hz": 40.0,
+    }
+    assert lengths["luff"] == {
+        "ramp +1 V/s": 13.0,
+        "step +4 V": 10.0,
+        "step +6.5 V": 10.0,
+        "step +9 V": 10.0,
+        "sine 4 V 0.1 Hz": 30.0,
+        "sine 6.5 V 0.1 Hz": 30.0,
+        "sine 9 V 0.05 Hz": 40.0,
+    }
+
+
+def test_source_tests_are_what_their_names_say():
+    hoist, slew = maneuvers.source_tests("hoist"), maneuvers.source_tests("slew")
+    assert hoist["step -6.5 V"](3.0) == -6.5
+    assert hoist["ramp -1 V/s"](10.5) == -9.5
+    assert hoist["sine 9 V 0.3 Hz"](1.0 + 0.25 / 0.3) == pytest.approx(9.0)
+    # The return of slewing takes 4.5 s: the ramp comes to 7.5 V before it.
+    assert slew["ramp +1 V/s"](8.5) == 7.5
+    assert slew["ramp +1 V/s"](10.75) == pytest.approx(7.5 / 2 + 4.5 / 8, rel=1e-14)
+    assert slew["step +2 V"](3.0) == 2.0
+
+
+@pytest.mark.parametrize("axis", ["hoist", "slew", "luff"])
+def test_source_tests_begin_and_end_at_rest_within_ten_volts(axis):
+    for run in maneuvers.source_tests(axis).values():
+        voltage = run.sample()
+        assert not voltage[:512].any()
+        assert voltage[-1] == 0.0
+        assert np.abs(voltage).max() <= 10.0
+
+
+@pytest.mark.parametrize(
+    ("text", "same"),
+    [
+        ("rest:2", maneuvers.rest(2.0)),
+        ("step:9", maneuvers.step(9.0)),
+        ("sine:6.5,0.1", maneuvers.sine(6.5, 0.1)),
+        ("sine:6.5, 0.1, length=40", maneuvers.sine(6.5, 0.1, length=40.0)),
+        ("ramp:-1", maneuvers.ramp(-1.0)),
+        ("ramp:slope=1,limit=5", maneuvers.ramp(1.0, limit=5.0)),
+        ("stairs:2/4/6/0,dwell=3", maneuvers.stairs([2, 4, 6, 0], dwell=3.0)),
+        ("stairs:2", maneuvers.stairs([2.0])),
+        ("chirp:4,5e-2,0.5", maneuvers.chirp(4.0, 0.05, 0.5)),
+        ("multisine:5,0.1/0.7,seed=2", maneuvers.multisine(5.0, [0.1, 0.7], seed=2)),
+        ("multisine:5,0.05:1:9,length=80", maneuvers.multisine(5.0, (0.05, 1.0, 9), length=80)),
+    ],
+)
+def test_parse_makes_what_the_function_makes(text, same):
+    m = maneuvers.parse(text)
+    assert m.name == same.name
+    np.testing.assert_array_equal(m.sample(), same.sample())
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("jump:9", "'jump' is no manoeuvre: choose one of rest, step, ramp, sine, stairs, chirp"),
+        ("", "'' is no manoeuvre"),
+        ("step", "missing a required argument: 'amplitude'; step takes amplitude, start, stop"),
+        ("step:1,2", "too many positional arguments; step takes amplitude, start, stop, length"),
+        ("step:1,end=2", "unexpected keyword argument 'end'; step takes amplitude, start, stop"),
+        ("step:1,stop=3,stop=4", "gives a keyword twice"),
+        ("step:nine", "'nine' is not a number: write one as 6.5, a list as 2/4/0"),
+        ("step:9,", "'' is not a number"),
+        ("stairs:2//3", "'' is not a number"),
+        ("step:1/2", "amplitude must be a number"),
+        ("step:nan", "amplitude must be finite"),
+        ("step:5,stop=1/2", "stop must be a number"),
+        ("sine:1,0.1,length=2", "leave nothing of a length of 2 s"),
+        ("multisine:1,0.1:2", "a tuple of frequencies is"),
+        ("multisine:1,0.1,seed=1.5", "seed must be a whole number"),
+    ],
+)
+def test_parse_says_what_is_right(text, message):
+    with pytest.raises(InputError, match=message):
+        maneuvers.parse(text)

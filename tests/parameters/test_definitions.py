@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS, DEFAULTS, REFINEMENTS
-from swashplate.parameters.rules import broken_rules
+from swashplate.parameters import CATALOGUE, COLUMNS, DEFAULTS, REFINEMENTS, broken_rules
 
 
 def test_every_parameter_says_what_it_is() -> None:

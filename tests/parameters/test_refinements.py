@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, ParameterError
-from swashplate.parameters.definitions import CATALOGUE, REFINEMENTS
+from swashplate.parameters import CATALOGUE, REFINEMENTS
 
 FILE = """
 [refinements]

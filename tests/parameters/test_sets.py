@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swashplate import Drive, FileError, Pair, ParameterError
-from swashplate.parameters.definitions import CATALOGUE
-from swashplate.parameters.files import preset_names
+from swashplate.parameters import CATALOGUE, preset_names
 
 
 def test_presets() -> None:
@@ -91,7 +90,7 @@ def test_toml_gives_an_equal_drive_back(name: str, tmp_path: Path) -> None:
 
 @given(st.floats(1e-12, 1e3), st.floats(1e-12, 1e3))
 def test_toml_keeps_every_bit(plus: float, minus: float) -> None:
-    from swashplate.parameters.files import dump_set, read_set
+    from swashplate.parameters import dump_set, read_set
 
     drive = Drive.preset("hoist").replace(Z16=(plus, minus))
     assert read_set(dump_set(drive.parameters), "text")["Z16"].value == Pair(plus, minus)
@@ -118,7 +117,7 @@ control_card = "rexroth_mdsd_1k_2x_2"
 @pytest.fixture
 def lines() -> dict[str, str]:
     """The hoist's pump and motor, a line a parameter."""
-    from swashplate.parameters.files import dump_set
+    from swashplate.parameters import dump_set
 
     text = dump_set(Drive.preset("hoist").parameters).split("[pump_motor]\n")[1]
     return {line.split(" = ")[0]: line for line in text.strip().splitlines()}

@@ -12,7 +12,7 @@ from swashplate.identification import staging
 from swashplate.identification.assessment import Assessment, assess
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Setup, load_setup
-from swashplate.parameters.definitions import columns_of
+from swashplate.parameters import columns_of
 
 AXES = ("hoist", "slew", "luff")
 

@@ -13,11 +13,10 @@ from swashplate.equations.marching.jacobian import jacobian
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
 from swashplate.full_order.drive import path_of
-from swashplate.identification.linearised import linearised_fit
+from swashplate.identification.intervals import uncertainty
 from swashplate.identification.model import Linearised
-from swashplate.identification.problem import Problem
+from swashplate.identification.problem import Problem, linearised_fit
 from swashplate.identification.solving import solve
-from swashplate.identification.uncertainty import uncertainty
 from swashplate.identification.unknowns import Unknown, Unknowns
 
 Array = np.ndarray

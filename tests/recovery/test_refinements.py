@@ -13,7 +13,7 @@ from swashplate.campaign import ChannelKind, rig
 from swashplate.campaign.campaign import Campaign
 from swashplate.identification.fitting import StageFit, fit
 from swashplate.identification.setup import Free, Setup, Stage
-from swashplate.parameters.definitions import OPTIONS, REFINEMENTS
+from swashplate.parameters import OPTIONS, REFINEMENTS
 
 STICTION = {"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6}
 LOAD = {"load_torque": 3e4, "load_inertia": 5e3, "motor_leakage": 1e-6}

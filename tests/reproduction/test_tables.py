@@ -10,19 +10,6 @@ from reproduction.virtual_errors import thesis_errors
 
 PARAMETER_TABLES = [number for number in TABLES if number not in (*ERROR_TABLES, "7.1")]
 NUMBER = re.compile(r"-?\d+\.?\d*(?:[eE][-+]?\d+)?")
-LABELS = {
-    "V_{dz}": "V_dz",
-    "ζ": "zeta",
-    "ω_{n}": "omega",
-    "τ_{td}": "tau",
-    "İ_{lim1}": "lim1",
-    "İ_{lim2}": "lim2",
-    "I_{t,1}": "I_t1",
-    "I_{t,2}": "I_t2",
-    "C": "C",
-    "a": "a",
-    "J": "J",
-}
 
 
 def table(number: str) -> Table:
@@ -43,11 +30,6 @@ def values(made: Table) -> list[tuple[str, list[Cell]]]:
         else:
             pairs += [(row[n].text, [row[n + 1]]) for n in (0, 2, 4) if row[n].text]
     return pairs
-
-
-def symbol_of(label: str) -> str:
-    name = re.split(r" [+(]", label)[0]
-    return LABELS.get(name) or re.sub(r"[_{}]", "", name)
 
 
 def source_rows(text: str, number: str) -> list[list[str]]:
@@ -89,37 +71,6 @@ def test_numbers_are_those_of_the_text(source_text: str, number: str) -> None:
                 wanted = wanted[:1]
             assert found == wanted, (cell, printed)
     assert corrected == {"4.3": 1, "4.4": 2, "8.3": 2}.get(number, 0)
-
-
-@pytest.mark.parametrize("number", PARAMETER_TABLES)
-def test_numbers_are_those_of_the_facts(number: str, source_parameters: dict) -> None:
-    """Magnitudes against the project's facts, within the digits printed."""
-    pumps, cards = source_parameters["pump_motor"], source_parameters["control_card"]
-    for label, cells in values(table(number)):
-        symbol = symbol_of(label)
-        if number[0] == "4":
-            side = 0 if number in ("4.1", "4.2") else -1
-            facts = [
-                [_both(cards[name][symbol])[side]]
-                for name in ("rexroth_mdsd_1k_2x_2", "rexroth_mdsd_1k_2x_4")
-            ]
-        else:
-            first = 2 if number[0] == "7" else 1
-            axis = ("hoist", "slew", "luff")[int(number[-1]) - first]
-            pump = pumps[axis]
-            fact = pump.get(symbol, cards[pump["control_card"]].get(symbol))
-            facts = [fact if isinstance(fact, list) else [fact]]
-        for cell, fact in zip(cells, facts, strict=True):
-            found = [abs(each) for each in numbers(cell.text)]
-            wanted = [abs(each) for each in fact]
-            if len(found) < len(wanted):
-                assert not any(wanted)
-                wanted = wanted[:1]
-            assert found == pytest.approx(wanted, rel=1e-9), (label, number)
-
-
-def _both(fact: float | list[float]) -> list[float]:
-    return fact if isinstance(fact, list) else [fact]
 
 
 def test_errata_are_marked_and_said() -> None:

@@ -11,12 +11,11 @@ import sympy as sp
 from swashplate import Drive, maneuvers
 from swashplate.equations.equation import interpreted
 from swashplate.equations.fields import made
-from swashplate.full_order import FullOrderDrive, PhysicalSet
-from swashplate.full_order.physical_set import QUANTITIES
+from swashplate.full_order import QUANTITIES, FullOrderDrive, PhysicalSet
 from swashplate.models import machine, pump
 from swashplate.models.machine import Machine
 from swashplate.models.pump import Pump
-from swashplate.parameters.definitions import CATALOGUE
+from swashplate.parameters import CATALOGUE
 
 holding_pressure = interpreted(machine.holding_pressure)
 static_pressure = interpreted(machine.static_pressure)

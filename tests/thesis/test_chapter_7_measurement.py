@@ -8,10 +8,10 @@ from swashplate import Drive, maneuvers
 from swashplate.campaign import (
     DIFFERENTIATOR,
     LOW_PASS,
+    Encoder,
     interpolate_counts,
     matched_speed,
     path_delay,
-    radians_per_count,
     speed_from_angle,
 )
 from swashplate.simulation.batch import SquaredError
@@ -42,7 +42,7 @@ def test_eq_7_1_cost_is_a_sum_of_squares_over_the_tests(hoist: Drive) -> None:
 def test_eq_7_2_to_7_4_counts_of_a_turn(
     axis: str, counts_per_turn: float, gear_ratio: float, turn: float
 ) -> None:
-    angle = turn * radians_per_count(counts_per_turn, gear_ratio)
+    angle = turn * Encoder(counts_per_turn, gear_ratio, 1, None).angle_per_count
     assert angle == pytest.approx(2.0 * np.pi, rel=2e-5), axis
 
 
@@ -50,13 +50,14 @@ def test_erratum_24_the_factor_2_pi_is_missing() -> None:
     """7.2 to 7.4 give turns per second; the model's speed, and the tables', are rad/s."""
     time = np.arange(2048) * H
     turns = 0.25 * time  # a quarter turn per second
-    speed = speed_from_angle(time, radians_per_count(HOIST_TURN) * turns * HOIST_TURN)
+    count = Encoder(HOIST_TURN, 1.0, 1, None).angle_per_count
+    speed = speed_from_angle(time, count * turns * HOIST_TURN)
     assert speed[-1] == pytest.approx(2.0 * np.pi * 0.25, rel=1e-9)
 
 
 def test_erratum_24_quadrature_is_data() -> None:
     """81,000 'with quadrature' and still times 4 in 7.2: either reading can be said."""
-    once, again = (radians_per_count(each, 7.0) for each in (81e3, 324e3))
+    once, again = (Encoder(each, 7.0, 1, None).angle_per_count for each in (81e3, 324e3))
     assert once / again == pytest.approx(4.0)
 
 

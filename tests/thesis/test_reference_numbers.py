@@ -121,12 +121,6 @@ def test_every_manoeuvre_settles_where_the_static_curve_says(name: str) -> None:
                 )
 
 
-def test_campaign_has_the_sources_size() -> None:
-    runs = maneuvers.source_tests("hoist")
-    assert len(runs) == 13
-    assert sum(run.sample(512.0).size for run in runs.values()) == 110_605
-
-
 def test_card_keeps_its_steady_level(hoist: Drive) -> None:
     """The printed rate form would settle a 9 V step at 0.37 A."""
     run = hoist.simulate(maneuvers.step(9.0).sample(512.0))

@@ -9,7 +9,7 @@ import re
 import pytest
 
 from swashplate import Drive
-from swashplate.parameters.definitions import CATALOGUE
+from swashplate.parameters import CATALOGUE
 
 Cells = dict[str, list[str]]
 

@@ -23,8 +23,10 @@ from .limits import LimitTimeline as LimitTimeline
 from .limits import limit_shares as limit_shares
 from .limits import limit_timeline as limit_timeline
 from .monte_carlo import Bands as Bands
+from .monte_carlo import Deviations as Deviations
 from .monte_carlo import Draws as Draws
 from .monte_carlo import bands as bands
+from .monte_carlo import draw_deviations as draw_deviations
 from .monte_carlo import drives as drives
 from .monte_carlo import half_widths as half_widths
 from .monte_carlo import independent_drives as independent_drives

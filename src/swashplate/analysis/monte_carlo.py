@@ -17,9 +17,8 @@ from swashplate.campaign import Campaign
 from swashplate.documents import read_text
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, FileError, InputError, ParameterError
-from swashplate.identification.assessment import Assessment, assess
+from swashplate.identification.assessment import Assessment, assess, load_fit
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.storing import load_fit
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -150,8 +149,7 @@ def independent_drives(
 class Deviations:
     """Errors of one stage's vector."""
 
-    own: Array
-    """(K, K) covariance of its own noise."""
+    own: Array  # (K, K) covariance of its own noise.
     slopes: Mapping[int, Array] = field(default_factory=dict)
     """By the number of an earlier stage (K, K_earlier): by how much its errors move this one's."""
 
@@ -201,7 +199,7 @@ def drives(assessments: Sequence[Assessment], draws: int = 200, seed: int = 0) -
     -----
     Errors are normal in the solver's vector, so that a logarithmic parameter is log-normal. What
     the card's stage does not know moves pump and motor as the fit would follow it, see
-    `identification.uncertainty`.
+    `identification.intervals`.
     """
     if not assessments:
         raise InputError("A Monte Carlo needs the assessment of at least one stage.")

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import schema
-from swashplate.campaign.encoder import ambiguous_gaps, unwrap_counts
 from swashplate.campaign.experiment import Channel, Encoder, Experiment, InputSignal
 from swashplate.campaign.reading import (
     Columns,
@@ -24,6 +23,7 @@ from swashplate.campaign.reading import (
     windows,
 )
 from swashplate.campaign.recognition import recognise
+from swashplate.campaign.samples import ambiguous_gaps, unwrap_counts
 from swashplate.campaign.schema import applying, inside
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.errors import InputError

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.campaign import read_run
-from swashplate.campaign.encoder import rolls_over_at
 from swashplate.campaign.quality import has_sign
 from swashplate.campaign.recognition import recognise
+from swashplate.campaign.samples import rolls_over_at
 from swashplate.campaign.schema import KINDS, CampaignFile, ChannelKind, InputKind, conversion
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError

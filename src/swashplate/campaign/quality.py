@@ -16,10 +16,14 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import schema
 from swashplate.campaign.campaign import Campaign, read_campaign_file
-from swashplate.campaign.encoder import find_lost_counts, unwrap_counts
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
+from swashplate.campaign.samples import (
+    StampStatistics,
+    find_lost_counts,
+    stamp_statistics,
+    unwrap_counts,
+)
 from swashplate.campaign.schema import applying, inside
-from swashplate.campaign.stamps import StampStatistics, stamp_statistics
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.tables import Column, Table
@@ -107,24 +111,38 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
             f"goes from {low:g} to {high:g} {drive.unit}, beyond its range of {limits[0]:g} to "
             f"{limits[1]:g}: check unit, scale and offset"
         )
-    of_input = Quality(
-        experiment.name,
-        "input",
-        drive.kind,
-        drive.unit,
-        stamps,
-        float(low),
-        float(high),
-        _share_at(drive.values, limits),
-        None,
-        None,
-        drive.dropped,
-        0.0,
-        tuple(findings),
-    )
-    return of_input, *(
+    clipped = _share_at(drive.values, limits)
+    return _quality(experiment, "input", drive, stamps, drive.values, clipped, findings), *(
         _of_channel(experiment, each, signed=each.name not in unsigned)
         for each in experiment.channels.values()
+    )
+
+
+def _quality(
+    experiment: Experiment,
+    name: str,
+    signal: InputSignal | Channel,
+    stamps: StampStatistics,
+    values: Array,
+    clipped: float,
+    findings: Iterable[str],
+    stuck: float | None = None,
+    lost: int | None = None,
+) -> Quality:
+    return Quality(
+        experiment.name,
+        name,
+        signal.kind,
+        signal.unit,
+        stamps,
+        float(values.min()),
+        float(values.max()),
+        clipped,
+        stuck,
+        lost,
+        signal.dropped,
+        float(np.mean(~signal.used)) if isinstance(signal, Channel) else 0.0,
+        tuple(findings),
     )
 
 
@@ -165,20 +183,8 @@ def _of_channel(experiment: Experiment, channel: Channel, *, signed: bool) -> Qu
             lie = _counted(int(outside.sum()), "sample lies", "samples lie")
             findings.append(f"{lie} before or after the input's record")
     shown = values if values.size else channel.values
-    return Quality(
-        experiment.name,
-        channel.name,
-        channel.kind,
-        channel.unit,
-        stamps,
-        float(shown.min()),
-        float(shown.max()),
-        clipped,
-        stuck,
-        lost,
-        channel.dropped,
-        float(np.mean(~used)),
-        tuple(findings),
+    return _quality(
+        experiment, channel.name, channel, stamps, shown, clipped, findings, stuck, lost
     )
 
 

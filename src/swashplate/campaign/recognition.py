@@ -11,12 +11,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import floor, log10
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.campaign.stamps import increasing, signal
+from swashplate.campaign.samples import increasing, signal
 from swashplate.maneuvers.pieces import row
 
 Array = NDArray[np.float64]
@@ -52,17 +52,19 @@ COARSEST = 6.0
 class Recognised:
     """The manoeuvre of a record. Numbers are rounded to what the data support.
 
-    Levels and amplitudes in the name are relative to `rest`, with their sign in the record.
+    Levels and amplitudes in the name are relative to the input at rest, with their sign in the
+    record.
     """
 
-    kind: Kind
     name: str
     """As `swashplate.maneuvers` names it: ``"step +4 V"``, ``"sine 6.5 V 0.1 Hz"``, ``"free"``."""
-    unit: str
-    rest: float
-    """The input at rest, not rounded. [unit]"""
     frequency: float | None = None
     """Frequency of a sine. [Hz]"""
+
+    @property
+    def kind(self) -> Kind:
+        """The first word of its name."""
+        return cast("Kind", self.name.split()[0])
 
 
 def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recognised:
@@ -98,15 +100,15 @@ def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recogn
     """
     trace = _trace(time, voltage, unit)
     if unit == "V" and abs(trace.rest) > LARGEST_ZERO:
-        return Recognised("free", "free", unit, trace.rest)
+        return Recognised("free")
     if trace.peak <= trace.least:
-        return Recognised("rest", "rest", unit, trace.rest)
+        return Recognised("rest")
     if trace.time.size >= SHORTEST:
         for find in (_stairs, _ramp, _sine):
             found = find(trace, unit)
             if found is not None:
                 return found
-    return Recognised("free", "free", unit, trace.rest)
+    return Recognised("free")
 
 
 def roundest(value: float, uncertainty: float) -> float:
@@ -296,11 +298,9 @@ def _stairs(trace: _Trace, unit: str) -> Recognised | None:
         for each, error in zip(levels, errors, strict=True)
     )
     if len(levels) == 1:
-        name = f"step {heights[0]:+g} {unit}"
-    else:
-        shown = [*heights, 0.0] if ending.kind == "fall" else heights
-        name = f"stairs {'/'.join(f'{height:g}' for height in shown)} {unit}"
-    return Recognised("step" if len(levels) == 1 else "stairs", name, unit, trace.rest)
+        return Recognised(f"step {heights[0]:+g} {unit}")
+    shown = [*heights, 0.0] if ending.kind == "fall" else heights
+    return Recognised(f"stairs {'/'.join(f'{height:g}' for height in shown)} {unit}")
 
 
 def _held_levels(trace: _Trace) -> tuple[list[_Level], _Ending] | None:
@@ -390,7 +390,7 @@ def _ramp(trace: _Trace, unit: str) -> Recognised | None:
     if not _fits(trace, line, ending):
         return None
     shown = roundest(slope, max(3.0 * error, 0.002 * abs(slope)))
-    return Recognised("ramp", f"ramp {shown:+g} {unit}/s", unit, trace.rest)
+    return Recognised(f"ramp {shown:+g} {unit}/s")
 
 
 def _line(trace: _Trace, first: int, last: int) -> tuple[float, float, float]:
@@ -464,10 +464,7 @@ def _sine(trace: _Trace, unit: str) -> Recognised | None:
     frequency = roundest(hertz, max(3.0 * tone.error / (2.0 * np.pi), 0.001 * hertz))
     down = float(np.cos(tone.omega * (start - tone.crossing))) < -1e-9
     amplitude = roundest(-tone.amplitude if down else tone.amplitude, 0.002 * tone.amplitude)
-    # where it begins within the sine there is no rest to see
-    rest = trace.rest if first else trace.rest + tone.mean
-    name = f"sine {amplitude:g} {unit} {frequency:g} Hz"
-    return Recognised("sine", name, unit, rest, frequency)
+    return Recognised(f"sine {amplitude:g} {unit} {frequency:g} Hz", frequency)
 
 
 def _guessed(trace: _Trace) -> tuple[_Tone, float] | None:

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, m
 from swashplate.errors import InputError
 from swashplate.logs import TextOptions
 from swashplate.results import short
-from swashplate.units import speed_unit, to_si
+from swashplate.units import scaling, speed_unit
 
 InputKind = Literal["voltage", "current", "other"]
 ChannelKind = Literal[
@@ -85,12 +85,10 @@ def conversion(kind: str, unit: str | None, what: str) -> tuple[str, float, floa
         unit = speed_unit(unit)
     for si in (*units[1:], units[0]):
         try:
-            zero = to_si(0.0, unit, si, what)
+            return si, *scaling(unit, si, what)
         except InputError:
             if si == units[0]:
                 raise
-            continue
-        return si, to_si(1.0, unit, si, what) - zero, zero
     raise AssertionError
 
 

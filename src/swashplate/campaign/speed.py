@@ -13,9 +13,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swashplate.campaign.encoder import interpolate_counts, interpolated, radians_per_count
 from swashplate.campaign.experiment import Channel
-from swashplate.campaign.stamps import Array, Stamps, signal, stamps_of
+from swashplate.campaign.samples import Array, Stamps, interpolate_counts, signal, stamps_of
 from swashplate.equations.cache import kernel
 from swashplate.errors import InputError
 from swashplate.maneuvers.pieces import positive
@@ -62,6 +61,12 @@ def speed_of(channel: Channel, method: Method = "source") -> Speed:
     ------
     InputError
         If the channel measures something else, or the method cannot be used with its stamps.
+
+    Notes
+    -----
+    ``"savitzky_golay"`` is the slope of the parabola that fits the samples within 0.05 s of each
+    instant best. It is not delayed, because half of each window lies in the future; within half a
+    window of either end it is that of the first or last window, and noisier.
     """
     if channel.kind == "shaft_speed":
         return Speed(channel.time, channel.values, 0.0)
@@ -81,43 +86,12 @@ def speed_of(channel: Channel, method: Method = "source") -> Speed:
         form: Form = "source" if method == "source" else "exact"
         return Speed(time, speed_from_angle(time, angle, form=form), path_delay(period, form=form))
     if method == "savitzky_golay":
-        return Speed(time, savitzky_golay_speed(time, angle), 0.0)
+        return Speed(time, _slope(stamps_of(time), angle), 0.0)
     if method == "difference":
         return Speed(time[1:], np.diff(angle) / np.diff(time), 0.5 * period)
     raise InputError(
         f"There is no method '{method}'; there are source, exact, savitzky_golay and difference."
     )
-
-
-def speed_from_counts(
-    time: ArrayLike,
-    counts: ArrayLike,
-    *,
-    counts_per_turn: float,
-    gear_ratio: float = 1.0,
-    sign: Literal[1, -1] = 1,
-    form: Form = "source",
-) -> Array:
-    """Speed of a shaft from encoder counts: interpolation, low pass, band-limited differentiator.
-
-    Parameters
-    ----------
-    time, form :
-        As in `speed_from_angle`.
-    counts : array_like, shape (n,)
-        Position without roll-overs (`encoder.unwrap_counts`). [count]
-    counts_per_turn, gear_ratio, sign :
-        Scale of the encoder, as in `encoder.radians_per_count`.
-
-    Returns
-    -------
-    array, shape (n,)
-        Speed, delayed by `path_delay`. [rad/s]
-    """
-    stamps = stamps_of(time)
-    position = interpolated(stamps.time, signal("counts", counts, stamps.time.size))
-    position *= radians_per_count(counts_per_turn, gear_ratio, sign)
-    return speed_from_angle(stamps.time, position, form=form)
 
 
 def speed_from_angle(time: ArrayLike, angle: ArrayLike, *, form: Form = "source") -> Array:
@@ -199,52 +173,26 @@ def path_delay(period: float, *, form: Form = "source") -> float:
         If the period is not positive, or the explicit form cannot be used.
     """
     h = positive("period", period)
-    _, recursion = _recursion(Stamps(np.array([0.0, h]), h), form)
-    first, second, from_state, _ = (float(each[0]) for each in recursion)
-    # mean age of what the output is made of, in samples: half a sample of the mean, what x adds
-    # where it is used, and what each recursion keeps
-    through_state = from_state / (1.0 - second) * (1.0 + first / (1.0 - first))
-    return h * (0.5 + through_state + second / (1.0 - second))
+    _recursion(Stamps(np.array([0.0, h]), h), form)
+    return 1.0 / LOW_PASS + 1.0 / DIFFERENTIATOR - (0.5 * h if form == "source" else 0.0)
 
 
-def savitzky_golay_speed(time: ArrayLike, angle: ArrayLike) -> Array:
-    """Slope of the parabola that fits the samples within 0.05 s of each instant best.
-
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        Evenly spaced stamps. [s]
-    angle : array_like, shape (n,)
-        Position; of an encoder, interpolated (`encoder.interpolate_counts`). [rad]
-
-    Returns
-    -------
-    array, shape (n,)
-        Speed, not delayed: half of each window lies in the future. Within half a window of either
-        end it is the slope of the first or last window's parabola, and noisier. [rad/s]
-
-    Raises
-    ------
-    InputError
-        If the stamps are uneven, the window holds fewer than three samples or more than the record
-        has, or a number is not finite.
-    """
+def _slope(stamps: Stamps, angle: Array) -> Array:
+    """Slope of the moving parabola; refused where the window does not fit the stamps."""
     from scipy.signal import savgol_filter
 
-    stamps, period = stamps_of(time)
-    position = signal("angle", angle, stamps.size)
-    if period is None:
+    if stamps.period is None:
         raise InputError(
             "The Savitzky-Golay filter needs evenly spaced stamps; take the exact filters, or "
             "resample the record first."
         )
-    count = 2 * round(0.5 * (WINDOW / period - 1.0)) + 1
-    if not 3 <= count <= stamps.size:
+    count = 2 * round(0.5 * (WINDOW / stamps.period - 1.0)) + 1
+    if not 3 <= count <= angle.size:
         raise InputError(
-            f"The window of {WINDOW:g} s must hold from 3 samples to the record's {stamps.size}, "
-            f"but at {1.0 / period:.4g} Hz it holds {max(count, 0)}."
+            f"The window of {WINDOW:g} s must hold from 3 samples to the record's {angle.size}, "
+            f"but at {1.0 / stamps.period:.4g} Hz it holds {max(count, 0)}."
         )
-    slope: Array = savgol_filter(position, count, 2, deriv=1, delta=period, mode="interp")
+    slope: Array = savgol_filter(angle, count, 2, deriv=1, delta=stamps.period, mode="interp")
     return slope
 
 

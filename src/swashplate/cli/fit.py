@@ -57,14 +57,12 @@ from swashplate.tables import (
 if TYPE_CHECKING:
     from swashplate.campaign import Campaign
     from swashplate.drive import Drive
-    from swashplate.identification.assessment import RunQuality
+    from swashplate.identification.acceptance import Verdict
+    from swashplate.identification.assessment import Judged, StoredFit
     from swashplate.identification.fitting import Search
-    from swashplate.identification.judging import Judged
-    from swashplate.identification.solving import Progress
+    from swashplate.identification.solving import Progress, StartResult
     from swashplate.identification.staging import Parameters
-    from swashplate.identification.starts import StartResult
-    from swashplate.identification.storing import StoredFit
-    from swashplate.identification.verdict import Verdict
+    from swashplate.identification.validation import RunQuality
     from swashplate.parameters.parameter_set import ParameterSet
 
 FIT_EXAMPLES = """\
@@ -179,9 +177,9 @@ def fit(
         raise InputError(f"{model} says what is free and where it begins: leave out the others.")
     with working("Starting"):
         from swashplate.executors import Dask, Processes
+        from swashplate.identification.assessment import Wanted, judge_fit
         from swashplate.identification.fitting import fit as fitted
         from swashplate.identification.fitting import refined
-        from swashplate.identification.judging import Wanted, judge_fit
         from swashplate.identification.own_model import ModelSetup
         from swashplate.identification.solving import longest_left
         from swashplate.identification.staging import setup_of
@@ -246,7 +244,7 @@ def _search(
 ) -> Search:
     from swashplate.executors import Dask, Processes
     from swashplate.identification.fitting import Search
-    from swashplate.identification.starts import time_left
+    from swashplate.identification.solving import time_left
 
     assert isinstance(executor, Processes | Dask)
     begun: dict[str, tuple[float, int]] = {}
@@ -434,18 +432,12 @@ def validate(
 ) -> None:
     """Predict runs from their command alone and judge the drive by them.
 
-    Prints errors run by run, the error tables of Kruse (2001) with what they
-    leave out, what is left in the residuals, and a verdict. The exit code is 1
-    if the drive is not usable for these runs.
+    Prints errors run by run, what is left in the residuals, and a verdict. The
+    exit code is 1 if the drive is not usable for these runs.
     """
     from swashplate.identification import tables
-    from swashplate.identification.validation import (
-        error_tables,
-        predict,
-        source_rules,
-        with_speeds,
-    )
-    from swashplate.identification.verdict import verdict
+    from swashplate.identification.acceptance import verdict
+    from swashplate.identification.validation import predict, with_speeds
 
     if figures is not None and out is None:
         raise InputError("--figures needs a folder to write them to: give --out DIR.")
@@ -472,7 +464,6 @@ def validate(
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
         judged = verdict((), predicted, required=require / 100.0)
         qualities = with_speeds(predicted)
-        errors = error_tables(qualities, source_rules(parameters.name))
     lines = []
     if out is not None:
         with working("Writing the report"):
@@ -483,8 +474,6 @@ def validate(
     note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
     show(*tables.runs_tables(qualities))
     say(MEASURES)
-    show(*(tables.errors_table(each) for each in errors))
-    _listed(tables.left_out(errors))
     show(tables.residual_table(predicted))
     say(RESIDUALS)
     _listed(judged.sentences)
@@ -503,7 +492,7 @@ def _validation_written(
     drive: str,
 ) -> list[str]:
     """Write the report and its tables; lines that say so."""
-    from swashplate.identification.judging import versions
+    from swashplate.identification.assessment import versions
     from swashplate.identification.tables import runs_tables
     from swashplate.identification.validation import with_speeds
     from swashplate.report.figures import save_run_figures
@@ -547,7 +536,7 @@ def report(
     samples, weights or ignored windows have changed, the report is refused.
     """
     from swashplate.campaign import Campaign
-    from swashplate.identification.judging import judge_stored
+    from swashplate.identification.assessment import judge_stored
 
     folder = fitted if fitted.is_dir() else fitted.parent
     if out is not None and out != folder:  # the fit's own report is written again
@@ -574,8 +563,8 @@ def report(
 
 def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -> StoredFit:
     """The stored fit; of a drive that is named, the one beside it that found it."""
+    from swashplate.identification.assessment import load_fit
     from swashplate.identification.own_model import ModelSetup
-    from swashplate.identification.storing import load_fit
 
     own = None if model is None else ModelSetup.from_file(model)
     stored = load_fit(place, campaign, model=own)
@@ -605,8 +594,8 @@ def demo(
     """
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
+    from swashplate.identification.assessment import Wanted, judge_fit
     from swashplate.identification.fitting import fit
-    from swashplate.identification.judging import Wanted, judge_fit
     from swashplate.identification.setup import load_setup
     from swashplate.identification.staging import drawn
     from swashplate.identification.tables import estimates_table, runs_tables, truth_count
@@ -648,7 +637,7 @@ def demo(
 
 def _result_drawn(found: Judged, truth: Drive, out: Path) -> str:
     """Draw a predicted run and the estimates beside the truth; a line that says so."""
-    from swashplate.identification.truth import true_values
+    from swashplate.identification.identifiability import true_values
     from swashplate.identification.validation import with_speeds
     from swashplate.report.figures import plot_fit, save_figure
 

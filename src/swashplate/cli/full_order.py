@@ -15,7 +15,7 @@ from swashplate.cli.options import (
 from swashplate.cli.terminal import Outputs, note, progress, say, show, working
 from swashplate.cli.words import physical_values, simulated
 from swashplate.errors import InputError
-from swashplate.tables import FIGURE, TABLE, write_table
+from swashplate.tables import FIGURE, TABLE
 
 Method = Literal["march", "radau"]
 
@@ -95,9 +95,9 @@ def full_order(
         least_substeps(sampling.rate)  # one out of range is refused before anything is sampled
         with progress(len(comparison.TABLE_MANEUVERS)) as begin:
             found = comparison.validity(full, sampling.rate, begin=begin)
-        files.write(out, "Table", lambda path: write_table(found, path))
-        said = f"{found.height} manoeuvres"
-        tables.append(comparison.validity_table(found, sampling.rate))
+        files.write(out, "Table", found.write)
+        said = f"{len(found.rows)} manoeuvres"
+        tables.append(found)
         verdict, title = [comparison.validity_verdict(found)], drive.title
     else:
         with working("Simulating"):

@@ -57,17 +57,6 @@ TABLE_MANEUVERS: tuple[tuple[str, Maneuver], ...] = (
     ),
 )
 """Manoeuvres of the table of the reduction's validity."""
-VALIDITY = {
-    "axis": str,
-    "maneuver": str,
-    "top_speed": float,
-    "largest_percent": float,
-    "rms_percent": float,
-    "step_error_percent": float,
-    "within_1_percent": bool,
-    "within_0_1_percent": bool,
-}
-"""Columns of that table; the top speed is in rad/s."""
 
 
 @dataclass(frozen=True)
@@ -212,33 +201,38 @@ def convergence(
 
 def validity(
     full: FullOrderDrive, rate: float = SOURCE_RATE, *, begin: Callable[[str], object] | None = None
-) -> polars.DataFrame:
+) -> Table:
     """For which of `TABLE_MANEUVERS` the one-state model is within 1 % and 0.1 %, for one drive.
 
     A row for each manoeuvre: top speed, largest and rms difference and step error in percent of it,
-    and whether the largest difference is within 1 % and 0.1 %; null where the drive does not move.
+    and whether the largest difference is within 1 % and 0.1 %; none where the drive does not move.
     `begin` is called with the name of each manoeuvre before it is simulated.
     """
-    import polars as pl
-
-    rows = []
+    made = Table(
+        "Reduced model less full-order one, in % of the top speed",
+        (
+            Column("axis", of="f"),
+            Column("Manoeuvre", key="maneuver"),
+            Column("top", ".2f", "rad/s", key="top_speed"),
+            Column("largest", ".2f", key="largest_percent"),
+            Column("rms", ".2f", key="rms_percent"),
+            Column(f"step error at {usual_rate(rate):g} Hz", ".2f", key="step_error_percent"),
+            Column("within", key="within_1_percent"),
+            Column("within_0_1_percent", of="f"),
+        ),
+    )
     for title, maneuver in TABLE_MANEUVERS:
         if begin is not None:
             begin(title)
-        run = full.drive.simulate(maneuver.sample(rate), rate)
-        found = compare(full, run).difference
-        percent = 100.0 / found.top_speed if found.moves else None
+        found = compare(full, full.drive.simulate(maneuver.sample(rate), rate)).difference
+        top, percent = found.top_speed, 100.0 / found.top_speed if found.moves else None
         shares = (found.largest, found.rms, found.step_error)
-        rows.append(
-            (
-                full.physical.name,
-                title,
-                found.top_speed,
-                *(None if percent is None else share * percent for share in shares),
-                *(found.relative <= band if found.moves else None for band in reversed(BANDS)),
-            )
-        )
-    return pl.DataFrame(rows, schema=VALIDITY, orient="row")
+        numbers = (None if percent is None else share * percent for share in shares)
+        within = [found.relative <= band if found.moves else None for band in reversed(BANDS)]
+        words = "does not move" if not found.moves else "1 %" if within[0] else "no"
+        words = "0.1 %" if within[1] else words
+        made.add(full.physical.name, title, top, *numbers, Cell(within[0], words), within[1])
+    return made
 
 
 # --- tables and verdicts --------------------------------------------------------------------------
@@ -316,34 +310,13 @@ def comparison_verdict(found: Comparison) -> list[str]:
     return [said, f"It leaves out {left_out}, and the motor's pressure drop."]
 
 
-def validity_table(found: polars.DataFrame, rate: float) -> Table:
-    """The manoeuvres of `validity` for people."""
-    made = Table(
-        "Reduced model less full-order one, in % of the top speed",
-        (
-            Column("Manoeuvre"),
-            Column("top", ".2f", "rad/s"),
-            Column("largest", ".2f"),
-            Column("rms", ".2f"),
-            Column(f"step error at {usual_rate(rate):g} Hz", ".2f"),
-            Column("within"),
-        ),
-    )
-    for row in found.iter_rows(named=True):
-        shares = (row[f"{key}_percent"] for key in ("largest", "rms", "step_error"))
-        within = "1 %" if row["within_1_percent"] else "no"
-        within = "0.1 %" if row["within_0_1_percent"] else within
-        still = row["largest_percent"] is None
-        made.add(row["maneuver"], row["top_speed"], *shares, "does not move" if still else within)
-    return made
-
-
-def validity_verdict(found: polars.DataFrame) -> str:
-    """For how many of the manoeuvres one state is enough, and for which it is not."""
-    moving = found.drop_nulls("within_1_percent")
-    beyond = moving.filter(~moving["within_1_percent"])["maneuver"].to_list()
+def validity_verdict(table: Table) -> str:
+    """For how many of the manoeuvres of `validity` one state is enough, and for which it is not."""
+    found = table.to_polars()
+    moving = found.filter(found["within_1_percent"].is_not_null())
     if not moving.height:
         return "The shaft does not move under any of these, so nothing can be said of one state."
+    beyond = moving.filter(~moving["within_1_percent"])["maneuver"].to_list()
     if not beyond:
         return "One state is enough for all of these that move the drive, to 1 % of the top speed."
     if len(beyond) == moving.height:

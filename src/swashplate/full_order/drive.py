@@ -397,10 +397,6 @@ class FullOrderDrive:
         at = np.array(state.motion)
         return modes_of(state_matrix(at, force, self.plant.machine, self.options()))
 
-    def eigenvalues(self, current: float = 0.0) -> NDArray[np.complex128]:
-        """Eigenvalues of the five states about an equilibrium, see `modes`. [rad/s]"""
-        return self.modes(current).eigenvalues
-
     def sensitivities(
         self,
         voltage: ArrayLike,

@@ -26,7 +26,7 @@ from swashplate.errors import InputError, ParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine
 from swashplate.parameters.definitions import Definition, definition_of
-from swashplate.parameters.files import AXES, written
+from swashplate.parameters.files import AXES, Entry, parameter_of, written
 from swashplate.parameters.files import load_preset as load_parameters
 from swashplate.parameters.parameter_set import (
     Change,
@@ -39,7 +39,6 @@ from swashplate.parameters.parameter_set import (
     value_of,
 )
 from swashplate.parameters.rules import out_of_range, range_sentence
-from swashplate.parameters.schema import Entry
 from swashplate.tables import Column, Table
 from swashplate.units import chosen_unit, to_si, unit_text
 
@@ -552,20 +551,10 @@ def si_value(quantity: Definition, number: float, unit: str) -> float:
 
 def _entries(contents: PhysicalFile) -> dict[str, Parameter]:
     known = quantity_of if contents.lumps is None else chosen_quantity
-    return {name: _value(known(name), entry) for name, entry in contents.physical.items()}
-
-
-def _value(quantity: Definition, entry: Entry) -> Parameter:
-    """One entry of a file, in SI."""
-    if entry.bounds is not None:
-        raise ParameterError(
-            f"{quantity.symbol} has bounds; leave them out, a fit is given its own."
-        )
-    given = entry.value if isinstance(entry.value, list) else [entry.value]
-    first, *second = (si_value(quantity, number, entry.unit) for number in given)
-    change = (first, second[0]) if second else first
-    value = value_of(quantity.symbol, quantity, change)
-    return Parameter(quantity, value, entry.source, entry.status)
+    for name, entry in contents.physical.items():
+        if entry.bounds is not None:
+            raise ParameterError(f"{name} has bounds; leave them out, a fit is given its own.")
+    return {name: parameter_of(known(name), entry) for name, entry in contents.physical.items()}
 
 
 # --- for people -----------------------------------------------------------------------------------

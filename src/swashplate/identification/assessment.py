@@ -1,25 +1,29 @@
-"""Assessment of a stage: what its data tell, errors of the estimates, quality of each run."""
+"""Assessment of a fit, all that follows it, and its file."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import platform
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import date
 from functools import cached_property
+from hashlib import blake2b
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
+from pydantic import BaseModel, ConfigDict
 
+from swashplate.__about__ import __version__
+from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
-from swashplate.errors import InputError
-from swashplate.identification.fitting import StageFit
+from swashplate.documents import read_json
+from swashplate.errors import FileError, InputError
+from swashplate.identification.acceptance import Verdict, verdict
+from swashplate.identification.fitting import Fit, StageFit, smooth
 from swashplate.identification.identifiability import Identifiability, identifiability
-from swashplate.identification.linearised import LinearisedFit, linearised_fit
-from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
-from swashplate.identification.problem import Problem
-from swashplate.identification.profile import checked_ends
-from swashplate.identification.uncertainty import (
+from swashplate.identification.intervals import (
     Handed,
     Uncertainty,
     prior_sentences,
@@ -29,262 +33,37 @@ from swashplate.identification.uncertainty import (
     slopes_by_fixed,
     uncertainty,
 )
+from swashplate.identification.own_model import ModelParameters, ModelSetup
+from swashplate.identification.problem import LinearisedFit, linearised_fit
+from swashplate.identification.profile import Profile, checked_ends, profiles_of
+from swashplate.identification.resampling import (
+    Bootstrap,
+    CrossValidation,
+    bootstraps_of,
+    cross_validate,
+)
+from swashplate.identification.setup import Setup
+from swashplate.identification.solving import Solution, StartResult
+from swashplate.identification.staging import Parameters, stage_problem, with_estimates
+from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.identification.validation import RunQuality, predict, run_qualities
+from swashplate.parameters.definitions import find
+from swashplate.parameters.files import dump_set, read_set
+from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
+from swashplate.tables import write_text
 
 if TYPE_CHECKING:
+    from swashplate.campaign import Campaign, Experiment
+    from swashplate.executors import Executor
+    from swashplate.identification.intervals import Estimate
+    from swashplate.identification.solving import Loss
     from swashplate.tables import Table
 
 Array = NDArray[np.float64]
 
-
-LONGEST_SHOWN = 2.0
-"""Largest lag of the curves. [s]"""
-
-DEVIATIONS = 1.96
-"""Half width of the bands, in standard deviations: 95 %."""
-
-CHANCE = 0.05
-"""Probability that unrelated signals are said to be related, all lags together."""
-
-
-@dataclass(frozen=True, eq=False)
-class ResidualTest(Result):
-    """Whiteness of the residuals of one channel of one run, and independence of the input."""
-
-    lags: Array
-    """(m,) from 0. [s]"""
-    autocorrelation: Array
-    """(m,) of the residuals."""
-    white_band: float
-    """Half width of the 95 % band of white noise."""
-    cross_lags: Array
-    """(2 m - 1,) positive where the residual comes after the input. [s]"""
-    cross_correlation: Array
-    """(2 m - 1,) of the residuals with the input."""
-    cross_band: float
-    """Half width of the 95 % band of residuals, coloured as these are, without relation to the
-    input."""
-    duration: float
-    """Time over which the residuals stay correlated; 0 if they are white. [s]"""
-    verdict: str
-    """In words."""
-
-    @property
-    def white(self) -> bool:
-        """Whether nothing but white noise is left."""
-        return self.duration == 0.0
-
-    @property
-    def peak(self) -> tuple[float, float]:
-        """Lag of the largest cross-correlation [s], and its value."""
-        place = int(np.argmax(np.abs(self.cross_correlation)))
-        return float(self.cross_lags[place]), float(self.cross_correlation[place])
-
-
-def residual_test(
-    time: Array, residual: Array, command: Array, *, longest: float = LONGEST_SHOWN
-) -> ResidualTest:
-    """Test the residuals of one channel of one run.
-
-    Parameters
-    ----------
-    time : (n,) array
-        Stamps of the samples that count; gaps are respected. [s]
-    residual, command : (n,) arrays
-        Simulated less measured, weights left out, and the input at the same stamps.
-    longest : float
-        Largest lag of the curves; at most a quarter of the run is shown. [s]
-
-    Raises
-    ------
-    InputError
-        If lengths differ, a number is not finite, or there are fewer than 8 samples.
-
-    Notes
-    -----
-    The band of the cross-correlation is 1.96 √(Σ ρ_r ρ_u/n): two coloured signals without any
-    relation show large correlations by chance (Bartlett's formula), and a band of 1.96/√n would
-    call every one of them a finding.
-    """
-    if not time.shape == residual.shape == command.shape:
-        raise InputError(
-            f"{time.size} stamps, {residual.size} residuals and {command.size} samples of the "
-            "input do not belong together."
-        )
-    if time.size < 8:
-        raise InputError(f"{time.size} samples tell nothing of correlation; 8 are the least.")
-    first = float(residual[0])
-    if not (np.isfinite(residual).all() and np.isfinite(command).all()):
-        raise InputError("Residuals and input must be finite; leave the other samples out.")
-    grid = grid_of(time)
-    most = max(int(LONGEST * grid.size), 1)
-    shown = min(most, max(int(longest / grid.step), 1))
-    residual, command = residual - residual.mean(), command - command.mean()
-    own, counts = _autocorrelation(residual, grid, most)
-    length = correlation_length(own, counts)
-    # beyond the residuals' own length their estimated correlation is chance
-    kept = slice(1, max(length, 1) + 1)
-    theirs = _autocorrelation(command, grid, most)[0]
-    inflation = max(1.0, 1.0 + 2.0 * float(own[kept] @ theirs[kept]))
-    band = min(DEVIATIONS * float(np.sqrt(inflation / time.size)), 1.0)
-    cross = np.zeros(2 * shown + 1)
-    scale = float(np.linalg.norm(residual) * np.linalg.norm(command))
-    if scale > 0.0:
-        size = next_fast_len(grid.size + shown, real=True)
-        spectra = rfft(grid.spread(command), size).conj() * rfft(grid.spread(residual), size)
-        products = irfft(spectra, size)
-        cross = np.concatenate([products[size - shown :], products[: shown + 1]]) / scale
-    lags: Array = np.arange(shown + 1.0) * grid.step
-    both = np.concatenate([-lags[:0:-1], lags])
-    white = DEVIATIONS / float(np.sqrt(time.size))
-    duration = length * grid.step
-    made = ResidualTest(lags, own[: shown + 1], white, both, cross, band, duration, "")
-    return replace(made, verdict=_in_words(made, first))
-
-
-def _in_words(test: ResidualTest, first: float) -> str:
-    """The verdict of a test; `first` is the first residual."""
-    if not test.autocorrelation[1:].any():
-        what = "exactly zero" if first == 0.0 else f"{first:.4g} throughout"
-        return f"The residuals are {what}: there is no noise to test."
-    colour = (
-        "The residuals are white"
-        if test.white
-        else f"The residuals stay correlated over {test.duration:.2g} s"
-    )
-    if not test.cross_correlation.any():
-        return f"{colour}; the input is constant and explains nothing."
-    from scipy.special import ndtri
-
-    # neighbouring lags say the same: as many looks as correlation lengths fit
-    looks = max(test.cross_lags.size / max(test.duration / test.lags[1], 1.0), 1.0)
-    limit = -float(ndtri(0.5 * CHANCE / looks)) / DEVIATIONS * test.cross_band
-    lag, value = test.peak
-    if abs(value) <= limit:
-        return f"{colour} and have no relation to the input."
-    when = (
-        f"{abs(lag):.2g} s {'after' if lag > 0.0 else 'before'} it" if lag else "at the same time"
-    )
-    return (
-        f"{colour} and follow the input (correlation {value:+.2f} {when}): the model leaves out "
-        "something that the input causes."
-    )
-
-
-def _autocorrelation(samples: Array, grid: Grid, lags: int) -> tuple[Array, Array]:
-    sums, counts = pair_sums(samples, grid, lags)
-    means = sums / np.maximum(counts, 1.0)
-    if not means[0] > 0.0:
-        return np.where(np.arange(lags + 1) == 0, 1.0, 0.0), counts
-    return np.clip(means / means[0], -1.0, 1.0), counts
-
-
-class Measures(NamedTuple):
-    """Measures of one channel of one run, or of several together."""
-
-    samples: int
-    """Samples that count."""
-    rmse: float
-    """Root of the mean squared difference, in the channel's unit."""
-    spread: float
-    """Standard deviation of what was measured, in the channel's unit."""
-
-    @property
-    def nrmse(self) -> float | None:
-        """RMSE over the measured standard deviation; None where nothing moved."""
-        return self.rmse / self.spread if self.spread > 0.0 else None
-
-    @property
-    def fit_percent(self) -> float | None:
-        """100 (1 - NRMSE); 100 is perfect, 0 no better than the measured mean. [%]"""
-        return None if self.nrmse is None else 100.0 * (1.0 - self.nrmse)
-
-    @property
-    def r_squared(self) -> float | None:
-        """1 - NRMSE²."""
-        return None if self.nrmse is None else 1.0 - self.nrmse**2
-
-    @property
-    def sentence(self) -> str:
-        """The verdict for a table's cell or a line of text."""
-        if self.fit_percent is None:
-            return f"RMSE {self.rmse:.4g}; what was measured is constant, so there is no fit %"
-        return f"RMSE {self.rmse:.4g}, fit {self.fit_percent:.1f} %, R² {self.r_squared:.4f}"
-
-
-def measures(measured: Array, simulated: Array, weight: Array | None = None) -> Measures:
-    """Measures of one channel of one run.
-
-    Parameters
-    ----------
-    measured, simulated : (n,) arrays
-        In the channel's unit.
-    weight : (n,) array, optional
-        Factors on the squared errors, of which those that are 0 say which samples do not count. The
-        others weigh nothing here: a window of weight ten would otherwise pass for the whole run.
-
-    Raises
-    ------
-    InputError
-        If lengths differ, no sample counts, one that does is not finite, or a weight is negative.
-    """
-    return pooled_measures([(measured, simulated, weight)])
-
-
-def pooled_measures(runs: list[tuple[Array, Array, Array | None]]) -> Measures:
-    """Measures of one channel over several runs, each about the mean of all; else as `measures`."""
-    parts = [_counting(*run) for run in runs]
-    measured, simulated = (np.concatenate(column) for column in zip(*parts, strict=True))
-    if not measured.size:
-        raise InputError("No sample counts: all are ignored or have weight 0.")
-    mean = float(measured.mean())
-    # a constant channel's own mean is off by rounding
-    about = measured - mean
-    about[np.abs(about) <= 4.0 * np.finfo(np.float64).eps * abs(mean)] = 0.0
-    rmse, spread = (float(np.sqrt(np.mean(each**2))) for each in (simulated - measured, about))
-    return Measures(measured.size, rmse, spread)
-
-
-def _counting(measured: Array, simulated: Array, weight: Array | None) -> tuple[Array, Array]:
-    """The samples that count."""
-    factor = np.ones(measured.shape) if weight is None else weight
-    if measured.shape != simulated.shape or measured.shape != factor.shape:
-        raise InputError(
-            f"{measured.size} measured and {simulated.size} simulated samples with {factor.size} "
-            "weights cannot be compared; simulate at the measurement's stamps."
-        )
-    if not (factor >= 0.0).all():
-        raise InputError(
-            "A weight is negative or not a number; a factor on a squared error is 0 or more."
-        )
-    used = factor > 0.0
-    for what, samples in (("measured", measured), ("simulated", simulated)):
-        if not np.isfinite(samples[used]).all():
-            row = int(np.flatnonzero(used & ~np.isfinite(samples))[0])
-            raise InputError(f"Sample {row + 1} of what was {what} is not finite; ignore it.")
-    return measured[used], simulated[used]
-
-
 LIMITS = ("Z13", "Z14", "Z15", "Z16")
 """Parameters that limit something: stops, strokes, relief, orifices."""
-
-
-@dataclass(frozen=True, eq=False)
-class RunQuality(Result):
-    """How well one channel of one run is simulated."""
-
-    experiment: Experiment
-    channel: str
-    simulated: Array
-    """(m,) at the channel's stamps, its free zero included. [unit of the channel]"""
-    measures: Measures
-    test: ResidualTest | None
-    """None where there are too few samples."""
-
-    @property
-    def residual(self) -> Array:
-        """(m,) simulated less measured."""
-        return self.simulated - self.experiment[self.channel].values
 
 
 @dataclass(frozen=True, eq=False)
@@ -360,30 +139,460 @@ class Assessment(Result):
         return run_qualities(self.stage.problem, self._vector)
 
 
-def run_qualities(problem: Problem, vector: Array) -> tuple[RunQuality, ...]:
-    """Quality of each channel of each run of a problem at a point."""
-    return tuple(
-        compared(experiment, name, simulated)
-        for number, experiment in enumerate(problem.experiments)
-        for name, simulated in problem.outputs(vector, number).items()
-        if experiment[name].used.any()
-    )
-
-
-def compared(experiment: Experiment, name: str, simulated: Array) -> RunQuality:
-    """Quality of one channel of one run, simulated at its stamps."""
-    channel = experiment[name]
-    used, test = channel.used, None
-    if np.count_nonzero(used) >= 8:
-        time, residual = channel.time[used], (simulated - channel.values)[used]
-        test = residual_test(time, residual, experiment.input.at(time))
-    found = measures(channel.values, simulated, channel.weight)
-    return RunQuality(experiment, name, simulated, found, test)
-
-
 def assess(stages: Sequence[StageFit]) -> tuple[Assessment, ...]:
     """The assessment of each stage of a fit."""
     made: list[Assessment] = []
     for each in stages:
         made.append(Assessment(each, tuple(made)))
     return tuple(made)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What was asked for besides the fit."""
+
+    folds: int = 0
+    bootstrap: int = 0
+    profiles: tuple[str, ...] = ()
+    """Unknowns by name, or ``"all"``."""
+    seed: int = 0
+    executor: Executor | None = None
+    loss: Loss = "linear"
+    required: float = 0.1
+    """Largest error of held-out runs over their range."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged(Result):
+    """A fit and all that was found out about it."""
+
+    campaign: Campaign
+    result: Fit
+    runs: Sequence[Experiment]
+    assessments: Sequence[Assessment]
+    predicted: Sequence[RunQuality]
+    verdict: Verdict
+    bootstraps: Mapping[str, Bootstrap] = field(default_factory=dict)
+    """By stage."""
+    profiles: Sequence[StageProfile] = ()
+    folds: CrossValidation | None = None
+    notes: Mapping[str, str] = field(default_factory=dict)
+    """Versions, seed, campaign."""
+
+    def tables(self) -> list[Table]:
+        """Criteria of the verdict, then the fit's tables and the errors of held-out runs."""
+        from swashplate.identification.tables import criteria_table, runs_tables
+
+        return [
+            criteria_table(self.verdict),
+            *self.result.tables(),
+            *(runs_tables(self.predicted) if self.predicted else ()),
+        ]
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The verdict's headline and all that it says."""
+        return (self.verdict.headline, *self.verdict.sentences)
+
+    def name_of(self, profile: StageProfile) -> str:
+        """The unknown that a profile is of."""
+        stage = next(each for each in self.result.stages if each.stage.name == profile.stage)
+        return stage.problem.unknowns.names[profile.profile.index]
+
+    def store(self, path: Path) -> None:
+        """Write what `load_fit` reads and the report can be made from again."""
+        save_fit(
+            self.result,
+            self.runs,
+            path,
+            campaign=self.campaign.path,
+            profiles=self.profiles,
+            folds=self.folds,
+            notes=self.notes,
+        )
+
+    def fitted_set(self) -> ParameterSet:
+        """The fitted set, where each number says whether it was fitted or fixed, and its source.
+
+        Of a fitted one the source is campaign, date and 95 % interval; of a fixed one that of the
+        set which the fit began from.
+        """
+        found, nominal = self.result.drive.parameters, self.result.nominal
+        assert isinstance(nominal, ParameterSet)
+        today, ends = f"{date.today():%d %b %Y}", _interval_words(self.assessments, found)
+        parameters = {}
+        for symbol, parameter in found.parameters.items():
+            if symbol in ends:
+                words = "; ".join(ends[symbol])
+                source = f"{self.campaign.path.name}, {today}; 95 %: {words}"
+                parameter = replace(parameter, status="fitted", source=source)
+            elif parameter.status != "inactive":
+                before = nominal.parameters.get(symbol, parameter)
+                source = f"{nominal.name}: {before.source}" if before.source else nominal.name
+                parameter = replace(parameter, status="fixed", source=source)
+            parameters[symbol] = parameter
+        fitted = len(self.result.stages[0].problem.experiments)
+        title = f"{self.campaign.title}: fitted to {fitted} runs, {today}"
+        return replace(found, title=title, parameters=parameters)
+
+
+def _interval_words(assessments: Sequence[Assessment], found: ParameterSet) -> dict[str, list[str]]:
+    """Intervals of the fitted parameters in words, by symbol."""
+    ends: dict[str, list[str]] = {}
+    for each in assessments:
+        unknowns = each.stage.problem.unknowns
+        for estimate, unknown in zip(each.uncertainty.estimates, unknowns, strict=True):
+            if unknown.run is not None:
+                continue
+            if unknown.name.startswith("force_"):
+                for symbol in ("Z19", "Z20", "Z21", "Z22"):
+                    ends[symbol] = ["from the fitted forces"]
+                continue
+            for target in unknown.targets:
+                if target in found.numbers:
+                    side = target.rpartition("_")[2]
+                    side = f"{side} " if side in ("plus", "minus") else ""
+                    words = f"{side}{_ends(estimate)}"
+                    ends.setdefault(find(target).symbol, []).append(words)
+    return ends
+
+
+def _ends(estimate: Estimate) -> str:
+    low, high = estimate.lower, estimate.upper
+    if low is None and high is None:
+        return estimate.status
+    words = (
+        "none below" if low is None else f"{low:.5g}",
+        "none above" if high is None else f"{high:.5g}",
+    )
+    return " to ".join(words)
+
+
+def judge_fit(
+    campaign: Campaign,
+    axis: str,
+    runs: Sequence[Experiment],
+    nominal: Parameters,
+    plan: Setup,
+    result: Fit,
+    wanted: Wanted,
+    watch: Callable[[str], None] = lambda _: None,
+) -> Judged:
+    """Assess a fit, predict the runs held out, and compute what else was asked for.
+
+    Parameters
+    ----------
+    campaign, axis, runs, nominal, plan :
+        What was fitted, from where, and how.
+    result : Fit
+        What was found.
+    wanted : Wanted
+        Folds, bootstrap, profiles.
+    watch : callable
+        Is told in words how far the work is.
+
+    Raises
+    ------
+    InputError
+        If a profile of an unknown is wanted that there is not.
+    """
+    assessments = assess(result.stages)
+    _check(wanted.profiles, assessments)
+    predicted = predict(result.parameters, campaign.select(axis=axis, role="validate"))
+    planned = [each.name for each in result.setup.stages]
+    judged = verdict(assessments, predicted, planned=planned, required=wanted.required)
+    folds, bootstraps, profiles = None, {}, []
+    if wanted.folds:
+        folds = cross_validate(
+            runs,
+            nominal,
+            plan,
+            folds=wanted.folds,
+            loss=wanted.loss,
+            watch=lambda _, done: watch(f"{done} of {wanted.folds} folds"),
+            executor=wanted.executor,
+            seed=wanted.seed,
+        )
+    if wanted.bootstrap:
+        bootstraps = bootstraps_of(
+            assessments,
+            wanted.bootstrap,
+            watch=lambda done: watch(f"{done} of {wanted.bootstrap} fits to new noise"),
+            executor=wanted.executor,
+            seed=wanted.seed,
+        )
+    for each in assessments if wanted.profiles else ():
+        profiles += _profiles(each, wanted, watch)
+    return Judged(
+        campaign,
+        result,
+        runs,
+        assessments,
+        predicted,
+        judged,
+        bootstraps,
+        profiles,
+        folds,
+        {**versions(), "seed": str(wanted.seed), "campaign": str(campaign.path)},
+    )
+
+
+def judge_stored(campaign: Campaign, stored: StoredFit) -> Judged:
+    """Assess a fit that was stored once more; nothing is fitted."""
+    assessments = assess(stored.fit.stages)
+    names = {each.name for each in stored.experiments}
+    runs = campaign.select(axis=stored.axis, role="validate")
+    predicted = predict(stored.fit.parameters, [each for each in runs if each.name not in names])
+    planned = [each.name for each in stored.fit.setup.stages]
+    return Judged(
+        campaign,
+        stored.fit,
+        stored.experiments,
+        assessments,
+        predicted,
+        verdict(assessments, predicted, planned=planned),
+        profiles=stored.profiles,
+        folds=stored.folds,
+        notes=stored.notes or {},
+    )
+
+
+def versions() -> dict[str, str]:
+    """Of this package and of Python."""
+    return {"swashplate": __version__, "Python": platform.python_version()}
+
+
+def _check(names: Sequence[str], assessments: Sequence[Assessment]) -> None:
+    known = [name for each in assessments for name in each.stage.problem.unknowns.names]
+    for name in names:
+        if name != "all" and name not in known:
+            machine = [each for each in known if "(" not in each]
+            raise InputError(f"There is no unknown '{name}'; there are {', '.join(machine)}.")
+
+
+def _profiles(
+    assessment: Assessment, wanted: Wanted, watch: Callable[[str], None]
+) -> list[StageProfile]:
+    name, known = assessment.stage.stage.name, assessment.stage.problem.unknowns.names
+    names = None if "all" in wanted.profiles else [n for n in wanted.profiles if n in known]
+    if names == []:
+        return []
+    found = profiles_of(
+        assessment,
+        names,
+        executor=wanted.executor,
+        watch=lambda done: watch(f"{name}: {done} profiles"),
+    )
+    return [StageProfile(name, each) for each in found.values()]
+
+
+class StageProfile(NamedTuple):
+    """A profile, and the stage whose unknown it is of."""
+
+    stage: str
+    profile: Profile
+
+
+class Entry(BaseModel):
+    """A table of the file; a key that it does not know is refused."""
+
+    model_config = ConfigDict(extra="forbid", ser_json_inf_nan="strings")
+
+
+class StoredStage(Entry):
+    """How a stage ended, and its starts."""
+
+    name: str
+    unknowns: tuple[Unknown, ...]
+    """With what their priors are worth."""
+    solution: Solution
+    starts: tuple[StartResult, ...]
+
+
+class FitFile(Entry):
+    """The whole file."""
+
+    swashplate: str
+    axis: str
+    campaign: str
+    runs: dict[str, str]
+    """Name to fingerprint of each run that was fitted, in their order."""
+    nominal: str | dict[str, float]
+    """What the fit began from: a drive's parameter file, or the numbers of a model of one's own."""
+    setup: Setup
+    stages: tuple[StoredStage, ...]
+    profiles: tuple[StageProfile, ...]
+    folds: CrossValidation | None
+    notes: dict[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class StoredFit(Result):
+    """A fit as it was, and what was computed with it."""
+
+    fit: Fit
+    axis: str
+    experiments: tuple[Experiment, ...]
+    """That were fitted."""
+    profiles: tuple[StageProfile, ...] = ()
+    folds: CrossValidation | None = None
+    notes: Mapping[str, str] | None = None
+    """Versions, seed, command."""
+
+
+def save_fit(
+    fit: Fit,
+    experiments: Sequence[Experiment],
+    path: str | Path,
+    *,
+    campaign: str | Path = "",
+    profiles: Sequence[StageProfile] = (),
+    folds: CrossValidation | None = None,
+    notes: Mapping[str, str] | None = None,
+) -> None:
+    """Store a fit as JSON, whole or not at all.
+
+    Parameters
+    ----------
+    fit : Fit
+        What was found.
+    experiments : sequence of Experiment
+        The runs that it was fitted to, as given to `fitting.fit`. Their samples stay in the
+        campaign; a fingerprint of each is stored.
+    path : path
+        ``fitted/fit.json``.
+    campaign : path
+        The campaign's file, for people.
+    profiles, folds :
+        What was computed besides, if anything.
+    notes : mapping of str to str, optional
+        What belongs to the report: versions, seed, command.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written.
+    """
+    stages = tuple(
+        StoredStage(
+            name=each.stage.name,
+            unknowns=each.problem.unknowns.items,
+            solution=each.solution,
+            starts=each.starts,
+        )
+        for each in fit.stages
+    )
+    start = fit.nominal
+    content = FitFile(
+        swashplate=__version__,
+        axis=experiments[0].axis,
+        campaign=str(campaign),
+        runs={each.name: fingerprint(each) for each in experiments},
+        nominal=dict(start.numbers) if isinstance(start, ModelParameters) else dump_set(start),
+        setup=fit.setup,
+        stages=stages,
+        profiles=tuple(profiles),
+        folds=folds,
+        notes=dict(notes or {}),
+    )
+    write_text(content.model_dump_json(indent=1, by_alias=True) + "\n", path)
+
+
+def load_fit(
+    path: str | Path,
+    campaign: Campaign,
+    *,
+    model: ModelSetup | None = None,
+    threads: int | None = None,
+) -> StoredFit:
+    """A stored fit with its campaign, without fitting again.
+
+    Parameters
+    ----------
+    path : path
+        What `save_fit` wrote.
+    campaign : Campaign
+        The tests that were fitted.
+    model : ModelSetup, optional
+        The model of one's own that was fitted; the file does not hold it.
+    threads : int, optional
+        As of `fitting.fit`.
+
+    Raises
+    ------
+    FileError, ParameterError
+        If the file is none, or was written by another version.
+    InputError
+        If the campaign is not the one that was fitted, the sentence names the run; or the model is
+        not given, or another one.
+    """
+    file = read_json(path, FitFile, strict=False)
+    if file.swashplate != __version__:
+        raise FileError(
+            f"{path} was written by swashplate {file.swashplate}, this is {__version__}: fit again."
+        )
+    experiments = tuple(_same(campaign, name, mark, path) for name, mark in file.runs.items())
+    nominal: Parameters
+    if isinstance(file.nominal, str):
+        nominal = read_set(file.nominal, str(path))
+    elif model is None:
+        raise InputError(f"{path} is the fit of a model of your own: give that, with --model FILE.")
+    else:
+        nominal = model.nominal(experiments)
+    if isinstance(nominal, ModelParameters) and nominal.setup.setup != file.setup:
+        raise InputError(f"{path} is the fit of another model, or of other bounds: fit again.")
+    parameters, stages = smooth(nominal), list[StageFit]()
+    for stage, entry in zip(file.setup.stages, file.stages, strict=False):
+        uncertain = file.setup.standard_uncertainty
+        problem = stage_problem(
+            stage, parameters, experiments, threads=threads, uncertain=uncertain
+        )
+        known, theirs = problem.unknowns.items, entry.unknowns
+        if (stage.name, [(each.name, each.run) for each in known]) != (
+            entry.name,
+            [(each.name, each.run) for each in theirs],
+        ) or entry.solution.vector.size != len(known):
+            raise FileError(
+                f"{path}: stage {entry.name} has other unknowns than its set-up makes: fit again."
+            )
+        problem = replace(problem, unknowns=Unknowns(theirs))
+        parameters = with_estimates(parameters, problem, entry.solution.vector)
+        stages.append(StageFit(stage, problem, entry.solution, parameters, entry.starts))
+    return StoredFit(
+        Fit(file.setup, nominal, tuple(stages)),
+        file.axis,
+        experiments,
+        file.profiles,
+        file.folds,
+        file.notes,
+    )
+
+
+def fingerprint(experiment: Experiment) -> str:
+    """Hash of a run's input and channels: stamps, samples and weights."""
+    digest = blake2b(digest_size=8)
+    start = (experiment.start, experiment.start_pressure, experiment.input.interpolation)
+    digest.update(repr(start).encode())
+    arrays = [experiment.input.time, experiment.input.values]
+    for name, channel in experiment.channels.items():
+        digest.update(f"{name} {channel.kind}".encode())
+        arrays += [channel.time, channel.values, channel.weight]
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def _same(campaign: Campaign, name: str, mark: str, path: str | Path) -> Experiment:
+    """A run of the campaign, if it is the one that was fitted."""
+    experiment = next((each for each in campaign if each.name == name), None)
+    if experiment is None:
+        raise InputError(
+            f"{path} was fitted to the run '{name}', which {campaign.path} has not: give the "
+            "campaign of the fit, or fit again."
+        )
+    if fingerprint(experiment) != mark:
+        raise InputError(
+            f"The run '{name}' of {campaign.path} is not as it was when {path} was fitted (its "
+            "samples, weights or ignored windows differ): fit again."
+        )
+    return experiment

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from itertools import chain
 from typing import Literal, NamedTuple
@@ -17,6 +17,9 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import SIGNALS
 from swashplate.identification.excitation import simulated_run
+from swashplate.identification.model import EquationModel
+from swashplate.identification.own_model import ModelSetup
+from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Setup
 from swashplate.identification.staging import stage_problem
 from swashplate.parameters.parameter_set import ParameterSet
@@ -118,8 +121,8 @@ def check_sound(
     if not _refused(found):
         card = all(stage.part == "card" for stage in setup.stages)
         found += short_runs(experiments, nominal, of_current=card)
-    if rank and not _refused(found):
-        found += _rank(experiments, nominal, setup)
+    for stage in setup.stages if rank and not _refused(found) else ():
+        found += _rank(f"Stage {stage.name}", stage_problem(stage, nominal, experiments))
     return tuple(sorted(found, key=lambda each: each.severity != "refuse"))
 
 
@@ -127,7 +130,8 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
     """What is wrong with runs beside each other and beside the nominal drive."""
     unsigned = unsigned_currents(experiments).items()
     found = [refusal(None, name, f"{said}.") for (_, name), said in unsigned]
-    found += [finding for each in experiments for finding in _samples(each)]
+    for each in experiments:
+        found += _samples(each, [n for n, c in each.channels.items() if c.kind in SIGNALS])
     if not _refused(found):
         found += idle_commands(experiments, nominal)
     if _refused(found):
@@ -145,6 +149,40 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
         }
         found += check(left)
     return found
+
+
+def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> tuple[Finding, ...]:
+    """What stands in the way of a fit of a model of one's own, as `check_sound` of a drive.
+
+    Whatever the model: samples that are no numbers, sensors that stand still while their input
+    moves, a run that is there twice, fewer samples than unknowns, and a model of equations on
+    whose unknowns nothing depends.
+    """
+    found, seen = list[Finding](), dict[bytes, str]()
+    for each in experiments:
+        found += _samples(each, setup.channels or tuple(each.channels))
+    if _refused(found):
+        return tuple(found)
+    problem = setup.problem(experiments)
+    moving = {n for e in experiments for n, c in e.channels.items() if np.ptp(c.values) > 0.0}
+    for each in problem.experiments:
+        names = [name for name in problem.channels if name in each.channels]
+        arrays = [each.input.values, *(each[name].values for name in names)]
+        first = seen.setdefault(b"".join(array.tobytes() for array in arrays), each.name)
+        if first != each.name:
+            said = (
+                f"{each.name} has the samples of {first}, to the last bit, and counts twice; leave"
+            )
+            found.append(warning(each.name, None, f'{said} one of them out with role = "ignore".'))
+        for name in names if np.ptp(each.input.values) > 0.0 else ():
+            used = each[name].values[each[name].used]
+            if name in moving and used.size and np.ptp(used) == 0.0:
+                said = f"{each.name}: '{name}' never changes, though the input does and it moves in"
+                also = "other runs; look at the sensor, or ignore the channel in this run."
+                found.append(warning(each.name, name, f"{said} {also}"))
+    if not _refused(found):
+        found += _rank(setup.name, problem)
+    return tuple(sorted(found, key=lambda each: each.severity != "refuse"))
 
 
 def contradicting_runs(
@@ -178,7 +216,7 @@ def _refused(found: Sequence[Finding]) -> bool:
 # --- samples --------------------------------------------------------------------------------------
 
 
-def _samples(experiment: Experiment) -> list[Finding]:
+def _samples(experiment: Experiment, fitted: Collection[str]) -> list[Finding]:
     """Runs without two samples, and numbers that are none."""
     name, signal = experiment.name, experiment.input
     bad = ~(np.isfinite(signal.values) & np.isfinite(signal.time))
@@ -188,12 +226,13 @@ def _samples(experiment: Experiment) -> list[Finding]:
     if bad.any():
         said = f"{name}: its input is not finite at sample {int(np.argmax(bad))}; mend the log or "
         return [refusal(name, None, f"{said}cut the run with a span.")]
-    return [finding for each in experiment.channels.values() for finding in _of_channel(name, each)]
+    channels = (each for key, each in experiment.channels.items() if key in fitted)
+    return [finding for each in channels for finding in _of_channel(name, each)]
 
 
 def _of_channel(run: str, channel: Channel) -> list[Finding]:
     used, name = channel.used, channel.name
-    if channel.kind not in SIGNALS or (channel.values.size and not used.any()):
+    if channel.values.size and not used.any():
         return []
     bad = used & ~(np.isfinite(channel.values) & np.isfinite(channel.time))
     samples = int(np.count_nonzero(used))
@@ -594,25 +633,17 @@ def _scales(name: str, ours: Sequence[Motion]) -> list[Finding]:
 # --- what the runs determine ----------------------------------------------------------------------
 
 
-def _rank(experiments: Sequence[Experiment], nominal: ParameterSet, setup: Setup) -> list[Finding]:
-    """Stages with fewer samples than unknowns, or on whose unknowns nothing depends."""
-    found: list[Finding] = []
-    for stage in setup.stages:
-        problem = stage_problem(stage, nominal, experiments)
-        unknowns, where = problem.unknowns, f"Stage {stage.name}"
-        if problem.samples < len(unknowns):
-            said = (
-                f"{where}: {_count(problem.samples)} cannot determine {len(unknowns)} unknowns; "
-                "record longer runs, or free less."
-            )
-            found.append(refusal(None, None, said))
-        elif not problem.evaluate(problem.start).jacobian.any():
-            said = (
-                f"{where}: no run depends on any of {', '.join(unknowns.names[:NAMED])}; free what "
-                "the runs exercise, or test what exercises these."
-            )
-            found.append(refusal(None, None, said))
-    return found
+def _rank(where: str, problem: Problem) -> list[Finding]:
+    """Fewer samples than unknowns, or unknowns on which nothing depends."""
+    unknowns = problem.unknowns
+    if problem.samples < len(unknowns):
+        said = f"{_count(problem.samples)} cannot determine {len(unknowns)} unknowns; "
+        return [refusal(None, None, f"{where}: {said}record longer runs, or free less.")]
+    exact = isinstance(problem.model, EquationModel)  # any other may take minutes
+    if exact and not problem.evaluate(problem.start).jacobian.any():
+        said = f"no run depends on any of {', '.join(unknowns.names[:NAMED])}; free what the runs "
+        return [refusal(None, None, f"{where}: {said}exercise, or test what exercises these.")]
+    return []
 
 
 def beside_the_drives(campaign: Campaign) -> list[str]:

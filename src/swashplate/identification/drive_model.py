@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import ChannelKind
-from swashplate.campaign.ammeter import signed_by_command
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
+from swashplate.campaign.samples import signed_by_command
 from swashplate.equations.marching.observation import ObservedRecord
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.errors import DomainError, InputError, ParameterError
@@ -113,7 +113,7 @@ class Forces:
     minus: tuple[float, float, float, float]
     """Of the negative direction, as magnitudes. [A]"""
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the eight forces."""
         return tuple(f"force_{side}_{k}" for side in ("plus", "minus") for k in (1, 2, 3, 4))

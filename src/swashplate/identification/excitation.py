@@ -21,8 +21,7 @@ from swashplate.identification.identifiability import (
     identifiability,
     listed,
 )
-from swashplate.identification.linearised import LinearisedFit, linearised_fit
-from swashplate.identification.problem import Problem
+from swashplate.identification.problem import LinearisedFit, Problem, linearised_fit
 from swashplate.identification.setup import Free, GivenForces, Setup, Stage
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.unknowns import Unknown
@@ -338,7 +337,7 @@ def outlook(
     stage : Stage
         What is free and what is fitted.
     nominal : ParameterSet or Drive
-        Nominal values; best those that `fit.smooth` makes, as a fit takes them.
+        Nominal values; best those that `fitting.smooth` makes, as a fit takes them.
     experiments : sequence of Experiment
         The runs to fit.
 

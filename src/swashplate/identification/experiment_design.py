@@ -17,16 +17,16 @@ from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import CURRENTS, SIGNALS
-from swashplate.identification.linearised import (
+from swashplate.identification.intervals import uncertainty
+from swashplate.identification.problem import (
     TOLERANCE,
+    Problem,
     linearised_fit,
     triangular_factor,
     whitening,
 )
-from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Free, Setup, Stage
 from swashplate.identification.staging import stage_problem
-from swashplate.identification.uncertainty import uncertainty
 from swashplate.identification.unknowns import Unknowns
 from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
 from swashplate.parameters.definitions import CATALOGUE, find

@@ -19,17 +19,24 @@ from swashplate.drive import Drive
 from swashplate.equations import Model as Equations
 from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial
-from swashplate.identification.data_checks import check_sound, refuse_unsound
+from swashplate.identification.data_checks import check_model, check_sound, refuse_unsound
 from swashplate.identification.drive_model import DriveModel, at_rate_of
+from swashplate.identification.intervals import weighed
 from swashplate.identification.lack_of_fit import measurement_error
 from swashplate.identification.model import Model, OwnModel
 from swashplate.identification.own_model import ModelParameters, ModelSetup, Range
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Setup, Stage
-from swashplate.identification.solving import Loss, Progress, Solution, solve
+from swashplate.identification.solving import (
+    Loss,
+    Progress,
+    Solution,
+    StartResult,
+    sobol_starts,
+    solve,
+    solve_from,
+)
 from swashplate.identification.staging import Parameters, stage_problem, with_estimates
-from swashplate.identification.starts import StartResult, sobol_starts, solve_from
-from swashplate.identification.uncertainty import weighed
 from swashplate.identification.unknowns import Unknown
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
@@ -218,6 +225,7 @@ def fit(
             entries = free if isinstance(free, Mapping) else {}
             named = tuple(channels), dict(noise or {}), dict(fixed or {})
             own = ModelSetup(own, entries, "", *named)
+        doubts = refuse_unsound(check_model(experiments, own))
         nominal = own.nominal(experiments)
         setup = own.setup
     else:
@@ -295,17 +303,7 @@ def _from_elsewhere(
         others = solve_from(problem, starts, tolerance=tolerance, max_evaluations=max_evaluations)
     except KeyboardInterrupt:  # before the first of them ended
         others = ()
-    nominal = StartResult(
-        0,
-        tuple(map(float, problem.start)),
-        tuple(map(float, found.vector)),
-        found.start_cost,
-        found.cost,
-        found.evaluations,
-        found.converged,
-        found.message,
-        found.seconds,
-    )
+    nominal = StartResult.of(0, problem.start, found)
     return nominal, *(replace(each, number=each.number + 1) for each in others)
 
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.errors import DomainError
 from swashplate.identification.drive_model import CURRENTS, DriveModel
-from swashplate.identification.linearised import TOLERANCE, triangular_factor
 from swashplate.identification.model import linearised, simulated
+from swashplate.identification.problem import TOLERANCE, triangular_factor
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
 
 if TYPE_CHECKING:
@@ -197,8 +197,7 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
             constants = list(places)[count:]
     uncertain = [place for name, place in places.items() if name.startswith(UNCERTAIN)]
     triangle = np.eye(len(places) + 1)[uncertain]
-    for block in blocks:
-        triangle = triangular_factor(np.vstack([triangle, block.placed(places)]))
+    triangle = triangular_factor(np.vstack([triangle, *(each.factor(places) for each in blocks)]))
     basis, inverse = _span(triangle[:, :count])
     shift = inverse @ triangle[:, -1]
     left = triangle[:, -1] - basis @ (basis.T @ triangle[:, -1])
@@ -311,12 +310,12 @@ class _Block(NamedTuple):
     meanings: Mapping[str, tuple[float, str, float]]
     """Factor to its unit, unit, and plausible size of each fixed parameter and fault."""
 
-    def placed(self, places: Mapping[str, int]) -> Array:
-        """(n, P + 1) all columns and the residual."""
-        made = np.zeros((self.residual.size, len(places) + 1))
-        for name, values in (*self.estimates.items(), *self.fixed.items(), *self.faults.items()):
-            made[:, places[name]] = values
-        made[:, -1] = self.residual
+    def factor(self, places: Mapping[str, int]) -> Array:
+        """(<= n, P + 1) triangular factor of its own columns and the residual, among all others."""
+        columns = {**self.estimates, **self.fixed, **self.faults}
+        factor = triangular_factor(np.column_stack([*columns.values(), self.residual]))
+        made = np.zeros((len(factor), len(places) + 1))
+        made[:, [*(places[name] for name in columns), -1]] = factor
         return made
 
     def against_known(self, places: Mapping[str, int], shift: Array) -> list[ChannelFit]:

@@ -1,34 +1,28 @@
-"""Noise of residuals: its autocorrelation, and the covariance of the estimates that follows."""
+"""Noise of residuals: autocorrelation, spectral lines, and the covariance that follows."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+from scipy.linalg import eigh_tridiagonal
 
-from swashplate.identification.linearised import LinearisedFit, LinearisedRun
+from swashplate.identification.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.unknowns import Unknowns
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
-
-Noise = Literal["white", "coloured"]
-
-LABELS: Mapping[Noise, str] = {
-    "white": "white noise (too small for coloured residuals)",
-    "coloured": "coloured noise that may swell and fade along the runs",
-}
 
 
 @dataclass(frozen=True, eq=False)
 class Covariance(Result):
     """Covariance of the solver's vector under one assumption on the noise."""
 
-    noise: Noise
     variables: Unknowns
     matrix: Array
     """(K, K); rows and columns of unknowns at a bound or undetermined are 0."""
@@ -36,11 +30,6 @@ class Covariance(Result):
     """(K,) unknowns that have a variance."""
     degrees_of_freedom: Array
     """(K,) of Student's distribution for each interval; inf is the normal one."""
-
-    @property
-    def label(self) -> str:
-        """The assumption in words."""
-        return LABELS[self.noise]
 
     @property
     def standard_errors(self) -> Array:
@@ -61,7 +50,7 @@ class Covariance(Result):
 
 
 def white_noise_covariance(fit: LinearisedFit) -> Covariance:
-    """Covariance if the residuals were white: s²(JᵀJ)⁻¹. To stand next to the others, labelled.
+    """Covariance if the residuals were white: s²(JᵀJ)⁻¹.
 
     Raises
     ------
@@ -70,16 +59,14 @@ def white_noise_covariance(fit: LinearisedFit) -> Covariance:
     """
     spare = fit.spare_samples
     matrix = fit.squares / spare * (fit.whitening @ fit.whitening.T)
-    return covariance_of("white", fit, matrix, np.full(fit.variables.count, float(spare)))
+    return covariance_of(fit, matrix, np.full(fit.variables.count, float(spare)))
 
 
-def covariance_of(noise: Noise, fit: LinearisedFit, matrix: Array, freedom: Array) -> Covariance:
+def covariance_of(fit: LinearisedFit, matrix: Array, freedom: Array) -> Covariance:
     """A covariance from a matrix, cleared of what the fit does not determine."""
     known = np.outer(fit.determined, fit.determined)
     symmetric = 0.5 * (matrix + matrix.T)
-    return Covariance(
-        noise, fit.variables, np.where(known, symmetric, 0.0), fit.determined, freedom
-    )
+    return Covariance(fit.variables, np.where(known, symmetric, 0.0), fit.determined, freedom)
 
 
 Places = NDArray[np.intp]
@@ -202,11 +189,13 @@ def correlation_length(autocovariance: Array, counts: Array) -> int:
     before = np.concatenate([[0.0], np.cumsum(rho[1:-1] ** 2)]) if rho.size > 1 else np.zeros(0)
     band = 2.0 * np.sqrt((1.0 + 2.0 * before) / np.maximum(counts[1:], 1.0))
     outside = np.abs(rho[1:]) > band  # of lag k at k - 1
-    for length in (0, *(np.flatnonzero(outside) + 1)):
-        after = outside[length : length + max(20, length // 4)]
-        if not after[:IN_A_ROW].any() and after.sum() <= STRAY * max(after.size, 1):
-            return int(length)
-    return int(rho.size - 1)
+    lengths = np.concatenate([[0], np.flatnonzero(outside) + 1])
+    ends = np.minimum(lengths + np.maximum(20, lengths // 4), outside.size)
+    so_far = np.concatenate([[0], np.cumsum(outside)])
+    near = so_far[np.minimum(lengths + IN_A_ROW, outside.size)] - so_far[lengths]
+    stray = so_far[ends] - so_far[lengths]
+    stays = (near == 0) & (stray <= STRAY * np.maximum(ends - lengths, 1))
+    return int(lengths[np.argmax(stays)]) if stays.any() else int(rho.size - 1)
 
 
 def flat_top(lags: Array, length: float) -> Array:
@@ -249,15 +238,6 @@ class NoiseColour(Result):
     def drifting(self) -> bool:
         """Whether the runs are only a few correlation lengths long: no noise does that."""
         return self.length > max(DRIFTING * self.longest, 5.0)
-
-    def effective_samples(self, samples: int) -> float:
-        """Independent samples that `samples` correlated ones are worth.
-
-        Notes
-        -----
-        n/(1 + 2 Σ ρ_k), for noise of first order n (1 - ρ)/(1 + ρ).
-        """
-        return max(samples / self.inflation, min(1.0, float(samples)))
 
 
 def unweighted(run: LinearisedRun) -> Array:
@@ -398,7 +378,7 @@ class _Sums:
         some = self.squares > 0.0
         np.divide(each * self.total**2, self.squares, out=freedom, where=some)
         matrix = self.fit.whitening @ self.middle @ self.fit.whitening.T
-        return covariance_of("coloured", self.fit, matrix, np.maximum(freedom, 1.0))
+        return covariance_of(self.fit, matrix, np.maximum(freedom, 1.0))
 
 
 class _Spectrum:
@@ -454,17 +434,7 @@ def _smoothed(values: Array) -> Array:
 def band_score_covariance(
     fit: LinearisedFit, spectra: Sequence[_Spectrum] | None = None
 ) -> Covariance:
-    """Covariance of the least-squares estimate under noise that may differ along the runs.
-
-    Parameters
-    ----------
-    fit : LinearisedFit
-        The fit. Its runs, and channels of a run, are taken as independent of each other.
-
-    Raises
-    ------
-    InputError
-        If there are no more samples than unknowns.
+    """Covariance under noise that may differ along the runs; otherwise as `spectral_covariance`.
 
     Notes
     -----
@@ -491,16 +461,6 @@ def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
     A smoothed spectrum knows the noise well but takes it as alike all along a run; scores by bands
     take in noise that is not, but are few. On the bench neither alone holds 93 to 97 % on every
     axis, both together do (docs/calibration.md).
-
-    Parameters
-    ----------
-    fit : LinearisedFit
-        The fit.
-
-    Raises
-    ------
-    InputError
-        If there are no more samples than unknowns.
     """
     spectra = spectra_of(fit)
     first, second = spectral_covariance(fit, spectra), band_score_covariance(fit, spectra)
@@ -513,3 +473,149 @@ def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
     return replace(
         first, matrix=first.matrix * np.outer(stretch, stretch), degrees_of_freedom=freedom
     )
+
+
+HALF_BANDWIDTH = 4.0
+"""Time-bandwidth product NW of the tapers, of which 2 NW - 1 are used (Thomson 1982)."""
+LOWEST = 4.0
+"""Half bandwidths of the shortest run below which no line is told from slow noise or drift."""
+FALSE_ALARM = 0.01
+"""Probability that white noise has a line, over all frequencies of a channel together."""
+MOST = 40
+"""Lines of a channel that are removed, the strongest first."""
+PADDING = 4
+"""Zeros beside a run, in its lengths, before its spectrum is taken; a parabola through the largest
+three values then tells a line's frequency to a hundredth of a bin."""
+FEWEST = 256
+"""Samples of a run from which lines are sought."""
+
+
+class SpectralLine(NamedTuple):
+    """A sinusoid in the residuals of a channel, of one frequency in all its runs."""
+
+    channel: str
+    frequency: float
+    """[Hz]"""
+    share: float
+    """Part of the channel's residual variance that removing it takes away, 0 to 1. [1]"""
+
+
+def without_lines(fit: LinearisedFit) -> tuple[LinearisedFit, tuple[SpectralLine, ...]]:
+    """A fit with the spectral lines of its residuals removed, and those lines.
+
+    Notes
+    -----
+    Lines are found by Thomson's (1982) harmonic F-test on discrete prolate spheroidal tapers,
+    numerators and denominators summed over the runs of a channel. At each a sine and a cosine are
+    fitted to every run by least squares and subtracted; what that takes from the sum of squares is
+    the line's share. None is sought below four half bandwidths of the shortest run, 16 of its
+    bins, where a model error or a drift is no line.
+    """
+    runs, found = list(fit.runs), list[SpectralLine]()
+    for channel in dict.fromkeys(run.channel for run in fit.runs):
+        members = [
+            k
+            for k, run in enumerate(fit.runs)
+            if run.channel == channel and run.time.size >= FEWEST
+        ]
+        if not members:
+            continue
+        whole = sum(
+            float(np.sum(unweighted(run) ** 2)) for run in fit.runs if run.channel == channel
+        )
+        left = {k: unweighted(fit.runs[k]) for k in members}
+        for frequency in _frequencies([left[k] for k in members], [_grid(fit, k) for k in members]):
+            before = sum(float(each @ each) for each in left.values())
+            for k in members:
+                turn = 2.0 * np.pi * frequency * fit.runs[k].time
+                waves = np.linalg.qr(np.column_stack([np.cos(turn), np.sin(turn)]))[0]
+                left[k] = left[k] - waves @ (waves.T @ left[k])
+            taken = before - sum(float(each @ each) for each in left.values())
+            found.append(SpectralLine(channel, frequency, taken / whole))
+        for k in members:
+            weight = fit.runs[k].weight
+            runs[k] = runs[k]._replace(residual=left[k] if weight is None else weight * left[k])
+    return (replace(fit, runs=tuple(runs)) if found else fit), tuple(found)
+
+
+def line_sentences(lines: Sequence[SpectralLine]) -> tuple[str, ...]:
+    """What lines there are, one sentence a channel."""
+    said = []
+    for channel in dict.fromkeys(line.channel for line in lines):
+        alike = sorted((e for e in lines if e.channel == channel), key=lambda e: e.frequency)
+        most = max(alike, key=lambda each: each.share)
+        what, largest = f"A spectral line at {most.frequency:.3g} Hz makes", ""
+        if len(alike) > 1:
+            what = (
+                f"{len(alike)} spectral lines between {alike[0].frequency:.3g} and "
+                f"{alike[-1].frequency:.3g} Hz make"
+            )
+            largest = f", the largest {100.0 * most.share:.2g} % at {most.frequency:.3g} Hz"
+        share = sum(each.share for each in alike)
+        said.append(
+            f"{what} {100.0 * share:.2g} % of the residuals' variance of {channel}{largest}."
+        )
+    return tuple(said)
+
+
+def _grid(fit: LinearisedFit, number: int) -> Grid:
+    return grid_of(fit.runs[number].time)
+
+
+def _frequencies(runs: Sequence[Array], grids: Sequence[Grid]) -> list[float]:
+    """Frequencies of significant lines, the strongest first, no two within a bandwidth. [Hz]"""
+    from scipy.special import fdtri
+
+    step = float(np.median([grid.step for grid in grids]))
+    size = next_fast_len(PADDING * max(grid.size for grid in grids), real=True)
+    count = round(2.0 * HALF_BANDWIDTH) - 1
+    explained, unexplained = np.zeros(size // 2 + 1), np.zeros(size // 2 + 1)
+    for samples, grid in zip(runs, grids, strict=True):
+        tapers = _tapers(grid.size, count)
+        spectra = rfft(tapers * grid.spread(samples), size, axis=1)
+        sums = tapers.sum(axis=1)
+        energy = float(sums @ sums)
+        amplitude = sums @ spectra / energy
+        explained += energy * np.abs(amplitude) ** 2
+        unexplained += np.sum(np.abs(spectra - sums[:, None] * amplitude) ** 2, axis=0)
+    frequencies = rfftfreq(size, step)
+    shortest = min(grid.size for grid in grids) * step
+    bandwidth = HALF_BANDWIDTH / shortest
+    looks = 0.5 * shortest / step  # independent frequencies
+    ratio = (count - 1.0) * explained / np.maximum(unexplained, 1e-300)
+    freedom = 2.0 * len(runs), 2.0 * len(runs) * (count - 1.0)
+    # the upper quantile of F is one over the lower one with its freedoms exchanged
+    limit = 1.0 / float(fdtri(*freedom[::-1], FALSE_ALARM / looks))
+    told = (ratio > limit) & (frequencies > LOWEST * bandwidth) & (frequencies < 0.5 / step)
+    chosen: list[float] = []
+    for place in np.argsort(-np.where(told, explained, 0.0)):
+        if not told[place] or len(chosen) == MOST:
+            break
+        near = abs(np.array(chosen) - frequencies[place]) < bandwidth
+        if not near.any():
+            chosen.append(float(frequencies[place] + _aside(explained, place) * frequencies[1]))
+    return chosen
+
+
+def _aside(power: Array, place: int) -> float:
+    """How far beside a maximum the parabola through it and its neighbours has its own. [bin]"""
+    if not 0 < place < power.size - 1:
+        return 0.0
+    low, middle, high = power[place - 1 : place + 2]
+    bend = low - 2.0 * middle + high
+    return float(np.clip(0.5 * (low - high) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
+
+
+@lru_cache(maxsize=32)
+def _tapers(size: int, count: int) -> Array:
+    """(count, size) Slepian sequences of unit energy, each of either sign.
+
+    Eigenvectors of Slepian's (1978) tridiagonal matrix, as in SciPy's ``dpss``, which comes with
+    all of `scipy.signal` and half a second to load it.
+    """
+    n = np.arange(size)
+    middle = (0.5 * (size - 1) - n) ** 2 * np.cos(2.0 * np.pi * HALF_BANDWIDTH / size)
+    beside = 0.5 * n[1:] * (size - n[1:])
+    wanted = (size - count, size - 1)
+    tapers: Array = eigh_tridiagonal(middle, beside, select="i", select_range=wanted)[1].T[::-1]
+    return tapers

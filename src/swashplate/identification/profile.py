@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
-from swashplate.identification.linearised import LinearisedFit
-from swashplate.identification.problem import Problem
+from swashplate.identification.problem import LinearisedFit, Problem
 from swashplate.identification.solving import Evaluation, solve
 from swashplate.identification.unknowns import Vector
 from swashplate.results import Result

@@ -14,10 +14,9 @@ import numpy as np
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.experiment_design import Advice, Gain, SensorAdvice
-from swashplate.identification.identifiability import GAUGES
+from swashplate.identification.identifiability import GAUGES, SCALES, moved_columns, true_values
+from swashplate.identification.intervals import Estimate
 from swashplate.identification.own_model import ModelParameters
-from swashplate.identification.truth import SCALES, moved_columns, true_values
-from swashplate.identification.uncertainty import Estimate, estimates
 from swashplate.identification.validation import ignored_windows, pooled, with_speeds
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.simulation.instance import START_PRESSURE
@@ -37,14 +36,13 @@ from swashplate.units import chosen_unit, display_unit
 
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Channel, Experiment
-    from swashplate.identification.assessment import Assessment, Measures, RunQuality
-    from swashplate.identification.bootstrap import Bootstrap
-    from swashplate.identification.cross_validation import CrossValidation
+    from swashplate.identification.acceptance import Verdict
+    from swashplate.identification.assessment import Assessment
     from swashplate.identification.excitation import Outlook
     from swashplate.identification.fitting import Fit, StageFit
+    from swashplate.identification.resampling import Bootstrap, CrossValidation
     from swashplate.identification.unknowns import Unknown
-    from swashplate.identification.validation import ErrorTable
-    from swashplate.identification.verdict import Verdict
+    from swashplate.identification.validation import Measures, RunQuality
     from swashplate.parameters.parameter_set import ParameterSet
 
 # --- estimates ------------------------------------------------------------------------------------
@@ -64,7 +62,7 @@ def estimates_table(
     assessment : Assessment
         Of the stage.
     truth : ParameterSet, optional
-        Of virtual tests, in the scales that the fit kept fixed (`truth.in_the_fits_scales`).
+        Of virtual tests, in the scales that the fit kept fixed, see `in_the_fits_scales`.
     bootstrap : Bootstrap, optional
         Whose intervals stand beside.
     own : bool
@@ -74,9 +72,8 @@ def estimates_table(
     unknowns = stage.problem.unknowns
     true = {} if truth is None else true_values(stage, truth)
     refitted = None if bootstrap is None else bootstrap.intervals()
-    level, quoted, white = _intervals(assessment)
+    level, quoted = _intervals(assessment)
     ends = f"{100.0 * level:g} %"
-    head = " white noise," if _alternating(quoted, white) else " white noise, too small,"
     number = ".5g"
     made = Table(
         f"Stage {stage.stage.name}",
@@ -93,8 +90,6 @@ def estimates_table(
             Column(f"lower {ends}", number, none=NONE),
             Column(f"upper {ends}", number, none=NONE),
             Column("half width", "s", of="p"),
-            Column(f"{ends}{head} from", number, of="p", none=NONE),
-            Column("to", number, of="p", none=NONE),
             Column(f"bootstrap lower {ends}", number, none="-", of="tpf" if refitted else ""),
             Column(f"bootstrap upper {ends}", number, none="-", of="tpf" if refitted else ""),
             Column("standard error", number, of="f"),
@@ -106,7 +101,7 @@ def estimates_table(
     for k, (name, unknown) in enumerate(zip(unknowns.names, unknowns, strict=True)):
         if (unknown.run is None) == own:
             continue
-        estimate, narrow = quoted[k], white[k]
+        estimate = quoted[k]
         value, factor = stage.values[name], chosen_unit(unknown.unit).factor
         status = at_bounds.get(name, "estimated") if estimate is None else estimate.status
         low, high = (None, None) if estimate is None else (estimate.lower, estimate.upper)
@@ -131,7 +126,6 @@ def estimates_table(
             lower,
             upper,
             NONE if low is None or high is None else f"±{percent(0.5 * (high - low), value)}",
-            *((None, None) if narrow is None else (narrow.lower, narrow.upper)),
             *redrawn,
             None if estimate is None else estimate.standard_error,
             status,
@@ -147,27 +141,13 @@ def _end(value: float | None, shown: str, factor: float, side: str) -> Cell:
     return Cell(value, shown or f"{factor * value:.5g}")
 
 
-def _intervals(
-    assessment: Assessment,
-) -> tuple[float, Sequence[Estimate | None], Sequence[Estimate | None]]:
-    """Level, intervals and those for white noise; none where the verdict says why."""
+def _intervals(assessment: Assessment) -> tuple[float, Sequence[Estimate | None]]:
+    """Level and intervals; none where the verdict says why."""
     try:
         found = assessment.uncertainty
-        return found.level, found.estimates, estimates(found.white, level=found.level)
+        return found.level, found.estimates
     except InputError:
-        nothing = [None] * len(assessment.stage.problem.unknowns)
-        return 0.95, nothing, nothing
-
-
-def _alternating(quoted: Sequence[Estimate | None], white: Sequence[Estimate | None]) -> bool:
-    """Whether white noise would give the wider intervals, as for residuals that alternate."""
-    pairs = [
-        (wide.standard_error, narrow.standard_error)
-        for wide, narrow in zip(quoted, white, strict=True)
-        if wide is not None and narrow is not None
-    ]
-    ratios = sorted(narrow / wide for wide, narrow in pairs if wide and narrow)
-    return bool(ratios) and ratios[len(ratios) // 2] > 1.0
+        return 0.95, [None] * len(assessment.stage.problem.unknowns)
 
 
 def _at_bounds(stage: StageFit) -> dict[str, str]:
@@ -431,47 +411,6 @@ def residual_table(qualities: Sequence[RunQuality]) -> Table:
     return made
 
 
-def errors_table(found: ErrorTable) -> Table:
-    """The thesis's error table of one channel: the largest error of each kind of test."""
-    made = Table(
-        f"Largest per cent error of {found.channel}, by kind of test",
-        (
-            Column("kind"),
-            Column("error", ".2f", none="-"),
-            Column(""),
-            Column("in", wrap=True),
-            Column("at", ".2f", "s", none="-"),
-            Column("samples", ",d"),
-            Column("runs", "d"),
-        ),
-    )
-    for row in found.rows:
-        where = row.run or "no sample is left"
-        sign = "" if row.percent is None else "%"
-        made.add(row.kind, row.percent, sign, where, row.time, row.samples, row.runs)
-    return made
-
-
-def left_out(errors: Sequence[ErrorTable]) -> list[str]:
-    """What error tables leave out, each rule that acted once, and what else belongs to them."""
-    said = ["Per cent of what is measured at that instant."] if errors else []
-    acted = {rule for each in errors for rule in each.acted}
-    for rule in dict.fromkeys(rule for each in errors for rule in each.rules):
-        if rule not in acted:
-            continue
-        runs = dict.fromkeys(run for each in errors for run, by in each.left_out if by == rule.name)
-        whole = f" All of: {', '.join(runs)}." if runs else ""
-        said.append(f"Left out ({rule.name}): {rule.why}{whole}")
-    averages = {each.average for each in errors if each.average}
-    said += [f"Differences of currents are averaged over {a:g} s: they dither." for a in averages]
-    if any(each.channel.startswith("speed from ") for each in errors):
-        said.append("Measured and simulated positions are filtered alike to become speeds.")
-    unjudged = dict.fromkeys(run for each in errors for run in each.unjudged)
-    if unjudged:
-        said.append(f"Neither ramp, step nor sine, or too short: {listed([*unjudged])}.")
-    return said
-
-
 def criteria_table(verdict: Verdict) -> Table:
     """The acceptance criteria, those that are not met first."""
     columns = (Column("criterion", wrap=True), Column("value", "s"), Column("limit", "s"))
@@ -673,10 +612,6 @@ def best_tests_table(gains: Sequence[Gain], best: Mapping[str, tuple[str, Gain]]
         test, after = best.get(gain.name, ("none tells more", gain))
         made.add(gain.name, _error(gain.before), _error(after.after), test)
     return made
-
-
-def _gained(gain: Gain) -> str:
-    return f"{gain.name} {_error(gain.before)} to {_error(gain.after)}"
 
 
 def _error(error: float) -> str:

@@ -9,7 +9,7 @@ from math import exp, isfinite, log, sqrt
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from pydantic import PlainSerializer, PlainValidator
 
 from swashplate.errors import InputError, ParameterError
@@ -41,7 +41,7 @@ class Prior:
     """Standard deviation, positive; of a logarithmic unknown that of its logarithm."""
     worth: float = 1.0
     """Squared residuals of the data's cost that stand for one independent one of variance 1: so
-    often the prior counts, see `uncertainty.weighed`."""
+    often the prior counts, see `intervals.weighed`."""
 
 
 @dataclass(frozen=True)
@@ -113,27 +113,14 @@ def bounded(
 ) -> Unknown:
     """An unknown with bounds that are multiples of its nominal value, or numbers.
 
-    Parameters
-    ----------
-    name : str
-        Its name.
-    nominal : float
-        Where the fit begins.
-    relative, absolute : (float, float)
-        One of the two: factors on the nominal value, in either order, or bounds as they are.
-    least : float, optional
-        Value that it must not fall below, whatever the bounds: it begins there at the lowest.
-    **more :
-        Other fields of `Unknown`.
+    `relative` are factors on the nominal value, in either order, `absolute` the bounds as they are;
+    it never falls below `least`, and begins there at the lowest. `more` are fields of `Unknown`.
 
     Raises
     ------
     ParameterError
-        If both or none are given, or `relative` is given for a nominal value of 0, which no
-        factor moves.
+        If `relative` is given for a nominal value of 0, which no factor moves.
     """
-    if (relative is None) == (absolute is None):
-        raise ParameterError(f"{name} needs bounds: give relative or absolute ones, one of them.")
     if relative is not None:
         if nominal == 0.0:
             raise ParameterError(
@@ -167,66 +154,6 @@ class Unknowns(Result, Sequence[Unknown]):
                 if (each.run, target) in taken:
                     raise ParameterError(f"{target} is set by two unknowns; let one set it.")
                 taken.add((each.run, target))
-
-    @classmethod
-    def of(
-        cls,
-        names: Sequence[str],
-        values: ArrayLike,
-        *,
-        scales: ArrayLike | None = None,
-        logarithmic: ArrayLike | None = None,
-        at_bound: ArrayLike | None = None,
-    ) -> Unknowns:
-        """Unknowns of a Jacobian from elsewhere, at their estimates.
-
-        Parameters
-        ----------
-        names : sequence of str
-            K names, all different.
-        values, scales : (K,) array_like
-            Estimates, and what counts as 100 %; by default each estimate's size, 1 for 0.
-        logarithmic : (K,) array_like of bool, optional
-            Which are moved by their logarithms; none by default.
-        at_bound : (K,) array_like of int, optional
-            -1 at the lower bound, 1 at the upper, 0 between; none at a bound by default.
-
-        Raises
-        ------
-        InputError
-            If lengths differ, a name appears twice, a number is not finite, a scale is not
-            positive, or a logarithmic value is not.
-        """
-        count = len(names)
-        number = np.asarray(values, dtype=np.float64)
-        own = np.where(number == 0.0, 1.0, np.abs(number))
-        size = own if scales is None else np.asarray(scales, dtype=np.float64)
-        logs = np.zeros(count, bool) if logarithmic is None else np.asarray(logarithmic, bool)
-        bound = np.zeros(count, np.int8) if at_bound is None else np.asarray(at_bound, np.int8)
-        arrays = {"values": number, "scales": size, "logarithmic": logs, "at_bound": bound}
-        for what, array in arrays.items():
-            if array.shape != (count,):
-                raise InputError(f"{count} unknowns need as many {what}, not {array.shape}.")
-        if len(set(names)) < count:
-            twice = next(name for name in names if list(names).count(name) > 1)
-            raise InputError(f"The unknown {twice} appears twice; name each once.")
-        items = []
-        for name, value, scale, by_log, side in zip(names, number, size, logs, bound, strict=True):
-            if not np.isfinite(value) or not (np.isfinite(scale) and scale > 0.0):
-                raise InputError(
-                    f"{name} = {value:g} with the scale {scale:g}: both must be finite and the "
-                    "scale positive."
-                )
-            if by_log and value <= 0.0:
-                raise InputError(f"{name} = {value:g} has no logarithm; it must be positive.")
-            low, high = (value / 1e9, value * 1e9) if by_log else (value - scale, value + scale)
-            low, high = (value if side < 0 else low), (value if side > 0 else high)
-            items.append(
-                Unknown(name, float(value), low, high, log=bool(by_log), scale=float(scale))
-            )
-        if not items:
-            raise InputError("A fit needs at least one unknown.")
-        return cls(tuple(items))
 
     def __getitem__(self, index):  # type: ignore[no-untyped-def]
         return self.items[index]

@@ -1,32 +1,287 @@
-"""Validation: runs predicted from the command alone, measures, and the source's error tables."""
+"""Validation: measures and tests of residuals, and runs predicted from the command alone."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple, get_args
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.speed import speed_of
 from swashplate.errors import InputError
-from swashplate.identification.assessment import (
-    Measures,
-    RunQuality,
-    compared,
-    measures,
-    pooled_measures,
-)
 from swashplate.identification.drive_model import SIGNALS, DriveModel, current_record
+from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
 from swashplate.identification.own_model import ModelParameters
+from swashplate.identification.problem import Problem
 from swashplate.identification.staging import Parameters
 from swashplate.parameters.parameter_set import HasParameters, set_of
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Kind = Literal["ramp", "step", "sine"]
+
+
+LONGEST_SHOWN = 2.0
+"""Largest lag of the curves. [s]"""
+
+DEVIATIONS = 1.96
+"""Half width of the bands, in standard deviations: 95 %."""
+
+CHANCE = 0.05
+"""Probability that unrelated signals are said to be related, all lags together."""
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualTest(Result):
+    """Whiteness of the residuals of one channel of one run, and independence of the input."""
+
+    lags: Array
+    """(m,) from 0. [s]"""
+    autocorrelation: Array
+    """(m,) of the residuals."""
+    white_band: float
+    """Half width of the 95 % band of white noise."""
+    cross_lags: Array
+    """(2 m - 1,) positive where the residual comes after the input. [s]"""
+    cross_correlation: Array
+    """(2 m - 1,) of the residuals with the input."""
+    cross_band: float
+    """Half width of the 95 % band of residuals, coloured as these are, without relation to the
+    input."""
+    duration: float
+    """Time over which the residuals stay correlated; 0 if they are white. [s]"""
+    verdict: str
+    """In words."""
+
+    @property
+    def white(self) -> bool:
+        """Whether nothing but white noise is left."""
+        return self.duration == 0.0
+
+    @property
+    def peak(self) -> tuple[float, float]:
+        """Lag of the largest cross-correlation [s], and its value."""
+        place = int(np.argmax(np.abs(self.cross_correlation)))
+        return float(self.cross_lags[place]), float(self.cross_correlation[place])
+
+
+def residual_test(
+    time: Array, residual: Array, command: Array, *, longest: float = LONGEST_SHOWN
+) -> ResidualTest:
+    """Test the residuals of one channel of one run.
+
+    Parameters
+    ----------
+    time : (n,) array
+        Stamps of the samples that count; gaps are respected. [s]
+    residual, command : (n,) arrays
+        Simulated less measured, weights left out, and the input at the same stamps.
+    longest : float
+        Largest lag of the curves; at most a quarter of the run is shown. [s]
+
+    Raises
+    ------
+    InputError
+        If there are fewer than 8 samples.
+
+    Notes
+    -----
+    The band of the cross-correlation is 1.96 √(Σ ρ_r ρ_u/n): two coloured signals without any
+    relation show large correlations by chance (Bartlett's formula), and a band of 1.96/√n would
+    call every one of them a finding.
+    """
+    if time.size < 8:
+        raise InputError(f"{time.size} samples tell nothing of correlation; 8 are the least.")
+    first = float(residual[0])
+    grid = grid_of(time)
+    most = max(int(LONGEST * grid.size), 1)
+    shown = min(most, max(int(longest / grid.step), 1))
+    residual, command = residual - residual.mean(), command - command.mean()
+    own, counts = _autocorrelation(residual, grid, most)
+    length = correlation_length(own, counts)
+    # beyond the residuals' own length their estimated correlation is chance
+    kept = slice(1, max(length, 1) + 1)
+    theirs = _autocorrelation(command, grid, most)[0]
+    inflation = max(1.0, 1.0 + 2.0 * float(own[kept] @ theirs[kept]))
+    band = min(DEVIATIONS * float(np.sqrt(inflation / time.size)), 1.0)
+    cross = np.zeros(2 * shown + 1)
+    scale = float(np.linalg.norm(residual) * np.linalg.norm(command))
+    if scale > 0.0:
+        size = next_fast_len(grid.size + shown, real=True)
+        spectra = rfft(grid.spread(command), size).conj() * rfft(grid.spread(residual), size)
+        products = irfft(spectra, size)
+        cross = np.concatenate([products[size - shown :], products[: shown + 1]]) / scale
+    lags: Array = np.arange(shown + 1.0) * grid.step
+    both = np.concatenate([-lags[:0:-1], lags])
+    white = DEVIATIONS / float(np.sqrt(time.size))
+    duration = length * grid.step
+    made = ResidualTest(lags, own[: shown + 1], white, both, cross, band, duration, "")
+    return replace(made, verdict=_in_words(made, first))
+
+
+def _in_words(test: ResidualTest, first: float) -> str:
+    """The verdict of a test; `first` is the first residual."""
+    if not test.autocorrelation[1:].any():
+        what = "exactly zero" if first == 0.0 else f"{first:.4g} throughout"
+        return f"The residuals are {what}: there is no noise to test."
+    colour = (
+        "The residuals are white"
+        if test.white
+        else f"The residuals stay correlated over {test.duration:.2g} s"
+    )
+    if not test.cross_correlation.any():
+        return f"{colour}; the input is constant and explains nothing."
+    from scipy.special import ndtri
+
+    # neighbouring lags say the same: as many looks as correlation lengths fit
+    looks = max(test.cross_lags.size / max(test.duration / test.lags[1], 1.0), 1.0)
+    limit = -float(ndtri(0.5 * CHANCE / looks)) / DEVIATIONS * test.cross_band
+    lag, value = test.peak
+    if abs(value) <= limit:
+        return f"{colour} and have no relation to the input."
+    when = (
+        f"{abs(lag):.2g} s {'after' if lag > 0.0 else 'before'} it" if lag else "at the same time"
+    )
+    return (
+        f"{colour} and follow the input (correlation {value:+.2f} {when}): the model leaves out "
+        "something that the input causes."
+    )
+
+
+def _autocorrelation(samples: Array, grid: Grid, lags: int) -> tuple[Array, Array]:
+    sums, counts = pair_sums(samples, grid, lags)
+    means = sums / np.maximum(counts, 1.0)
+    if not means[0] > 0.0:
+        return np.where(np.arange(lags + 1) == 0, 1.0, 0.0), counts
+    return np.clip(means / means[0], -1.0, 1.0), counts
+
+
+class Measures(NamedTuple):
+    """Measures of one channel of one run, or of several together."""
+
+    samples: int
+    """Samples that count."""
+    rmse: float
+    """Root of the mean squared difference, in the channel's unit."""
+    spread: float
+    """Standard deviation of what was measured, in the channel's unit."""
+
+    @property
+    def nrmse(self) -> float | None:
+        """RMSE over the measured standard deviation; None where nothing moved."""
+        return self.rmse / self.spread if self.spread > 0.0 else None
+
+    @property
+    def fit_percent(self) -> float | None:
+        """100 (1 - NRMSE); 100 is perfect, 0 no better than the measured mean. [%]"""
+        return None if self.nrmse is None else 100.0 * (1.0 - self.nrmse)
+
+    @property
+    def r_squared(self) -> float | None:
+        """1 - NRMSE²."""
+        return None if self.nrmse is None else 1.0 - self.nrmse**2
+
+    @property
+    def sentence(self) -> str:
+        """The verdict for a table's cell or a line of text."""
+        if self.fit_percent is None:
+            return f"RMSE {self.rmse:.4g}; what was measured is constant, so there is no fit %"
+        return f"RMSE {self.rmse:.4g}, fit {self.fit_percent:.1f} %, R² {self.r_squared:.4f}"
+
+
+def measures(measured: Array, simulated: Array, weight: Array | None = None) -> Measures:
+    """Measures of one channel of one run.
+
+    Parameters
+    ----------
+    measured, simulated : (n,) arrays
+        In the channel's unit.
+    weight : (n,) array, optional
+        Factors on the squared errors, of which those that are 0 say which samples do not count. The
+        others weigh nothing here: a window of weight ten would otherwise pass for the whole run.
+
+    Raises
+    ------
+    InputError
+        If lengths differ, no sample counts, one that does is not finite, or a weight is negative.
+    """
+    return pooled_measures([(measured, simulated, weight)])
+
+
+def pooled_measures(runs: list[tuple[Array, Array, Array | None]]) -> Measures:
+    """Measures of one channel over several runs, each about the mean of all; else as `measures`."""
+    parts = [_counting(*run) for run in runs]
+    measured, simulated = (np.concatenate(column) for column in zip(*parts, strict=True))
+    if not measured.size:
+        raise InputError("No sample counts: all are ignored or have weight 0.")
+    mean = float(measured.mean())
+    # a constant channel's own mean is off by rounding
+    about = measured - mean
+    about[np.abs(about) <= 4.0 * np.finfo(np.float64).eps * abs(mean)] = 0.0
+    rmse, spread = (float(np.sqrt(np.mean(each**2))) for each in (simulated - measured, about))
+    return Measures(measured.size, rmse, spread)
+
+
+def _counting(measured: Array, simulated: Array, weight: Array | None) -> tuple[Array, Array]:
+    """The samples that count."""
+    factor = np.ones(measured.shape) if weight is None else weight
+    if measured.shape != simulated.shape or measured.shape != factor.shape:
+        raise InputError(
+            f"{measured.size} measured and {simulated.size} simulated samples with {factor.size} "
+            "weights cannot be compared; simulate at the measurement's stamps."
+        )
+    if not (factor >= 0.0).all():
+        raise InputError(
+            "A weight is negative or not a number; a factor on a squared error is 0 or more."
+        )
+    used = factor > 0.0
+    for what, samples in (("measured", measured), ("simulated", simulated)):
+        if not np.isfinite(samples[used]).all():
+            row = int(np.flatnonzero(used & ~np.isfinite(samples))[0])
+            raise InputError(f"Sample {row + 1} of what was {what} is not finite; ignore it.")
+    return measured[used], simulated[used]
+
+
+@dataclass(frozen=True, eq=False)
+class RunQuality(Result):
+    """How well one channel of one run is simulated."""
+
+    experiment: Experiment
+    channel: str
+    simulated: Array
+    """(m,) at the channel's stamps, its free zero included. [unit of the channel]"""
+    measures: Measures
+    test: ResidualTest | None
+    """None where there are too few samples."""
+
+    @property
+    def residual(self) -> Array:
+        """(m,) simulated less measured."""
+        return self.simulated - self.experiment[self.channel].values
+
+
+def run_qualities(problem: Problem, vector: Array) -> tuple[RunQuality, ...]:
+    """Quality of each channel of each run of a problem at a point."""
+    return tuple(
+        compared(experiment, name, simulated)
+        for number, experiment in enumerate(problem.experiments)
+        for name, simulated in problem.outputs(vector, number).items()
+        if experiment[name].used.any()
+    )
+
+
+def compared(experiment: Experiment, name: str, simulated: Array) -> RunQuality:
+    """Quality of one channel of one run, simulated at its stamps."""
+    channel = experiment[name]
+    used, test = channel.used, None
+    if np.count_nonzero(used) >= 8:
+        time, residual = channel.time[used], (simulated - channel.values)[used]
+        test = residual_test(time, residual, experiment.input.at(time))
+    found = measures(channel.values, simulated, channel.weight)
+    return RunQuality(experiment, name, simulated, found, test)
 
 
 def predict(
@@ -148,282 +403,3 @@ def _speed_quality(quality: RunQuality) -> RunQuality | None:
         measures(speed.values, same.speed, speed.weight),
         None,
     )
-
-
-# --- the source's error tables --------------------------------------------------------------------
-
-START = 400.0 / 512.0
-"""Begin of speed records that is left out. [s]"""
-OVERSHOOT = 2.0
-"""What is left out behind an edge of a step, its rise taken in. [s]"""
-CROSSING = 0.1
-"""Of a sine's largest command, below which one ammeter around both leads misreads. [1]"""
-FAST = 0.3
-"""Frequency from which sines are left out. [Hz]"""
-SMALL = 0.2
-"""Of the largest measured size, below which a per cent means nothing. [1]"""
-EDGE = 0.25
-"""A jump between two samples by this part of the largest command is an edge."""
-OFF_ZERO = 0.01
-"""Part of the largest command beyond which it has left zero."""
-DITHER_MEAN = 0.1
-"""Width of the moving mean over a current's differences, against the dither. [s]"""
-
-
-@dataclass(frozen=True, eq=False)
-class ComparedRun:
-    """One run of one kind of test, measured and simulated, where it counts."""
-
-    name: str
-    kind: Kind
-    quantity: str
-    """Kind of the channel, such as ``"shaft_speed"``."""
-    time: Array
-    """(n,) stamps. [s]"""
-    command: Array
-    """(n,) voltage. [V]"""
-    measured: Array
-    """(n,) in the channel's unit."""
-    simulated: Array
-    """(n,) the same."""
-    frequency: float | None = None
-    """Of a sine. [Hz]"""
-
-
-class Rule(NamedTuple):
-    """What leaves out samples."""
-
-    name: str
-    """In a few words."""
-    why: str
-    """What is left out and for what reason, as a sentence."""
-    excluded: Callable[[ComparedRun], Mask | bool]
-    """From a run the (n,) samples that are left out, or one answer for all."""
-
-
-def _after_edges(run: ComparedRun) -> Mask | bool:
-    if run.kind != "step":
-        return False
-    since = run.time[:, None] - edges(run)
-    after: Mask = np.any((since >= 0.0) & (since < OVERSHOOT), axis=1)
-    return after
-
-
-def _small(values: Array, share: float) -> Mask:
-    size = np.abs(values)
-    small: Mask = size < share * size.max(initial=0.0)
-    return small
-
-
-SOURCE_RULES: tuple[Rule, ...] = (
-    Rule(
-        "start transient",
-        f"The first {START:.3g} s of the speed: the plussing acts as a step when the simulation "
-        "begins.",
-        lambda run: (run.time < run.time[0] + START) & (run.quantity == "shaft_speed"),
-    ),
-    Rule(
-        "overshoot",
-        f"{OVERSHOOT:.3g} s after each edge of the command in step tests: the solenoids' overshoot "
-        "is not modelled.",
-        _after_edges,
-    ),
-    Rule(
-        "zero crossings",
-        f"Sines of the rectified current below {100.0 * CROSSING:.3g} % of the largest command: "
-        "one ammeter around both leads misreads where the solenoids change over.",
-        lambda run: (
-            (run.kind == "sine" and run.quantity == "rectified_current")
-            & _small(run.command, CROSSING)
-        ),
-    ),
-    Rule(
-        "fast sines",
-        f"Sines of {FAST:g} Hz and above: faster than any swell that a crane is to follow.",
-        lambda run: run.kind == "sine" and (run.frequency or 0.0) >= (1.0 - 1e-6) * FAST,
-    ),
-    Rule(
-        "small values",
-        f"Measured values below {100.0 * SMALL:.3g} % of the run's largest: a per cent of next to "
-        "nothing means nothing. The source does not state how it did this.",
-        lambda run: _small(run.measured, SMALL),
-    ),
-)
-"""The source's exclusions on hoist."""
-
-STEPS = Rule(
-    "steps",
-    "All step tests: the turret swings in its backlash, so that no steady value can be told.",
-    lambda run: run.kind == "step",
-)
-
-
-def source_rules(drive: str) -> tuple[Rule, ...]:
-    """What the source leaves out of its tables for a drive of that name: of slew all steps."""
-    return (*SOURCE_RULES, STEPS) if drive == "slew" else SOURCE_RULES
-
-
-def edges(run: ComparedRun) -> Array:
-    """Instants at which the command jumps, or leaves zero for the first time. [s]"""
-    size = np.abs(run.command)
-    largest = float(size.max(initial=0.0))
-    if largest == 0.0:
-        return np.zeros(0)
-    jumps = np.flatnonzero(np.abs(np.diff(run.command)) > EDGE * largest)
-    leaving = np.flatnonzero(size > OFF_ZERO * largest)[:1]
-    found: Array = run.time[np.unique(np.concatenate([jumps + 1, leaving]))]
-    return found
-
-
-class LargestError(NamedTuple):
-    """The largest error of a kind of test."""
-
-    kind: Kind
-    percent: float | None
-    """None where no sample is left. [%]"""
-    run: str | None
-    """In which it is."""
-    time: float | None
-    """When. [s]"""
-    samples: int
-    """That were looked at, in all runs of the kind."""
-    runs: int
-    """Runs of the kind of which some samples were looked at."""
-
-
-@dataclass(frozen=True)
-class ErrorTable:
-    """Largest per cent errors of one channel, as in the source's tables 4.5, 4.6, 7.5 and 7.6."""
-
-    channel: str
-    rows: tuple[LargestError, ...]
-    """Of the kinds of test that there are: ramp, step, sine."""
-    rules: tuple[Rule, ...]
-    """That were applied."""
-    acted: tuple[Rule, ...]
-    """Those of them that left out a sample."""
-    left_out: tuple[tuple[str, str], ...]
-    """Runs that were left out as a whole, and the rule."""
-    average: float
-    """Width of the moving mean over the differences. [s]"""
-    unjudged: tuple[str, ...] = ()
-    """Runs that are neither ramp, step nor sine, or too short."""
-
-
-def error_tables(
-    qualities: Sequence[RunQuality], rules: Sequence[Rule] = SOURCE_RULES
-) -> tuple[ErrorTable, ...]:
-    """The source's error table of each channel: the largest per cent error by kind of test.
-
-    Positions are passed over: their zero is free, so that a per cent of one means nothing; take
-    `with_speeds`. The source speaks of the region with the largest per cent error and gives neither
-    formula nor limits of the regions; they are stated here as rules and printed with the table.
-    """
-    made = []
-    for name in dict.fromkeys(each.channel for each in qualities):
-        alike = [each for each in qualities if each.channel == name]
-        channel = alike[0].experiment[name]
-        found = {each.experiment.name: compared_run(each) for each in alike}
-        judged = [run for run in found.values() if run is not None]
-        if judged and not channel.is_position:
-            unjudged = tuple(run for run, each in found.items() if each is None)
-            average = DITHER_MEAN if channel.unit == "A" else 0.0
-            made.append(error_table(name, judged, rules, average, unjudged))
-    return tuple(made)
-
-
-def compared_run(quality: RunQuality) -> ComparedRun | None:
-    """A channel of a run as the source's error tables take it, None if it is of no kind there."""
-    experiment, channel = quality.experiment, quality.experiment[quality.channel]
-    kind, used = kind_of(experiment), channel.used
-    if kind is None or np.count_nonzero(used) < 8:
-        return None
-    time, recognised = channel.time[used], experiment.recognised
-    return ComparedRun(
-        experiment.name,
-        kind,
-        channel.kind,
-        time,
-        experiment.input.at(time),
-        channel.values[used],
-        quality.simulated[used],
-        recognised.frequency if recognised is not None else None,
-    )
-
-
-def kind_of(experiment: Experiment) -> Kind | None:
-    """Kind of a test in the source's tables, by the first word of its manoeuvre."""
-    word = experiment.maneuver.split(" ")[0]
-    return next((each for each in get_args(Kind) if each == word), None)
-
-
-def error_table(
-    channel: str,
-    runs: Sequence[ComparedRun],
-    rules: Sequence[Rule] = SOURCE_RULES,
-    average: float = 0.0,
-    unjudged: tuple[str, ...] = (),
-) -> ErrorTable:
-    """Largest per cent error of what is measured in runs of one axis and channel, by kind of test.
-
-    `average` is the width of a moving mean over the differences, for currents with dither: the
-    source read its errors off figures. 0 is none. [s]
-
-    Raises
-    ------
-    InputError
-        If lengths differ or a number is not finite.
-    """
-    rows, acted, left_out = [], set[str](), list[tuple[str, str]]()
-    for kind in get_args(Kind):
-        alike = [run for run in runs if run.kind == kind]
-        best: tuple[float, str, float] | None = None
-        samples = judged = 0
-        for run in alike:
-            kept, by, whole = kept_by(run, rules)
-            acted.update(by)
-            left_out += [(run.name, by[0])] if whole else []
-            percent = _percent(run, average)
-            places = np.flatnonzero(kept & np.isfinite(percent))
-            samples += places.size
-            judged += bool(places.size)
-            if places.size and (best is None or percent[places].max() > best[0]):
-                worst = int(places[np.argmax(percent[places])])
-                best = float(percent[worst]), run.name, float(run.time[worst])
-        if alike:
-            percent_of, where, when = best or (None, None, None)
-            rows.append(LargestError(kind, percent_of, where, when, samples, judged))
-    of_use = tuple(rule for rule in rules if rule.name in acted)
-    return ErrorTable(
-        channel, tuple(rows), tuple(rules), of_use, tuple(left_out), average, unjudged
-    )
-
-
-def kept_by(run: ComparedRun, rules: Sequence[Rule]) -> tuple[Mask, list[str], bool]:
-    """(n,) samples that rules leave in, names of those that act, and whether one leaves out all."""
-    arrays = (run.time, run.command, run.measured, run.simulated)
-    if len({each.shape for each in arrays}) != 1 or not run.time.size:
-        raise InputError(f"{run.name}: time, command, measured and simulated differ in length.")
-    if not all(np.isfinite(each).all() for each in arrays):
-        raise InputError(f"{run.name}: a sample is not finite; leave it out.")
-    kept, acted = np.ones(run.time.shape, dtype=np.bool_), list[str]()
-    for rule in rules:
-        out = np.broadcast_to(rule.excluded(run), kept.shape)
-        if out.all():
-            # of what is not there at all no other rule can take anything
-            return ~out, [rule.name], True
-        acted += [rule.name] if out.any() else []
-        kept &= ~out
-    return kept, acted, False
-
-
-def _percent(run: ComparedRun, average: float) -> Array:
-    """(n,) errors of what is measured; nan where that is nothing. [%]"""
-    difference = run.simulated - run.measured
-    if average > 0.0 and run.time.size > 1:
-        width = max(round(average / float(np.median(np.diff(run.time)))), 1)
-        inside = np.convolve(np.ones(difference.size), np.ones(width), "same")
-        difference = np.convolve(difference, np.ones(width), "same") / inside
-    size = np.abs(run.measured)
-    nothing = np.full_like(size, np.nan)
-    return np.divide(100.0 * np.abs(difference), size, out=nothing, where=size > 0.0)

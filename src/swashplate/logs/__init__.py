@@ -4,6 +4,8 @@
 SI. A file that is damaged or hostile ends in one sentence, and nothing half-read is returned.
 """
 
+from swashplate.logs.apart import LONG as LONG
+from swashplate.logs.apart import in_parts as in_parts
 from swashplate.logs.dialect import TextOptions as TextOptions
 from swashplate.logs.log import SUFFIXES as SUFFIXES
 from swashplate.logs.log import Column as Column
@@ -16,5 +18,3 @@ from swashplate.logs.log import check_stamps as check_stamps
 from swashplate.logs.log import open_log as open_log
 from swashplate.logs.log import read_series as read_series
 from swashplate.logs.log import unit_of as unit_of
-from swashplate.logs.long import LONG as LONG
-from swashplate.logs.long import in_parts as in_parts

@@ -3,7 +3,8 @@
 At some damage Polars aborts the whole process that reads a Parquet file, the HDF5 library goes
 round in circles, asammdf prints what it meets. A second process, started at the first such file and
 kept for the next, can be ended instead, has a limit to its memory, and turns whatever a library
-raises into one sentence.
+raises into one sentence. A text log of more rows than are held at once is converted to a Parquet
+table once, which is then read in parts.
 """
 
 from __future__ import annotations
@@ -16,16 +17,20 @@ import sys
 import tempfile
 import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import IO, TYPE_CHECKING, Any, cast
 from weakref import finalize
 
 import numpy as np
 
 from swashplate.errors import FileError, InputError, SwashplateError
-from swashplate.logs.log import Array, Column, Log, printable, reader_of, said
+from swashplate.logs.log import Array, Column, Log, opener, printable, said
+
+if TYPE_CHECKING:
+    import polars
 
 _PATIENCE = 30.0
 """How long a small file may take [s]."""
@@ -36,12 +41,12 @@ _START = "import sys; sys.path[:] = {path!r}; from swashplate.logs.apart import 
 
 
 def open_apart(reader: str, path: Path) -> Log:
-    """Look into a file as a reader of this package does, in the other process.
+    """Look into a file of a format of this package, in the other process.
 
     Parameters
     ----------
     reader : str
-        Its name, as `reader_of` takes it.
+        Name of the format in `READERS`.
 
     Raises
     ------
@@ -175,6 +180,103 @@ def _ended(process: subprocess.Popen[bytes], errors: IO[bytes]) -> None:
     errors.close()
 
 
+# --- long logs ------------------------------------------------------------------------------------
+
+LONG = 2_000_000
+"""Rows beyond which a log is not held whole."""
+_GROUP = 1 << 18  # rows that are stored together, and found without those before them
+_KEY = "swashplate"
+
+
+def in_parts(log: Log, names: Sequence[str]) -> Log:
+    """A log whose rows can be read in parts if it is long; a short one as it is.
+
+    A long text log is converted to Parquet once, piece after piece: ``log.csv.parquet`` beside it
+    holds the columns asked for, and serves until the log changes. Formats that cannot be read in
+    parts stay as they are.
+
+    Parameters
+    ----------
+    log : Log
+        As `open_log` gives it.
+    names : sequence of str
+        Columns that will be read, as in `Log.find`.
+
+    Raises
+    ------
+    FileError
+        If a cell holds no number, or the table cannot be written.
+    """
+    if log.rows is None or log.rows <= LONG or log.stream is None:
+        return log
+    table = log.path.with_name(f"{log.path.name}.parquet")
+    columns = list(dict.fromkeys(log.columns.index(log.find(name)) for name in names))
+    stat = log.path.stat()
+    stamp = [stat.st_size, stat.st_mtime_ns, log.format]
+    held = _held(table)
+    if held is None or held[:3] != stamp or not {*columns} <= {*held[3]}:
+        columns = sorted({*columns, *(held[3] if held is not None and held[:3] == stamp else [])})
+        _convert(log, columns, table, json.dumps([*stamp, columns]))
+        held = [*stamp, columns]
+    stored = open_apart("Parquet", table)
+    note = f"Its {stored.rows} rows are read from {table.name}, written beside it."
+    kept = tuple(log.columns[position] for position in held[3])
+    return replace(
+        stored, path=log.path, columns=kept, comments=log.comments, notes=(*log.notes, note)
+    )
+
+
+def _held(table: Path) -> list[Any] | None:
+    """Size, time and format of the log that a table was made of, and positions of its columns."""
+    import polars as pl
+
+    if not table.is_file():
+        return None
+    try:
+        held = json.loads(pl.read_parquet_metadata(table).get(_KEY, "null"))
+    except (pl.exceptions.PolarsError, ValueError, OSError):
+        return None
+    if held is None:
+        raise FileError(f"{table} stands where the table of a long log belongs; rename it.")
+    return list(held)
+
+
+def _convert(log: Log, columns: Sequence[int], table: Path, stamp: str) -> None:
+    import polars as pl
+    from polars.io.plugins import register_io_source
+
+    stream, names = log.stream, [str(position) for position in columns]
+    failed: list[FileError] = []
+
+    def pieces(
+        wanted: list[str] | None, predicate: object, count: object, size: object
+    ) -> Iterator[polars.DataFrame]:
+        assert stream is not None
+        try:
+            for arrays in stream(columns):
+                yield pl.DataFrame(dict(zip(names, arrays, strict=True)))
+        except FileError as error:  # Polars would tell of it in words of its own
+            failed.append(error)
+            raise
+
+    partial = table.with_name(f"{table.name}.part")
+    source = register_io_source(pieces, schema=dict.fromkeys(names, pl.Float64()))
+    try:
+        source.sink_parquet(partial, row_group_size=_GROUP, metadata={_KEY: stamp})
+        partial.replace(table)
+    except (pl.exceptions.PolarsError, OSError) as error:
+        raise (
+            failed[0]
+            if failed
+            else FileError(
+                f"{log.path} has about {log.rows} rows, more than are held at once, and its table "
+                f"{table.name} cannot be written beside it: {said(error)}."
+            )
+        ) from None
+    finally:
+        partial.unlink(missing_ok=True)
+
+
 # --- the other process ----------------------------------------------------------------------------
 
 _SPARE = 3 << 30
@@ -194,15 +296,15 @@ def serve() -> None:
     last: tuple[object, Log] | None = None
     for line in sys.stdin.buffer:
         asked = json.loads(line)
-        path, reader = Path(asked["path"]), reader_of(asked["reader"])
+        path, reader = Path(asked["path"]), asked["reader"]
         arrays: Sequence[Array] = []
         answer: dict[str, Any]
         try:
             _limit_memory(path)
-            known = (asked["reader"], path, path.stat().st_mtime_ns, path.stat().st_size)
+            known = (reader, path, path.stat().st_mtime_ns, path.stat().st_size)
             if last is None or last[0] != known:
                 last = None
-                last = known, reader.open(path, TextOptions())
+                last = known, opener(reader)(path, TextOptions())
             log = last[1]
             if asked["positions"] is not None:
                 log = log.between(*asked["rows"]) if asked["rows"] else log
@@ -217,7 +319,7 @@ def serve() -> None:
             what = str(error)
             if not isinstance(error, SwashplateError):
                 what = (
-                    f"{path} cannot be read as {reader.name}, it is damaged or of another kind: "
+                    f"{path} cannot be read as {reader}, it is damaged or of another kind: "
                     f"{said(error)}."
                 )
             kind = "InputError" if isinstance(error, InputError) else "FileError"

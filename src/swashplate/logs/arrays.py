@@ -14,11 +14,9 @@ from swashplate.logs.dialect import TextOptions
 from swashplate.logs.log import (
     Array,
     Column,
-    Format,
     Log,
-    check_any,
     check_kind,
-    left_out_notes,
+    checked,
     printable,
     said,
     split_unit,
@@ -100,7 +98,6 @@ def open_matlab(path: Path, options: TextOptions) -> Log:
         for signal in several:
             columns.append(Column(signal.name, split_unit(called)[1]))
             found.append((called, signal))
-    check_any(path, columns, "vectors", left_out)
 
     def load(positions: Sequence[int]) -> list[Array]:
         return [_variable(path, *found[position]) for position in positions]
@@ -108,7 +105,7 @@ def open_matlab(path: Path, options: TextOptions) -> Log:
     five = order in (b"IM", b"MI")
     comments = (head[:116].decode("latin-1").strip(" \0"),) if five else ()
     form = "MATLAB 5" if five else "MATLAB 4"
-    return Log(path, form, tuple(columns), load, comments, left_out_notes(left_out), left_out)
+    return checked(Log(path, form, tuple(columns), load, comments, left_out=left_out), "vectors")
 
 
 def _check_elements(path: Path, order: Any) -> None:
@@ -252,14 +249,13 @@ def _open(
             if reason is not None:
                 left_out[called] = reason
         comments = tuple(_comments(file))
-    check_any(path, columns, "columns", left_out)
 
     def load(positions: Sequence[int]) -> list[Array]:
         with h5py.File(path, "r", locking=False) as file:
             return [_dataset(path, file, columns[position][1]) for position in positions]
 
     names = tuple(column for column, _ in columns)
-    return Log(path, form, names, load, comments, left_out_notes(left_out), left_out)
+    return checked(Log(path, form, names, load, comments, left_out=left_out))
 
 
 def _datasets(path: Path, file: Any) -> Iterator[Any]:
@@ -344,7 +340,3 @@ def _check_stored(path: Path, dataset: Any) -> None:
                 f"{path}: {what} has only {count} of its {expected} blocks; the others were never "
                 "written."
             )
-
-
-MATLAB = Format("MATLAB", (".mat",), open_matlab)
-HDF5 = Format("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), open_hdf5)

@@ -18,11 +18,9 @@ from swashplate.logs.dialect import TextOptions, shown
 from swashplate.logs.log import (
     Array,
     Column,
-    Format,
     Log,
-    check_any,
     check_kind,
-    left_out_notes,
+    checked,
     split_unit,
 )
 from swashplate.logs.text import numbers_of
@@ -79,7 +77,6 @@ def open_parquet(path: Path, options: TextOptions) -> Log:
             columns.append(Column(column, "s" if kind.is_temporal() else split_unit(column)[1]))
         else:
             left_out[column] = f"it is of the type {kind}"
-    check_any(path, columns, "columns", left_out)
     dated = [each for each, kind in schema.items() if kind in (pl.Date, pl.Datetime)]
     notes = [f"'{each}' holds dates, read as seconds since the first." for each in dated]
 
@@ -88,16 +85,11 @@ def open_parquet(path: Path, options: TextOptions) -> Log:
         # one column after the other: none that is done waits in the form that Polars reads it in
         return [_column(path, columns[position].name, first, count) for position in positions]
 
-    return Log(
-        path,
-        "Parquet",
-        tuple(columns),
-        part,
-        _comments(pl.read_parquet_metadata(path)),
-        (*notes, *left_out_notes(left_out)),
-        left_out,
-        part=part,
-        rows=int(pl.scan_parquet(path).select(pl.len()).collect().item()),
+    comments = _comments(pl.read_parquet_metadata(path))
+    rows = int(pl.scan_parquet(path).select(pl.len()).collect().item())
+    found = tuple(columns)
+    return checked(
+        Log(path, "Parquet", found, part, comments, tuple(notes), left_out, part=part, rows=rows)
     )
 
 
@@ -184,20 +176,18 @@ def open_tdms(path: Path, options: TextOptions) -> Log:
                 columns.setdefault(called, (Column(called, "s"), source))
         _check_stored(path, file, stored)
         comments = _comments(file.properties)
-    check_any(path, columns, "channels", left_out)
-    found, sources = zip(*columns.values(), strict=True)
-    notes = [
+    found, sources = zip(*columns.values(), strict=True) if columns else ((), ())
+    notes = tuple(
         f"'{column.name}' is computed from the increment of a waveform."
         for column, source in columns.values()
         if source.clock
-    ]
+    )
 
     def load(positions: Sequence[int]) -> list[Array]:
         with _tdms(path) as file:
             return [_channel(path, file, sources[position]) for position in positions]
 
-    said = (*notes, *left_out_notes(left_out))
-    return Log(path, "TDMS", found, load, comments, said, left_out)
+    return checked(Log(path, "TDMS", found, load, comments, notes, left_out), "channels")
 
 
 @contextmanager
@@ -342,7 +332,6 @@ def open_mdf(path: Path, options: TextOptions) -> Log:
                     columns.append(Column(called, unit or split_unit(channel.name)[1]))
                     sources.append((number, place, rows))
         comments = (f"start: {mdf.header.start_time.isoformat()}",)
-    check_any(path, columns, "channels", left_out)
 
     def load(positions: Sequence[int]) -> list[Array]:
         with opened() as mdf:
@@ -351,8 +340,8 @@ def open_mdf(path: Path, options: TextOptions) -> Log:
                 for position in positions
             ]
 
-    notes = left_out_notes(left_out)
-    return Log(path, "MDF 4", tuple(columns), load, comments, notes, left_out)
+    made = Log(path, "MDF 4", tuple(columns), load, comments, left_out=left_out)
+    return checked(made, "channels")
 
 
 def _prefixes(mdf: Any) -> list[str]:
@@ -377,8 +366,3 @@ def _samples(path: Path, mdf: Any, called: str, group: int, place: int, rows: in
     if invalid is not None:
         numbers[np.asarray(invalid, bool)] = np.nan
     return numbers
-
-
-PARQUET = Format("Parquet", (".parquet", ".pq"), open_parquet)
-TDMS = Format("TDMS", (".tdms",), open_tdms)
-MDF = Format("MDF", (".mf4", ".mdf"), open_mdf)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module, metadata
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import FileError, InputError
-from swashplate.units import speed_unit, to_si
+from swashplate.units import scaling, speed_unit, to_si
 
 if TYPE_CHECKING:
     from swashplate.logs.dialect import TextOptions
@@ -156,23 +156,28 @@ class Log:
         )
 
     def _position(self, wanted: str) -> int:
-        try:
-            return find_column(self.columns, wanted, self.path)
-        except InputError:
-            for name, reason in self.left_out.items():
-                if wanted in (name, name.rpartition("/")[2]):
-                    raise FileError(
-                        f"{self.path}: '{name}' cannot be read as numbers: {reason}."
-                    ) from None
-            raise
-
-
-class Format(NamedTuple):
-    """A reader of this package, as `Reader` has it."""
-
-    name: str
-    suffixes: tuple[str, ...]
-    open: Callable[[Path, TextOptions], Log]
+        names = [column.name for column in self.columns]
+        suffixed = re.compile(rf"{re.escape(wanted)}_\w+")
+        for matches in (
+            lambda column: column.name == wanted,
+            lambda column: _without_unit(column) == wanted,
+            lambda column: suffixed.fullmatch(column.name),
+            lambda column: _last(column.name) == wanted or _last(_without_unit(column)) == wanted,
+        ):
+            found = [place for place, column in enumerate(self.columns) if matches(column)]
+            if len(found) == 1:
+                return found[0]
+            if found:
+                several = _listed([names[place] for place in found])
+                raise InputError(
+                    f"{self.path} has more than one '{wanted}': {several}; name the one."
+                )
+        for name, reason in self.left_out.items():
+            if wanted in (name, _last(name)):
+                raise FileError(f"{self.path}: '{name}' cannot be read as numbers: {reason}.")
+        raise InputError(
+            f"{self.path} has no column '{wanted}'; it has {_listed(names)}: name the one to take."
+        )
 
 
 @runtime_checkable
@@ -282,36 +287,32 @@ def check_kind(path: Path, *expected: str) -> None:
             )
 
 
-def left_out_notes(left_out: Mapping[str, str]) -> tuple[str, ...]:
-    """What is left out of a file and why, one sentence each."""
-    return tuple(f"'{each}' is left out: {reason}." for each, reason in left_out.items())
+def checked(log: Log, what: str = "columns") -> Log:
+    """A log with a note on each thing that is left out; one without columns of numbers is refused.
 
-
-def check_any(
-    path: Path, columns: Collection[object], what: str, left_out: Mapping[str, str]
-) -> None:
-    """Refuse a file without columns of numbers, and say what it has instead."""
-    if not columns:
-        why = "".join(f"; '{each}': {reason}" for each, reason in left_out.items())[:300]
-        raise FileError(f"{path} has no {what} of numbers{why}.")
+    `what` is what the format calls its columns, for the sentence.
+    """
+    if not log.columns:
+        why = "".join(f"; '{each}': {reason}" for each, reason in log.left_out.items())[:300]
+        raise FileError(f"{log.path} has no {what} of numbers{why}.")
+    left_out = (f"'{each}' is left out: {reason}." for each, reason in log.left_out.items())
+    return replace(log, notes=(*log.notes, *left_out))
 
 
 # --- opening --------------------------------------------------------------------------------------
 
-_READERS = {
-    "text.TEXT": (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".log"),
-    "channels.PARQUET": (".parquet", ".pq"),
-    "arrays.MATLAB": (".mat",),
-    "arrays.HDF5": (".h5", ".hdf5", ".hdf", ".he5"),
-    "channels.TDMS": (".tdms",),
-    "channels.MDF": (".mf4", ".mdf"),
+READERS = {
+    "CSV": ("text.open_text", (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".log")),
+    "Parquet": ("channels.open_parquet", (".parquet", ".pq")),
+    "MATLAB": ("arrays.open_matlab", (".mat",)),
+    "HDF5": ("arrays.open_hdf5", (".h5", ".hdf5", ".hdf", ".he5")),
+    "TDMS": ("channels.open_tdms", (".tdms",)),
+    "MDF": ("channels.open_mdf", (".mf4", ".mdf")),
 }
-"""Reader of each format and the endings of its files: they are imported when one is opened."""
+"""What opens each format, imported when a file is opened, and the endings of its files. All but
+text have libraries that cannot be trusted with a damaged file: see `apart`."""
 
-_TRUSTED = ("text.TEXT",)
-"""Others have libraries that cannot be trusted with a damaged file: see `apart`."""
-
-SUFFIXES = tuple(suffix for suffixes in _READERS.values() for suffix in suffixes)
+SUFFIXES = tuple(suffix for _, suffixes in READERS.values() for suffix in suffixes)
 """Endings of files that swashplate reads itself."""
 
 GROUP = "swashplate.readers"
@@ -344,21 +345,24 @@ def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
 
     source = Path(path)
     suffix = source.suffix.lower()
-    name = next((name for name, suffixes in _READERS.items() if suffix in suffixes), None)
-    reader = _other(source) if name is None else None
+    name = next((name for name, (_, suffixes) in READERS.items() if suffix in suffixes), None)
+    other = _other(source) if name is None else None
     check_file(source)
-    if name is not None and name not in _TRUSTED:
-        from swashplate.logs.apart import open_apart
+    if name in (None, "CSV"):
+        look = other.open if other is not None else opener("CSV")
+        return look(source, options or TextOptions())
+    from swashplate.logs.apart import open_apart
 
-        return open_apart(name, source)
-    return (reader or reader_of(name or "")).open(source, options or TextOptions())
+    return open_apart(str(name), source)
 
 
-def reader_of(name: str) -> Reader:
-    """The reader of a format of this package, imported by its name: ``"channels.PARQUET"``."""
-    module, _, constant = name.partition(".")
-    reader: Reader = getattr(import_module(f"swashplate.logs.{module}"), constant)
-    return reader
+def opener(name: str) -> Callable[[Path, TextOptions], Log]:
+    """What opens a format of this package, imported by its name in `READERS`."""
+    module, _, function = READERS[name][0].partition(".")
+    look: Callable[[Path, TextOptions], Log] = getattr(
+        import_module(f"swashplate.logs.{module}"), function
+    )
+    return look
 
 
 def _other(path: Path) -> Reader:
@@ -453,8 +457,8 @@ def _si(log: Log, wanted: str, si: str, values: Array) -> Array:
     unit = unit_of(found, wanted, si)
     unit = speed_unit(unit) if si == "rad/s" else unit
     what = f"{log.path}: column '{found.name}'"
-    zero, one = (to_si(value, unit, si, what) for value in (0.0, 1.0))
-    return values * one if zero == 0.0 else values * (one - zero) + zero
+    factor, zero = scaling(unit, si, what)
+    return values * factor + zero
 
 
 # --- columns by name, and their units -------------------------------------------------------------
@@ -470,33 +474,6 @@ def split_unit(name: str) -> tuple[str, str | None]:
     if match is None or not match[1]:
         return name, None
     return match[1], (match[2] if match[2] is not None else match[3]).strip()
-
-
-def find_column(columns: Sequence[Column], wanted: str, path: str | Path) -> int:
-    """Position of the column of a name; see `Log.find`.
-
-    Raises
-    ------
-    InputError
-        If there is none or more than one; the sentence lists what there is.
-    """
-    names = [column.name for column in columns]
-    suffixed = re.compile(rf"{re.escape(wanted)}_\w+")
-    for matches in (
-        lambda column: column.name == wanted,
-        lambda column: _without_unit(column) == wanted,
-        lambda column: suffixed.fullmatch(column.name),
-        lambda column: _last(column.name) == wanted or _last(_without_unit(column)) == wanted,
-    ):
-        found = [position for position, column in enumerate(columns) if matches(column)]
-        if len(found) == 1:
-            return found[0]
-        if found:
-            several = _listed([names[position] for position in found])
-            raise InputError(f"{path} has more than one '{wanted}': {several}; name the one.")
-    raise InputError(
-        f"{path} has no column '{wanted}'; it has {_listed(names)}: name the one to take."
-    )
 
 
 def unit_of(column: Column, wanted: str, si: str) -> str:

@@ -32,7 +32,7 @@ from swashplate.logs.dialect import (
     read_heading,
     shown,
 )
-from swashplate.logs.log import Format, Log, printable
+from swashplate.logs.log import Log, printable
 
 if TYPE_CHECKING:
     import polars
@@ -108,9 +108,6 @@ def open_text(path: Path, options: TextOptions) -> Log:
         stream=table.read,
         rows=round(path.stat().st_size / length),
     )
-
-
-TEXT = Format("CSV", (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".log"), open_text)
 
 
 def _comments(line: str, marks: tuple[str, ...]) -> bool:

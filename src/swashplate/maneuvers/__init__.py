@@ -23,12 +23,12 @@ from swashplate.maneuvers.pieces import SplineReturn as SplineReturn
 from swashplate.maneuvers.pieces import sampled as sampled
 from swashplate.maneuvers.pieces import spline_return as spline_return
 from swashplate.maneuvers.pieces import superpose as superpose
-from swashplate.maneuvers.records import recorded as recorded
-from swashplate.maneuvers.records import recorded_file as recorded_file
 from swashplate.maneuvers.shapes import chirp as chirp
 from swashplate.maneuvers.shapes import multisine as multisine
 from swashplate.maneuvers.shapes import parse as parse
 from swashplate.maneuvers.shapes import ramp as ramp
+from swashplate.maneuvers.shapes import recorded as recorded
+from swashplate.maneuvers.shapes import recorded_file as recorded_file
 from swashplate.maneuvers.shapes import rest as rest
 from swashplate.maneuvers.shapes import sine as sine
 from swashplate.maneuvers.shapes import source_tests as source_tests

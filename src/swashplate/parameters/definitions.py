@@ -132,14 +132,10 @@ def find(name: str) -> Definition:
     ParameterError
         If there is none of that name; the sentence lists the right ones.
     """
-    if name in CATALOGUE:
-        return CATALOGUE[name]
-    if name in COLUMNS:
-        return CATALOGUE[COLUMNS[name]]
-    if name in REFINEMENTS:
-        return REFINEMENTS[name]
-    if name in OWN:
-        return OWN[name]
+    symbol = COLUMNS.get(name, name)
+    for known in (CATALOGUE, REFINEMENTS, OWN):
+        if symbol in known:
+            return known[symbol]
     raise unknown_parameter(name)
 
 
@@ -155,13 +151,7 @@ def unknown_parameter(name: str) -> ParameterError:
 
 
 def columns_of(names: Mapping[str, object] | tuple[str, ...] | list[str]) -> list[str]:
-    """Columns that a list of symbols and columns stands for, in its order.
-
-    Raises
-    ------
-    ParameterError
-        For a name that no parameter has.
-    """
+    """Columns that a list of symbols and columns stands for, in its order; refuses as `find`."""
     columns: list[str] = []
     for name in names:
         definition = find(name)

@@ -4,13 +4,88 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.errors import InputError, ParameterError
-from swashplate.parameters.definitions import Block, find, options_of
-from swashplate.parameters.parameter_set import Pair, Parameter, ParameterSet
-from swashplate.parameters.schema import CardFile, Entry, SetFile
+from swashplate.parameters.definitions import Block, Definition, find, options_of
+from swashplate.parameters.parameter_set import (
+    CardSwitch,
+    CoulombSign,
+    Pair,
+    Parameter,
+    ParameterSet,
+    PressureRoot,
+    Status,
+    value_of,
+)
 from swashplate.units import to_si
+
+# --- what stands in a file ------------------------------------------------------------------------
+
+TwoNumbers = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class Entry(BaseModel):
+    """One parameter: ``Z16 = { value = [1.2e-4, 1.5e-4], unit = "m", source = "table 7.2" }``."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    value: float | TwoNumbers
+    unit: str
+    source: str = ""
+    status: Status = "user"
+    bounds: TwoNumbers | None = None
+
+
+class ModelOptions(BaseModel):
+    """Variants of the equations; the defaults are those the published values belong to."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    pressure_root: PressureRoot = "published"
+    coulomb_sign: CoulombSign = "smooth"
+    card_switch: CardSwitch = "sampled"
+    rate: PositiveFloat | None = None
+    """Samples a second that the recursion of the card's filter belongs to; none is the filter's
+    differential equation, for any rate."""
+    options: list[str] | None = None
+    """Terms of the pump that count; where they are not given, those whose parameters are not 0."""
+
+
+class CardFile(BaseModel):
+    """A control card by itself, so that several sets can use it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    format: Literal[1] = 1
+    name: str
+    title: str = ""
+    rate: PositiveFloat | None = None
+    """Of the recursion that its filter belongs to."""
+    control_card: dict[str, Entry]
+
+
+class SetFile(BaseModel):
+    """A whole drive; `control_card` is the name of a packaged card or the card's own table."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    format: Literal[1] = 1
+    name: str
+    title: str = ""
+    control_card: str | dict[str, Entry]
+    card: str = ""
+    """Name of a card that is given by its own table."""
+    pump_motor: dict[str, Entry]
+    model: ModelOptions = ModelOptions()
+    refinements: dict[str, Entry] = {}
+    """What goes beyond the source's equations; all of it is off where it is not given."""
+
+
+# --- reading and writing --------------------------------------------------------------------------
 
 AXES = ("hoist", "slew", "luff")  # The source's three axes.
 
@@ -23,13 +98,7 @@ def preset_names() -> tuple[str, ...]:
 
 @cache
 def load_preset(name: str) -> ParameterSet:
-    """A packaged parameter set.
-
-    Raises
-    ------
-    ParameterError
-        For an unknown name; the sentence lists the right ones.
-    """
+    """A packaged parameter set; the `ParameterError` for an unknown name lists the right ones."""
     if name not in preset_names():
         raise ParameterError(
             f"There is no packaged parameter set '{name}'; there are {', '.join(preset_names())}."
@@ -38,15 +107,7 @@ def load_preset(name: str) -> ParameterSet:
 
 
 def load_set(path: str | Path) -> ParameterSet:
-    """A parameter set from a TOML file.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read or is not TOML.
-    ParameterError
-        If an entry is missing, unknown, malformed or breaks a rule.
-    """
+    """A parameter set from a TOML file; a `ParameterError` names file, parameter and rule."""
     return read_set(read_text(path), str(path))
 
 
@@ -126,7 +187,28 @@ def written(parameter: Parameter) -> Mapping[str, object]:
     return entry
 
 
-def _folder(name: str):  # type: ignore[no-untyped-def]
+def parameter_of(definition: Definition, entry: Entry) -> Parameter:
+    """A parameter from its entry, in SI; what does not fit the definition is a `ParameterError`."""
+    what = f"{definition.symbol} ({definition.name})"
+
+    def si(numbers: list[float]) -> tuple[float, ...]:
+        try:
+            return tuple(to_si(each, entry.unit, definition.unit, what) for each in numbers)
+        except InputError as error:
+            raise ParameterError(str(error)) from None
+
+    if not isinstance(entry.value, list):
+        (number,) = si([entry.value])
+        value = value_of(definition.symbol, definition, number)
+    elif definition.directional:
+        value = Pair(*si(entry.value))
+    else:
+        raise ParameterError(f"{what} has one value, not a plus and a minus one.")
+    bounds = None if entry.bounds is None else si(entry.bounds)
+    return Parameter(definition, value, entry.source, entry.status, bounds)  # type: ignore[arg-type]
+
+
+def _folder(name: str) -> Any:
     folder = files("swashplate.parameters").joinpath("sets")
     return folder.joinpath(name) if name else folder
 
@@ -144,25 +226,13 @@ def _load_card(name: str, origin: str) -> CardFile:
 
 
 def _parameters(entries: Mapping[str, Entry], block: Block, origin: str) -> dict[str, Parameter]:
-    return {symbol: _parameter(symbol, entry, block, origin) for symbol, entry in entries.items()}
-
-
-def _parameter(symbol: str, entry: Entry, block: Block, origin: str) -> Parameter:
-    try:
-        definition = find(symbol)
-        if symbol != definition.symbol or definition.block != block:
-            raise ParameterError(f"[{block}] has no parameter '{symbol}'.")
-        what = f"{symbol} ({definition.name})"
-        pair = isinstance(entry.value, list)
-        given = entry.value if isinstance(entry.value, list) else [entry.value]
-        numbers = [to_si(number, entry.unit, definition.unit, what) for number in given]
-        bounds = None
-        if entry.bounds is not None:
-            low, high = (to_si(b, entry.unit, definition.unit, what) for b in entry.bounds)
-            bounds = (low, high)
-    except (ParameterError, InputError) as error:
-        raise ParameterError(f"{origin}: {error}") from None
-    if pair and not definition.directional:
-        raise ParameterError(f"{origin}: {what} has one value, not a plus and a minus one.")
-    value = Pair(*(numbers if pair else numbers * 2)) if definition.directional else numbers[0]
-    return Parameter(definition, value, entry.source, entry.status, bounds)
+    made = {}
+    for symbol, entry in entries.items():
+        try:
+            definition = find(symbol)
+            if symbol != definition.symbol or definition.block != block:
+                raise ParameterError(f"[{block}] has no parameter '{symbol}'.")
+            made[symbol] = parameter_of(definition, entry)
+        except ParameterError as error:
+            raise ParameterError(f"{origin}: {error}") from None
+    return made

@@ -43,32 +43,38 @@ def test_codes_of_twelve_bits() -> None:
         put_out(volts, NONE)
 
 
-def test_offset_and_noise_of_the_readback() -> None:
-    tools = Instruments(voltage_offset=0.02, voltage_noise=0.003)
-    reading = read_voltage(np.full(10_000, 5.0), tools, chance())
-    # standard errors: 0.03 mV of the mean, 0.7 % of the deviation
-    assert reading.mean() == pytest.approx(5.02, abs=1e-4)
-    assert reading.std() == pytest.approx(0.003, rel=0.03)
+@pytest.mark.parametrize(
+    ("volts", "tools", "mean", "spread"),
+    [
+        # standard errors: 0.03 mV of the mean, 0.7 % of the deviation
+        (5.0, Instruments(voltage_offset=0.02, voltage_noise=0.003), 5.02, 0.003),
+        # steps of 4.88 mV and noise of half of it read right on average; 0.29 of a step more
+        (4.0013, Instruments(voltage_bits=12, voltage_noise=0.003), 4.0013, 0.00331),
+    ],
+)
+def test_noise_of_the_readback(
+    volts: float, tools: Instruments, mean: float, spread: float
+) -> None:
+    reading = read_voltage(np.full(100_000, volts), tools, chance())
+    assert reading.mean() == pytest.approx(mean, abs=5e-5)
+    assert reading.std() == pytest.approx(spread, rel=0.03)
 
 
-def test_a_step_of_the_converter_and_noise_of_half_of_it_read_right_on_average() -> None:
-    tools = Instruments(voltage_bits=12, voltage_noise=0.003)
-    reading = read_voltage(np.full(100_000, 4.0013), tools, chance())
-    assert set(np.diff(np.unique(reading))) == {0.0048828125}
-    assert reading.mean() == pytest.approx(4.0013, abs=5e-5)
-
-
-def test_the_ammeter_reads_the_sum_of_both_magnitudes() -> None:
-    plus, minus = np.full(GRID.size, 0.3), np.linspace(0.0, 0.1, GRID.size)
-    np.testing.assert_array_equal(ammeter(plus, minus), plus + minus)
-
-
-def test_errors_of_the_ammeter_by_hand() -> None:
-    """1.01 · √(0.3² + 0.4²) + 0.004 = 0.509; at zero it reads its floor."""
-    level, off = np.full(GRID.size, 0.3), np.zeros(GRID.size)
-    errors = {"current_gain_error": 0.01, "current_zero": 0.004, "current_floor": 0.4}
-    np.testing.assert_allclose(ammeter(level, off, **errors), 0.509, rtol=1e-14)
-    np.testing.assert_allclose(ammeter(off, off, **errors), 1.01 * 0.4 + 0.004, rtol=1e-14)
+@pytest.mark.parametrize(
+    ("plus", "minus", "errors", "shown"),
+    [
+        (0.3, 0.1, {}, 0.4),
+        (0.4567, 0.0, {"current_resolution": 0.0005}, 0.4565),
+        # 1.01 · √(0.3² + 0.4²) + 0.004 = 0.509; at zero it reads its floor
+        (0.3, 0.0, {"current_gain_error": 0.01, "current_zero": 4e-3, "current_floor": 0.4}, 0.509),
+        (0.0, 0.0, {"current_gain_error": 0.01, "current_zero": 4e-3, "current_floor": 0.4}, 0.408),
+    ],
+)
+def test_readings_of_the_ammeter_by_hand(
+    plus: float, minus: float, errors: dict[str, float], shown: float
+) -> None:
+    reading = ammeter(np.full(GRID.size, plus), np.full(GRID.size, minus), **errors)
+    np.testing.assert_allclose(reading, shown, rtol=1e-14)
 
 
 def test_noise_of_the_ammeter_has_no_mean_even_at_zero() -> None:
@@ -76,12 +82,6 @@ def test_noise_of_the_ammeter_has_no_mean_even_at_zero() -> None:
     reading = ammeter(off, off, current_noise=0.002)
     assert abs(reading.mean()) < 4.0 * 0.002 / np.sqrt(GRID.size)
     assert reading.std() == pytest.approx(0.002, rel=0.04)
-
-
-def test_steps_of_the_ammeters_converter() -> None:
-    level = np.full(GRID.size, 0.4567)
-    reading = ammeter(level, 0.0 * level, current_resolution=0.0005)
-    np.testing.assert_array_equal(reading, 0.4565)
 
 
 def test_the_ripple_by_hand() -> None:
@@ -160,25 +160,17 @@ def test_counts_are_passed_edges() -> None:
 
 
 def test_counts_are_right_on_average() -> None:
-    angle = np.array([0.0, 1.2345])
-    tools = Instruments(encoder_step=1)
-    last = [
-        read_counts(angle, 36.0, tools, np.random.default_rng(seed))[-1] for seed in range(4000)
-    ]
+    angle, tools = np.array([0.0, 1.2345]), Instruments(encoder_step=1)
+    last = [read_counts(angle, 36.0, tools, np.random.default_rng(k))[-1] for k in range(4000)]
     exact = 1.2345 * 36.0 / (2.0 * np.pi)
     assert set(last) == {np.floor(exact), np.ceil(exact)}
     assert np.mean(last) == pytest.approx(exact, abs=4.0 * 0.5 / np.sqrt(4000))
 
 
 def test_a_counter_of_eight_bits_rolls_over() -> None:
-    counts = read_counts(
-        np.arange(0.0, 300.0) * 2.0 * np.pi, 1.0, Instruments(counter_bits=8), chance()
-    )
-    np.testing.assert_allclose(counts[[0, 127, 128, 255, 256, 299]], [0, 127, -128, -1, 0, 43])
-    back = read_counts(
-        np.array([0.0, -128.0, -129.0]), 2.0 * np.pi, Instruments(counter_bits=8), chance()
-    )
-    np.testing.assert_allclose(back, [0.0, -128.0, 127.0])
+    turns = np.array([0.0, 127.0, 128.0, 255.0, 256.0, 299.0, -128.0, -129.0])
+    counts = read_counts(2.0 * np.pi * turns, 1.0, Instruments(counter_bits=8), chance())
+    np.testing.assert_allclose(counts, [0, 127, -128, -1, 0, 43, -128, 127])
 
 
 def test_transducers_are_noisy_in_proportion() -> None:
@@ -199,15 +191,11 @@ def test_stamps_tell_the_jitter_but_not_the_hidden_part() -> None:
     assert instants.min() >= 0.0
     assert instants.max() <= GRID[-1]
     np.testing.assert_array_equal(stamps, np.round(stamps, 6))
-    plain, same = sampled_instants(GRID, NONE, chance())
-    np.testing.assert_array_equal(plain, GRID)
-    np.testing.assert_array_equal(same, GRID)
-
-
-def test_jitter_however_large_keeps_the_order() -> None:
-    instants, stamps = sampled_instants(GRID, Instruments(jitter=1.0, hidden_jitter=1.0), chance())
-    assert np.diff(instants).min() > 0.0
-    assert np.diff(stamps).min() > 0.0
+    for each in sampled_instants(GRID, NONE, chance()):
+        np.testing.assert_array_equal(each, GRID)
+    # however large it is, it keeps the order
+    for each in sampled_instants(GRID, Instruments(jitter=1.0, hidden_jitter=1.0), chance()):
+        assert np.diff(each).min() > 0.0
 
 
 def test_rounding_gives_the_floats_of_decimal_numbers() -> None:
@@ -244,26 +232,18 @@ def test_the_play_operator_sample_by_sample() -> None:
         behind = max(position - 0.75, min(position + 0.75, behind))
         expected.append(behind)
     np.testing.assert_array_equal(play(drives, 1.5), expected)
+    np.testing.assert_array_equal(play(drives[:1], 1.0), drives[:1])
+    np.testing.assert_array_equal(play(drives[:3], 0.0), drives[:3])
 
 
-def test_play_of_one_sample_and_of_none() -> None:
-    np.testing.assert_array_equal(play(np.array([3.0]), 1.0), [3.0])
-    drives = np.array([0.0, 1.0, 0.5])
-    np.testing.assert_array_equal(play(drives, 0.0), drives)
-
-
-def test_instruments_as_made_are_perfect_and_clean_are_those() -> None:
+def test_clean_instruments_are_none_and_realistic_ones_have_nothing_systematic() -> None:
     assert SEVERITIES["clean"] == Instruments()
-
-
-def test_realistic_instruments_have_nothing_systematic() -> None:
     tools = SEVERITIES["realistic"]
     systematic = (
         "voltage_offset current_gain_error current_zero current_floor averaging_time "
         "hidden_jitter counter_bits empty_cells"
     )
-    for name in systematic.split():
-        assert getattr(tools, name) == 0.0
+    assert [getattr(tools, name) for name in systematic.split()] == [0.0] * 8
     # what is read back has the steps of what is put out
     assert tools.command_bits == tools.voltage_bits == 12
 

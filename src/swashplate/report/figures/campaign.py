@@ -623,7 +623,7 @@ def plot_current(
         current I₊ - I₋, which lags the command as the measured one does, tells the zero crossings.
     mask_width, level : float
         Length of the mask around each crossing [s], and the signed current [A] that counts as
-        zero, as in `campaign.ammeter.zero_crossings`.
+        zero, as in `campaign.zero_crossings`.
     window : (float, float), optional
         First and last instant to show [s].
     title : str, optional

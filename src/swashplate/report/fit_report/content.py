@@ -16,16 +16,15 @@ from swashplate.campaign import Campaign, examine, quality_table
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
-from swashplate.identification.assessment import Assessment, RunQuality, assess
-from swashplate.identification.cross_validation import CrossValidation
+from swashplate.identification.acceptance import Statement, Verdict, Weight, starts_of, verdict
+from swashplate.identification.assessment import Assessment, StageProfile, assess
 from swashplate.identification.fitting import Fit, StageFit
+from swashplate.identification.identifiability import in_the_fits_scales
 from swashplate.identification.own_model import ModelParameters
+from swashplate.identification.resampling import CrossValidation
+from swashplate.identification.solving import StartResult
 from swashplate.identification.staging import Parameters
-from swashplate.identification.starts import StartResult
-from swashplate.identification.storing import StageProfile
-from swashplate.identification.truth import in_the_fits_scales
-from swashplate.identification.validation import error_tables, pooled, source_rules
-from swashplate.identification.verdict import Statement, Verdict, Weight, starts_of, verdict
+from swashplate.identification.validation import RunQuality, pooled
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
 from swashplate.report.fit_report.page import Block, Section, listed_block, page, text
@@ -129,10 +128,10 @@ def write_fit_report(
             _profile_section(fit, profiles),
             _starts_section(several),
             _folds_section(folds, assessed),
-            *shared[2:4],
+            shared[2],
             _excitation_section(assessed),
             _verdict_section(judged, assessed, runs, head["findings"]),
-            shared[4],
+            shared[3],
             _setup_section(campaign, fit.nominal, fit.setup.title, notes, fit.stages),
         ]
     content = {**head, "what": "Fit", "facts": f"{head['drive']} · {facts}"}
@@ -181,9 +180,9 @@ def write_validation_report(
     )
     sections = [
         summary_section(found, campaign, known, (), runs, head["findings"]),
-        *shared[:4],
+        *shared[:3],
         _verdict_section(found, (), runs, head["findings"]),
-        shared[4],
+        shared[3],
         _setup_section(campaign, drive, "", notes, ()),
     ]
     write_text(page(sections, {**head, "what": "Validation", "facts": facts}), path)
@@ -201,7 +200,7 @@ def _units_of_people() -> AbstractContextManager[None]:
 def _shared(
     campaign: Campaign, runs: Sequence[ShownRun], drive: Parameters
 ) -> tuple[dict[str, Any], list[Section]]:
-    """Head of a page, and its sections on runs, curves, errors, residuals and data."""
+    """Head of a page, and its sections on runs, curves, residuals and data."""
     axes = {run.experiment.axis for run in runs}
     examined = {each: examine(each) for each in campaign if each.axis in axes}
     found = [
@@ -241,7 +240,6 @@ def _shared(
         _agreement_section(runs, findings),
         _curves_section(runs, campaign.virtual),
         _residual_section(runs),
-        _errors_section(runs, drive.name),
         Section("data", "Data quality", data),
     ]
     return head, sections
@@ -311,28 +309,6 @@ def _curves_section(runs: Sequence[ShownRun], virtual: bool) -> Section:
         }
         blocks.append(Block("run", content))
     return Section("runs", "Curves", blocks)
-
-
-def _errors_section(runs: Sequence[ShownRun], drive: str) -> Section:
-    words = (
-        "The largest per cent error of each kind of test, of what is measured at that instant. "
-        "What is left out is listed with each table."
-    )
-    blocks = [text(words)]
-    keys = dict.fromkeys((run.role, each.stage) for run in runs for each in run.channels)
-    for role, stage in keys:
-        alike = [
-            each.quality for run in runs if run.role == role for each in run.channels
-            if each.stage == stage
-        ]  # fmt: skip
-        for found in error_tables(alike, source_rules(drive)):
-            blocks.append(Block("heading", f"{found.channel} ({role})", "h3"))
-            blocks.append(Block("table", tables.errors_table(found), "errors"))
-            said = tables.left_out([found])[1:]
-            if said:
-                rules = ", ".join(rule.name for rule in found.acted) or "remarks"
-                blocks.append(Block("details", listed_block(said), f"Left out: {rules}"))
-    return Section("errors", "Errors by kind of test", blocks)
 
 
 def _residual_section(runs: Sequence[ShownRun]) -> Section:

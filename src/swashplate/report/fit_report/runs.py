@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import Channel
-from swashplate.identification.assessment import Assessment, RunQuality
+from swashplate.identification.assessment import Assessment
 from swashplate.identification.tables import ignored_words, start_words
-from swashplate.identification.validation import ignored_windows, with_speeds
+from swashplate.identification.validation import RunQuality, ignored_windows, with_speeds
 from swashplate.report.lines import gap_rows, thinned
 from swashplate.report.style import in_lines
 from swashplate.tables import quantity

@@ -6,30 +6,27 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, log
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.linearised import LinearisedFit, linearised_fit
 from swashplate.identification.model import linearised as linearised_model
 from swashplate.identification.noise import (
     Covariance,
     NoiseColour,
+    SpectralLine,
     coloured_noise_covariance,
+    line_sentences,
     noise_colours,
     spectral_covariance,
     white_noise_covariance,
-)
-from swashplate.identification.problem import Problem
-from swashplate.identification.profile import CheckedEnd
-from swashplate.identification.spectral_lines import (
-    SpectralLine,
-    line_sentences,
     without_lines,
 )
+from swashplate.identification.problem import LinearisedFit, Problem, linearised_fit
+from swashplate.identification.profile import CheckedEnd
 from swashplate.identification.unknowns import Unknowns
 from swashplate.results import Result, short
 
@@ -130,45 +127,35 @@ def estimates(
     half = reach(covariance, level)
     variables = covariance.variables
     errors = covariance.standard_errors
-    distances = {
-        upper: np.array([ends.get((k, upper), half[k]) for k in range(half.size)])
+    down, up = (
+        np.array([ends.get((k, upper), half[k]) for k in range(half.size)])
         for upper in (False, True)
-    }
-    open_ended = {upper: np.isinf(distances[upper]) for upper in distances}
+    )
     with np.errstate(invalid="ignore"):
-        lower = variables.to_values(variables.vector - distances[False])
-        upper = variables.to_values(variables.vector + distances[True])
-    made = []
+        lower = variables.to_values(variables.vector - down)
+        upper = variables.to_values(variables.vector + up)
+    made, most = [], np.where(variables.logarithmic, log(DECADES), DECADES)
     for k, name in enumerate(variables.names):
-        value = float(variables.estimates[k])
-        below, above = bool(open_ended[False][k]), bool(open_ended[True][k])
-        if variables.at_bound[k]:
-            low = variables.at_bound[k] < 0
-            side: Status = "at its lower bound" if low else "at its upper bound"
-            made.append(Estimate(name, value, side, None, None, None, None))
-        elif (
-            not covariance.determined[k]
-            or (below and above)
-            or half[k] > (log(DECADES) if variables.logarithmic[k] else DECADES)
-        ):
-            made.append(Estimate(name, value, "undetermined", None, None, None, None))
-        else:
-            freedom = float(covariance.degrees_of_freedom[k])
-            error = float(abs(variables.slopes[k]) * errors[k])
-            status: Status = "estimated"
-            if below or above:
-                status = "no lower end" if below else "no upper end"
-            made.append(
-                Estimate(
-                    name,
-                    value,
-                    status,
-                    error if status == "estimated" else None,
-                    None if below else float(lower[k]),
-                    None if above else float(upper[k]),
-                    freedom,
-                )
+        below, above = bool(np.isinf(down[k])), bool(np.isinf(up[k]))
+        status: Status = "estimated"
+        if side := variables.at_bound[k]:
+            status = "at its lower bound" if side < 0 else "at its upper bound"
+        elif not covariance.determined[k] or (below and above) or half[k] > most[k]:
+            status = "undetermined"
+        elif below or above:
+            status = "no lower end" if below else "no upper end"
+        told = not side and status != "undetermined"
+        made.append(
+            Estimate(
+                name,
+                float(variables.estimates[k]),
+                status,
+                float(abs(variables.slopes[k]) * errors[k]) if status == "estimated" else None,
+                float(lower[k]) if told and not below else None,
+                float(upper[k]) if told and not above else None,
+                float(covariance.degrees_of_freedom[k]) if told else None,
             )
+        )
     return tuple(made)
 
 
@@ -332,10 +319,8 @@ class Uncertainty(Result):
     own: Covariance
     """That of the stage's own noise."""
     white: Covariance
-    """Too small where residuals are coloured; to stand beside the others."""
+    """Too small where residuals are coloured: what `inflation` is told from."""
     colours: tuple[NoiseColour, ...]
-    samples: tuple[tuple[str, int, float], ...]
-    """For each run its label, samples, and the independent samples that they are worth."""
     noisy: bool
     """Whether there are any residuals at all."""
     level: float
@@ -395,12 +380,6 @@ class Uncertainty(Result):
                     f"That is a large part of a run: those of {colour.channel} are a model error "
                     "or a tone rather than noise, and intervals cover noise alone."
                 )
-        ratio = self._ratio()
-        if ratio is not None:
-            said.append(
-                f"White-noise errors would be {ratio:.2g} times too small; the report shows them "
-                "for comparison only."
-            )
         said += self.priors
         for end in self.ends:
             side, name = "upper" if end.upper else "lower", self.own.variables.names[end.number]
@@ -437,15 +416,6 @@ class Uncertainty(Result):
         """That of all stages' noise: the quoted one without what fixed numbers may be off."""
         return with_handed(self.own, self.handed)
 
-    def _ratio(self) -> float | None:
-        """Median of the stage's own over white error."""
-        known = self.own.determined & (self.white.standard_errors > 0.0)
-        if not known.any():
-            return None
-        ratio = self.own.standard_errors[known] / self.white.standard_errors[known]
-        median = float(np.median(ratio))
-        return median if median > 1.05 else None
-
 
 def uncertainty(
     fit: LinearisedFit,
@@ -476,16 +446,11 @@ def uncertainty(
     clean, lines = without_lines(fit)
     colours = noise_colours(clean)
     own = replace(coloured_noise_covariance(fit), variables=bounded)
-    worth = {m: colour for colour in colours for m in colour.members}
     made = Uncertainty(
         with_handed(own, handed, fixed),
         own,
         replace(white_noise_covariance(fit), variables=bounded),
         colours,
-        tuple(
-            (run.label, run.time.size, worth[m].effective_samples(run.time.size))
-            for m, run in enumerate(fit.runs)
-        ),
         fit.squares > 0.0,
         level,
         tuple(handed),
@@ -507,13 +472,11 @@ def released(fit: LinearisedFit) -> LinearisedFit:
     return replace(fit, variables=fit.variables.released)
 
 
-P = TypeVar("P", bound=Problem)
-
 LEAST = 1e-6
 """Smallest worth: residuals that are all but zero leave a prior its say on what they leave open."""
 
 
-def weighed(problem: P, vector: Array) -> P:
+def weighed(problem: Problem, vector: Array) -> Problem:
     """The problem with priors that count as much as the residuals are really worth.
 
     The cost takes every residual for an independent one of variance 1. Where a hundred of them are
@@ -547,11 +510,6 @@ def weighed(problem: P, vector: Array) -> P:
         for worth, unknown in zip(found, problem.unknowns, strict=True)
         if unknown.prior is not None
     ]
-    return with_worths(problem, worths)
-
-
-def with_worths(problem: P, worths: Sequence[float]) -> P:
-    """The problem with these worths of its priors, in the order of the unknowns."""
     return replace(problem, unknowns=problem.unknowns.with_worths(worths))
 
 

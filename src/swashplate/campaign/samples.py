@@ -1,0 +1,446 @@
+"""Samples and their time stamps, checked; an encoder's counts; one ammeter around both leads.
+
+Counts have their roll-overs taken out, their staircase filled and their jumps found. The ammeter
+reads the sum of magnitudes: compare it with the same of the simulation, and leave out what lies
+around the zero crossings, where a sign that is put back is a guess. Never differentiate through it.
+"""
+
+from math import ceil, log2
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.errors import InputError
+from swashplate.maneuvers.pieces import not_negative, positive, row, whole
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+GAP = 1.5
+"""An interval of more than this many usual ones is a gap."""
+TOLERANCE = 0.05
+"""How far off an even grid stamps may lie and still count as even, in sample periods.
+
+Stamps of an even logger are off by what their printing rounds away: 1/512 s in steps of 0.1 ms by
+2.6 % of a period. Differences of such stamps would put the rounding into the speed.
+"""
+
+
+class Stamps(NamedTuple):
+    """Stamps, and how far they are apart if that is the same throughout."""
+
+    time: Array
+    """Stamps; where they are even, those of the even grid. [s]"""
+    period: float | None
+    """Sample period, None for uneven stamps. [s]"""
+
+
+class StampStatistics(NamedTuple):
+    """What the stamps of a record are like."""
+
+    rows: int
+    rate: float
+    """One over the median interval. [Hz]"""
+    period: float
+    """Median interval. [s]"""
+    jitter: float
+    """Standard deviation of the intervals about their median, gaps left out. [s]"""
+    longest: float
+    """Longest interval, gap or not. [s]"""
+    gaps: Rows
+    """Rows that come after a gap."""
+    missing: int
+    """Samples that the gaps would have held at the median rate."""
+
+
+def increasing(time: ArrayLike) -> Array:
+    """Copy stamps [s] to a row; they must increase from each of two or more to the next.
+
+    Raises
+    ------
+    InputError
+        If one is not finite or not later than the one before it; the sentence names its row.
+    """
+    stamps = row("time", time)
+    if stamps.size < 2:
+        raise InputError("time must have two rows at least, not 1.")
+    wrong = np.flatnonzero(stamps[1:] <= stamps[:-1])
+    if wrong.size:
+        at = int(wrong[0]) + 1
+        raise InputError(
+            f"time must increase, but row {at} (the first is 0) has {stamps[at]} s after "
+            f"{stamps[at - 1]} s."
+        )
+    return stamps
+
+
+def stamps_of(time: ArrayLike) -> Stamps:
+    """Check two stamps [s] or more; those that are even but for their rounding go onto their grid.
+
+    Raises
+    ------
+    InputError
+        As `increasing`.
+    """
+    stamps = increasing(time)
+    period = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
+    grid = stamps[0] + period * np.arange(stamps.size)
+    if np.max(np.abs(stamps - grid)) > TOLERANCE * period:
+        return Stamps(stamps, None)
+    return Stamps(grid, period)
+
+
+def stamp_statistics(time: ArrayLike) -> StampStatistics:
+    """Rate, jitter and gaps of two stamps [s] or more.
+
+    Raises
+    ------
+    InputError
+        As `increasing`.
+    """
+    stamps = increasing(time)
+    intervals = np.diff(stamps)
+    median = float(np.median(intervals))
+    wide = intervals > GAP * median
+    usual = intervals[~wide]
+    return StampStatistics(
+        rows=stamps.size,
+        rate=1.0 / median,
+        period=median,
+        jitter=float(np.sqrt(np.mean((usual - median) ** 2))),
+        longest=float(intervals.max()),
+        gaps=np.flatnonzero(wide) + 1,
+        missing=int(np.sum(np.round(intervals[wide] / median) - 1.0)),
+    )
+
+
+def signal(name: str, values: ArrayLike, rows: int) -> Array:
+    """Samples of a signal, one for each of so many stamps, all finite; an array is not copied.
+
+    Raises
+    ------
+    InputError
+        If the shape is another or a value is not finite; the sentence names its row.
+    """
+    try:
+        numbers = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be numbers, not {values!r}.") from None
+    if numbers.shape != (rows,):
+        raise InputError(
+            f"{name} must be one signal with one row for each of the {rows} stamps, not of the "
+            f"shape {numbers.shape}."
+        )
+    wrong = np.flatnonzero(~np.isfinite(numbers))
+    if wrong.size:
+        raise InputError(
+            f"{name} must be finite, but row {wrong[0]} (the first is 0) is {numbers[wrong[0]]}."
+        )
+    return numbers
+
+
+# --- an encoder's counts --------------------------------------------------------------------------
+
+WIDEST = 2**53
+"""Most readings of a counter that a float64 holds to the count."""
+DOUBTFUL = 0.25
+"""A step larger than this share of a counter may have been another one. [1]"""
+SUSTAINED = 5
+"""A speed lasts if the median of this many neighbouring intervals has it."""
+MARGIN = 1.5
+"""A jump is this much faster than anything that lasts."""
+FEWEST = 32
+"""Readings that a counter shows at least; fewer may be those of a switch."""
+ORDINARY = 0.998
+"""Share of the steps that are no larger than those about a roll-over; others lead across gaps."""
+NEAR = 1.05
+"""The counts of a turn are the size where they are at most this much more than the range."""
+
+
+class Unwrapped(NamedTuple):
+    """A counter's position without its roll-overs."""
+
+    counts: Array
+    """Position from the first row's reading on. [count]"""
+    doubtful: Rows
+    """Rows whose step is so large that a roll-over more or less may be what happened."""
+
+
+def unwrap_counts(counts: ArrayLike, modulus: int) -> Unwrapped:
+    """Counts without the roll-overs of a counter: each step is the shortest way round.
+
+    Parameters
+    ----------
+    counts : array_like, shape (n,)
+        Readings, whole numbers from 0 up or, of a signed counter, from -modulus/2 up. [count]
+    modulus : int
+        How many readings the counter has: 65536 for 16 bits.
+
+    Raises
+    ------
+    InputError
+        If a reading is no whole number or outside the counter, or a step is exactly half the
+        modulus, so that neither way round is the shorter.
+    """
+    readings = row("counts", counts)
+    broken = np.flatnonzero(np.floor(readings) != readings)
+    if broken.size:
+        raise InputError(
+            f"counts must be whole numbers, but row {broken[0]} (the first is 0) is "
+            f"{readings[broken[0]]}."
+        )
+    size = whole("modulus", modulus)
+    if not 2 <= size <= WIDEST:
+        raise InputError(f"A counter must have from 2 to 2^53 readings, not {size}.")
+    signed = readings.min() < 0.0
+    low, high = (-(size // 2), (size - 1) // 2) if signed else (0, size - 1)
+    outside = np.flatnonzero((readings < low) | (readings > high))
+    if outside.size:
+        raise InputError(
+            f"counts hold {readings[outside[0]]:.0f} in row {outside[0]} (the first is 0), outside "
+            f"the {low} to {high} of a {'signed ' if signed else ''}counter of {size} readings: "
+            "give its own size, in a campaign file rolls_over_at."
+        )
+    steps = np.diff(readings)
+    short = steps - size * np.floor(steps / size + 0.5)
+    ambiguous = np.flatnonzero(short == -0.5 * size)
+    if ambiguous.size:
+        at = int(ambiguous[0]) + 1
+        raise InputError(
+            f"counts go from {readings[at - 1]:.0f} to {readings[at]:.0f} at row {at} (the first "
+            f"is 0), half the range of a counter of {size}, which may be up or down; cut the "
+            "record there."
+        )
+    position = readings[0] + np.concatenate([[0.0], np.cumsum(short)])
+    return Unwrapped(position, np.flatnonzero(np.abs(short) > DOUBTFUL * size) + 1)
+
+
+def ambiguous_gaps(time: Array, readings: Array, modulus: int) -> Rows:
+    """Rows after a gap so long that a counter of `modulus` may have gone round in it unseen.
+
+    A shaft that goes on at 1.5 times its greatest lasting speed passes half the counter within the
+    gap: the shortest way round need not be the one that it took. [row]
+    """
+    intervals = np.diff(time)
+    gaps = np.flatnonzero(intervals > GAP * np.median(intervals))
+    if not gaps.size or readings.size < 2 * SUSTAINED or np.any(readings != np.floor(readings)):
+        return np.zeros(0, dtype=np.intp)
+    steps = np.diff(readings)
+    short = steps - modulus * np.floor(steps / modulus + 0.5)
+    usual = np.delete(np.arange(steps.size), gaps)
+    # across a gap the shortest way round says nothing of the speed
+    fastest = MARGIN * _lasting(short[usual], intervals[usual])
+    return gaps[fastest * intervals[gaps] >= 0.5 * modulus] + 1
+
+
+def _lasting(steps: Array, intervals: Array) -> float:
+    """Greatest speed that lasts: the median over a few neighbouring intervals. [count/s]"""
+    from scipy.ndimage import median_filter
+
+    speeds = np.abs(steps) / intervals
+    return float(median_filter(speeds, size=SUSTAINED, mode="nearest").max())
+
+
+def interpolate_counts(time: ArrayLike, counts: ArrayLike) -> Array:
+    """Fill the samples that share a count: the source's smoothing of an encoder's staircase.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Stamps, even or not. [s]
+    counts : array_like, shape (n,)
+        Position without roll-overs, either direction. [count]
+
+    Returns
+    -------
+    array, shape (n,)
+        Position on straight lines from each row at which the count changed to the next such row.
+        The first row counts as one: up to the first change the line starts there, because a step
+        of a whole count within one sample would be a spike of speed. From the last change on the
+        count is held. [count]
+
+    Raises
+    ------
+    InputError
+        If the stamps do not increase or a number is not finite.
+
+    Notes
+    -----
+    Kruse (2001), section 7.2. Two properties of it stay: a line knows a change before it happens,
+    so it is no causal filter; and the row of a change carries its new count in both directions, so
+    that a reversal, whose two changes pass the same edge, moves the position by one count.
+    """
+    stamps = increasing(time)
+    edges = signal("counts", counts, stamps.size)
+    knots = np.concatenate([[0], np.flatnonzero(edges[1:] != edges[:-1]) + 1])
+    filled: Array = np.interp(stamps, stamps[knots], edges[knots])
+    return filled
+
+
+def find_lost_counts(time: ArrayLike, counts: ArrayLike) -> Rows:
+    """Rows at which the count changed faster than the shaft can turn.
+
+    Rows that jumps lead to: faster than 1.5 times the greatest speed that lasts (the median over
+    five neighbouring intervals, which isolated jumps do not reach), one count of rounding granted.
+    A loss that is no larger than the motion within a sample is not seen.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Stamps, even or not, six or more. [s]
+    counts : array_like, shape (n,)
+        Position without roll-overs. [count]
+
+    Raises
+    ------
+    InputError
+        If the stamps do not increase, a number is not finite, or the record is too short.
+    """
+    stamps = increasing(time)
+    steps, intervals = np.diff(signal("counts", counts, stamps.size)), np.diff(stamps)
+    if steps.size < SUSTAINED:
+        raise InputError(f"A record of {stamps.size} rows is too short to tell lost counts.")
+    limit = MARGIN * _lasting(steps, intervals)
+    return np.flatnonzero(np.abs(steps) > limit * intervals + 1.0) + 1
+
+
+def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int | None:
+    """Counts after which a counter begins anew, None where the numbers are not such a counter's.
+
+    The numbers are whole and many, and some steps go over more than half of their range, which
+    become as small as the others when they are taken the other way round. Numbers that only go up
+    by the same step each time count the samples. The counts of a turn are a likely size.
+    """
+    if values.size < 2 or not np.isfinite(values).all() or np.any(values != np.floor(values)):
+        return None
+    if np.unique(values).size < FEWEST:
+        return None
+    low, high = float(values.min()), float(values.max())
+    span = high + 1.0 if low >= 0.0 else 2.0 * max(-low, high + 1.0)
+    steps = np.diff(values)
+    over = np.abs(steps) > 0.5 * span
+    if not over.any() or over.all():
+        return None
+    ordinary = float(np.quantile(np.abs(steps[~over]), ORDINARY))
+    # the steps beside a roll-over are as large as the one across it, taken the other way round
+    beside = np.interp(np.flatnonzero(over), np.flatnonzero(~over), steps[~over])
+    turn = 0.0 if counts_per_turn is None else float(counts_per_turn)
+    sizes = {1 << ceil(log2(span)), 100 * ceil(span / 100.0)}
+    if turn.is_integer() and span <= turn <= NEAR * span:
+        sizes = {int(turn)}
+    best, error = 0, np.inf
+    for size in sorted(sizes):
+        short = steps[over] - size * np.round(steps[over] / size)
+        off = float(np.median(np.abs(short - beside)))
+        if off < error:
+            best, error, across = size, off, short
+    # across a gap any step may be; the counter's size is known to what the largest reading leaves
+    small = np.mean(np.abs(across) <= 2.0 * ordinary + (best - span)) >= 0.5
+    level = np.ptp(np.concatenate([steps[~over], across])) == 0.0
+    return None if level or not small or ordinary >= 0.25 * best else best
+
+
+# --- the ammeter ----------------------------------------------------------------------------------
+
+
+class ZeroCrossings(NamedTuple):
+    """Where a signal changes its sign, and what lies around it."""
+
+    instants: Array
+    """Instants of the crossings; of a stay at zero, when it begins and ends. [s]"""
+    masked: Mask
+    """True for samples within half the width of an instant: leave them out."""
+
+
+def zero_crossings(
+    time: ArrayLike, values: ArrayLike, *, width: float, level: float = 0.0
+) -> ZeroCrossings:
+    """Find where a signal changes its sign and mask the samples around.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Stamps. [s]
+    values : array_like, shape (n,)
+        The command, or better the simulated signed current, which lags like the measured one.
+    width : float
+        Length of the mask around each crossing, half before and half after. [s]
+    level : float
+        What is no larger than this counts as zero, in the unit of `values`.
+
+    Returns
+    -------
+    ZeroCrossings
+        A stay at zero between both signs is masked at both of its ends, and within if it is no
+        longer than the width. Leaving zero and coming back with the same sign is no crossing.
+
+    Raises
+    ------
+    InputError
+        If the stamps do not increase, a number is not finite, or the width is not positive.
+    """
+    stamps = increasing(time)
+    numbers = signal("values", values, stamps.size)
+    half = 0.5 * positive("width", width)
+    band = not_negative("level", level)
+    sure = np.flatnonzero(np.abs(numbers) > band)
+    turns = np.flatnonzero(np.sign(numbers[sure[1:]]) != np.sign(numbers[sure[:-1]]))
+    before, after = sure[turns], sure[turns + 1]
+    direct = after == before + 1
+    share = numbers[before] / (numbers[before] - numbers[after])
+    crossed = stamps[before] + share * (stamps[after] - stamps[before])
+    instants = np.unique(
+        np.concatenate([crossed[direct], stamps[before[~direct]], stamps[after[~direct]]])
+    )
+    masked = np.zeros(stamps.size, dtype=np.bool_)
+    for first, last in zip(
+        np.searchsorted(stamps, instants - half, side="left"),
+        np.searchsorted(stamps, instants + half, side="right"),
+        strict=True,
+    ):
+        masked[first:last] = True
+    return ZeroCrossings(instants, masked)
+
+
+def signed_by_command(rectified: ArrayLike, command: ArrayLike, *, level: float = 0.0) -> Array:
+    """Give a rectified current the sign of the command.
+
+    Parameters
+    ----------
+    rectified : array_like, shape (n,)
+        Reading of the ammeter, not negative. [A]
+    command : array_like, shape (n,)
+        Voltage, or any signal with the current's sign. [V]
+    level : float
+        A command no larger than this has no sign of its own. [V]
+
+    Returns
+    -------
+    array, shape (n,)
+        Current, positive where the command is. While the command has no sign the last one it had
+        holds, because the current is still on its way to zero; before the first it is positive. [A]
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, the lengths differ, or a reading is negative: it would have its
+        sign already.
+
+    Notes
+    -----
+    The true current passes zero smoothly; this one jumps where the command does, by twice the
+    reading. Its derivative, and that of a cost through it, mean nothing there.
+    """
+    numbers = row("command", command)
+    readings = signal("rectified", rectified, numbers.size)
+    negative = np.flatnonzero(readings < 0.0)
+    if negative.size:
+        raise InputError(
+            f"rectified must not be negative, but row {negative[0]} (the first is 0) is "
+            f"{readings[negative[0]]} A."
+        )
+    signs = np.where(np.abs(numbers) > level, np.sign(numbers), 0.0)
+    last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(signs.size), 0))
+    return np.where(signs[last] < 0.0, -readings, readings)

@@ -1,0 +1,274 @@
+"""Stamps and samples checked; counts, their roll-overs and jumps; one ammeter and its sign."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swashplate.campaign import (
+    find_lost_counts,
+    increasing,
+    interpolate_counts,
+    rolls_over_at,
+    signal,
+    signed_by_command,
+    stamp_statistics,
+    stamps_of,
+    unwrap_counts,
+    zero_crossings,
+)
+from swashplate.errors import InputError
+
+SHARED = Path(__file__).parents[3] / "shared"
+
+
+def test_rounded_stamps_are_put_back_onto_their_grid() -> None:
+    grid = np.arange(600) / 512.0
+    stamps = stamps_of(np.round(grid, 4))
+    assert stamps.period is not None
+    # the last stamp's own rounding, at most 5e-5 s, is spread over the record
+    assert stamps.period == pytest.approx(1.0 / 512.0, abs=5e-5 / 599.0)
+    np.testing.assert_allclose(stamps.time, grid, atol=5e-5)
+    assert np.ptp(np.diff(stamps.time)) < 1e-12
+
+
+def test_uneven_stamps_stay_as_they_are() -> None:
+    time = np.array([0.0, 1.0, 2.2, 3.0])
+    stamps = stamps_of(time)
+    assert stamps.period is None
+    np.testing.assert_array_equal(stamps.time, time)
+
+
+@pytest.mark.parametrize(
+    ("time", "said"),
+    [
+        ([0.0, 1.0, 1.0, 2.0], "row 2 (the first is 0) has 1.0 s after 1.0 s"),
+        ([0.0, np.nan, 1.0], "time must be finite, but row 1"),
+        ([0.0], "two rows at least"),
+        ([[0.0, 1.0]], "one row of numbers"),
+    ],
+)
+def test_wrong_stamps_are_refused(time: list, said: str) -> None:
+    with pytest.raises(InputError) as refused:
+        increasing(time)
+    assert said in str(refused.value)
+
+
+def test_wrong_samples_are_refused_by_row() -> None:
+    with pytest.raises(InputError, match="speed must be finite, but row 2 .* is inf"):
+        signal("speed", [0.0, 1.0, np.inf, 2.0], 4)
+    with pytest.raises(InputError, match="one row for each of the 5 stamps"):
+        signal("speed", np.zeros(4), 5)
+    with pytest.raises(InputError, match="must be numbers"):
+        signal("speed", ["a", "b"], 2)
+    with pytest.raises(InputError, match="one signal .* not of the shape"):
+        signal("speed", np.zeros((4, 3)), 4)
+
+
+def test_statistics_by_hand() -> None:
+    # intervals 0.1 0.12 0.08 0.1 0.5 0.1: median 0.1, the fifth a gap of four samples
+    found = stamp_statistics([0.0, 0.1, 0.22, 0.3, 0.4, 0.9, 1.0])
+    assert found.rows == 7
+    assert found.rate == pytest.approx(10.0)
+    assert found.jitter == pytest.approx(np.sqrt(2 * 0.02**2 / 5))
+    assert found.longest == pytest.approx(0.5)
+    np.testing.assert_array_equal(found.gaps, [5])
+    assert found.missing == 4
+
+
+def test_a_real_log_with_a_pause() -> None:
+    folder = SHARED / "data" / "excavator"
+    if not folder.exists():
+        pytest.skip("the excavator's measured data are not beside this checkout")
+    import polars as pl
+
+    path = sorted(folder.glob("steps_*.csv"))[0]
+    time = pl.read_csv(path)["Time"].to_numpy().astype(float)
+    found = stamp_statistics(time)
+    assert found.rate == pytest.approx(52.0, abs=2.0)
+    assert found.longest == pytest.approx(1.0, abs=0.2)
+    assert found.missing > 40
+
+
+# --- counts ---------------------------------------------------------------------------------------
+
+
+def test_a_counter_of_three_bits_rolls_over_both_ways() -> None:
+    unwrapped = unwrap_counts([6, 7, 1, 2, 1, 0, 6], 8)
+    # 7 → 1 is +2 across the end, 0 → 6 is -2 across it
+    np.testing.assert_array_equal(unwrapped.counts, [6, 7, 9, 10, 9, 8, 6])
+    assert unwrapped.doubtful.size == 0
+
+
+def test_large_steps_are_doubtful_and_half_the_range_is_refused() -> None:
+    unwrapped = unwrap_counts([0, 3, 4], modulus=8)
+    np.testing.assert_array_equal(unwrapped.counts, [0, 3, 4])
+    np.testing.assert_array_equal(unwrapped.doubtful, [1])
+    with pytest.raises(InputError, match="from 3 to 7 at row 2 .* half the range .* up or down"):
+        unwrap_counts([2, 3, 7], modulus=8)
+
+
+@given(
+    st.lists(st.integers(-499, 499), min_size=1, max_size=50),
+    st.integers(-(10**6), 10**6),
+    st.sampled_from([1000, 1024, 999]),
+    st.booleans(),
+)
+def test_any_motion_slower_than_half_the_range_is_recovered(
+    steps: list[int], first: int, modulus: int, signed: bool
+) -> None:
+    walk = first + np.concatenate([[0], np.cumsum(steps)])
+    low = modulus // 2 if signed else 0
+    readings = (walk + low) % modulus - low
+    unwrapped = unwrap_counts(readings, modulus=modulus)
+    np.testing.assert_array_equal(unwrapped.counts - unwrapped.counts[0], walk - walk[0])
+    assert unwrapped.counts[0] == readings[0]
+
+
+@pytest.mark.parametrize(
+    ("counts", "modulus", "said"),
+    [
+        ([0, 9], 8, "hold 9 in row 1 .* outside the 0 to 7 of a counter of 8"),
+        ([-1, 7], 8, "hold 7 in row 1 .* the -4 to 3 of a signed counter"),
+        ([0, 0.5], 8, "whole numbers, but row 1"),
+        ([0, 1], 2**64, "from 2 to 2.53 readings"),
+        ([0, 1], 1, "from 2 to 2.53 readings, not 1"),
+        ([0, np.nan], 256, "finite, but row 1"),
+    ],
+)
+def test_readings_that_no_such_counter_shows_are_refused(
+    counts: list, modulus: int, said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        unwrap_counts(counts, modulus)
+
+
+@pytest.mark.parametrize(
+    ("time", "counts", "lines"),
+    [
+        # changes at rows 2, 5, 7; the first row begins the first line; after row 7 it is held
+        (
+            range(10),
+            [5, 5, 6, 6, 6, 8, 8, 7, 7, 7],
+            [5, 5.5, 6, 6 + 2 / 3, 6 + 4 / 3, 8, 7.5, 7, 7, 7],
+        ),
+        ([0.0, 1.0, 3.0, 4.0, 10.0], [0, 0, 1, 1, 2], [0.0, 1 / 3, 1.0, 1 + 1 / 7, 2.0]),
+        (range(4), [3, 3, 3, 3], [3, 3, 3, 3]),
+        (range(4), [3, 9, 4, 5], [3, 9, 4, 5]),
+    ],
+)
+def test_interpolation_by_hand(time: list, counts: list, lines: list) -> None:
+    np.testing.assert_allclose(interpolate_counts(time, counts), lines, rtol=1e-15)
+
+
+@given(st.floats(0.02, 30.0), st.floats(0.0, 1.0), st.sampled_from([-1.0, 1.0]))
+def test_steady_motion_is_found_to_the_motion_within_one_sample(
+    speed: float, first: float, direction: float
+) -> None:
+    rows = np.arange(2000)
+    position = first + direction * speed * rows
+    counts = np.floor(position)
+    changes = np.flatnonzero(np.diff(counts)) + 1
+    inside = slice(changes[0], changes[-1] + 1)
+    lines = interpolate_counts(rows, counts)
+    # the edge below (forth) or above (back) was passed within the sample before the change
+    behind = direction * (position - lines)[inside] + (1.0 if direction < 0.0 else 0.0)
+    assert behind.min() >= -1e-9
+    assert behind.max() <= min(1.0, speed) + 1e-9
+
+
+def test_lost_counts_are_found_where_they_are() -> None:
+    time = np.arange(1000) / 512.0
+    counts = np.floor(300.0 * np.sin(2.0 * np.pi * time))  # at most 1885 counts/s
+    counts[400:] += 50.0
+    counts[700:] -= 21.0
+    np.testing.assert_array_equal(find_lost_counts(time, counts), [400, 700])
+
+
+def test_stamps_count_and_a_record_must_be_long_enough() -> None:
+    time = np.array([0.0, 0.1, 0.2, 1.2, 1.3, 1.4, 1.5])
+    # 50 counts in the pause of 1 s are no faster than 5 in 0.1 s; 15 in 0.1 s are
+    counts = [0.0, 5.0, 10.0, 60.0, 75.0, 80.0, 85.0]
+    np.testing.assert_array_equal(find_lost_counts(time, counts), [4])
+    with pytest.raises(InputError, match="5 rows is too short to tell lost counts"):
+        find_lost_counts(time[:5], counts[:5])
+
+
+def test_rest_has_no_lost_counts() -> None:
+    flicker = np.array([0, 0, 0, 1, 0, 0, 0, 0, 1, 1, 1, 0], dtype=float)
+    assert find_lost_counts(np.arange(12.0), flicker).size == 0
+
+
+# --- columns that are counters --------------------------------------------------------------------
+
+
+LONG = np.linspace(0.0, 10.0, 2001)
+THERE_AND_BACK = np.floor(9000.0 * np.sin(0.6 * LONG))
+"""Up to 9000 counts and back, at most 27 in a sample."""
+
+
+@pytest.mark.parametrize(
+    ("values", "turn", "size"),
+    [
+        (THERE_AND_BACK % 1000, None, 1000),
+        (THERE_AND_BACK % 3600, None, 3600),
+        (THERE_AND_BACK % 4096, None, 4096),
+        (THERE_AND_BACK % 3990, None, 4000),
+        (THERE_AND_BACK % 3990, 3990.0, 3990),  # the counts of a turn are likely
+        ((THERE_AND_BACK + 2048) % 4096 - 2048, None, 4096),  # signed
+        (THERE_AND_BACK, None, None),  # never begins anew
+        (np.arange(2001.0) % 256, None, None),  # counts the samples
+        (THERE_AND_BACK % 4096 + 0.5, None, None),
+        (np.where(LONG % 2.0 < 1.0, 0.0, 1000.0), None, None),  # a switch
+        (np.where(LONG < 8.0, np.floor(400.0 * np.sin(0.3 * LONG)), 0.0), None, None),  # set to 0
+        (np.full(5, np.nan), None, None),
+        (np.zeros(0), None, None),
+    ],
+)
+def test_columns_that_are_counters(
+    values: np.ndarray, turn: float | None, size: int | None
+) -> None:
+    assert rolls_over_at(values, turn) == size
+
+
+# --- the ammeter ----------------------------------------------------------------------------------
+
+
+TIME = np.arange(11) * 0.1
+
+
+@pytest.mark.parametrize(
+    ("values", "options", "instants", "masked"),
+    [
+        # from +3 at 0.4 s to -1 at 0.5 s: zero at 0.475 s; 0.26 s around: 0.345 to 0.605 s
+        ([3, 3, 3, 3, 3, -1, -1, -1, -1, -1, -1], {"width": 0.26}, [0.475], [4, 5, 6]),
+        # a stay at zero is masked at both ends
+        ([1, 1, 0, 0, 0, 0, 0, 0, -1, -1, -1], {"width": 0.22}, [0.1, 0.8], [0, 1, 2, 7, 8, 9]),
+        # rest and the return to it are no crossings
+        ([0, 0, 1, 2, 0, 0, 1, 0, 0, 0, 0], {"width": 0.2}, [], []),
+        # noise below the level has no sign
+        ([2, 2, 0.01, -0.01, 0.01, -0.01, 2, 2, 2, 2, 2], {"width": 0.1, "level": 0.05}, [], []),
+    ],
+)
+def test_zero_crossings(values: list, options: dict, instants: list, masked: list) -> None:
+    found = zero_crossings(TIME, values, **options)
+    np.testing.assert_allclose(found.instants, instants)
+    np.testing.assert_array_equal(np.flatnonzero(found.masked), masked)
+
+
+def test_sign_of_a_current_on_its_way_to_zero() -> None:
+    command = np.array([0.0, -5.0, -5.0, 0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 4.0, 4.0])
+    reading = np.array([0.0, 0.1, 0.4, 0.3, 0.1, 0.0, 0.0, 0.2, 0.3, 0.4, 0.4])
+    expected = [0.0, -0.1, -0.4, -0.3, -0.1, 0.0, 0.0, 0.2, 0.3, 0.4, 0.4]
+    np.testing.assert_allclose(signed_by_command(reading, command), expected)
+
+
+def test_wrong_readings_are_refused() -> None:
+    with pytest.raises(InputError, match="rectified must not be negative, but row 3"):
+        signed_by_command(np.where(np.arange(11) == 3, -0.1, 0.1), TIME)
+    with pytest.raises(InputError, match="width must be positive"):
+        zero_crossings(TIME, TIME, width=0.0)
+    with pytest.raises(InputError, match="level must not be negative"):
+        zero_crossings(TIME, TIME, width=0.1, level=-1.0)

@@ -1,0 +1,200 @@
+"""The source's largest per cent errors."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from reproduction.source_errors import (
+    SOURCE_RULES,
+    ComparedRun,
+    ErrorTable,
+    edges,
+    error_table,
+    error_tables,
+    source_rules,
+)
+
+from swashplate import Channel, Experiment
+from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.errors import InputError
+from swashplate.identification.validation import compared
+
+FINE = np.arange(0.0, 10.0, 0.01)
+TIME = np.arange(0.0, 10.0, 0.1)
+
+
+def step(**more: object) -> ComparedRun:
+    """Command on from 1 s to 6 s; the simulation is 2 % high, and 30 % off where it rises."""
+    command = np.where((TIME >= 1.0) & (TIME < 6.0), 4.0, 0.0)
+    measured = np.where((TIME >= 1.0) & (TIME < 7.0), 100.0, 0.0)
+    simulated = 1.02 * measured
+    simulated[(TIME > 1.05) & (TIME < 1.95)] = 130.0
+    fields = {
+        "name": "hoistr6", "kind": "step", "quantity": "shaft_speed", "time": TIME,
+        "command": command, "measured": measured, "simulated": simulated,
+    }  # fmt: skip
+    return ComparedRun(**{**fields, **more})  # type: ignore[arg-type]
+
+
+def sine(frequency: float = 0.1, quantity: str = "shaft_speed", **more: object) -> ComparedRun:
+    turn = 2.0 * np.pi * frequency * TIME
+    fields = {
+        "name": f"sine {frequency:g} Hz", "kind": "sine", "quantity": quantity, "time": TIME,
+        "command": 4.0 * np.sin(turn), "measured": 50.0 * np.sin(turn),
+        "simulated": 55.0 * np.sin(turn), "frequency": frequency,
+    }  # fmt: skip
+    return ComparedRun(**{**fields, **more})  # type: ignore[arg-type]
+
+
+def percent(table: ErrorTable) -> dict[str, float | None]:
+    return {row.kind: row.percent for row in table.rows}
+
+
+def test_the_settled_error_of_a_step() -> None:
+    table = error_table("speed", [step()])
+    assert percent(table) == {"step": pytest.approx(2.0)}
+    (row,) = table.rows
+    assert row.run == "hoistr6"
+    assert row.time >= 3.0
+    assert row.runs == 1
+
+
+def test_the_overshoot_counts_if_its_rule_is_off() -> None:
+    rules = [rule for rule in SOURCE_RULES if rule.name != "overshoot"]
+    assert percent(error_table("speed", [step()], rules=rules))["step"] == pytest.approx(30.0)
+
+
+def test_rules_that_left_out_something_are_named() -> None:
+    """A step's speed has no zero crossings of a current, and there is no fast sine."""
+    table = error_table("speed", [step()])
+    assert table.rules == SOURCE_RULES
+    assert [rule.name for rule in table.acted] == ["start transient", "overshoot", "small values"]
+
+
+def test_fast_sines_are_left_out_as_a_whole() -> None:
+    table = error_table("speed", [sine(0.1), sine(0.3, simulated=np.zeros(TIME.size))])
+    assert percent(table)["sine"] == pytest.approx(10.0)
+    assert table.left_out == (("sine 0.3 Hz", "fast sines"),)
+    alone = error_table("speed", [sine(0.3)])
+    assert [rule.name for rule in alone.acted] == ["fast sines"]
+
+
+def test_nothing_left_is_a_verdict() -> None:
+    table = error_table("speed", [sine(0.3)])
+    assert percent(table) == {"sine": None}
+    assert table.rows[0].samples == 0
+
+
+def test_slew_leaves_out_its_steps() -> None:
+    assert percent(error_table("speed", [step()], source_rules("slew"))) == {"step": None}
+
+
+def test_a_run_at_rest_has_no_per_cent() -> None:
+    still = step(measured=np.zeros(TIME.size))
+    assert percent(error_table("speed", [still], rules=[])) == {"step": None}
+
+
+def test_rows_come_in_the_sources_order() -> None:
+    ramp = step(kind="ramp", name="ramp")
+    assert [row.kind for row in error_table("speed", [sine(), step(), ramp]).rows] == [
+        "ramp",
+        "step",
+        "sine",
+    ]
+
+
+def test_dither_is_averaged_over() -> None:
+    dither = 20.0 * np.where(np.arange(TIME.size) % 2, 1.0, -1.0)
+    run = step(simulated=1.02 * step().measured + dither)
+    assert percent(error_table("speed", [run]))["step"] > 20.0
+    assert percent(error_table("speed", [run], average=0.2))["step"] == pytest.approx(2.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("run", "said"),
+    [
+        (step(measured=np.zeros(3)), "differ in length"),
+        (step(simulated=np.full(TIME.size, np.nan)), "not finite"),
+    ],
+)
+def test_wrong_runs_are_refused(run: ComparedRun, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        error_table("speed", [run])
+
+
+PULSE = np.where((TIME >= 1.0) & (TIME < 6.0), 1.0, 0.0)
+
+
+def excluded(name: str, run: ComparedRun) -> np.ndarray:
+    """Samples that one of the source's rules leaves out."""
+    (rule,) = (each for each in SOURCE_RULES if each.name == name)
+    return np.broadcast_to(rule.excluded(run), run.time.shape)
+
+
+def test_the_start_transient_is_the_speeds() -> None:
+    early = TIME < 400.0 / 512.0
+    np.testing.assert_array_equal(excluded("start transient", step()), early)
+    assert not excluded("start transient", step(quantity="rectified_current")).any()
+
+
+def test_edges_of_a_step_and_of_a_ramp() -> None:
+    np.testing.assert_allclose(edges(step()), [1.0, 6.0])
+    ramp = step(kind="ramp", command=np.clip(TIME - 1.0, 0.0, None))
+    np.testing.assert_allclose(edges(ramp), [1.1])
+    assert edges(step(command=np.zeros(TIME.size))).size == 0
+
+
+def test_overshoot_windows() -> None:
+    expected = ((TIME > 0.95) & (TIME < 2.95)) | ((TIME > 5.95) & (TIME < 7.95))
+    np.testing.assert_array_equal(excluded("overshoot", step()), expected)
+    assert not excluded("overshoot", step(kind="ramp")).any()
+
+
+def test_zero_crossings_are_the_rectified_currents() -> None:
+    out = excluded("zero crossings", sine(quantity="rectified_current"))
+    np.testing.assert_array_equal(out, np.abs(np.sin(0.2 * np.pi * TIME)) < 0.1)
+    assert not excluded("zero crossings", sine()).any()
+    assert not excluded("zero crossings", step(quantity="rectified_current")).any()
+
+
+def test_fast_and_small() -> None:
+    assert excluded("fast sines", sine(0.3)).all()
+    assert not excluded("fast sines", sine(0.1)).any()
+    assert not excluded("fast sines", replace(sine(), frequency=None)).any()
+    found = excluded("small values", step(measured=30.0 * PULSE + 70.0 * PULSE * (TIME > 3.0)))
+    np.testing.assert_array_equal(found, PULSE == 0.0)
+
+
+def measured_run(name: str, maneuver: str, current: np.ndarray) -> Experiment:
+    """A command of 4 V from 1 s to 6 s, and a current."""
+    log, voltage = (
+        Source(Path("log.csv"), "column"),
+        np.where((FINE >= 1.0) & (FINE < 6.0), 4.0, 0.0),
+    )
+    drive = InputSignal("voltage", "V", FINE, voltage, "previous", log)
+    channel = Channel("current", "rectified_current", "A", FINE, current, np.ones(FINE.size), log)
+    return Experiment(
+        name, "hoist", name, "validate", "rest", None, drive, {"current": channel}, maneuver
+    )
+
+
+def test_the_table_of_a_channel() -> None:
+    current = np.where((FINE >= 1.0) & (FINE < 6.0), 0.5, 0.0)
+    # 5 % too large throughout, 40 % within the overshoot's window that is left out
+    simulated = current * np.where((FINE >= 1.0) & (FINE < 2.0), 1.4, 1.05)
+    step = measured_run("a", "step +4 V", current)
+    free = measured_run("b", "free", current)
+    (found,) = error_tables(
+        [compared(step, "current", simulated), compared(free, "current", current)]
+    )
+    assert (found.channel, found.unjudged, found.average) == ("current", ("b",), 0.1)
+    (row,) = found.rows
+    assert (row.kind, row.run) == ("step", "a")
+    assert row.percent == pytest.approx(5.0, rel=1e-6)
+    assert [each.name for each in source_rules("slew")] == [
+        *(each.name for each in source_rules("hoist")),
+        "steps",
+    ]
+    (slew,) = error_tables([compared(step, "current", simulated)], source_rules("slew"))
+    assert slew.rows[0].percent is None
