@@ -1,4 +1,5 @@
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -6,6 +7,37 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from swashplate.cli import app
+
+STEPS = tuple(
+    word
+    for volts in (4, -5)
+    for word in ("--maneuver", f"step:{volts},start=0.5,stop=2.5,length=4")
+)
+"""Two short tests, as options of 'rig'."""
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The published hoist's virtual tests, in a folder that tests copy from."""
+    folder = tmp_path_factory.mktemp("made")
+    words = ["rig", "hoist", "--out", str(folder / "virtual"), *STEPS]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    return folder
+
+
+@pytest.fixture
+def virtual(made: Path, tmp_path: Path) -> Path:
+    """The campaign file of two steps of the published hoist, in the folder virtual."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "virtual" / "campaign.toml"
+
+
+@pytest.fixture
+def held_out(virtual: Path) -> Path:
+    """The same, the second run held back."""
+    before, _, after = virtual.read_text("utf-8").rpartition('role = "fit"')
+    virtual.write_text(f'{before}role = "validate"{after}', "utf-8")
+    return virtual
 
 
 @pytest.fixture

@@ -6,14 +6,22 @@ import polars as pl
 import pytest
 
 from swashplate import Drive
+from swashplate.identification.setup import load_setup
+
+# --- advise ---------------------------------------------------------------------------------------
+
 
 Words = Callable[..., str]
+
+
 SMALL = (
     "--maneuver",
     "step:1,start=0.5,stop=2.5,length=4",
     "--maneuver",
     "step:2,start=0.5,stop=2.5,length=4",
 )
+
+
 SETUP = """
 [[stages]]
 name = "pump"
@@ -22,11 +30,15 @@ free.Z10 = { relative = [0.5, 2.0], log = true }
 free.Z13 = { relative = [0.5, 2.0], log = true }
 free.Z19 = { relative = [0.5, 2.0], log = true }
 """
+
+
 TRIALS = tuple(
     word
     for volts in ("2", "-2", "9", "-9")
     for word in ("--maneuver", f"step:{volts},start=0.5,stop=2.5,length=4")
 )
+
+
 PRESSURE = ("--sensor", "stroker_pressure")
 
 
@@ -98,3 +110,96 @@ def test_refusals(refused: Words, campaign: str) -> None:
     assert "no maneuver" in refused("advise", "hoist", "--maneuver", "wobble:3")
     assert ".txt" in refused("advise", campaign, "--setup", "setup.toml", *TRIALS, "--out", "a.txt")
     assert "no packaged" in refused("advise", "boom")
+
+
+# --- excite ---------------------------------------------------------------------------------------
+
+
+TESTS = (
+    "--maneuver",
+    "step:2,start=0.5,stop=2.5,length=4",
+    "--maneuver",
+    "step:9,start=0.5,stop=2.5,length=4",
+)
+
+
+BOTH_PARTS = """
+[[stages]]
+name = "card"
+part = "card"
+free.J = { relative = [0.5, 2.0] }
+free.lim1_plus = { relative = [0.5, 2.0], log = true }
+
+[[stages]]
+name = "pump"
+part = "pump"
+free.Z6 = { relative = [0.5, 2.0], log = true }
+free.Z8 = { relative = [0.5, 2.0], log = true }
+free.Z13 = { relative = [0.5, 2.0], log = true }
+"""
+
+
+@pytest.fixture
+def steps_up(done: Words, tmp_path: Path) -> str:
+    """Two positive steps of a hoist, of which one reaches the stop."""
+    done("rig", "hoist", "--out", "virtual", *TESTS)
+    (tmp_path / "setup.toml").write_text(BOTH_PARTS, "utf-8")
+    return "virtual/campaign.toml"
+
+
+def row(said: str, unknown: str) -> list[str]:
+    (line,) = re.findall(rf"^{unknown}  +(.*)$", said, re.MULTILINE)
+    return re.split(r"  +", line.strip())
+
+
+def test_each_unknown_has_a_row(done: Words, steps_up: str) -> None:
+    said = done("excitation", steps_up, "--setup", "setup.toml")
+    assert row(said, "J_plus")[-1] == "##"
+    needs, seconds, effect, runs = row(said, "J_minus")
+    assert (needs, seconds, effect, runs) == ("a command beyond the dead zone", "0", "0", "..")
+    # only the step of 9 V reaches the stop
+    assert row(said, "Z13_plus")[-1] == ".#"
+    said = " ".join(said.split())
+    assert "J_minus needs a command beyond the dead zone (minus), which no run has." in said
+    assert "* Fix J_minus: no run exercises it." in said
+    assert "run 2: hoist_step_9_V" in said
+    assert "(--write FILE keeps it)" in said
+    assert "J_plus = {relative = [0.5, 2.0]}" in said
+
+
+def test_the_proposal_can_be_written_and_fitted(done: Words, steps_up: str, tmp_path: Path) -> None:
+    setup = ("--setup", "setup.toml")
+    said = done("excitation", steps_up, *setup, "--write", "mine.toml", "--out", "runs.csv")
+    assert "Set-up: mine.toml" in said
+    card, pump = load_setup(tmp_path / "mine.toml").stages
+    assert list(card.free) == ["J_plus", "lim1_plus"]
+    assert list(pump.free) == ["Z6", "Z8", "Z13_plus"]
+    table = pl.read_csv(tmp_path / "runs.csv")
+    assert set(table["stage"]) == {"card", "pump"}
+    known = table.filter(pl.col("share") > 0.0)
+    shares = known.group_by("stage", "parameter").agg(pl.col("share").sum())
+    assert shares["share"].to_list() == pytest.approx([1.0] * shares.height)
+    again = done("excitation", steps_up, "--setup", "mine.toml")
+    assert "The fit configuration can stay as it is." in again
+    done("fit", steps_up, "--setup", "mine.toml", "--out", "fitted", "--no-report")
+
+
+def test_doubts_are_said_first(done: Words, tmp_path: Path) -> None:
+    idle = ("--maneuver", "step:0.1,start=0.5,stop=1,length=2")
+    done("rig", "hoist", "--out", "virtual", "--severity", "clean", *TESTS, *idle)
+    (tmp_path / "setup.toml").write_text(BOTH_PARTS, "utf-8")
+    said = done("excitation", "virtual/campaign.toml", "--setup", "setup.toml")
+    assert said.startswith("! hoist_step_0.1_V: its command stays between 0 and 0.1 V")
+
+
+def test_refusals_of_excitation(refused: Words, steps_up: str, tmp_path: Path) -> None:
+    assert "no axis 'boom'; it has hoist" in refused("excitation", steps_up, "--axis", "boom")
+    assert "no packaged fit configuration 'boom'" in refused(
+        "excitation", steps_up, "--setup", "boom"
+    )
+    (tmp_path / "none.toml").write_text(
+        '[[stages]]\nname = "pump"\npart = "pump"\nfree.Z14 = { relative = [0.5, 2.0] }\n', "utf-8"
+    )
+    said = refused("excitation", steps_up, "--setup", "none.toml", "--write", "mine.toml")
+    assert "The runs determine none of the parameters" in said
+    assert ".txt" in refused("excitation", steps_up, "--setup", "setup.toml", "--out", "t.txt")

@@ -8,17 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from tests.cli.conftest import STEPS
 from typer.testing import Result
 
 from swashplate import Drive
 
 Words = Callable[..., str]
-TESTS = (
-    "--maneuver",
-    "step:4,start=0.5,stop=2.5,length=4",
-    "--maneuver",
-    "step:-5,start=0.5,stop=2.5,length=4",
-)
 SETUP = """
 [[stages]]
 name = "card"
@@ -39,14 +34,16 @@ def campaign(done: Words, tmp_path: Path) -> Path:
     """Virtual tests of a hoist with other orifices and another jump."""
     truth = Drive.preset("hoist").replace(Z16=(1.3e-4, 1.3e-4), J=(0.26, 0.31))
     truth.to_toml(tmp_path / "truth.toml")
-    done("rig", "truth.toml", "--out", "virtual", *TESTS)
+    done("rig", "truth.toml", "--out", "virtual", *STEPS)
     path = tmp_path / "virtual" / "campaign.toml"
     path.write_text(path.read_text("utf-8").replace('drive = "drive.toml"', 'drive = "hoist"'))
     (tmp_path / "setup.toml").write_text(SETUP, "utf-8")
     return path
 
 
-def test_a_campaign_becomes_a_drive(done: Words, campaign: Path, tmp_path: Path) -> None:
+def test_a_campaign_becomes_a_drive(
+    done: Words, refused: Words, campaign: Path, tmp_path: Path
+) -> None:
     said = done("fit", "virtual/campaign.toml", "--setup", "setup.toml", "--out", "fitted")
     assert "Stage card" in said
     assert "Stage pump" in said
@@ -66,8 +63,11 @@ def test_a_campaign_becomes_a_drive(done: Words, campaign: Path, tmp_path: Path)
     header, *rows = (tmp_path / "fitted" / "estimates.csv").read_text("utf-8").splitlines()
     assert header.startswith("stage,parameter,unit,nominal,estimate")
     assert len([row for row in rows if "offset" not in row]) == 6
+    again = ("fit", "virtual/campaign.toml", "--setup", "setup.toml", "--out", "fitted")
+    assert "fitted/drive.toml exists already" in refused(*again)
 
 
+@pytest.mark.slow
 def test_starts_are_resumed_after_a_kill(campaign: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "swashplate", "fit", "virtual/campaign.toml"]
     command += ["--setup", "setup.toml", "--out", "fitted", "--starts", "12", "--jobs", "1"]
@@ -96,6 +96,7 @@ def test_starts_are_resumed_after_a_kill(campaign: Path, tmp_path: Path) -> None
     ).read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_the_whole_search_and_resume_goes_on(campaign: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "swashplate", "fit", "virtual/campaign.toml", "--no-report"]
     command += ["--setup", "setup.toml", "--starts", "12", "--jobs", "2", "--out"]
@@ -136,6 +137,7 @@ def test_a_folder_that_cannot_be_written_is_said_before_the_fit(
     assert not list(tmp_path.glob("fitted*"))
 
 
+@pytest.mark.slow
 def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path: Path) -> None:
     asked = ("--folds", "2", "--bootstrap", "40", "--profile", "Z8", "--profile", "J_plus")
     setup = ("--setup", "setup.toml", "--jobs", "1", "--figures", "svg")
@@ -181,6 +183,9 @@ def test_refusals(refused: Words, campaign: Path, tmp_path: Path) -> None:
     assert "no parameter 'Z99'" in refused(*fit, "--setup", "setup.toml", "--profile", "Z99")
     (tmp_path / "bad.toml").write_text(SETUP.replace("Z16", "Z61"), "utf-8")
     assert "no parameter 'Z61'" in refused(*fit, "--setup", "bad.toml")
+    (tmp_path / "bad.toml").write_text(SETUP.replace("[0.5, 2.0]", "[2.0, 0.5]", 1), "utf-8")
+    said = refused(*fit, "--setup", "bad.toml")
+    assert "bad.toml: stages.0.free.J: relative = [2, 0.5] must rise: write [0.5, 2]" in said
     (tmp_path / "bad.toml").write_text(SETUP.replace("relative", "relativ", 1), "utf-8")
     assert "perhaps 'relative' is meant" in refused(*fit, "--setup", "bad.toml")
     text = campaign.read_text("utf-8").replace('role = "fit"', 'role = "ignore"')

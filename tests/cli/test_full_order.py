@@ -1,5 +1,4 @@
 import re
-import shlex
 from pathlib import Path
 
 import numpy as np
@@ -138,63 +137,3 @@ def test_a_solver_agrees_with_the_march(done, number):
     march, radau = done(*words), done(*words, "--method", "radau")
     row = "largest difference"
     assert number(radau, row) == pytest.approx(number(march, row), abs=2e-3)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("crane",), "no packaged set, file or folder 'crane'"),
-        (("none.toml", "step:9"), "There is no file none.toml"),
-        (("neutral",), "neutral: spool_stroke (stroke of the spool, both ways) is inf m"),
-        (("hoist", "stepp:9"), "'stepp' is no maneuver"),
-        (("hoist", "step:11"), "the card takes ±10 V"),
-        (("hoist", "--rate", "1"), "must be between 10 and 100000 Hz"),
-        (("hoist", "step:9", "--rate", "1"), "must be between 10 and 100000 Hz"),
-        (("hoist", "--like", "crane"), "no packaged physical set 'crane'; there are hoist"),
-        (("slew", "--like", "hoist"), "slew: spool_mass on spool_arm alone has"),
-        (("hoist", "--plot", "run.png"), "--plot draws one run; name a maneuver"),
-        (("hoist", "--method", "radau"), "--method radau checks one run; name a maneuver"),
-        (("hoist", "step:9", "--out", "run.doc"), "run.doc ends in '.doc'"),
-        (("hoist", "--out", "none/table.csv"), "cannot be written"),
-        (("hoist", "step:9", "--plot", "run.gif"), "a figure is written as .png"),
-        (("hoist", "--physical", "oil=1"), "A physical set has no quantity 'oil'"),
-        (("hoist", "--physical", "oil_volum=1"), "did you mean oil_volume?"),
-        (("hoist", "--physical", "oil_volume"), "--physical cannot read 'oil_volume'; write"),
-        (
-            ("hoist", "--physical", "oil_volume=nan"),
-            "at the stroking piston) is nan m^3, but must be above 0",
-        ),
-        (("hoist", "--physical", "oil_volume=1e-4/2e-4"), "oil_volume has one value, not a plus"),
-        (("hoist", "--physical", "oil_volume=1kg"), "in 'kg', which does not measure the same"),
-        (("hoist", "--physical", "oil_volume=1 glug"), "the unknown unit 'glug'"),
-        (("hoist", "--physical", "oil_volume=-1"), "is -1 m^3, but must be above 0"),
-        (("hoist", "--physical", "bulk_modulus=inf"), "is inf Pa, but must be above 0"),
-        (
-            ("hoist", "--physical", "swash_arm=0.1", "--physical", "swash_arm=80mm"),
-            "--physical gives swash_arm twice",
-        ),
-        (("hoist", "--physical", "return_spring_rate=7e4"), "76102.8345 follows from Z1"),
-        (
-            (
-                *("hoist", "--physical", "spool_frequency=50Hz"),
-                *("--physical", "feedback_arm_inertia=1e-6"),
-            ),
-            "feedback_arm_inertia and spool_frequency are both given",
-        ),
-        (("hoist", "--set", "Z2=0.1"), "a physical set has Z2 = 0"),
-        (("hoist", "--set", "Z11=0.01"), "without load_torque no speed is lost to it"),
-    ],
-)
-def test_refusals(refused, words, said):
-    assert said in refused("full-order", *words)
-
-
-def test_the_examples_in_its_help(run, done, tmp_path):
-    text = run("full-order", "--help").stdout
-    (tmp_path / "fitted").mkdir()
-    Drive.preset("luff").renamed("mine").to_toml(tmp_path / "fitted" / "drive.toml")
-    (tmp_path / "log.csv").write_text("time,voltage\n0,0\n1,4\n2,0\n", "utf-8")
-    examples = re.findall(r"^ *swashplate (full-order .*?) *$", text.partition("Example")[2], re.M)
-    assert len(examples) >= 4
-    for example in examples:
-        done(*shlex.split(example))

@@ -1,9 +1,19 @@
+from io import StringIO
+
+import h5py
 import numpy as np
 import polars as pl
 import pytest
+import scipy.io
+from rich.console import Console
 
 from swashplate import Drive, Limit, maneuvers
 from swashplate.analysis import outcomes
+from swashplate.maneuvers import source_tests
+from swashplate.parameters.definitions import CATALOGUE
+from swashplate.parameters.files import AXES, preset_names
+
+# --- simulate -------------------------------------------------------------------------------------
 
 
 def test_a_step_prints_the_known_speeds(done, number):
@@ -74,12 +84,6 @@ def test_out_writes_every_signal(done, name):
         np.testing.assert_array_equal(table[column], expected[column])
 
 
-def test_out_writes_over_an_older_file(done, tmp_path):
-    (tmp_path / "run.csv").write_text("old")
-    done("simulate", "hoist", "rest:1", "--out", "run.csv")
-    assert pl.read_csv("run.csv").height == 513
-
-
 def test_plot(done, tmp_path):
     text = done("simulate", "hoist", "step:9", "--plot", "step.png")
     assert "Figure: step.png" in text
@@ -90,15 +94,10 @@ def test_plot(done, tmp_path):
 @pytest.mark.parametrize(
     ("words", "changes"),
     [
-        (("--set", "Z16=1.2e-4"), {"Z16": 1.2e-4}),
         (("--set", "Z16=1.2e-4/1.5e-4"), {"Z16": (1.2e-4, 1.5e-4)}),
-        (("--set", "Z16=.12/.15mm"), {"Z16": (1.2e-4, 1.5e-4)}),
         (("--set", "Z16_plus=0.12mm"), {"Z16_plus": 1.2e-4}),
-        (("--set", "Z16 = 0.12 mm"), {"Z16": 1.2e-4}),
         (("--set", "Z9=90 bar", "--set", "tau=20ms"), {"Z9": 9e6, "tau": 0.02}),
         (("--set", "Z10=744 1/min"), {"Z10": 12.4}),
-        (("--set", "lim1=5A/s"), {"lim1": 5.0}),
-        (("--set", "Z16_minus=inf"), {"Z16_minus": np.inf}),
         (("--scale", "Z10=1.5"), {"Z10": 1.5 * 12.396}),
         (("--scale", "Z13=0.5/0.25"), {"Z13": (0.5 * 0.27596, 0.25 * 0.26047)}),
         (("--set", "Z10=10", "--scale", "Z10=1.5"), {"Z10": 15.0}),
@@ -110,11 +109,6 @@ def test_set_and_scale(done, words, changes):
     expected = drive.simulate(maneuvers.sine(9.0, 0.1).sample())
     speed = pl.read_parquet("run.parquet")["shaft_speed"].to_numpy()
     np.testing.assert_allclose(speed, expected.shaft_speed, rtol=1e-9, atol=1e-12)
-
-
-def test_a_scaled_gain_scales_the_speed(done, number):
-    text = done("simulate", "hoist", "step:9", "--scale", "Z10=0.5")
-    assert number(text, "peak speed, positive") == 98.00
 
 
 def test_an_own_set(done, number, tmp_path):
@@ -165,3 +159,200 @@ def test_the_first_lag_of_a_straight_line_is_read_off_the_speed():
 def test_peaks_of_what_never_goes_one_way():
     assert outcomes.peaks(np.array([-3.0, -1.0])) == (0.0, -3.0)
     assert outcomes.peaks(np.array([2.0])) == (2.0, 0.0)
+
+
+# --- records --------------------------------------------------------------------------------------
+
+
+TIME = np.arange(1025) / 512.0
+
+
+VOLTAGE = 9.0 * np.sin(TIME)
+
+
+def simulated(done, *words):
+    done("simulate", "hoist", *words, "--out", "run.parquet", "--force")
+    return pl.read_parquet("run.parquet")
+
+
+def as_matlab(path):
+    scipy.io.savemat(path, {"time": TIME, "voltage": VOLTAGE})
+
+
+def as_hdf5(path):
+    with h5py.File(path, "w") as file:
+        file["run/time"], file["run/voltage"] = TIME, VOLTAGE
+
+
+def as_text(path):
+    table = pl.DataFrame({"time": TIME, "voltage": VOLTAGE, "note": "x"})
+    comma = path.suffix == ".txt"
+    table.write_csv(path, separator=";" if comma else ",", decimal_comma=comma)
+
+
+def as_parquet(path):
+    pl.DataFrame({"time": TIME, "voltage": VOLTAGE, "note": "x"}).write_parquet(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("log.csv", as_text),
+        ("log.txt", as_text),
+        ("log.parquet", as_parquet),
+        ("log.mat", as_matlab),
+        ("log.h5", as_hdf5),
+    ],
+)
+def test_a_record_is_simulated(done, tmp_path, name, write):
+    write(tmp_path / name)
+    written = simulated(done, name, "--interpolation", "linear")
+    expected = Drive.preset("hoist").simulate(VOLTAGE)
+    np.testing.assert_allclose(written["shaft_speed"], expected.shaft_speed, atol=1e-12)
+
+
+def test_units_in_the_header(done, tmp_path):
+    table = pl.DataFrame({"time [ms]": 1e3 * TIME, "voltage_mV": 1e3 * VOLTAGE})
+    table.write_csv(tmp_path / "log.csv")
+    written = simulated(done, "log.csv", "--interpolation", "linear")
+    expected = Drive.preset("hoist").simulate(VOLTAGE)
+    np.testing.assert_allclose(written["shaft_speed"], expected.shaft_speed, atol=1e-9)
+
+
+def test_other_columns(done, tmp_path):
+    table = pl.DataFrame({"t": TIME, "time": 0.0, "voltage": 0.0, "joystick": VOLTAGE})
+    table.write_csv(tmp_path / "log.csv")
+    words = ("--interpolation", "linear", "--time-column", "t", "--column", "joystick")
+    written = simulated(done, "log.csv", *words)
+    np.testing.assert_allclose(written["voltage"], VOLTAGE, atol=1e-12)
+
+
+def test_interpolation(done, tmp_path):
+    (tmp_path / "log.csv").write_text("time,voltage\n0,0\n1,8\n2,8\n")
+    held = simulated(done, "log.csv", "--interpolation", "previous", "--rate", "100")
+    line = simulated(done, "log.csv", "--interpolation", "linear", "--rate", "100")
+    assert held["voltage"][50] == 0.0
+    assert line["voltage"][50] == 4.0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time,voltage\n0,1\n1,nan\n2,1\n", "'voltage' is empty or NaN in data row 2"),
+        ("time,voltage\n0,1\n1,x\n2,1\n", "'voltage' holds 'x', which is no number, in data row 2"),
+        ("", "log.csv is empty"),
+        ("time,voltage\n0,1\n2,1\n1,1\n", "'time' goes back from 2.0 to 1.0 in data row 3"),
+        ("time,voltage\n0,1\n1,1\n1,1\n", "'time' has 1.0 twice, in data rows 2 and 3"),
+        ("time,voltage\n0,1\n1,-10.5\n", "-10.5 V at 1 s, but the card takes ±10 V"),
+        ("time,voltage\n0,1\n4e9,1\n", "check the unit of the time"),
+        (
+            "t,u\n0,1\n1,1\n",
+            "no column 'time'; it has 't', 'u': name the one to take, with --time-",
+        ),
+        ("time,u\n0,1\n1,1\n", "it has 'time', 'u': name the one to take, with --column."),
+        ("time,voltage [bar]\n0,1\n1,1\n", "'bar', which does not measure the same as V"),
+        ("time [blinks],voltage\n0,1\n1,1\n", "unknown unit 'blinks'; give it in s"),
+        ("time,voltage\n0,1\n1\n2,3,4\n", "data row 2 (line 3) has 1 field instead of 2"),
+    ],
+)
+def test_a_bad_record_is_refused(refused, tmp_path, text, said):
+    (tmp_path / "log.csv").write_text(text)
+    words = ("--interpolation", "previous", "--out", "run.csv", "--plot", "run.png")
+    sentence = refused("simulate", "hoist", "log.csv", *words)
+    assert "log.csv" in sentence
+    assert said in sentence
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("none.csv", "There is no file none.csv"),
+        ("log.xlsx", "log.xlsx ends in '.xlsx'; a log is read from .csv, .tsv, .txt"),
+        ("log", "log ends in ''"),
+    ],
+)
+def test_a_file_that_is_none(refused, tmp_path, name, said):
+    (tmp_path / "log").write_text("time,voltage\n0,1\n1,1\n")
+    assert said in refused("simulate", "hoist", name, "--interpolation", "linear")
+
+
+# --- parameters -----------------------------------------------------------------------------------
+
+
+def test_axes_lists_speeds(done, number):
+    text = done("axes")
+    for name in preset_names():
+        assert f"\n{name} " in text
+    hoist = next(line for line in text.splitlines() if line.startswith("hoist "))
+    assert [float(word) for word in hoist.split()[-3:]] == [-185.00, 3.09, 196.00]
+    assert "rexroth_mdsd_1k_2x_4" in text
+    assert max(map(len, text.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_show_lists_every_parameter_in_80_columns(done, name):
+    text = done("show", name)
+    first_words = [line.split()[0] for line in text.splitlines() if line.strip()]
+    assert set(CATALOGUE) <= set(first_words)
+    assert max(map(len, text.splitlines())) <= 80
+    assert "…" not in text
+
+
+def test_show_has_values_units_status_and_source(done):
+    lines = done("show", "hoist").splitlines()
+    (row,) = [line for line in lines if line.startswith("Z16 ")]
+    assert row.split()[-4:] == ["0.00011634", "0.00015126", "m", "fitted"]
+    assert row.split()[1:3] == ["opening", "at"]
+    sources = [line.strip() for line in lines if line.strip().endswith(":")]
+    assert sources == ["tables 4.1, 4.3:", "tables 4.2, 4.4:", "table 7.2:"]
+
+
+def test_toml_starts_an_own_set(done, tmp_path):
+    (tmp_path / "mine.toml").write_text(done("show", "hoist", "--toml"), "utf-8")
+    mine, hoist = Drive.from_toml(tmp_path / "mine.toml"), Drive.preset("hoist")
+    assert mine == hoist
+    assert done("show", "mine.toml") == done("show", "hoist")
+
+
+# --- tour -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def printed(done):
+    return done("tour", "--out", "sub/tour")
+
+
+def test_every_run_is_written_and_listed(printed, tmp_path):
+    folder = tmp_path / "sub/tour"
+    names = {
+        f"{axis}/{name.replace('/', ' per ')}.csv" for axis in AXES for name in source_tests(axis)
+    }
+    figures = {"overview.png", "steady.png"}
+    written = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
+    assert written == names | figures
+    assert len(names) == 25
+    assert pl.read_csv(folder / "hoist/step +9 V.csv").height == 5121
+    assert {"hoist/ramp -1 V per s.csv", "slew/sine 6 V 0.05 Hz.csv"} <= names
+    (row,) = [line for line in printed.splitlines() if line.startswith("hoist  step +9 V ")]
+    assert row.split()[4:7] == ["5121", "196.00", "0.00"]
+    assert "swash stop" in printed
+    for figure in figures:
+        assert (folder / figure).read_bytes().startswith(b"\x89PNG")
+        assert f"sub/tour/{figure}" in printed
+    assert max(map(len, printed.splitlines())) <= 80
+
+
+@pytest.mark.slow
+def test_a_person_who_waits_sees_a_bar(run, monkeypatch):
+    terminal = Console(file=StringIO(), force_terminal=True, width=80, markup=False)
+    monkeypatch.setattr("swashplate.cli.terminal.side", terminal)
+    assert run("tour").exit_code == 0
+    seen = terminal.file.getvalue()
+    assert "0/27" in seen
+    assert "hoist, ramp +1 V/s" in seen
+    assert seen.endswith("\x1b[?25h\r\x1b[1A\x1b[2K")  # the bar is wiped out, the cursor is back
+
+
+def test_a_folder_that_cannot_be_made(refused, tmp_path):
+    (tmp_path / "file").write_text("")
+    assert "Error: file cannot be made: " in refused("tour", "--out", "file")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.analysis.outcomes import OUTCOMES, Outcome, Trial, find_outcomes, outcome_matrix
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS, columns_of, find
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.simulation.result import Simulation
@@ -93,9 +93,8 @@ def find_lever(name: str) -> Lever:
     """A lever by name, or a parameter by its symbol or column; another one is an `InputError`."""
     if name in LEVERS:
         return LEVERS[name]
-    if name in CATALOGUE or name in COLUMNS:
-        symbol = COLUMNS.get(name, name)
-        return Lever(name, {name: 1.0}, f"Parameter {name}: {CATALOGUE[symbol].name}.")
+    if name in CATALOGUE or name in COLUMNS or name in REFINEMENTS:
+        return Lever(name, {name: 1.0}, f"Parameter {name}: {find(name).name}.")
     close = get_close_matches(name, [*LEVERS, *CATALOGUE, *COLUMNS], n=1)
     hint = f" (did you mean {close[0]}?)" if close else ""
     main = [each for each in LEVERS if not each.endswith(("_plus", "_minus"))]
@@ -145,7 +144,8 @@ def pulled_columns(
     Raises
     ------
     InputError
-        For an unknown lever, a factor that is negative or NaN, or 0 times infinity.
+        For an unknown lever, a refinement without a value, a factor that is negative or NaN, or 0
+        times infinity.
     """
     columns: dict[str, Array] = {}
     for name, given in factors.items():
@@ -155,6 +155,8 @@ def pulled_columns(
             raise InputError(f"The factor on {name} is {bad:g}, but must be 0 or more.")
         for symbol, power in lever.powers.items():
             for column in columns_of([symbol]):
+                if column not in numbers:
+                    raise InputError(f"{column} has no value here that a factor could change.")
                 columns[column] = columns.get(column, np.ones(())) * factor**power
     with np.errstate(invalid="ignore"):
         made = {name: np.asarray(numbers[name] * factor) for name, factor in columns.items()}

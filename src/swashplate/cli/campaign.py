@@ -13,15 +13,15 @@ import typer
 from swashplate.cli.options import (
     AxisName,
     CampaignPath,
-    DriveWord,
-    Force,
+    DriveChoice,
     Seed,
-    Values,
     command,
     option,
 )
 from swashplate.cli.terminal import (
+    FORCED,
     Outputs,
+    check_free,
     note,
     say,
     show,
@@ -123,7 +123,6 @@ def init(
     unit: Annotated[
         list[str] | None, option("Unit of a column; may be repeated.", metavar="COLUMN=UNIT")
     ] = None,
-    force: Force = False,
 ) -> None:
     """Write the first draft of a campaign file from the headers of logs.
 
@@ -134,7 +133,6 @@ def init(
     from swashplate.campaign.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
 
     target = out or logs[0].parent / "campaign.toml"
-    _keep(force, target, "another with --out")
     Outputs((target, None))
     with working("Reading"):
         text = draft_campaign(
@@ -155,11 +153,6 @@ def init(
             note(f"  {line.lstrip('# ')}")
     note("Then run")
     note(f"  swashplate campaign check {shlex.quote(str(target))}")
-
-
-def _keep(force: bool, path: Path, instead: str) -> None:
-    if path.exists() and not force:
-        raise InputError(f"{path} exists already; name {instead}, or say --force.")
 
 
 def _from(folder: Path, drive: str | None) -> str | None:
@@ -205,7 +198,7 @@ def check(
     virtual = " (virtual)" if campaign.virtual else ""
     note(f"{campaign.title}{virtual}: {len(campaign)} experiments ({counted})")
     tables = {each.name: quality_table(each, qualities[each.name]) for each in campaign}
-    widths = widths_of(tables.values())
+    widths = widths_of(tables.values()) if tables else []
     for experiment in campaign:
         show_in(widths, tables[experiment.name])
         for text in experiment.notes:
@@ -269,9 +262,10 @@ def plot(
     else:
         title = f"{campaign.title} (virtual)" if campaign.virtual else campaign.title
         figures = plot_campaign(campaign.experiments, title=title)
-        for number, figure in enumerate(figures, start=1):
-            several = out.with_stem(f"{out.stem}-{number}")
-            files.draw(out if len(figures) == 1 else several, figure)
+        several = [out.with_stem(f"{out.stem}-{k}") for k in range(1, len(figures) + 1)]
+        check_free(*several)
+        for path, figure in zip([out] if len(figures) == 1 else several, figures, strict=True):
+            files.draw(path, figure)
     files.say()
 
 
@@ -315,14 +309,13 @@ command(app, "schema", SCHEMA_EXAMPLES)(schema)
 
 
 def rig(
-    drive: DriveWord,
+    drive: DriveChoice,
     out: Annotated[Path, option("A new or empty folder for logs and campaign.", metavar="DIR")],
     seed: Seed = 1,
     severity: Annotated[
         Severity,
         option("The instruments: perfect, as in a good campaign, or with everything wrong."),
     ] = "realistic",
-    values: Values = None,
     backlash_deg: Annotated[float, option("Play between shaft and encoder.", metavar="DEG")] = 0.0,
     perturb: Annotated[
         float, option("Draw all true parameters, fixed ones too, within this share: 0.1.")
@@ -334,31 +327,32 @@ def rig(
             metavar="MANEUVER",
         ),
     ] = None,
-    force: Annotated[bool, option("Write into a folder that is not empty.", "--force")] = False,
 ) -> None:
     """Write a virtual test campaign: logs, campaign.toml and, apart, the truth.
 
     A drive with known parameters is simulated over the tests of Kruse (2001)
-    and read by instruments with chosen errors. --set changes the drive that is
-    simulated, not the one that a fit starts from. Fit it as you would your
-    machine's logs, then look into truth/. Every file says that it is virtual.
+    and read by instruments with chosen errors. --set and --scale change the
+    drive that is simulated, not the one that a fit starts from. Fit it as you
+    would your machine's logs, then look into truth/. Every file says that it is
+    virtual.
     """
     from swashplate.campaign import rig as bench
     from swashplate.tables import Column, Table
 
+    check_free(out)
     with working("Simulating"):
-        nominal = drive_of(drive)
+        nominal = drive_of(drive.drive)
         tests = bench.run(
-            drive if drive_file(drive) is None else nominal,
+            nominal if drive_file(drive.drive) else drive.drive,
             None if not maneuver else [maneuver_of(each, nominal) for each in maneuver],
             seed=seed,
             severity=severity,
             instruments=replace(bench.SEVERITIES[severity], backlash=radians(backlash_deg)),
-            truth=drive_of(drive, values) if values else None,
+            truth=drive.chosen if drive.values or drive.factors else None,
             perturb=perturb,
         )
     with working("Writing"):
-        path = bench.write(tests, out, overwrite=force)
+        path = bench.write(tests, out, overwrite=FORCED.get())
     numbers = (Column("rows", "d"), Column("s", ".4g"))
     words = (Column("log"), Column("maneuver", wrap=True), Column("role"))
     made = Table("", (*words, *numbers))
@@ -377,7 +371,6 @@ def guess(
         Path | None,
         option("Folder for start.toml and setup.toml; by default the campaign's.", metavar="DIR"),
     ] = None,
-    force: Force = False,
 ) -> None:
     """Read a machine's dead zones, gains, limits, delay and lag off its logs.
 
@@ -393,8 +386,7 @@ def guess(
         runs = runs_to_fit(campaign, chosen)
         folder = path.parent if out is None else out
         start, setup = folder / "start.toml", folder / "setup.toml"
-        for each in (start, setup):
-            _keep(force, each, "a folder with --out")
+        check_free(start, setup)
         found = guess_drive(runs)
         parameters = guessed_set(found, path.name)
         folder.mkdir(parents=True, exist_ok=True)

@@ -25,6 +25,7 @@ from swashplate.cli.options import (
 from swashplate.cli.terminal import (
     Shown,
     Timing,
+    check_free,
     long_work,
     note,
     progress,
@@ -169,8 +170,10 @@ def fit(
             "more, 1000 for smooth ones."
         )
     check_folder(out)
-    if pdf is not None:
-        _check_printing(pdf, report)
+    if not resume:
+        made = (DRIVE, NUMBERS, "estimates.csv", STORED, *(["report.html"] if report else []))
+        check_free(*(out / each for each in made))
+    _check_shown(out, report, pdf, figures)
     clock = Timing()
     if model is not None and (setup is not None or begin is not None or joint):
         raise InputError(f"{model} says what is free and where it begins: leave out the others.")
@@ -374,14 +377,19 @@ def _shown(
     return lines
 
 
-def _check_printing(pdf: Path, report: bool) -> None:
-    """See to it, before long work, that a report can be printed."""
+def _check_shown(out: Path, report: bool, pdf: Path | None, figures: Figures | None) -> None:
+    """See to it, before long work, that figures and a printed report can be written."""
+    if figures is not None:
+        check_free(out / "figures")
+    if pdf is None:
+        return
     from swashplate.report.fit_report import find_browser
 
     if not report:
         raise InputError("--pdf prints the report: leave out --no-report.")
     ending(pdf, Form("a printed report", (".pdf",)))
     check_place(pdf)
+    check_free(pdf)
     find_browser()
 
 
@@ -435,6 +443,10 @@ def validate(
 
     if figures is not None and out is None:
         raise InputError("--figures needs a folder to write them to: give --out DIR.")
+    if out is not None:
+        check_folder(out)
+        check_free(out / "measures.csv", out / "report.html")
+        _check_shown(out, True, None, figures)
     with working(f"Reading {path}"):
         parameters: Parameters | None = None if model else parameters_of(drive)
         campaign, chosen = campaign_of(path, axis)
@@ -536,12 +548,14 @@ def report(
     from swashplate.identification.assessment import judge_stored
     from swashplate.report.fit_report import shown_runs, write_samples
 
-    if pdf is not None:
-        _check_printing(pdf, True)
     if data is not None:
         ending(data, TABLE)
         check_place(data)
+        check_free(data)
     folder = fitted if fitted.is_dir() else fitted.parent
+    if out is not None and out != folder:  # the fit's own report is written again
+        check_free(out / "report.html")
+    _check_shown(out or folder, True, pdf, figures)
     with working(f"Reading {path}"):
         if not (folder / STORED).is_file():
             raise InputError(
@@ -593,7 +607,7 @@ def demo(
     Draws a hoist that differs from the published one, logs the 13 tests of
     Kruse (2001) through a 12-bit command, an ammeter and an encoder, fits card,
     pump and motor to ten of them, predicts the other three and writes a report.
-    Takes less than a minute.
+    Takes less than a minute. An earlier demo is replaced.
     """
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
@@ -603,6 +617,8 @@ def demo(
     from swashplate.identification.staging import drawn
     from swashplate.identification.tables import estimates_table, runs_tables, truth_count
 
+    if not (out / "virtual" / "truth").is_dir():  # an earlier demo is replaced, nothing else
+        check_free(out)
     setup = load_setup("hoist")
     with progress(5) as begin:
         begin("testing the virtual hoist")

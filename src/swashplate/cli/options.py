@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
 import typer
 
+from swashplate.cli.terminal import FORCED
 from swashplate.units import shown_in
 
 if TYPE_CHECKING:
@@ -85,7 +86,6 @@ PrintFigures = Annotated[
     Figures | None, option("Figures for print as well, in the folder figures.")
 ]
 Required = Annotated[float, option("Largest error of held-out runs, in % of their range.", min=0.0)]
-Force = Annotated[bool, option("Replace older files.", "--force")]
 Seed = Annotated[int, option("Of everything drawn at random.", min=0)]
 Levers = Annotated[
     list[str] | None,
@@ -183,6 +183,13 @@ class Simulating(Sampling):
 
 
 @dataclass(frozen=True)
+class Replacing:
+    """Whether files that are there may be replaced."""
+
+    force: Annotated[bool, option("Replace older files.", "--force")] = False
+
+
+@dataclass(frozen=True)
 class ShownUnits:
     """Units that tables and figures are shown in."""
 
@@ -194,10 +201,14 @@ class ShownUnits:
     ] = None
 
 
+WRITTEN = {"out", "plot", "write", "pdf", "figures"}
+"""Parameters of commands that write files, and so replace older ones with --force alone."""
+
+
 def command(
     app: typer.Typer, name: str, examples: str, panel: str | None = None
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Register a command with its examples, its groups of options spread and the units' added."""
+    """Register a command with its examples, its groups spread, --force and units added."""
 
     def register(function: Callable[..., None]) -> Callable[..., None]:
         hints = get_type_hints(function, include_extras=True)
@@ -210,10 +221,12 @@ def command(
             else:
                 kind = inspect.Parameter.KEYWORD_ONLY
                 flat.append(each.replace(annotation=hints[each.name], kind=kind))
+        flat += _spread(Replacing) if WRITTEN & {each.name for each in given} else []
         flat += _spread(ShownUnits)
 
         def run(**words: Any) -> None:
             units, drum = words.pop("units"), words.pop("drum")
+            FORCED.set(words.pop("force", False))
             for name, group in groups.items():
                 own = [each.name for each in fields(group)]
                 words[name] = group(**{each: words.pop(each) for each in own})

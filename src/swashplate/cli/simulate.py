@@ -10,7 +10,6 @@ import typer
 from swashplate.cli.options import (
     CommandWord,
     DriveChoice,
-    DriveWord,
     FigureFile,
     Rate,
     Simulating,
@@ -18,9 +17,9 @@ from swashplate.cli.options import (
     argument,
     option,
 )
-from swashplate.cli.terminal import Outputs, note, progress, say, show, working
-from swashplate.cli.words import drive_of, maneuver_of, parameters_of, simulated
-from swashplate.tables import FIGURE, TABLE, made_folder
+from swashplate.cli.terminal import Outputs, check_free, note, progress, say, show, working
+from swashplate.cli.words import drive_of, maneuver_of, simulated
+from swashplate.tables import FIGURE, TABLE, check_folder, made_folder
 
 if TYPE_CHECKING:
     from swashplate.drive import Drive
@@ -164,7 +163,7 @@ def axes() -> None:
 
 
 def show_parameters(
-    drive: DriveWord,
+    drive: DriveChoice,
     toml: Annotated[
         bool, option("Print a TOML file, complete and ready to edit.", "--toml")
     ] = False,
@@ -174,13 +173,15 @@ def show_parameters(
     A parameter with a plus and a minus value has one for each direction; both
     are magnitudes. Units are SI.
     """
-    parameters = parameters_of(drive)
+    parameters = drive.chosen.parameters
     if toml:
         from swashplate.parameters.files import dump_set
 
         typer.echo(dump_set(parameters), nl=False)
         return
     say(f"{parameters.name}: {parameters.title}")
+    for line in drive.changes:
+        note(line)
     show(*parameters.tables())
     rate = "any rate" if parameters.rate is None else f"{parameters.rate:g} Hz"
     say(
@@ -205,6 +206,8 @@ def tour(
     from swashplate.maneuvers import source_tests
     from swashplate.parameters.files import AXES
 
+    check_folder(out)
+    check_free(out)
     drives = {axis: Drive.preset(axis) for axis in AXES}
     tests = {axis: source_tests(axis) for axis in AXES}
     runs: dict[str, dict[str, Simulation]] = {axis: {} for axis in AXES}

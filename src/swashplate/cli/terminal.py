@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from contextvars import ContextVar
 from pathlib import Path
+from textwrap import fill
 from time import perf_counter
 from typing import Any, Protocol
 
@@ -13,18 +15,42 @@ from rich import box
 from rich.console import Console
 from rich.status import Status
 
+from swashplate.errors import FileError
 from swashplate.tables import UNIT, Column, Form, Table, check_place, ending
 
 BEGUN = perf_counter()
+FORCED: ContextVar[bool] = ContextVar("FORCED", default=False)
+"""Whether older files may be replaced: --force."""
 LINE, BETWEEN = 80, 2
 """Characters of a line, and those between two columns."""
+NARROW = "\N{NO-BREAK SPACE}%"
+LEAST, LONGEST = 9, 30
+"""Characters of a head that is broken, and of a name beside too many numbers."""
 # names of files and maneuvers are printed as they are, whatever brackets and colons they hold
 output = Console(markup=False, highlight=False, emoji=False)
 side = Console(stderr=True, markup=False, highlight=False, emoji=False)
 """Standard error: what a pipe must not carry."""
 
 
-def _rich(table: Table, widths: Sequence[int] = ()) -> rich.table.Table:
+def _texts(table: Table) -> list[list[str]]:
+    """The words of the head and of each row."""
+    pairs = zip(table.columns, table.heads(), strict=True)
+    heads = ["" if column is UNIT else head for column, head in pairs]
+    return [heads, *(table.texts(row) for row in table.rows)]
+
+
+def _widths(texts: Sequence[Sequence[str]]) -> list[int]:
+    columns = zip(*texts, strict=True)
+    return [max(len(line) for cell in column for line in cell.split("\n")) for column in columns]
+
+
+def _rich(
+    table: Table,
+    texts: Sequence[Sequence[str]],
+    widths: Sequence[int] = (),
+    places: Sequence[int] = (),
+) -> rich.table.Table:
+    """A table, or some of its columns; numbers are never cut."""
     made = rich.table.Table(
         title=table.title or None,
         title_justify="left",
@@ -36,27 +62,64 @@ def _rich(table: Table, widths: Sequence[int] = ()) -> rich.table.Table:
         pad_edge=False,
         collapse_padding=True,
     )
-    for place, (column, head) in enumerate(zip(table.columns, table.heads(), strict=True)):
+    places = places or range(len(table.columns))
+    whole = _widths(texts)
+    for place in places:
+        column = table.columns[place]
         made.add_column(
-            "" if column is UNIT else head,
+            texts[0][place],
             justify="right" if column.spec else "left",
             no_wrap=not column.wrap,
             width=widths[place] if widths else None,
+            min_width=whole[place] if column.spec else None,
             # a name that is too long goes on in the next line
-            overflow="fold" if column.wrap and widths else "ellipsis",
+            overflow="fold" if widths and not column.spec else "ellipsis",
         )
-    for row in table.rows:
+    for row, cells in zip(table.rows, texts[1:], strict=True):
         if row.section:
             made.add_section()
-        made.add_row(*table.texts(row))
+        made.add_row(*(cells[place] for place in places))
     return made
+
+
+def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
+    """A table for lines of a length, in one block or, of too many numbers, in several.
+
+    Heads are broken first; every block begins with the columns before the first number.
+    """
+    texts = _texts(table)
+    widths = _widths(texts)
+
+    def length(places: Sequence[int]) -> int:
+        return sum(widths[k] for k in places) + BETWEEN * (len(places) - 1)
+
+    every = range(len(table.columns))
+    numbers = [k for k in every if table.columns[k].spec]
+    if length(every) <= line or not numbers or any(each.wrap for each in table.columns):
+        yield _rich(table, texts)
+        return
+    cells = _widths(texts[1:] or texts)
+    for k, head in enumerate(texts[0]):
+        broken = fill(head.replace(" %", NARROW), max(cells[k], LEAST))
+        texts[0][k] = broken.replace(NARROW, " %")
+    widths = [each if k in numbers else min(each, LONGEST) for k, each in enumerate(_widths(texts))]
+    lead = block = list(every[: numbers[0]])
+    for k in every[numbers[0] :]:
+        unit = [k + 1] if k + 1 in every and table.columns[k + 1] is UNIT else []
+        full = table.columns[k] is not UNIT and length([*block, k, *unit]) > line
+        if full and len(block) > len(lead):
+            yield _rich(table, texts, widths, block)
+            block = lead
+        block = [*block, k]
+    yield _rich(table, texts, widths, block)
 
 
 def show(*tables: Table) -> None:
     """Print tables, empty lines around them."""
     for each in tables:
-        output.print()
-        output.print(_rich(each.of("t")))
+        for block in _blocks(each.of("t"), output.width):
+            output.print()
+            output.print(block)
     output.print()
 
 
@@ -74,8 +137,9 @@ def widths_of(tables: Iterable[Table]) -> list[int]:
 
 def show_in(widths: Sequence[int], table: Table) -> None:
     """Print a table in columns of given widths."""
+    shown = table.of("t")
     output.print()
-    output.print(_rich(table.of("t"), widths))
+    output.print(_rich(shown, _texts(shown), widths))
     output.print()
 
 
@@ -182,6 +246,20 @@ def waiting(seconds: float | None, sort: str = "about") -> str:
     return f"{sort} {seconds / 60.0:.0f} min left"
 
 
+def check_free(*paths: Path) -> None:
+    """Refuse to replace a file, or to mix with what a folder holds, unless --force says so.
+
+    Raises
+    ------
+    FileError
+        For the first that is there.
+    """
+    for path in () if FORCED.get() else paths:
+        if path.is_file() or (path.is_dir() and any(path.iterdir())):
+            what = "is not empty" if path.is_dir() else "exists already"
+            raise FileError(f"{path} {what}; name another place, or replace it with --force.")
+
+
 class Outputs:
     """Files of a command: refused before anything is computed, and named when all is printed."""
 
@@ -196,13 +274,15 @@ class Outputs:
         Raises
         ------
         FileError
-            For a wrong ending, a folder that does not exist, or a folder in the file's place.
+            For a wrong ending, a folder that does not exist, a folder in the file's place, or a
+            file that is there already, unless --force is given.
         """
         for path, form in wanted:
             if path is not None and form is not None:
                 ending(path, form)
             if path is not None:
                 check_place(path)
+                check_free(path)
         self._lines: list[str] = []
 
     def write(self, path: Path | None, what: str, write: Callable[[Path], object]) -> None:

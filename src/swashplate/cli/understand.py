@@ -333,7 +333,7 @@ def _band_sentences(bands: Mapping[str, Bands]) -> list[str]:
 
 
 def size(
-    drive: DriveWord,
+    drive: DriveChoice,
     speed_deg_s: Annotated[float | None, option("Speed that is required.", metavar="DEG/S")] = None,
     acceleration_deg_s2: Annotated[
         float | None,
@@ -375,21 +375,22 @@ def size(
     given = (speed_deg_s, acceleration_deg_s2, tracking_deg_s)
     speed, acceleration, error = (None if each is None else radians(each) for each in given)
     required = sizing.Requirements(speed, acceleration, error, direction)
-    choice = DriveChoice(drive)
     with working("Sizing"):
         follow, ranges = None, ranges_of(levers or SIZED, sizing.WIDEST)
         if maneuver is not None:
-            voltage = maneuver_of(maneuver, choice.chosen).sample()
-            follow = trial(choice.chosen, voltage)
-        found = sizing.size(choice.chosen, required, ranges, follow=follow)
+            voltage = maneuver_of(maneuver, drive.chosen).sample()
+            follow = trial(drive.chosen, voltage)
+        found = sizing.size(drive.chosen, required, ranges, follow=follow)
     files.write(out, "Changed drive", found.drive.to_toml)
-    note(choice.title)
+    note(drive.title)
+    for line in drive.changes:
+        note(line)
     show(sizing.levers_table(found), sizing.performance_table(found, required))
     if found.change == 0.0:
         say("The drive meets it as it is; nothing needs to be changed.")
-    else:
-        words = ["swashplate", "whatif", drive]
-        typed = sizing.typed_factors(found, choice.chosen, required, follow)
+    elif not drive.changes:  # whatif begins at a drive as its file has it
+        words = ["swashplate", "whatif", drive.drive]
+        typed = sizing.typed_factors(found, drive.chosen, required, follow)
         for name, factor in typed.items():
             words += ["--scale", f"{name}={factor:.9g}"]
         note(f"See it over a command: {shlex.join(words)}")

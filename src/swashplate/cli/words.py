@@ -32,6 +32,8 @@ DRIVE = "drive.toml"
 """The drive in a folder that a fit wrote."""
 NUMBERS = "parameters.toml"
 """What a fit of a model of one's own writes in the place of a drive."""
+UNFELT, FEELING = "load_torque", ("motor_leakage", "motor_constant")
+"""A load, and what makes the speed depend on it."""
 SURPRISING = 1000.0
 """Factor from which a value that is set is questioned."""
 
@@ -208,7 +210,14 @@ def _is_lever(name: str) -> bool:
 
 def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
     """A line for each parameter of two sets that differs, with a question where it surprises."""
-    lines = []
+    known = {each.symbol for each in before.values()}
+    added = [each for each in after.values() if each.symbol not in known]
+    lines = [
+        f"{each.symbol} ({each.name}): {'/'.join(f'{v:g}' for v in each.values)} {each.unit}"
+        for each in added
+    ]
+    if UNFELT in {each.symbol for each in added} and not set(FEELING) & set(after.refinements):
+        lines.append(f"! {UNFELT} changes nothing without {' or '.join(FEELING)}: set one as well.")
     for old in before.values():
         new = after[old.symbol]
         if new.value == old.value:
@@ -264,6 +273,8 @@ def _change(option: str, word: str) -> tuple[str, Change]:
         )
         raise InputError(f"{option} cannot read '{word}'; write it as {examples}.")
     numbers, unit = read
+    if not scaled and _is_lever(name):
+        raise InputError(f"{name} is a lever, which has no value of its own: --scale {name}=1.5.")
     if not (scaled and _is_lever(name)):
         definition = find(name)
         if unit:

@@ -43,6 +43,18 @@ class GivenPrior(Entry):
     deviation: PositiveFloat
 
 
+def check_rising(**pairs: tuple[float, float] | None) -> None:
+    """Refuse, in a ValueError, bounds of which the lower one does not stand first."""
+    for name, pair in pairs.items():
+        if pair is not None and not pair[0] < pair[1]:
+            low, high = sorted(pair)
+            raise ValueError(
+                f"{name} = [{pair[0]:g}, {pair[1]:g}] must rise: write [{low:g}, {high:g}]"
+                if low < high
+                else f"{name} = [{pair[0]:g}, {pair[1]:g}] leaves nothing between its ends"
+            )
+
+
 class Free(Entry):
     """How a parameter is free: both directions apart, unless tied."""
 
@@ -58,6 +70,7 @@ class Free(Entry):
     def _bounded(self) -> Free:
         if (self.relative is None) == (self.bounds is None):
             raise ValueError("give either relative bounds or bounds")
+        check_rising(relative=self.relative, bounds=self.bounds)
         return self
 
 
@@ -67,6 +80,11 @@ class GivenForces(Entry):
     plus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat]
     minus: tuple[PositiveFloat, PositiveFloat, PositiveFloat, PositiveFloat]
     relative: Pair = Field((0.5, 2.0), description="Bounds as factors on the nominal forces.")
+
+    @model_validator(mode="after")
+    def _bounded(self) -> GivenForces:
+        check_rising(relative=self.relative)
+        return self
 
 
 class InputWeight(Window):

@@ -374,7 +374,8 @@ def _other(path: Path) -> Reader:
     if path.is_dir():
         raise FileError(f"{path} is a folder, not a log.")
     known = ", ".join((*SUFFIXES, *(each for other in others for each in other.suffixes)))
-    raise FileError(f"{path} ends in '{path.suffix}'; a log is read from {known}.")
+    instead = ": save a spreadsheet as CSV" if suffix.startswith(".xls") else ""
+    raise FileError(f"{path} ends in '{path.suffix}'; a log is read from {known}{instead}.")
 
 
 def _others() -> list[Reader]:

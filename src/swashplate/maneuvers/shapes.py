@@ -449,7 +449,8 @@ def parse(text: str) -> Maneuver:
         signature.bind(*positional, **keywords)
     except TypeError as error:
         known = ", ".join(signature.parameters)
-        raise InputError(f"{text!r}: {error}; {name} takes {known}.") from None
+        hint = ": separate levels by /, as in stairs:2/4/0" if name == "stairs" else ""
+        raise InputError(f"{text!r}: {error}; {name} takes {known}{hint}.") from None
     return _COMMANDS[name](*positional, **keywords)
 
 

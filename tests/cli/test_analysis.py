@@ -1,0 +1,456 @@
+import json
+import re
+import shlex
+import tomllib
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swashplate import Drive, maneuvers
+from swashplate.analysis import InverseMap, monte_carlo, performance, pulled
+
+# --- bode -----------------------------------------------------------------------------------------
+
+
+def rows(text: str) -> dict[str, list[str]]:
+    """The table's rows by amplitude."""
+    body = text.partition("─\n")[2].strip("\n").split("\n\n")[0]
+    return {line.split()[0]: line.split()[1:] for line in body.splitlines()}
+
+
+def test_gain_and_phase_at_0_3_hz(done):
+    text = done("bode", "hoist", "--points", "5")
+    assert "hoist, sines about 0 V: 6 frequencies from 0.02 to 5 Hz" in text
+    assert "At 0.3 Hz:" in text
+    table = rows(text)
+    assert list(table) == ["1", "4", "6.5", "9"]
+    phases = [float(row[1]) for row in table.values()]
+    assert phases == sorted(phases, reverse=True)
+    assert phases[-1] < -50.0 < -20.0 < phases[0]
+    for row in table.values():
+        # 0.3 Hz: 108 degrees a second
+        assert float(row[2]) == pytest.approx(-float(row[1]) / 108.0 * 1e3, abs=0.6)
+
+
+def test_files(done, tmp_path):
+    words = ("--amplitude", "0.1", "--amplitude", "1", "--bias", "3", "--points", "4")
+    text = done("bode", "slew", *words, "--linear-at", "3", "--plot", "b.png", "--out", "b.csv")
+    assert "Figure: b.png" in text
+    assert "Gain, phase and distortion, in SI: b.csv" in text
+    assert (tmp_path / "b.png").read_bytes().startswith(b"\x89PNG")
+    table = pl.read_csv("b.csv")
+    assert table.height == 2 * 5
+    f = np.unique(np.append(np.geomspace(0.02, 5.0, 4), 0.3))
+    expected = Drive.preset("slew").frequency_response(f, [0.1, 1.0], bias=3.0)
+    np.testing.assert_allclose(table["gain"], expected.gain.ravel())
+
+
+def test_an_amplitude_that_moves_nothing(done):
+    text = done("bode", "hoist", "--amplitude", "0.05", "--amplitude", "2", "--points", "3")
+    assert rows(text)["0.05"][0] == "none"
+
+
+def test_a_changed_drive_and_another_frequency(done):
+    text = done("bode", "hoist", "--scale", "Z16=2", "--frequency", "0.1", "--points", "3")
+    assert "Z16" in text
+    assert "At 0.1 Hz:" in text
+
+
+# --- compare --------------------------------------------------------------------------------------
+
+
+def test_two_axes(done, number):
+    text = done("compare", "hoist", "neutral")
+    assert "hoist and neutral, step 9 V" in text
+    assert number(text, "peak speed, positive") == 196.00
+    assert number(text, "peak speed, positive", 1) == pytest.approx(
+        np.degrees(100.0 * np.arctan(0.09)), abs=0.02
+    )
+    assert number(text, "settled speed at 9 V") == 196.00
+    # the neutral drive: a lag of 0.1 s and the card's two milliseconds twice
+    lag = 0.1 * np.log(10.0) + 2.0 / 512.0
+    assert number(text, "time to 90 % of it", 1) == pytest.approx(lag, abs=3e-3)
+
+
+def test_rms_difference(done):
+    text = done("compare", "hoist", "slew", "--maneuver", "sine:6.5,0.1")
+    voltage = maneuvers.sine(6.5, 0.1).sample()
+    speeds = [Drive.preset(name).simulate(voltage).shaft_speed for name in ("hoist", "slew")]
+    rms = np.degrees(np.sqrt(np.mean((speeds[0] - speeds[1]) ** 2)))
+    assert f"rms difference of the speeds: {rms:.2f} deg/s" in text
+
+
+def test_a_speed_never_reached(done):
+    text = done("compare", "hoist", "luff", "--maneuver", "step:9,start=1,stop=1.1,length=3")
+    (line,) = [line for line in text.splitlines() if line.startswith("time to 90 %")]
+    assert line.split()[-3:] == ["never", "never", "s"]
+
+
+def test_a_set_and_its_change(done, number, tmp_path):
+    Drive.preset("hoist").scale(Z10=0.5).to_toml(tmp_path / "mine.toml")
+    text = done("compare", "hoist", "mine.toml", "--maneuver", "step -9 V")
+    assert "hoist and mine.toml, step -9 V" in text
+    assert number(text, "peak speed, negative") == -185.00
+    assert number(text, "peak speed, negative", 1) == -92.50
+
+
+def test_a_set_with_itself(done):
+    text = done("compare", "hoist", "hoist")
+    assert "hoist and hoist (2), step 9 V" in text
+    assert "rms difference of the speeds: 0.00 deg/s" in text
+
+
+def test_out_and_plot(done, tmp_path):
+    done("compare", "hoist", "slew", "--rate", "100", "--out", "both.csv", "--plot", "both.png")
+    table = pl.read_csv("both.csv")
+    assert table.columns == ["time", "voltage", "shaft_speed hoist", "shaft_speed slew"]
+    assert table.height == 1001
+    expected = Drive.preset("slew").simulate(maneuvers.step(9.0).sample(100.0), 100.0)
+    np.testing.assert_array_equal(table["shaft_speed slew"], expected.shaft_speed)
+    assert (tmp_path / "both.png").read_bytes().startswith(b"\x89PNG")
+
+
+# --- compensate -----------------------------------------------------------------------------------
+
+
+def test_the_map_that_is_printed(done):
+    text = done("compensate", "hoist", "--speed-deg-s", "97.75", "--speed-deg-s", "-22.16")
+    assert "hoist: voltage for a wanted speed" in text
+    rows = dict(pair for line in text.splitlines() if len(pair := line.split()) == 2)
+    # the static table: 97.75 deg/s at 4 V, -22.16 at -1 V
+    assert float(rows["97.75"]) == pytest.approx(4.0, abs=5e-4)
+    assert float(rows["-22.16"]) == pytest.approx(-1.0, abs=5e-4)
+    assert float(rows["195.997"]) == pytest.approx(7.87, abs=0.005)
+    assert float(rows["-184.996"]) == pytest.approx(-7.41, abs=0.005)
+    assert "11 of 203 points shown" in text  # five of 101 each way, and 0 V
+    assert "points shown" not in done("compensate", "hoist", "--points", "5")
+
+
+def test_the_improvement(done, number):
+    text = done("compensate", "slew", "sine:2,0.1")
+    plain, mapped, led = (
+        number(text, name) for name in ("straight line", "inverse map", "inverse map and lead")
+    )
+    assert plain > mapped > led
+    assert "Error of the speed under sine 2 V 0.1 Hz" in text
+
+
+def test_compensate_files(done, tmp_path):
+    text = done("compensate", "luff", "--out", "luff.toml", "--plot", "luff.png", "--points", "21")
+    assert "Inverse map, in SI: luff.toml" in text
+    inverse = InverseMap.from_toml("luff.toml")
+    assert inverse.plus.speed.size == 21
+    luff = Drive.preset("luff")
+    assert luff.steady_speed(float(inverse.voltage(1.0))) == pytest.approx(1.0, abs=1e-5)
+    assert (tmp_path / "luff.png").read_bytes().startswith(b"\x89PNG")
+    done("compensate", "luff", "step:2", "--out", "luff.csv", "--plot", "bought.png")
+    table = pl.read_csv("luff.csv")
+    assert table.height == 203
+    assert np.degrees(table["speed"].max()) == pytest.approx(148.63, abs=0.01)
+
+
+# --- limits ---------------------------------------------------------------------------------------
+
+
+def test_the_envelope_that_is_printed(done, number):
+    """The numbers of the model description."""
+    text = done("limits", "hoist", "--frequency", "0.3")
+    assert "hoist: what it can do" in text
+    for place, (volts, speed, acceleration) in enumerate(
+        ((7.87, 196.0, 136.8), (-7.41, -185.0, -177.8))
+    ):
+        assert number(text, "saturation voltage", place) == volts
+        assert number(text, "speed limit", place) == pytest.approx(speed, abs=0.05)
+        assert number(text, "acceleration at rest", place) == pytest.approx(acceleration, abs=0.05)
+    assert number(text, "creep at 0 V") == pytest.approx(3.09, abs=0.005)
+    assert "Largest sine followed within 10 %" in text
+    assert number(text, "0.3") > 50.0
+    assert text.rstrip().endswith("none")
+
+
+def test_what_to_change_first(done, number):
+    text = done("limits", "luff", "sine:9,0.1")
+    assert "luff, sine 9 V 0.1 Hz: 55.889 deg/s rms from a drive without limits" in text
+    rows = [line.split("  ")[0] for line in text.splitlines()]
+    assert rows.index("orifice") < rows.index("delay") < rows.index("dead zone")
+    assert number(text, "orifice") == pytest.approx(69.5)
+    assert "spool stop" not in rows  # it does nothing here
+    assert "Change first: in-line orifice: larger bore (Z16)." in text
+    assert "falls by 96.6 %" in " ".join(text.split())
+    assert (
+        "\nSee more of it: swashplate whatif luff --scale orifice=1.5 --maneuver sine:9,0.1\n"
+        in text
+    )
+
+
+def test_what_is_to_be_tried_is_the_same_command(done, tmp_path):
+    done("simulate", "hoist", "step:9,stop=3,length=5", "--out", "a log.csv")
+    words = ("a log.csv", "--interpolation", "linear", "--rate", "256")
+    tried = done("limits", "hoist", *words).rstrip().splitlines()[-1]
+    assert tried.endswith("--maneuver 'a log.csv' --rate 256 --interpolation linear")
+    text = done(*shlex.split(tried.removeprefix("See more of it: swashplate ")))
+    assert "hoist, a log.csv" in text
+    for changed in (("--set", "Z16=1e-4"), ("--start", "steady"), ("--clip",)):
+        assert "See more" not in done("limits", "hoist", "step:9,stop=3,length=5", *changed)
+
+
+def test_nothing_to_change(done):
+    text = done("limits", "neutral", "step:9")
+    assert "No single change makes the error smaller." in text
+
+
+def test_a_drive_that_does_not_move_still_has_an_envelope(done):
+    text = done("limits", "hoist", "--set", "Z17=5")
+    assert "gain, mean" in text
+    assert "No sine can be commanded: No positive command up to 10 V moves hoist" in text
+
+
+def test_changes_are_said_and_count(done, number):
+    text = done("limits", "hoist", "--scale", "Z16=1.5", "--scale", "Z10=1.5", "--error", "0.2")
+    assert "Z16 (opening at which the orifice limits the flow)" in text
+    # figure 9.1: orifice and pump half as large again
+    assert number(text, "speed limit") == pytest.approx(294.0, abs=0.5)
+    assert "within 20 %" in text
+
+
+def test_limits_files(done, tmp_path):
+    text = done("limits", "slew", "--out", "slew.csv", "--plot", "slew.png")
+    assert "Envelope, in SI: slew.csv" in text
+    table = pl.read_csv("slew.csv")
+    row = table.row(by_predicate=pl.col("quantity") == "speed_limit", named=True)
+    assert np.degrees(row["plus"]) == pytest.approx(4.242, abs=5e-4)
+    assert (tmp_path / "slew.png").read_bytes().startswith(b"\x89PNG")
+    text = done("limits", "slew", "step:9", "--out", "shares.parquet", "--plot", "when.svg")
+    assert "Shares of each limit, in SI: shares.parquet" in text
+    assert pl.read_parquet("shares.parquet")["limit"][0] == "swash stop"
+    assert "<svg" in (tmp_path / "when.svg").read_text()
+
+
+def test_a_log(done, tmp_path):
+    rows = "\n".join(f"{t / 10},{9 if 10 <= t < 60 else 0}" for t in range(100))
+    (tmp_path / "log.csv").write_text(f"time [s],stick [V]\n{rows}\n")
+    words = ("--interpolation", "previous", "--column", "stick")
+    text = done("limits", "hoist", "log.csv", *words)
+    assert "hoist, log.csv: " in text
+    assert "Change first: in-line orifice" in text
+
+
+def test_the_units_of_the_errors(done):
+    said = done("limits", "hoist", "step:9")
+    (head,) = [line for line in said.splitlines() if line.startswith("Limit ")]
+    assert " ".join(head.split()) == "Limit share of time deg/s share of error deg/s"
+    assert max(len(line) for line in said.splitlines() if "whatif" not in line) <= 80
+
+
+# --- linearize ------------------------------------------------------------------------------------
+
+
+def test_what_is_printed(done, number):
+    text = done("linearize", "hoist", "--at", "4")
+    assert "hoist, small motions of the voltage" in text
+    assert number(text, "voltage") == 4.0
+    assert number(text, "current") == 0.4754
+    assert number(text, "shaft speed") == pytest.approx(97.75, abs=0.01)
+    # the slope of the steady speed
+    hoist = Drive.preset("hoist")
+    slope = np.degrees(hoist.steady_speed(4.001) - hoist.steady_speed(3.999)) / 0.002
+    assert number(text, "steady gain") == pytest.approx(slope, abs=2e-3)
+    assert number(text, "delay of the card") == 14.0
+    # ω = 56.253 rad/s, ζ = 0.71887: ζω and ω√(1 - ζ²)
+    (line,) = [line for line in text.splitlines() if "±" in line]
+    assert line.split() == ["rad/s", "-40.439", "±39.104", "8.953", "0.719"]
+    assert number(text, "gain at 0.3 Hz") < number(text, "steady gain")
+    assert number(text, "phase at 0.3 Hz") == pytest.approx(-17.3, abs=0.1)
+
+
+def test_the_source_s_time_constant(done, number):
+    words = ("--current", "0", "--input", "solenoid_force", "--frequency", "0.1")
+    text = done("linearize", "luff", *words)
+    assert number(text, "time constant of the pump") == 0.2015
+    assert "no limit" in text
+    assert "gain at 0.1 Hz" in text
+    assert "Coulomb" not in text
+
+
+def test_a_speed_and_a_loop(done, number):
+    text = done("linearize", "hoist", "--speed-deg-s", "-50", "--loop-gain", "0.1")
+    assert number(text, "shaft speed") == -50.0
+    assert number(text, "gain margin") == pytest.approx(
+        number(text, "largest proportional gain") / 0.1, rel=2e-3
+    )
+    assert number(text, "delay margin") > 14.0
+    assert (
+        number(done("linearize", "hoist", "--at", "4", "--loop-gain", "0.01"), "gain margin") > 20
+    )
+
+
+def test_notes(done):
+    assert "The card's Coulomb term C is left out" in done("linearize", "slew", "--at", "2")
+    assert "left out" not in done("linearize", "slew", "--at", "2", "--coulomb", "tangent")
+    text = done("linearize", "neutral", "--at", "0", "--set", "G1=0.03")
+    assert "One-sided at the card at 0 V: the side of positive voltage." in text
+    assert ": 0.015/0.015 -> 0.03/0.03 A/V" in text
+
+
+def test_linearize_files(done, tmp_path):
+    text = done("linearize", "slew", "--at", "2", "--sample-time", "0.01", "--out", "slew.toml")
+    assert "sampled at 0.01 s" in text
+    assert "Model, in SI: slew.toml" in text
+    read = tomllib.loads((tmp_path / "slew.toml").read_text("utf-8"))
+    expected = Drive.preset("slew").linearize(2.0).discrete(0.01)
+    np.testing.assert_array_equal(read["A"], expected.A)
+    done("linearize", "slew", "--at", "2", "--out", "slew.json")
+    assert json.loads((tmp_path / "slew.json").read_text("utf-8"))["delay"] == 0.014
+
+
+# --- sensitivity ----------------------------------------------------------------------------------
+
+
+FEW = ("--lever", "pump", "--lever", "orifice=0.8/1.5", "--maneuver", "step:9,stop=4,length=5")
+
+
+def test_one_at_a_time(done, tmp_path):
+    words = ("--outcome", "final_speed", "--plot", "t.png", "--out", "s.csv")
+    text = done("sensitivity", "hoist", *FEW, *words)
+    assert "final speed, 196.00 deg/s as it is" in text
+    (line,) = [line for line in text.splitlines() if line.startswith("pump ")]
+    assert line.split() == ["pump", "0.9", "1.1", "176.40", "215.60", "20.0", "%"]
+    assert "not moved by orifice" in text
+    assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
+    table = pl.read_csv(tmp_path / "s.csv")
+    assert table["lever"].to_list() == ["pump", "orifice"]
+    assert table["upper factor"].to_list() == [1.1, 1.5]
+    assert table["at upper factor"][0] == pytest.approx(1.1 * table["as it is"][0], rel=1e-6)
+
+
+def test_sobol(done, tmp_path):
+    words = ("--outcome", "final_speed", "--outcome", "overshoot", "--sobol", "32")
+    text = done("sensitivity", "hoist", *FEW, *words, "--plot", "s.png", "--out", "s.parquet")
+    assert "by itself  in total" in text
+    assert "- 128 simulations; indices are good to" in text
+    assert "- None of the levers moves overshoot." in text
+    assert (tmp_path / "s.png").exists()
+    table = pl.read_parquet(tmp_path / "s.parquet")
+    assert table.height == 4
+    speed = table.filter(pl.col("outcome") == "final_speed")
+    assert speed["total"][0] == pytest.approx(1.0, abs=0.3)
+    assert speed["total"][1] == pytest.approx(0.0, abs=1e-3)
+    assert table.filter(pl.col("outcome") == "overshoot")["total"].null_count() == 2
+
+
+def test_a_log_is_a_command(done, tmp_path):
+    done("simulate", "hoist", "step:9,stop=4,length=5", "--out", "log.csv")
+    words = ("--lever", "pump", "--outcome", "final_speed", "--maneuver", "log.csv")
+    text = done("sensitivity", "hoist", *words, "--interpolation", "linear")
+    assert "hoist, log.csv" in text
+    (line,) = [line for line in text.splitlines() if line.startswith("pump ")]
+    assert line.split() == ["pump", "0.9", "1.1", "176.40", "215.60", "20.0", "%"]
+
+
+# --- size -----------------------------------------------------------------------------------------
+
+
+def test_speed_and_acceleration(done, number, tmp_path):
+    words = ("--speed-deg-s", "200", "--acceleration-deg-s2", "200", "--out", "larger.toml")
+    text = done("size", "hoist", *words)
+    # both go with the pump, the acceleration with the orifice too
+    assert number(text, "pump") == pytest.approx(1.2094, abs=2e-3)
+    assert number(text, "orifice") == pytest.approx(1.2094, abs=2e-3)
+    (line,) = [line for line in text.splitlines() if line.startswith("acceleration")]
+    assert line.split()[:3] == ["acceleration", ">=", "200.00"]
+    assert "See it over a command: swashplate whatif hoist --scale orifice=1.2" in text
+    pump = Drive.from_toml(tmp_path / "larger.toml")["Z10"].value
+    assert pump == pytest.approx(12.396 * 1.2094, rel=2e-3)
+
+
+def test_a_tracking_error(done, number):
+    words = ("--tracking-deg-s", "18", "--maneuver", "sine:9,0.1", "--lever", "pump=1/1.5")
+    text = done("size", "hoist", *words)
+    assert 1.0 < number(text, "pump") < 1.5
+    (line,) = [line for line in text.splitlines() if line.startswith("tracking error")]
+    assert line.split()[2:4] == ["<=", "18.00"]
+
+
+@pytest.mark.parametrize("wanted", [150.0, 200.0, 220.0])
+@pytest.mark.parametrize("levers", [("orifice",), ("pump",), ("orifice", "pump")])
+def test_the_command_that_is_proposed_is_enough(done, wanted, levers):
+    words = [word for lever in levers for word in ("--lever", lever)]
+    text = done("size", "hoist", "--acceleration-deg-s2", f"{wanted:g}", *words)
+    given = dict(re.findall(r"--scale (\w+)=([\d.]+)", text))
+    assert set(given) == set(levers)
+    assert all(len(factor) <= 7 for factor in given.values())
+    changed = pulled(Drive.preset("hoist"), {name: float(each) for name, each in given.items()})
+    assert np.degrees(performance(changed).acceleration) >= wanted
+
+
+def test_size_nothing_to_change(done):
+    text = done("size", "hoist", "--speed-deg-s", "190", "--direction", "positive")
+    assert "nothing needs to be changed" in text
+
+
+# --- whatif ---------------------------------------------------------------------------------------
+
+
+BOTH = ("--scale", "orifice=1.5", "--scale", "pump=1.5")
+
+
+def test_figure_9_1(done, number, tmp_path):
+    words = ("--plot", "w.png", "--out", "larger.toml")
+    text = done("whatif", "hoist", *BOTH, "--maneuver", "sine:9,0.1", *words)
+    assert "hoist, sine 9 V 0.1 Hz" in text
+    assert "Z10 (swash plate angle to shaft speed): 12.396 -> 18.594 1/s" in text
+    assert number(text, "speed limit, positive") == 196.00
+    assert number(text, "speed limit, positive", 1) == pytest.approx(294.0, abs=0.05)
+    assert number(text, "speed limit, negative", 1) == pytest.approx(-277.5, abs=0.05)
+    assert "+50.0 %" in text
+    assert (tmp_path / "w.png").read_bytes().startswith(b"\x89PNG")
+    assert Drive.from_toml(tmp_path / "larger.toml")["Z10"].value == pytest.approx(18.594)
+
+
+def test_the_levers_are_listed(done):
+    text = done("whatif", "--levers")
+    for word in ("orifice _plus _minus", "drive_speed", "rate_limit_down", "Z16 by its square"):
+        assert word in text
+
+
+def test_bands(done, tmp_path, monkeypatch):
+    drawn = monte_carlo.independent_drives(Drive.preset("hoist"), {"Z10": 0.12396}, 50)
+    monkeypatch.setattr(monte_carlo, "stored_draws", lambda *_, **__: drawn)
+    words = ("--uncertainty", "fitted", "--draws", "50", "--plot", "w.svg")
+    text = done("whatif", "hoist", "--scale", "pump=1.5", "--maneuver", "step:9", *words)
+    (line,) = [line for line in text.splitlines() if line.startswith("final speed")]
+    # one per cent of 196 deg/s, about twice that each way
+    assert float(line.split()[3]) == pytest.approx(3.8, abs=1.2)
+    assert float(line.split()[5]) == pytest.approx(1.5 * float(line.split()[3]), abs=0.02)
+    (limit,) = [line for line in text.splitlines() if line.startswith("speed limit, positive")]
+    assert limit.split()[3:7] == line.split()[2:6]  # 9 V reaches the stop
+    assert "Band of 50 drives, changed: at most" in text
+    assert "Correlations ignored" in text
+    assert (tmp_path / "w.svg").exists()
+
+
+def test_an_outcome_that_is_not(done):
+    words = ("--maneuver", "step:0.05", "--scale", "pump=1.1")
+    text = done("whatif", "slew", *words)
+    assert "- as it is: no rise_time, the shaft stands still" in text
+
+
+def test_degrees_at_the_edge(done, number):
+    """The table's speed is the run's, in degrees."""
+    text = done("whatif", "luff", "--scale", "pump=1.2", "--maneuver", "step:9")
+    expected = np.degrees(Drive.preset("luff").steady_speed(9.0))
+    assert number(text, "final speed") == pytest.approx(expected, abs=0.02)
+
+
+def test_a_log_is_a_command_like_a_maneuver(done, tmp_path, number):
+    """A step to 6 V at 2 s, held until the next row, as the maneuver would be."""
+    rows = "\n".join(f"{t / 512},{6000 if 512 * 2 <= t < 512 * 5 else 0}" for t in range(512 * 8))
+    (tmp_path / "log.csv").write_text(f"time [s],stick [mV]\n{rows}\n")
+    words = ("--scale", "orifice=1.5", "--column", "stick", "--interpolation", "linear")
+    text = done("whatif", "hoist", "--maneuver", "log.csv", *words)
+    assert "hoist, log.csv" in text
+    assert "±" not in text  # no bands were asked for
+    same = done("whatif", "hoist", "--maneuver", "step:6,start=2,stop=5,length=8", *words[:2])
+    for outcome in ("final speed", "rise time", "tracking error", "travel"):
+        assert number(text, outcome) == pytest.approx(number(same, outcome), rel=2e-3)

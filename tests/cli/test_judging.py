@@ -1,0 +1,148 @@
+import csv
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import Result
+
+from swashplate import Campaign, Drive
+from swashplate.identification.assessment import save_fit
+from swashplate.identification.fitting import Fit, fit
+from swashplate.identification.setup import Setup
+
+# --- validate -------------------------------------------------------------------------------------
+
+
+Words = Callable[..., str]
+
+
+def test_a_drive_is_held_against_the_runs_that_were_held_back(
+    done: Words, held_out: Path, tmp_path: Path
+) -> None:
+    said = done("validate", "hoist", "virtual/campaign.toml", "--out", "found", "--figures", "svg")
+    assert "hoist_step_-5_V" in said
+    assert "hoist_step_4_V" not in said
+    assert re.search(r"\ncurrent +\n.* mA ", said, re.DOTALL)
+    assert re.search(r"\nspeed from counts +\n.* deg/s ", said, re.DOTALL)
+    assert "NRMSE is the RMSE over" in said
+    assert "'of its range' below means" in " ".join(said.split())
+    assert "Predicts speed from counts to 0." in said
+    assert "<svg" in (tmp_path / "found" / "report.html").read_text("utf-8")
+    assert [each.suffix for each in (tmp_path / "found" / "figures").iterdir()] == [".svg"]
+    with (tmp_path / "found" / "measures.csv").open(encoding="utf-8") as file:
+        rows = {row["channel"]: row for row in csv.DictReader(file)}
+    assert set(rows) == {"current", "counts", "speed from counts"}
+    # the published drive itself: what is left is the instruments' error
+    assert float(rows["speed from counts"]["fit_percent"]) > 97.0
+    assert rows["counts"]["unit"] == "rad"
+    assert rows["current"]["initial_state"] == "rest"
+    assert rows["speed from counts"]["correlation_with_input"] == ""
+
+
+def test_a_correlation_beyond_its_band_is_marked(
+    run: Callable[..., Result], held_out: Path
+) -> None:
+    """A drive of too low a gain misses the more the larger the command."""
+    Drive.preset("hoist").scale(J=0.4).to_toml("wrong.toml")
+    for drive, marks in (("hoist", {False}), ("wrong.toml", {True})):
+        said = run("validate", drive, "virtual/campaign.toml").stdout
+        table = said[said.index("Residuals: correlation") : said.index("'own' is how long")]
+        rows = [line for line in table.splitlines() if line.startswith("hoist_step")]
+        assert {"*" in row for row in rows if " current " in row} == marks
+        assert "* marks what lies beyond" in " ".join(said.split())
+
+
+def test_roles(done: Words, held_out: Path) -> None:
+    said = done("validate", "hoist", "virtual/campaign.toml", "--role", "all")
+    assert "hoist_step_-5_V" in said
+    assert "hoist_step_4_V" in said
+    assert "hoist_step_-5_V" not in done(
+        "validate", "hoist", "virtual/campaign.toml", "--role", "fit"
+    )
+
+
+def test_ignored_windows_stand_beside_the_fit(done: Words, held_out: Path) -> None:
+    text = held_out.read_text("utf-8")
+    held_out.write_text(f"{text}ignore = [{{ to = 0.5, why = 'noise' }}]\n", "utf-8")
+    assert "0 to 0.5 s (noise)" in done("validate", "hoist", "virtual/campaign.toml")
+
+
+def test_a_drive_that_is_not_usable_ends_with_1(
+    run: Callable[..., Result], held_out: Path, tmp_path: Path
+) -> None:
+    Drive.preset("hoist").scale(Z10=0.4, J=0.4, G1=0.4).to_toml(tmp_path / "wrong.toml")
+    result = run("validate", "wrong.toml", "virtual/campaign.toml")
+    assert result.exit_code == 1
+    assert result.stderr.startswith("Not usable: ")
+    assert "Residuals" in result.stdout
+
+
+def test_refusals(refused: Words, held_out: Path) -> None:
+    command = ("validate", "hoist", "virtual/campaign.toml")
+    assert "give --out DIR" in refused(*command, "--figures", "svg")
+    assert "no axis 'boom'; it has hoist" in refused(*command, "--axis", "boom")
+    assert "There is no file none.toml" in refused("validate", "none.toml", str(held_out))
+    text = held_out.read_text("utf-8").replace('role = "validate"', 'role = "ignore"')
+    held_out.write_text(text, "utf-8")
+    assert "no run of the axis 'hoist' has the role 'validate'; another" in refused(*command)
+
+
+# --- report ---------------------------------------------------------------------------------------
+
+
+SETUP = Setup.model_validate(
+    {
+        "stages": [
+            {"name": "card", "part": "card", "free": {"J_plus": {"relative": (0.5, 2.0)}}},
+            {"name": "pump", "part": "pump", "free": {"Z10": {"relative": (0.8, 1.25)}}},
+        ]
+    }
+)
+
+
+@pytest.fixture
+def fitted(held_out: Path, tmp_path: Path) -> Fit:
+    """A fit and what it keeps of itself, in the folder fitted."""
+    campaign = Campaign.from_toml(held_out)
+    runs = campaign.select(role="fit")
+    found = fit(Drive.preset("hoist").parameters, runs, SETUP)
+    (tmp_path / "fitted").mkdir()
+    Drive(found.parameters).to_toml(tmp_path / "fitted" / "drive.toml")
+    save_fit(found, runs, tmp_path / "fitted" / "fit.json", campaign=held_out, notes={"seed": "7"})
+    return found
+
+
+def test_the_report_is_written_again(done: Words, fitted: Fit, tmp_path: Path) -> None:
+    said = done("report", "fitted", "virtual/campaign.toml", "--truth", "virtual/truth")
+    assert "Report:    fitted/report.html" in said
+    assert "Usable: predicts held-out speed from counts to 0." in said
+    page = (tmp_path / "fitted" / "report.html").read_text("utf-8")
+    assert f"{fitted.stages[1].values['Z10']:.2f}" in page
+    assert '<th class="n">truth</th>' in page
+    assert '<th scope="row">seed</th><td>7</td>' in page
+    first = done("report", "fitted/drive.toml", "virtual/campaign.toml", "--out", "again")
+    assert "again/report.html" in first
+    assert '<th class="n">truth</th>' not in (tmp_path / "again" / "report.html").read_text("utf-8")
+
+
+def test_figures_stand_beside_it(done: Words, fitted: Fit, tmp_path: Path) -> None:
+    words = ("--figures", "pdf", "--data", "all.parquet", "--out", "print")
+    assert "Samples:   all.parquet" in done("report", "fitted", "virtual/campaign.toml", *words)
+    names = sorted(each.name for each in (tmp_path / "print" / "figures").iterdir())
+    assert names == ["overlay-01-hoist_step_4_V.pdf", "overlay-02-hoist_step_-5_V.pdf"]
+
+
+def test_report_refusals(refused: Words, fitted: Fit, tmp_path: Path) -> None:
+    command = ("report", "fitted", "virtual/campaign.toml")
+    assert "There is no fit.json in virtual" in refused("report", "virtual", command[2])
+    assert "There is no file truth.toml" in refused(*command, "--truth", "truth.toml")
+    Drive.preset("hoist").replace(Z10=9.0).to_toml(tmp_path / "fitted" / "mine.toml")
+    said = refused("report", "fitted/mine.toml", "virtual/campaign.toml")
+    assert "mine.toml is not the drive that fitted/fit.json found" in said
+    path = tmp_path / "virtual" / "campaign.toml"
+    text = path.read_text("utf-8")
+    path.write_text(text.replace("virtual = true", "virtual = false"), "utf-8")
+    assert "nobody knows its truth" in refused(*command, "--truth", "virtual/truth")
+    path.write_text(text.replace('role = "fit"', 'role = "fit"\nweight = 2.0', 1), "utf-8")
+    assert "is not as it was when fitted/fit.json was fitted" in refused(*command)
