@@ -21,7 +21,7 @@ REFUSED = {
     "compare hoist slew --rate 1 --out both.csv": "must be between 10 and 100000 Hz",
     "compensate hoist --speed-deg-s 200": "hoist cannot settle at 200 deg/s",
     "compensate hoist --speed-deg-s nan": "must be finite",
-    "compensate hoist --points 1": "takes 2 to 10001 points each way, not 1",
+    "compensate hoist --points 1": "takes 2 to 10001 points per direction, not 1",
     "compensate hoist --set Z17=5": "No positive command up to 10 V moves hoist",
     "compensate slew rest:2": "asks for nothing but standstill",
     "limits hoist --error 0": "The error is 0, but must be above 0 and below 1",
