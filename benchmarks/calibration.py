@@ -3,7 +3,7 @@
     .venv/bin/python benchmarks/calibration.py [--campaigns 400] [--cells 40] [--axes hoist slew]
     .venv/bin/python benchmarks/calibration.py --methods --campaigns 0 --cells 5
 
-Each campaign draws a drive about the published one, logs the source's tests of it through imperfect
+Each campaign draws a drive about the published one, logs Kruse's tests of it through imperfect
 instruments, is written to files, read, fitted from the published values, and judged, all by the
 same calls as `swashplate rig` and `swashplate fit` make. The axis "own" is a valve and a rod,
 fitted as a model of one's own, under realistic noise alone. `--cells` are campaigns in each of the
@@ -13,7 +13,7 @@ the noise model are compared on the same fits.
 
 The rule, written down before the comparison: of the methods whose pooled coverage over the noises
 of the right model is 93 to 97 % on every axis, the one with the smallest median half width; between
-methods within 5 % of it the one with the smaller error on new manoeuvres where the model is wrong,
+methods within 5 % of it the one with the smaller error on new maneuvers where the model is wrong,
 then the shorter code.
 """
 

@@ -5,7 +5,7 @@
 Each campaign draws a drive about the published one, as `benchmarks/calibration.py` does, puts one
 fault into the machine, its instruments or its logs, is written to files, checked, fitted, judged
 and validated by the calls that `swashplate campaign check`, `fit` and `validate` make. The true
-error is that of the fitted drive on manoeuvres that no campaign has, against the machine that was
+error is that of the fitted drive on maneuvers that no campaign has, against the machine that was
 simulated.
 """
 
@@ -28,7 +28,7 @@ NEW = {
     "hoist": ("stairs:-8:-5:-2:2:5:8", "multisine:6,0.05:0.6:5", "sine:5,0.5"),
     "slew": ("stairs:-5:-3:3:5", "multisine:5,0.03:0.4:5", "sine:5,0.5"),
 }
-"""Manoeuvres that no campaign has; the true error is the largest of theirs."""
+"""Maneuvers that no campaign has; the true error is the largest of theirs."""
 HELD_OUT = {
     "hoist": ("step +6.5 V", "step -6.5 V", "sine 6.5 V 0.1 Hz"),
     "slew": ("sine 4 V 0.1 Hz",),
@@ -184,7 +184,7 @@ def simulated_campaign(fault, axis, seed):
 
 
 def true_error(found, machine, axis):
-    """Largest error of the shaft's speed on new manoeuvres, in per cent of its range."""
+    """Largest error of the shaft's speed on new maneuvers, in per cent of its range."""
     from swashplate import Drive
     from swashplate.maneuvers import parse
 
@@ -313,7 +313,7 @@ def report(rows):
         wrong = [row for row in false if float(row["error"]) > 0.05]
         print(
             f"\nFalse alarms: {len(false)} of {len(sound)} sound campaigns, in {len(wrong)} of "
-            "them the search ended in another optimum (error on new manoeuvres above 0.05 %)."
+            "them the search ended in another optimum (error on new maneuvers above 0.05 %)."
         )
 
 

@@ -21,14 +21,14 @@ Array = NDArray[np.float64]
 
 ROUNDS = 40
 PUMP = tuple(name for name in PUMP_COLUMNS if name != "Z12")
-"""The source's 27 parameters of pump and motor."""
+"""Kruse's 27 parameters of pump and motor."""
 CARD = tuple(name for name in ALL_COLUMNS if name not in PUMP_COLUMNS and name != "tau")
 FREE = tuple(columns_of(["Z1", "Z3", "Z8", "Z10", "Z13", "Z16", "Z17", "Z19", "Z20", "Z21", "Z22"]))
 """What is left of them without gauges and without what no test reaches."""
 
 
 class HoistTests:
-    """The source's 13 tests of the hoist, with speed and current observed at every sample."""
+    """Kruse's 13 tests of the hoist, with speed and current observed at every sample."""
 
     def __init__(self) -> None:
         self.drive = Drive.preset("hoist")

@@ -53,7 +53,7 @@ def speeds() -> Iterator[str]:
 
 def derivatives() -> Iterator[str]:
     """30 s of the hoist with exact derivatives of its speed, and with central differences."""
-    yield "| unknowns | exact | central differences | faster |"
+    yield "| parameters | exact | central differences | faster |"
     yield "|---|--:|--:|--:|"
     hoist = FullOrderDrive.preset("hoist")
     record = record_of(CASES["sine 6.5 V, 0.1 Hz"].sample(512.0), 512.0, what="voltage")
@@ -79,8 +79,8 @@ def _best(run: Callable[[], object]) -> float:
 
 
 def validity() -> Iterator[str]:
-    """For which manoeuvres the one-state model will do."""
-    yield "| axis | manoeuvre | largest, % | rms, % | step error at 512 Hz, % | within |"
+    """For which maneuvers the one-state model will do."""
+    yield "| axis | maneuver | largest, % | rms, % | step error at 512 Hz, % | within |"
     yield "|---|---|--:|--:|--:|---|"
     found = pl.concat([validity_of(FullOrderDrive.preset(name)).to_polars() for name in AXES])
     for row in found.iter_rows(named=True):

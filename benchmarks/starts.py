@@ -42,7 +42,7 @@ class Ended(NamedTuple):
 
 
 def by_sqp(problem: Problem, start: np.ndarray) -> Ended:
-    """Search as the source did it: sequential quadratic programming, gradients by differences."""
+    """Search as Kruse (2001) did it: sequential quadratic programming, gradients by differences."""
     best, evaluations = np.inf, 0
     unit = problem.cost(start) or 1.0
 

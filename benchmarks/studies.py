@@ -72,7 +72,7 @@ def full_order_rows() -> Iterator[Row]:
 
 
 def sobol_rows() -> Iterator[Row]:
-    """Sobol's indices of eight levers and five outcomes over a 10 s manoeuvre."""
+    """Sobol's indices of eight levers and five outcomes over a 10 s maneuver."""
     found = work("sobol")
     for name in ("quarter", "all"):
         what = f"Sobol analysis of 10 s, {found[f'{name} runs']:,} runs, two threads"

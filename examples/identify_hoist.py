@@ -32,7 +32,7 @@ options = parser.parse_args([] if "ipykernel" in sys.modules else None)
 
 # %% [markdown]
 # ## Virtual tests
-# The source's 13 tests: ramps, steps and sines, logged at 512 Hz through a 12-bit command, an
+# Kruse's 13 tests: ramps, steps and sines, logged at 512 Hz through a 12-bit command, an
 # ammeter that does not know the sign, and an encoder. The same seed gives the same logs.
 
 # %%
@@ -60,7 +60,7 @@ print(f"{len(runs)} runs to fit, {len(held_back)} held back")
 # %%
 for stage in setup.stages:
     look = outlook(stage, smooth(start), runs)
-    print(f"{stage.name}: {len(look.problem.unknowns.names)} unknowns")
+    print(f"{stage.name}: {len(look.problem.unknowns.names)} parameters")
     for sentence in look.sentences():
         print(f"  {sentence}")
 

@@ -3,7 +3,7 @@
 #
 #     .venv/bin/python examples/simulate.py [--figure simulate.png]
 #
-# From a joystick's voltage to the shaft's speed: the packaged drives, a manoeuvre, what each limit
+# From a joystick's voltage to the shaft's speed: the packaged drives, a maneuver, what each limit
 # does to it, other parameters, many of them at once, and a loop of one's own. Everything is in SI;
 # degrees are for people.
 
@@ -32,7 +32,7 @@ for name in ("hoist", "slew", "luff"):
     print(f"{name:5s} at -9, -4, 0, 4, 9 V:", *(f"{speed:8.2f}" for speed in speeds), "deg/s")
 
 # %% [markdown]
-# ## A manoeuvre
+# ## A maneuver
 # A step of 9 V from 1 s to 6 s, sampled at 512 Hz. The result has every signal of the chain, from
 # the current to the shaft's position.
 

@@ -1,4 +1,4 @@
-"""The source's figures and tables as a page and a PDF.
+"""Kruse's figures and tables as a page and a PDF.
 
 python -m reproduction --out FOLDER [--seed 1]
 """

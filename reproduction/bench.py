@@ -1,4 +1,4 @@
-"""Virtual campaigns that stand in for the source's, each simulated once."""
+"""Virtual campaigns that stand in for Kruse's, each simulated once."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from swashplate.parameters.rules import FULL_VOLTAGE
 SEVERITY: rig.Severity = "realistic"
 REFINEMENTS = {"hoist": {"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6}}
 BACKLASH = {"slew": 0.002}
-"""What the source saw of each axis and did not model: overshooting steps; a turret's play [rad]."""
+"""What Kruse (2001) saw and did not model: overshooting steps; a turret's play [rad]."""
 ON_CURRENT = 1.5
-"""Factor that the source put on the luff axis's measured current. [1]"""
+"""Factor that Kruse (2001) put on the luff axis's measured current. [1]"""
 BELOW_STOP = 0.98
 """Share of the largest speed that the stand-in card reaches at 10 V. [1]"""
 
@@ -31,10 +31,10 @@ class Bench:
     )
 
     def tests(self, axis: str, effects: bool = False) -> tuple[rig.VirtualTests, Campaign]:
-        """The source's tests of an axis: what was simulated, and the logs as a campaign reads them.
+        """Kruse's tests of an axis: what was simulated, and the logs as a campaign reads them.
 
         The published drive is what is simulated; of luff with the stand-in card. With `effects` it
-        does what the source saw of the axis and did not model.
+        does what Kruse (2001) saw of the axis and did not model.
         """
         key = axis, "effects" if effects else ""
         if key not in self._kept:

@@ -36,7 +36,7 @@ def reproduce(
     only: Collection[str] | None = None,
     begin: Callable[[str], None] | None = None,
 ) -> Reproduction:
-    """Reproduce the source's figures and tables.
+    """Reproduce Kruse's figures and tables.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which figure of the source shows which manoeuvre of which axis."""
+"""Which figure of Kruse (2001) shows which maneuver of which axis."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ drive with larger orifices and pump."""
 
 
 class Shown(NamedTuple):
-    """A figure of the source."""
+    """A figure of Kruse (2001)."""
 
     number: str
     kind: Kind
@@ -87,7 +87,7 @@ FIGURES: tuple[Shown, ...] = (
     Shown("7.29", "other card", "luff", tuple(test for test, _ in _LUFF[4:])),
     Shown("9.1", "larger", "hoist", ("sine 9 V 0.1 Hz",), "hoistr27.dat"),
 )
-"""All figures of chapters 4 and 7, and figure 9.1, in the source's order."""
+"""All figures of chapters 4 and 7, and figure 9.1, in Kruse's order."""
 
 ERROR_TABLES = ("4.5", "4.6", "7.5", "7.6")
 TABLES = (

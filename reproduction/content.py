@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Role = Literal["command", "simulated", "other", "virtual"]
-"""The scaled command, the curve that the source simulated, what it is compared with, and what the
+"""The scaled command, the curve that Kruse (2001) simulated, what it is compared with, and what the
 instruments of a virtual test read."""
 
 
@@ -73,7 +73,7 @@ class Diagram:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of the source, reproduced."""
+    """A figure of Kruse (2001), reproduced."""
 
     number: str
     """In the source: ``"4.3"``."""
@@ -97,12 +97,12 @@ class Cell(NamedTuple):
 
     text: str
     mark: str = ""
-    """Erratum by which it differs from what the source prints."""
+    """Erratum by which it differs from what Kruse (2001) prints."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of the source, regenerated."""
+    """A table of Kruse (2001), regenerated."""
 
     number: str
     title: str

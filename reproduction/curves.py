@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 LARGER = 1.5
 """Factor on the opening of the orifices and on the pump's flow in figure 9.1. [1]"""
 SHAFTS = {"hoist": "winch", "slew": "turret", "luff": "winch"}
-ABSENT = "The source's measured {} is not at hand and not drawn."
+ABSENT = "Kruse's measured {} is not at hand and not drawn."
 
 
 class Scaled(NamedTuple):
@@ -52,13 +52,13 @@ def scaling_of(axis: str) -> Scaled:
 
 
 def filtered_speed_deg_s(run: Simulation) -> Array:
-    """Speed through the two low passes of figure 7.4, as the source drew it. [deg/s]"""
+    """Speed through the two low passes of figure 7.4, as Kruse (2001) drew it. [deg/s]"""
     return np.degrees(matched_speed(run.time, run.shaft_speed, form="source", aligned=False))
 
 
 @cache
 def simulated(axis: str, test: str) -> Simulation:
-    """A test of the source with the published parameters of its axis, from rest."""
+    """A test of Kruse (2001) with the published parameters of its axis, from rest."""
     return Drive.preset(axis).simulate(source_tests(axis)[test].sample())
 
 
@@ -71,7 +71,7 @@ def current_figure(shown: Shown) -> Figure:
     return Figure(
         shown.number,
         f"{shown.axis.capitalize()}: current of the card, {test}",
-        f"Simulated |I₊| + |I₋| and the command divided by 10 ({shown.logs} in the source). "
+        f"Simulated |I₊| + |I₋| and the command divided by 10 ({shown.logs} in Kruse (2001)). "
         + ABSENT.format("current")
         + " The model has no dither.",
         (
@@ -99,7 +99,7 @@ def speed_figure(shown: Shown) -> Figure:
         shown.number,
         f"{shown.axis.capitalize()}: {shaft} speed, {test}",
         f"Simulated speed, low-passed as in figure 7.4, and the {scaled.words.removesuffix(' (V)')}"
-        f" ({shown.logs} in the source). " + ABSENT.format("speed") + creep,
+        f" ({shown.logs} in Kruse (2001)). " + ABSENT.format("speed") + creep,
         (
             Panel(
                 scaled.beside(f"{shaft} speed (deg/s)"),
@@ -158,7 +158,7 @@ def inside_figure(shown: Shown) -> Figure:
         shown.number,
         f"{shown.axis.capitalize()}: inside the drive, {test}",
         f"All simulated signals from current to speed in the run of figure {seen} "
-        f"({shown.logs} in the source). None of those inside was ever measured. Which of them "
+        f"({shown.logs} in Kruse (2001)). None of those inside was ever measured. Which of them "
         "the source drew the text at hand does not say.",
         panels,
         (*negative, 2, 13, 31),
@@ -177,7 +177,8 @@ def other_card_figure(shown: Shown) -> Figure:
         shown.number,
         f"Luff: winch speed with the Rexroth card, {what}",
         "Simulated speeds of the luff pump and motor behind the card that was identified on slew: "
-        "an extrapolation in the source already, with nothing measured to compare. Commands leave "
+        "an extrapolation in Kruse (2001) already, with nothing measured to compare. Commands "
+        "leave "
         "zero at 1 s. The parameters are approximate.",
         (Panel("winch speed (deg/s)", curves),),
         (6, 13, 31, 33),
@@ -195,7 +196,8 @@ def larger_figure(shown: Shown) -> Figure:
         shown.number,
         f"Hoist: winch speed with 50 % more orifice and flow, {test}",
         f"Simulated speed with Z16 and Z10 times {LARGER:g} over that of the published set, both "
-        f"low-passed as in figure 7.4, and the command times 10 ({shown.logs} in the source). The "
+        f"low-passed as in figure 7.4, and the command times 10 ({shown.logs} in Kruse "
+        "(2001)). The "
         f"limits become {speed.max():+.0f} and {speed.min():+.0f} deg/s.".replace("-", "−"),
         (
             Panel(

@@ -74,7 +74,7 @@ def height_of(figure: Figure) -> float:
 
 
 def draw_figure(canvas: Canvas, figure: Figure, left: float, top: float, width: float) -> None:
-    """Draw a figure of the source onto a page.
+    """Draw a figure of Kruse (2001) onto a page.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def draw_figure(canvas: Canvas, figure: Figure, left: float, top: float, width: 
 
 
 def own_canvas(figure: Figure) -> Canvas:
-    """A figure of the source by itself."""
+    """A figure of Kruse (2001) by itself."""
     width = WIDE if is_wide(figure) else WIDTH
     canvas = new_figure(width, height_of(figure), layout="none")
     draw_figure(canvas, figure, 0.0, 0.0, width)

@@ -1,4 +1,4 @@
-"""Errata of the source, as far as they touch a figure or a table that is reproduced here."""
+"""Errata of Kruse (2001), as far as they touch a figure or a table that is reproduced here."""
 
 ERRATA = {
     1: "Equation 6.61: the polynomial of a negative current is taken of the signed current: even "
@@ -17,10 +17,10 @@ ERRATA = {
     "is missing.",
     25: "Equation 7.6: the inequality is reversed.",
     29: "196 deg/s would need more oil than the hoist's pumps deliver at 1774 rpm; the speed scale "
-    "is the source's all the same.",
-    31: "The source's routine reads the current one sample ahead; here nothing looks ahead (at "
+    "is Kruse's all the same.",
+    31: "Kruse's routine reads the current one sample ahead; here nothing looks ahead (at "
     "most 0.13 deg/s).",
     33: "The filters of figure 7.4 lag those of figure 7.3 by half a sample; speeds are drawn "
-    "through those of figure 7.4, as the source drew them.",
+    "through those of figure 7.4, as Kruse (2001) drew them.",
 }
 """By number in the project's list of errata. ``_{...}`` is a subscript."""

@@ -1,7 +1,7 @@
 """Tables 4.1 to 4.4, 7.1 to 7.4 and 8.1 to 8.3 from the package's parameter sets.
 
-The sets store magnitudes; the tables carry the source's signs, in its order and notation. A cell
-whose content differs from what the source prints bears the number of the erratum.
+The sets store magnitudes; the tables carry Kruse's signs, in his order and notation. A cell
+whose content differs from what Kruse (2001) prints bears the number of the erratum.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from swashplate.drive import Drive
 AXES = ("hoist", "slew", "luff")
 ENCODER_COUNTS = {"hoist": 400.0, "slew": 81_000.0, "luff": 635.0 * 4.0}
 """Counts in a turn of the encoder itself, erratum 24 resolved."""
-MAGNITUDES = "Minus values are signed as the source prints them; the package stores magnitudes."
+MAGNITUDES = "Minus values are signed as Kruse (2001) prints them; the package stores magnitudes."
 
 
 class Symbol(NamedTuple):
-    """A parameter as the source's tables write it."""
+    """A parameter as in Kruse's tables."""
 
     name: str
     """In the package's sets."""
     label: str
     unit: str
     printed: str = ""
-    """Erratum of the unit, where the source prints another."""
+    """Erratum of the unit, where Kruse (2001) prints another."""
 
 
 _SYMBOLS = {
@@ -52,7 +52,7 @@ _SYMBOLS = {
 _STATIC = ("J", "V_dz", "G1", "G2", "G3")
 _DYNAMIC = ("tau", "zeta", "omega", "C", "lim1", "lim2", "I_t1", "I_t2", "a")
 _NEGATIVE = {"J", "V_dz", "I_t1", "I_t2"}
-"""Minus values that the source prints as negative numbers, tables 4.3 and 4.4."""
+"""Minus values that Kruse (2001) prints as negative numbers, tables 4.3 and 4.4."""
 _SIGNS = {
     **dict.fromkeys((*_NEGATIVE, "lim1", "Z13", "Z16"), (1.0, -1.0)),
     "lim2": (-1.0, 1.0),
@@ -98,7 +98,7 @@ def card_table(number: str) -> Table:
 
 
 def gear_table() -> Table:
-    """Table 7.1: gear ratios of the encoders, which the source prints with two axes exchanged."""
+    """Table 7.1: gear ratios of the encoders, which Kruse (2001) prints with two axes exchanged."""
     printed = {"slew": "7", "luff": "120/19", "hoist": "1"}
     rows = []
     for axis, ratio in printed.items():
@@ -185,5 +185,5 @@ def _pair(drive: Drive, name: str, number: str) -> list[Cell]:
 
 
 def _number(value: float, *, raised: bool = False) -> str:
-    """As the source prints it: five significant digits, a power of ten where it is far from 1."""
+    """As Kruse (2001) prints it: five significant digits, a power of ten where it is far from 1."""
     return (f"{value:.4e}" if raised else f"{value:.5g}").replace("-", "−")

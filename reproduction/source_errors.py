@@ -1,4 +1,4 @@
-"""The source's error tables: the largest per cent error of each kind of test, by stated rules."""
+"""Kruse's error tables: the largest per cent error of each kind of test, by stated rules."""
 
 from __future__ import annotations
 
@@ -110,11 +110,11 @@ SOURCE_RULES: tuple[Rule, ...] = (
     Rule(
         "small values",
         f"Measured values below {100.0 * SMALL:.3g} % of the run's largest: a per cent of next to "
-        "nothing means nothing. The source does not state how it did this.",
+        "nothing means nothing. Kruse (2001) does not state how he did this.",
         lambda run: _small(run.measured, SMALL),
     ),
 )
-"""The source's exclusions on hoist."""
+"""Kruse's exclusions on hoist."""
 
 STEPS = Rule(
     "steps",
@@ -124,7 +124,7 @@ STEPS = Rule(
 
 
 def source_rules(drive: str) -> tuple[Rule, ...]:
-    """What the source leaves out of its tables for a drive of that name: of slew all steps."""
+    """What Kruse (2001) leaves out of his tables for a drive of that name: of slew all steps."""
     return (*SOURCE_RULES, STEPS) if drive == "slew" else SOURCE_RULES
 
 
@@ -158,7 +158,7 @@ class LargestError(NamedTuple):
 
 @dataclass(frozen=True)
 class ErrorTable:
-    """Largest per cent errors of one channel, as in the source's tables 4.5, 4.6, 7.5 and 7.6."""
+    """Largest per cent errors of one channel, as in Kruse's tables 4.5, 4.6, 7.5 and 7.6."""
 
     channel: str
     rows: tuple[LargestError, ...]
@@ -178,11 +178,11 @@ class ErrorTable:
 def error_tables(
     qualities: Sequence[RunQuality], rules: Sequence[Rule] = SOURCE_RULES
 ) -> tuple[ErrorTable, ...]:
-    """The source's error table of each channel: the largest per cent error by kind of test.
+    """Kruse's error table of each channel: the largest per cent error by kind of test.
 
     Positions are passed over: their zero is free, so that a per cent of one means nothing; take
-    `with_speeds`. The source speaks of the region with the largest per cent error and gives neither
-    formula nor limits of the regions; they are stated here as rules and printed with the table.
+    `with_speeds`. Kruse (2001) speaks of the region with the largest per cent error without a
+    formula or limits of the regions; they are stated here as rules and printed with the table.
     """
     made = []
     for name in dict.fromkeys(each.channel for each in qualities):
@@ -198,7 +198,7 @@ def error_tables(
 
 
 def compared_run(quality: RunQuality) -> ComparedRun | None:
-    """A channel of a run as the source's error tables take it, None if it is of no kind there."""
+    """A channel of a run as Kruse's error tables take it, None if it is of no kind there."""
     experiment, channel = quality.experiment, quality.experiment[quality.channel]
     kind, used = kind_of(experiment), channel.used
     if kind is None or np.count_nonzero(used) < 8:
@@ -217,7 +217,7 @@ def compared_run(quality: RunQuality) -> ComparedRun | None:
 
 
 def kind_of(experiment: Experiment) -> Kind | None:
-    """Kind of a test in the source's tables, by the first word of its manoeuvre."""
+    """Kind of a test in Kruse's tables, by the first word of its maneuver."""
     word = experiment.maneuver.split(" ")[0]
     return next((each for each in get_args(Kind) if each == word), None)
 

@@ -1,4 +1,4 @@
-"""The source's error tables, recomputed on virtual campaigns: never its measurements."""
+"""Kruse's error tables, recomputed on virtual campaigns: never his measurements."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from swashplate.parameters.parameter_set import ParameterSet
 
 SPREAD = 0.02
 """Standard deviation of the logarithm by which the fit's start differs from the truth: well within
-the source's bounds, 5 % for Z10. [1]"""
+Kruse's bounds, 5 % for Z10. [1]"""
 STARTS = 2
 """Fits of each campaign, of which the better one counts."""
 CHANNELS = {"current": "current", "speed": "speed from counts"}
@@ -46,7 +46,7 @@ NOTHING = "–"
 
 
 def thesis_errors() -> dict[str, dict[str, Any]]:
-    """The source's own numbers, by table."""
+    """Kruse's own numbers, by table."""
     text = files("reproduction").joinpath("thesis_errors.toml").read_text("utf-8")
     return tomllib.loads(text)
 
@@ -92,9 +92,7 @@ class ErrorTables:
         if "harmonic" in source:
             of_case = [_harmonic(self.qualities(axis, case)) for case in cases]
             rows.append(_row("sine, by amplitude", source["harmonic"], of_case))
-            notes.append(
-                "The source's last number takes in the phase as well, by an unstated rule."
-            )
+            notes.append("Kruse's last number takes in the phase as well, by an unstated rule.")
         notes += [f"Left out ({rule.name}): {rule.why}" for rule in rules]
         return Table(
             number,
@@ -124,9 +122,10 @@ def _fitted(nominal: Drive, axis: str, runs: Sequence[Experiment], seed: int) ->
 
 def _explained(axis: str, seed: int) -> str:
     return (
-        f"Only the second column was measured on a machine, by the source. Virtual: the published "
+        "Only the second column was measured on a machine, by Kruse (2001). Virtual: the "
+        "published "
         f"{axis} behind {SEVERITY} instruments, seed {seed}, scored as it is (what instruments "
-        "and filters alone make of no error at all), fitted to all of its tests with the source's "
+        "and filters alone make of no error at all), fitted to all of its tests with Kruse's "
         f"set-up (the better of {STARTS} starts some {100 * SPREAD:g} % off), and the same with "
         f"{EFFECT_WORDS[axis]}, which the model does not have. Per cent of what is measured then."
     )

@@ -31,7 +31,7 @@ def encoder_figure(shown: Shown, bench: Bench) -> Figure:
         shown.number,
         f"Raw and smoothed encoder counts, {shown.axis}, {test}",
         "Virtual encoder counts of the hoist winch at low speed, 512 samples a second, and the "
-        "straight lines that the source's smoothing puts between two changes. The run that the "
+        "straight lines that Kruse's smoothing puts between two changes. The run that the "
         "source shows is not named in the text at hand.",
         (
             Panel(
@@ -59,7 +59,8 @@ def measured_current_figure(shown: Shown, bench: Bench) -> Figure:
         shown.number,
         f"Luff: winch speed by a measured-type current, {test}",
         "Pump and motor behind 1.5 times a virtual ammeter's reading of a stand-in card, given the "
-        "command's sign; the command times 10. The source took the measured current of a Hägglunds "
+        "command's sign; the command times 10. Kruse (2001) took the measured current of a "
+        "Hägglunds "
         f"card ({shown.logs}); neither that nor its measured speed is at hand. Approximate.",
         (
             Panel(

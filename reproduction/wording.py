@@ -15,7 +15,7 @@ LEAD = (
 )
 NOT_MEASURED = (
     "Nothing here was measured.",
-    "Every curve is simulated. What instruments read is virtual and says so. The source's own "
+    "Every curve is simulated. What instruments read is virtual and says so. Kruse's own "
     "measurements are not at hand; of them only the printed error percentages stand here, in "
     "columns of their own.",
 )

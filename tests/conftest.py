@@ -1,4 +1,4 @@
-"""What many tests need: derivatives by differences, the drives, the source's numbers."""
+"""What many tests need: derivatives by differences, the drives, Kruse's numbers."""
 
 import tomllib
 from collections.abc import Callable, Sequence
@@ -50,7 +50,7 @@ def derivative() -> Callable[..., float]:
 
 @pytest.fixture(params=["hoist", "slew", "luff"])
 def axis(request: pytest.FixtureRequest) -> Drive:
-    """Each of the source's drives in turn."""
+    """Each of Kruse's drives in turn."""
     return Drive.preset(request.param)
 
 
@@ -65,10 +65,10 @@ SHARED = Path(__file__).parents[2] / "shared"
 
 @pytest.fixture(scope="session")
 def source_parameters() -> dict:
-    """The source's tables as facts apart from the package, where they are at hand."""
+    """Kruse's tables as facts apart from the package, where they are at hand."""
     path = SHARED / "spec" / "parameters.toml"
     if not path.exists():
-        pytest.skip("the source's tables are not beside this checkout")
+        pytest.skip("Kruse's tables are not beside this checkout")
     return tomllib.loads(path.read_text("utf-8"))
 
 
@@ -77,5 +77,5 @@ def source_text() -> str:
     """The source itself: others' work, which stays outside the project."""
     path = SHARED / "spec" / "thesis.txt"
     if not path.exists():
-        pytest.skip("the source's text is not beside this checkout, and may not be copied into it")
+        pytest.skip("Kruse's text is not beside this checkout, and may not be copied into it")
     return path.read_text("utf-8")

@@ -159,7 +159,7 @@ class Drive(Result):
     def at_every_rate(self) -> Drive:
         """The drive with a card's filter that means the same at every rate.
 
-        The source's filter is a recursion at 512 Hz (`ParameterSet.rate`): marched at another rate
+        Kruse's filter is a recursion at 512 Hz (`ParameterSet.rate`): marched at another rate
         it is another filter. In its place comes the differential equation with the same poles;
         where there is none, since the recursion changes its sign from sample to sample, an
         `InputError`.
@@ -185,7 +185,7 @@ class Drive(Result):
         Parameters
         ----------
         voltage : (n,) array_like or Maneuver
-            Command; a manoeuvre is sampled at `rate`. [V]
+            Command; a maneuver is sampled at `rate`. [V]
         rate : float
             Samples a second, 10 Hz to 100 kHz; with `time`, rate of the result's grid. [Hz]
         time : (n,) array_like, optional

@@ -6,7 +6,7 @@ class SwashplateError(ValueError):
 
 
 class InputError(SwashplateError):
-    """A record, manoeuvre, option or argument that cannot be simulated."""
+    """A record, maneuver, option or argument that cannot be simulated."""
 
 
 class ParameterError(SwashplateError):

@@ -1,4 +1,4 @@
-"""What a drive can do: the source's limits, closed forms, and the simulation itself."""
+"""What a drive can do: Kruse's limits, closed forms, and the simulation itself."""
 
 from math import sqrt
 

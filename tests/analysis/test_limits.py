@@ -1,4 +1,4 @@
-"""Each limit's share: drives with a single one, and the axes of the source."""
+"""Each limit's share: drives with a single one, and the axes of Kruse (2001)."""
 
 import numpy as np
 import polars as pl

@@ -116,7 +116,7 @@ def test_what_tells_nothing_is_refused() -> None:
         "measured", "shaft_speed", "rad/s", TIME, -sine["measured"].values, np.ones(TIME.size),
         SOURCE,
     )  # fmt: skip
-    with pytest.raises(InputError, match="against the command: turn it round with sign = -1"):
+    with pytest.raises(InputError, match="against the command: reverse it with sign = -1"):
         guess_drive([_with(sine, turned)])
     other = InputSignal("other", "%", TIME, sine.input.values, "previous", SOURCE)
     with pytest.raises(InputError, match="needs a command in V"):

@@ -52,7 +52,7 @@ def test_selection_and_drive(campaign_folder: Path) -> None:
         tests["up"]["speed"]
 
 
-def test_the_manoeuvre_is_recognised_or_stated(campaign_folder: Path, edited: Edit) -> None:
+def test_the_maneuver_is_recognised_or_stated(campaign_folder: Path, edited: Edit) -> None:
     assert Campaign.from_toml(campaign_folder / "campaign.toml")["up"].maneuver == "step +4 V"
     path = edited('file = "up.csv"', 'file = "up.csv"\nmaneuver = "harbour lift"')
     assert Campaign.from_toml(path)["up"].maneuver == "harbour lift"

@@ -297,7 +297,7 @@ def test_two_clamps_are_plus_and_minus(tmp_path: Path) -> None:
     assert list(drafted(tmp_path, log)["log"].channels) == ["rectified_current"]
 
 
-def test_manoeuvres_in_a_comment_are_in_volts(tmp_path: Path) -> None:
+def test_maneuvers_in_a_comment_are_in_volts(tmp_path: Path) -> None:
     command = np.where((TIME > 1.0) & (TIME < 5.0), -3000.0, 0.0)
     log = write(tmp_path, "log.csv", time=TIME, **{"stick [mV]": command}, speed=BOTH)
     assert "step -3 V" in draft_campaign([log], tmp_path)

@@ -110,7 +110,7 @@ GEAR = "gear_ratio = 2.0\n"
             GEAR,
             f'{GEAR}ignore = [{{ maneuver = "setp *" }}]\n',
             (
-                "axes.winch.channels.counts.ignore: no run has the manoeuvre 'setp *', so that its "
+                "axes.winch.channels.counts.ignore: no run has the maneuver 'setp *', so that its "
                 "window does nothing; there are 'step +4 V', 'step -4 V'",
             ),
         ),

@@ -96,7 +96,7 @@ def test_a_pause_in_the_log_is_found(tmp_path: Path) -> None:
     assert "gap" in drive.findings[0]
 
 
-def test_people_at_a_joystick_are_no_manoeuvre(excavator: Campaign) -> None:
+def test_people_at_a_joystick_are_no_maneuver(excavator: Campaign) -> None:
     for experiment in (*excavator.select(role="fit"), *excavator.select(role="validate")):
         assert experiment.maneuver == "free"
 

@@ -1,4 +1,4 @@
-"""Every expected number is the manoeuvre's own: what was put in has to be found again."""
+"""Every expected number is the maneuver's own: what was put in has to be found again."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -51,7 +51,7 @@ def test_tests_of_the_source_are_recognised_through_a_12_bit_readback(
 
 
 def of(run: Maneuver, *, shift: float = 0.0, part: slice = slice(None)) -> tuple:
-    """Stamps and readback of a manoeuvre."""
+    """Stamps and readback of a maneuver."""
     return (run.time() + shift)[part], readback(run.sample())[part]
 
 
@@ -80,7 +80,7 @@ CREEP[2000:2200] += np.linspace(0.0, 0.3, 200)
         (of(maneuvers.stairs([2.0, 0.0, -3.0, 0.0], 1.5)), "V", "stairs 2/0/-3/0 V"),
         (on_jumps(0.3 * 0.0 + 0.7 * 4.0, 0.3 * 4.0), "V", "step +4 V"),
         (on_jumps(0.15, 3.9), "V", "step +4 V"),
-        # a return other than the package's leaves the manoeuvre what it is
+        # a return other than the package's leaves the maneuver what it is
         ((LONG, readback(np.interp(LONG, [0, 1, 10, 11], [0, 0, 9, 0]))), "V", "ramp +1 V/s"),
         # 2.5355, rounded within 0.2 %
         ((grid(5.0, 52.0), DUTY), "%", "step +2.54 %"),
@@ -92,7 +92,7 @@ CREEP[2000:2200] += np.linspace(0.0, 0.3, 200)
         ((grid(20.0, 512.0), 0.02 * NOISE), "V", "rest"),
         ((grid(20.0, 512.0), 0.02 * NOISE), "%", "free"),
         ((grid(20.0, 512.0), 2.0 * NOISE), "V", "free"),
-        # a glitch is no part of a manoeuvre
+        # a glitch is no part of a maneuver
         ((maneuvers.sine(6.5, 0.1).time(), GLITCHES), "V", "free"),
         ((maneuvers.step(4.0).time(), CREEP), "V", "free"),
     ],
@@ -121,7 +121,7 @@ FREE = {
 
 
 @pytest.mark.parametrize("name", FREE)
-def test_what_is_no_manoeuvre_is_free(name: str) -> None:
+def test_what_is_no_maneuver_is_free(name: str) -> None:
     time = grid(FREE[name].length, 512.0)
     found = recognise(time, readback(FREE[name](time)))
     assert found.kind == found.name == "free"

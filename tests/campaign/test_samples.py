@@ -192,7 +192,7 @@ def test_stamps_count_and_a_record_must_be_long_enough() -> None:
     # 50 counts in the pause of 1 s are no faster than 5 in 0.1 s; 15 in 0.1 s are
     counts = [0.0, 5.0, 10.0, 60.0, 75.0, 80.0, 85.0]
     np.testing.assert_array_equal(find_lost_counts(time, counts), [4])
-    with pytest.raises(InputError, match="5 rows is too short to tell lost counts"):
+    with pytest.raises(InputError, match="5 rows is too short to find lost counts"):
         find_lost_counts(time[:5], counts[:5])
 
 

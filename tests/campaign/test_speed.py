@@ -1,4 +1,4 @@
-"""Speed from counts: the filters of the source, their exact form, and the moving parabola."""
+"""Speed from counts: the filters of Kruse (2001), their exact form, and the moving parabola."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ FORMS = ("source", "exact")
 
 
 def recursions(angle: np.ndarray, a: float, b: float, h: float) -> np.ndarray:
-    """Both of the source's recursions, one after the other, as they are printed."""
+    """Both of Kruse's recursions, one after the other, as they are printed."""
     low = np.full_like(angle, angle[0])
     speed = np.zeros_like(angle)
     for n in range(1, angle.size):

@@ -62,11 +62,11 @@ def test_small_positive_steps_want_large_and_negative_ones(
 ) -> None:
     words = ("--setup", "setup.toml", *TRIALS, *PRESSURE, "--tests", "2", "--out", "advice.csv")
     said = done("advise", campaign, *words)
-    best = section(said, "For each unknown")
+    best = section(said, "For each parameter")
     assert best["Z13_plus"].endswith("step 9 V")
     assert best["Z13_minus"].endswith("step -9 V")
     assert "step -" in best["Z19_minus"]
-    tests = section(said, "Tests, with the sensors at hand")
+    tests = section(said, "Tests with the present sensors")
     ranked = list(tests)
     # the large negative one tells of the negative force and the negative stop at once
     assert ranked[0] == "step -9 V"
@@ -74,15 +74,15 @@ def test_small_positive_steps_want_large_and_negative_ones(
     assert list(section(said, "A plan")) == ["step -9 V", "step 9 V"]
     assert "Z13_minus, Z19_minus" in tests["step -9 V"]
     table = pl.read_csv(tmp_path / "advice.csv")
-    stop = table.filter((pl.col("unknown") == "Z13_minus") & (pl.col("first to determine")))
+    stop = table.filter((pl.col("parameter") == "Z13_minus") & (pl.col("first to determine")))
     assert set(stop["test"]) == {"step -9 V"}
     assert stop["relative error before"].null_count() == stop.height
 
 
 def test_a_fresh_plan_needs_a_drive_alone(done: Words) -> None:
     said = done("advise", "hoist", "--setup", "hoist", *TRIALS, *PRESSURE, "--top", "2")
-    assert len(section(said, "Tests, with the sensors at hand")) >= 2
-    assert "encoder_counts: noise 0.000718 rad (rounding of the source's encoder)" in said
+    assert len(section(said, "Tests with the present sensors")) >= 2
+    assert "encoder_counts: noise 0.000718 rad (rounding of Kruse's encoder)" in said
     assert "Sensors to add, beside the plan" in said
 
 
@@ -96,7 +96,7 @@ def test_a_stated_noise_and_a_parameter_more(done: Words, campaign: str) -> None
     words = ("--setup", "setup.toml", *TRIALS[:2], *PRESSURE, "--free", "Z9")
     said = done("advise", campaign, *words, "--noise", "stroker_pressure=0.2bar")
     assert "stroker_pressure: noise 2e+04 Pa (stated)" in said
-    assert "Z9" in section(said, "For each unknown")
+    assert "Z9" in section(said, "For each parameter")
 
 
 def test_refusals(refused: Words, campaign: str) -> None:
@@ -107,7 +107,7 @@ def test_refusals(refused: Words, campaign: str) -> None:
     assert "--axis belongs to a campaign" in refused("advise", "hoist", "--axis", "hoist")
     assert "Z10 is free" in refused("advise", campaign, "--setup", "setup.toml", "--free", "Z10")
     assert "no parameter 'Z99'" in refused("advise", "hoist", "--free", "Z99")
-    assert "no manoeuvre" in refused("advise", "hoist", "--maneuver", "wobble:3")
+    assert "no maneuver" in refused("advise", "hoist", "--maneuver", "wobble:3")
     assert ".txt" in refused("advise", campaign, "--setup", "setup.toml", *TRIALS, "--out", "a.txt")
     assert "no packaged" in refused("advise", "boom")
 
@@ -177,10 +177,10 @@ def test_the_proposal_can_be_written_and_fitted(done: Words, steps_up: str, tmp_
     table = pl.read_csv(tmp_path / "runs.csv")
     assert set(table["stage"]) == {"card", "pump"}
     known = table.filter(pl.col("share") > 0.0)
-    shares = known.group_by("stage", "unknown").agg(pl.col("share").sum())
+    shares = known.group_by("stage", "parameter").agg(pl.col("share").sum())
     assert shares["share"].to_list() == pytest.approx([1.0] * shares.height)
     again = done("excitation", steps_up, "--setup", "mine.toml")
-    assert "The set-up can stay as it is." in again
+    assert "The fit configuration can stay as it is." in again
     done("fit", steps_up, "--setup", "mine.toml", "--out", "fitted", "--no-report")
 
 
@@ -194,10 +194,12 @@ def test_doubts_are_said_first(done: Words, tmp_path: Path) -> None:
 
 def test_refusals_of_excitation(refused: Words, steps_up: str, tmp_path: Path) -> None:
     assert "no axis 'boom'; it has hoist" in refused("excitation", steps_up, "--axis", "boom")
-    assert "no packaged set-up 'boom'" in refused("excitation", steps_up, "--setup", "boom")
+    assert "no packaged fit configuration 'boom'" in refused(
+        "excitation", steps_up, "--setup", "boom"
+    )
     (tmp_path / "none.toml").write_text(
         '[[stages]]\nname = "pump"\npart = "pump"\nfree.Z14 = { relative = [0.5, 2.0] }\n', "utf-8"
     )
     said = refused("excitation", steps_up, "--setup", "none.toml", "--write", "mine.toml")
-    assert "The runs determine none of the unknowns" in said
+    assert "The runs determine none of the parameters" in said
     assert ".txt" in refused("excitation", steps_up, "--setup", "setup.toml", "--out", "t.txt")

@@ -443,8 +443,8 @@ def test_degrees_at_the_edge(done, number):
     assert number(text, "final speed") == pytest.approx(expected, abs=0.02)
 
 
-def test_a_log_is_a_command_like_a_manoeuvre(done, tmp_path, number):
-    """A step to 6 V at 2 s, held until the next row, as the manoeuvre would be."""
+def test_a_log_is_a_command_like_a_maneuver(done, tmp_path, number):
+    """A step to 6 V at 2 s, held until the next row, as the maneuver would be."""
     rows = "\n".join(f"{t / 512},{6000 if 512 * 2 <= t < 512 * 5 else 0}" for t in range(512 * 8))
     (tmp_path / "log.csv").write_text(f"time [s],stick [mV]\n{rows}\n")
     words = ("--scale", "orifice=1.5", "--column", "stick", "--interpolation", "linear")

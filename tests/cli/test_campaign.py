@@ -43,7 +43,7 @@ def test_from_logs_to_a_check(done: Done, logs: list[str], tmp_path: Path) -> No
 
 def test_a_check_without_findings(done: Done, logs: list[str]) -> None:
     done("campaign", "init", *logs, *COUNTS)
-    assert "Nothing to look into." in done("campaign", "check")
+    assert "No findings." in done("campaign", "check")
 
 
 def test_a_draft_replaces_no_file(done: Done, refused: Callable[..., str], logs: list[str]) -> None:

@@ -17,7 +17,7 @@ def test_the_main_job(done, tmp_path):
     )
     for volts in (-6.5, -2.0, 2.0, 6.5):
         assert fitted.steady_speed(volts) == pytest.approx(truth.steady_speed(volts), rel=2e-3)
-    inside, counted = map(int, re.search(r"for (\d+) of (\d+) unknowns", printed).groups())
+    inside, counted = map(int, re.search(r"for (\d+) of (\d+) parameters", printed).groups())
     assert counted > 30
     assert inside > 0.8 * counted
     for name in ("drive.toml", "estimates.csv", "report.html"):

@@ -61,7 +61,7 @@ def test_a_campaign_becomes_a_drive(
     assert parameters.title.startswith("Virtual tests")
     assert "speed at the end" in done("simulate", "fitted/drive.toml", "step:4")
     header, *rows = (tmp_path / "fitted" / "estimates.csv").read_text("utf-8").splitlines()
-    assert header.startswith("stage,unknown,unit,nominal,estimate")
+    assert header.startswith("stage,parameter,unit,nominal,estimate")
     assert len([row for row in rows if "offset" not in row]) == 6
     again = ("fit", "virtual/campaign.toml", "--setup", "setup.toml", "--out", "fitted")
     assert "fitted/drive.toml exists already" in refused(*again)
@@ -152,11 +152,11 @@ def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path
     columns = header.split(",")
     for row in rows:
         entry = dict(zip(columns, row.split(","), strict=True))
-        if "offset" in entry["unknown"]:
+        if "offset" in entry["parameter"]:
             continue
         wide = [float(entry[f"{name} 95 %"]) for name in ("lower", "upper")]
         drawn = [float(entry[f"bootstrap {name} 95 %"]) for name in ("lower", "upper")]
-        assert 0.3 < (drawn[1] - drawn[0]) / (wide[1] - wide[0]) < 2.0, entry["unknown"]
+        assert 0.3 < (drawn[1] - drawn[0]) / (wide[1] - wide[0]) < 2.0, entry["parameter"]
     assert list((tmp_path / "fitted" / "figures").glob("*.svg"))
     page = (tmp_path / "fitted" / "report.html").read_text("utf-8")
     assert "profile" in page.lower()
@@ -177,10 +177,10 @@ def test_a_result_that_is_of_no_use_ends_with_1(
 
 def test_refusals(refused: Words, campaign: Path, tmp_path: Path) -> None:
     fit = ("fit", "virtual/campaign.toml")
-    assert "no packaged set-up 'boom'" in refused(*fit, "--setup", "boom")
+    assert "no packaged fit configuration 'boom'" in refused(*fit, "--setup", "boom")
     assert "no axis 'boom'; it has hoist" in refused(*fit, "--axis", "boom")
     assert "20 draws do not reach the ends" in refused(*fit, "--bootstrap", "20")
-    assert "no unknown 'Z99'" in refused(*fit, "--setup", "setup.toml", "--profile", "Z99")
+    assert "no parameter 'Z99'" in refused(*fit, "--setup", "setup.toml", "--profile", "Z99")
     (tmp_path / "bad.toml").write_text(SETUP.replace("Z16", "Z61"), "utf-8")
     assert "no parameter 'Z61'" in refused(*fit, "--setup", "bad.toml")
     (tmp_path / "bad.toml").write_text(SETUP.replace("[0.5, 2.0]", "[2.0, 0.5]", 1), "utf-8")

@@ -41,7 +41,7 @@ def test_a_run(done, number):
 def test_modes(done):
     text = done("full-order", "hoist", "rest:1")
     hertz, ratio = cells(text, "spool")[:2]
-    # section 6.2.4 of the source, and what is assumed
+    # section 6.2.4 of Kruse (2001), and what is assumed
     assert float(hertz) == pytest.approx(40.0, rel=0.02)
     assert float(ratio) == pytest.approx(0.3, abs=0.02)
     assert float(cells(text, "swash plate, held pressure")[0]) == pytest.approx(40.0, rel=0.02)
@@ -93,7 +93,7 @@ def test_nothing_moves(done):
 
 def test_the_table_is_the_documented_one(done):
     text = done("full-order", "luff")
-    assert text.startswith("luff, five states against one: 11 manoeuvres\n")
+    assert text.startswith("luff, five states against one: 11 maneuvers\n")
     documented = re.findall(r"^\| luff \| (.*?) \|$", PAGE.read_text("utf-8"), re.MULTILINE)
     rows = [[cell.strip() for cell in row.split("|")] for row in documented]
     rows = [row for row in rows if re.match("step|ramp|sine", row[0])]

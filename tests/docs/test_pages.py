@@ -6,8 +6,8 @@ A page is run from top to bottom in an empty folder:
   begins with ``# name.py`` is that file, too;
 - ``console`` blocks line by line: ``$ swashplate ...`` is run, 80 columns wide, and the lines below
   it must be what it printed, ``...`` standing for lines left out;
-- ``toml`` and ``csv`` blocks that begin with ``# name`` are that file; campaigns and set-ups are
-  valid ones, other ``toml`` is a fragment;
+- ``toml`` and ``csv`` blocks that begin with ``# name`` are that file; campaigns and fit
+  configurations are valid, other ``toml`` is a fragment;
 - ``diff`` blocks change a file: ``--- name``, then lines kept, taken out and put in;
 - another ``text`` block is a drawing, told by its lines and arrows.
 

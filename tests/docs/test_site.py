@@ -1,5 +1,6 @@
 """The documentation builds without a warning, and leaves out nothing that it should have."""
 
+import ast
 import importlib
 import re
 import subprocess
@@ -71,8 +72,8 @@ def test_the_reference_has_whole_modules(module: str) -> None:
     found = importlib.import_module(module)
     names = getattr(found, "__all__", vars(found))
     public = {name for name in names if callable(getattr(found, name)) and name[0] != "_"}
-    # what only takes part in the making of a manoeuvre
-    parts = {"Curve", "Piece", "SplineReturn"}
+    # what only takes part in the making and the taking of a maneuver
+    parts = {"Curve", "Piece", "SplineReturn", "sampled"}
     assert public - parts == {
         name.rpartition(".")[2] for name in OBJECTS if name.rpartition(".")[0] == module
     }
@@ -108,6 +109,24 @@ def test_every_ending_of_a_log_is_named() -> None:
     text = (DOCS / "campaign.md").read_text("utf-8")
     for suffix in SUFFIXES:
         assert re.search(rf"{re.escape(suffix)}\b", text), suffix
+
+
+def test_notes_of_a_fit_are_worded_as_they_are_printed() -> None:
+    """What stands between numbers, names and ``...`` in a note is within a message."""
+    messages = "\n".join(
+        "".join(str(part.value) if isinstance(part, ast.Constant) else "\n" for part in parts)
+        for path in (ROOT / "src" / "swashplate" / "identification").glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        for parts in [node.values if isinstance(node, ast.JoinedStr) else [node]]
+        if isinstance(parts[0], (ast.Constant, ast.FormattedValue))
+    )
+    page = (DOCS / "how-to" / "fit-notes.md").read_text("utf-8")
+    notes = re.findall(r"^\| (?!note|-)(.+?) \|", page, re.MULTILINE)
+    assert len(notes) > 20
+    for note in notes:
+        pieces = re.split(r"\.\.\.|[;:,±%()]|\bZ\w+|[-\d.]*\d[-\d.]*", note)
+        for piece in filter(None, (each.strip() for each in pieces)):
+            assert piece in messages, note
 
 
 def test_every_figure_can_be_made_again(scripts: ModuleType) -> None:

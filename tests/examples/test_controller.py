@@ -56,7 +56,7 @@ def margin(damping: float, foretold: float) -> float:
     slew = Drive.preset("slew").parameters.numbers
     f = np.geomspace(1e-3, 20.0, 400_000)
     s = 2j * np.pi * f
-    w, lag = slew["omega_plus"], 0.2069  # the lag at 2 V, as the source's small motion gives it
+    w, lag = slew["omega_plus"], 0.2069  # the lag at 2 V, as Kruse's small motion gives it
     drive = w**2 / (s**2 + 2.0 * slew["zeta_plus"] * w * s + w**2) / (1.0 + lag * s)
     angle = OMEGA * foretold
     sway = (np.cos(angle) + s / OMEGA * np.sin(angle)) * np.exp(-0.3 * s)

@@ -1,4 +1,4 @@
-"""examples/simulate.py: what it prints is what the source's numbers and equations say."""
+"""examples/simulate.py: what it prints is what Kruse's numbers and equations say."""
 
 import re
 from collections.abc import Callable
@@ -40,7 +40,7 @@ def test_without_its_stop_the_plate_is_where_the_spool_balances(run: Any) -> Non
 
 
 def test_the_orifice_sets_the_acceleration(run: Any) -> None:
-    assert "orifice and pump + 50 %: 294.0 deg/s" in run.printed  # as in the source's figure 9.1
+    assert "orifice and pump + 50 %: 294.0 deg/s" in run.printed  # as in Kruse's figure 9.1
     found = dict(re.findall(r"orifice x ([\d.]+): +([\d.]+) deg/s half", run.printed))
     soon = {float(factor): float(speed) - 3.09 for factor, speed in found.items()}
     # 136.8 deg/s² from when the delay of 14 ms and the card's filter are through

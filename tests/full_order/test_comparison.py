@@ -39,7 +39,7 @@ def test_difference_shrinks_like_the_root_of_epsilon(name: str) -> None:
 
 
 def test_without_damping_the_spool_rings() -> None:
-    """The source's eq. 6.19 has no damping: tens of deg/s off on a hoist step of 4 V."""
+    """Kruse's eq. 6.19 has no damping: tens of deg/s off on a hoist step of 4 V."""
     hoist = FullOrderDrive.preset("hoist").replace(spool_damping=0.0)
     step = maneuvers.step(4.0).sample(512.0)
     reduced = hoist.reduced.simulate(step, substeps=16).shaft_speed

@@ -27,7 +27,7 @@ LIGHT = {"spool_mass": 1e-3, "piston_mass": 0.05}
 
 @pytest.mark.parametrize("name", AXES)
 def test_preset_lands_on_the_published_lumps(name: str, source_parameters: dict) -> None:
-    """Against the source's tables, all but the gauge Z6↔Z8."""
+    """Against Kruse's tables, all but the gauge Z6↔Z8."""
     published = source_parameters["pump_motor"][name]
     lumps = PhysicalSet.preset(name).to_lumped()
     for symbol, value in lumps.items():
@@ -89,7 +89,7 @@ def test_gravity_moves_the_pressures_reference_and_nothing_else() -> None:
 
 
 def lumps_by_hand(n: dict, Z6: float) -> dict[str, float]:
-    """Kruse eqs. 6.56 to 6.70, written out from the symbols of the source."""
+    """Kruse eqs. 6.56 to 6.70, written out from the symbols of Kruse (2001)."""
     A, d4, k_r, V, B = (
         n[each]
         for each in ("piston_area", "swash_arm", "return_spring_rate", "oil_volume", "bulk_modulus")
@@ -200,7 +200,7 @@ def test_an_inertia_takes_the_place_of_its_frequency() -> None:
         ({}, {"spool_mass": 0.1}, "spool_mass on spool_arm alone has 6.331e-06 kg m², but spool_f"),
         ({}, {"piston_mass": 2.0}, "choose a smaller mass or a lower frequency"),
         ({}, {"control_arm": 0.2}, "control_arm is given as 0.2 m, but 0.127914042 follows from"),
-        ({}, {"load_torque": 1e8}, "the load holds a stroker pressure of .* Pa at rest"),
+        ({}, {"load_torque": 1e8}, "the load holds a stroking pressure of .* Pa at rest"),
         ({"Z2": 0.01}, {}, "mine: Z2 is 0.01, but a physical set has Z2 = 0"),
         ({"Z11": 0.01}, {}, "Z11 is 0.01, but without load_torque no speed is lost to it"),
         ({"Z12": 0.03}, {"load_inertia": 0.0}, "Z12 is 0.03, but without load_inertia"),

@@ -156,7 +156,7 @@ def test_constants_are_verdicts(residual: np.ndarray, command: np.ndarray, said:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ((TIME[:3], WHITE[:3], COMMAND[:3]), "3 samples tell nothing"),
+        ((TIME[:3], WHITE[:3], COMMAND[:3]), "3 samples show no correlation"),
     ],
 )
 def test_what_cannot_be_tested_is_refused(arguments: tuple, said: str) -> None:

@@ -177,5 +177,5 @@ def test_profiles_of_a_linear_model_are_its_intervals(assessed: Assessment) -> N
 
 def test_a_profile_of_nothing_is_refused(assessed: Assessment) -> None:
     assert list(profiles_of(assessed, ["level"])) == ["level"]
-    with pytest.raises(InputError, match="There is no unknown Z99; there are slope, level"):
+    with pytest.raises(InputError, match="There is no parameter Z99; there are slope, level"):
         profiles_of(assessed, ["Z99"])

@@ -176,7 +176,9 @@ def test_the_time_constant_is_that_of_a_step() -> None:
 def test_runs_that_end_before_the_answer() -> None:
     blink = maneuvers.step(8.0, start=0.0, stop=0.05, length=0.0625).sample(512.0)
     said = refused(run("blink", blink))
-    assert said.startswith("No run lasts: the longest, blink, ends 0.0625 s after its command")
+    assert said.startswith(
+        "No run is long enough: the longest, blink, ends 0.0625 s after its command"
+    )
     (said,) = warned(*GOOD, run("blink", blink))
     assert said.startswith("blink ends 0.0625 s after its command begins")
 
@@ -187,16 +189,16 @@ def test_fewer_samples_than_unknowns() -> None:
     thin[[600, 1200]] = 1.0
     few = replace(few, channels={"speed": replace(few["speed"], weight=thin)})
     more = Setup(stages=(Stage(name="pump", part="pump", free={"Z8": FACTOR, "Z16": FACTOR}),))
-    assert "Stage pump: 2 samples cannot determine 3 unknowns" in refused(few, setup=more)
+    assert "Stage pump: 2 samples cannot determine 3 parameters" in refused(few, setup=more)
 
 
 def test_commands_within_the_dead_zone() -> None:
     said = refused(run("timid", held(0.1)), run("shy", held(-0.05)))
     assert said.startswith("timid: its command stays between 0 and 0.1 V, within the dead zone")
-    assert "and so it is in all other runs; a drive that is not moved tells nothing" in said
+    assert "and so it is in all other runs; a drive that does not move cannot be identified" in said
     assert "-0.0979 to 0.127 V" in said
     (said,) = warned(*GOOD, run("timid", held(0.1)))
-    assert said.endswith("it tells of the drive at rest alone.")
+    assert said.endswith("it shows the drive at rest only.")
 
 
 def test_constant_commands() -> None:
@@ -312,7 +314,7 @@ def nothing(speed: np.ndarray) -> np.ndarray:
         ((*GOOD, run("again", held(8.0), lambda speed: 2.0 * speed)), "both cannot be right"),
         ((run("timid", held(0.1)),), "timid: its command stays between 0 and 0.1 V"),
         ((run("flat", np.zeros(1025)),), "flat: its command stays between 0 and 0 V"),
-        ((run("short", np.full(33, 8.0)),), "No run lasts: the longest, short"),
+        ((run("short", np.full(33, 8.0)),), "No run is long enough: the longest, short"),
         ((*GOOD, run("dead", held(8.0), np.zeros_like)), "dead: 'speed' never changes"),
         ((*GOOD, run("empty", held(8.0), nothing)), "0 samples that can be used"),
         ((*GOOD, run("one", np.zeros(1))), "1 samples that can be used"),

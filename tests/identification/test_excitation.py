@@ -71,8 +71,8 @@ def test_shares_by_hand() -> None:
     np.testing.assert_allclose(found.share, [[0.9, 1.0, 0.0], [0.1, 0.0, 0.0]])
     np.testing.assert_allclose(found.sensitivity[0], [0.03 / np.sqrt(2.0), 0.01 / np.sqrt(2.0), 0])
     assert found.sentences() == (
-        "Z8: 90 % of what is known of it comes from ramp, speed alone.",
-        "Z13: 100 % of what is known of it comes from ramp, speed alone.",
+        "Z8: 90 % of its information is from ramp, speed alone.",
+        "Z13: 100 % of its information is from ramp, speed alone.",
         "Z14: no run depends on it.",
     )
 
@@ -88,7 +88,7 @@ def test_before_a_fit_each_run_is_marked() -> None:
     assert found.effect("Z10") == pytest.approx(np.linalg.norm(0.01 * speeds) / 0.01)
     assert found.sentences() == (
         "Z13_minus needs the swash plate at its stop (minus), which no run has.",
-        "Z13_plus: 100 % of what the runs tell of it comes from high alone.",
+        "Z13_plus: 100 % of its information is from high alone.",
     )
 
 
@@ -102,8 +102,8 @@ def test_what_happens_where_nothing_counts_is_unseen() -> None:
     found = looked({"Z13_plus": FACTOR}, early, replace(stopped, channels={"speed": blind}))
     assert found.marks("Z13_plus") == ("none", "unseen")
     assert found.sentences() == (
-        "Z13_plus needs the swash plate at its stop (plus): stopped has it, but no sample that "
-        "counts shows it.",
+        "Z13_plus needs the swash plate at its stop (plus): stopped meets it, but shows it in no "
+        "sample that is used.",
     )
 
 
@@ -311,7 +311,7 @@ def test_nothing_left_is_said() -> None:
     assert found.proposed is None
     assert "Nothing is then left of the stage 'pump'" in found.sentences()[-1]
     setup = Setup(stages=(found.stage,))
-    with pytest.raises(InputError, match="determine none of the unknowns"):
+    with pytest.raises(InputError, match="determine none of the parameters"):
         proposed_setup(setup, [found])
 
 

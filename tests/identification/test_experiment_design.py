@@ -120,7 +120,7 @@ def test_a_candidate_that_moves_nothing() -> None:
     ("candidates", "said"),
     [
         ([], "no candidate"),
-        ([Candidate("c", np.ones((2, 3)))], "c: 2 unknowns need as many columns"),
+        ([Candidate("c", np.ones((2, 3)))], "c: 2 parameters need as many columns"),
         ([Candidate("c", np.full((2, 2), np.nan))], "c: the derivatives must be finite"),
     ],
 )
@@ -140,7 +140,7 @@ SPEED = Sensor("shaft_speed", 0.01)
 
 @pytest.fixture(scope="module")
 def hoist_tests(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
-    """The source's tests of a hoist near the published one, with instruments."""
+    """Kruse's tests of a hoist near the published one, with instruments."""
     tests = rig.run("hoist", seed=4, perturb=0.02)
     return Campaign.from_toml(rig.write(tests, tmp_path_factory.mktemp("rig") / "tests"))
 
@@ -277,7 +277,7 @@ def test_residuals_of_a_fit_tell_the_noise() -> None:
     assert fitted.sensors[0].noise == pytest.approx(0.04, rel=0.05)
     # white: each sample counts, or nearly, as the larger of two estimates of the error is quoted
     assert 1.0 / 512.0 <= fitted.sensors[0].memory < 2.0 / 512.0
-    with pytest.raises(InputError, match="residuals of 'speed' are as good as zero"):
+    with pytest.raises(InputError, match="residuals of 'speed' are practically zero"):
         bench(HOIST.parameters, setup("Z10"), [run("exact", 5.0)], fitted=True)
 
 
@@ -330,7 +330,7 @@ def test_the_usual_tests_differ() -> None:
 
 
 def test_wrong_wishes_are_refused() -> None:
-    with pytest.raises(InputError, match="Z10 is free in the set-up already"):
+    with pytest.raises(InputError, match="Z10 is free in the fit configuration already"):
         bench(HOIST.parameters, setup("Z10"), free=["Z10"])
     off = HOIST.replace(Z16=(np.inf, np.inf))
     with pytest.raises(InputError, match="Z16_plus is off in the drive"):

@@ -69,7 +69,7 @@ def test_quoted_intervals_take_it_in(staged: tuple[Campaign, Fit]) -> None:
     found = pump.uncertainty
     told = found.own.determined
     assert (found.quoted.standard_errors[told] >= found.own.standard_errors[told]).all()
-    assert any("what the stages before do not know" in each for each in found.sentences())
+    assert any("the uncertainty of earlier stages" in each for each in found.sentences())
 
 
 def test_variances_add_up_and_so_do_degrees_of_freedom() -> None:

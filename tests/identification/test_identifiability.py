@@ -54,7 +54,7 @@ def test_a_full_set_is_called_so() -> None:
     assert found.complete
     assert found.rank == 3
     assert found.to_fix == ()
-    assert found.sentences()[0].startswith("The tests determine all 3 free unknowns")
+    assert found.sentences()[0].startswith("The tests determine all 3 free parameters")
 
 
 def test_a_null_direction_is_written_by_name() -> None:
@@ -98,20 +98,20 @@ def test_an_unexcited_unknown_is_named() -> None:
 def test_nothing_at_all_is_a_verdict() -> None:
     found = judged(np.zeros((5, 2)), "ab")
     assert found.rank == 0
-    assert found.sentences()[0] == "The tests determine none of the unknowns."
+    assert found.sentences()[0] == "The tests determine none of the parameters."
 
 
 def test_all_at_bounds_is_a_verdict() -> None:
     variables = unknowns_of("ab", np.ones(2), at_bound=[1, -1])
     found = identifiability(RNG.normal(size=(5, 2)), variables)
-    assert found.sentences()[0].startswith("All unknowns stand at a bound")
+    assert found.sentences()[0].startswith("All parameters are at a bound")
 
 
 def test_one_sample_is_a_verdict() -> None:
     found = judged(np.array([[1.0, 2.0, 3.0]]), "abc")
     assert found.rank == 1
     assert len(found.null) == 2
-    assert found.sentences()[0].startswith("The tests determine 1 combination of 3 free unknowns")
+    assert found.sentences()[0].startswith("The tests determine 1 combination of 3 free parameters")
 
 
 def test_a_weak_unknown_is_named_with_what_follows_it() -> None:
@@ -126,14 +126,14 @@ def test_a_weak_unknown_is_named_with_what_follows_it() -> None:
     assert set(direction.changes) == {"a", "b"}
     assert direction.changes["a"] == pytest.approx(-direction.changes["b"], rel=1e-3)
     assert direction.sentence.startswith(f"Weak: {direction.fix} is known to ±19.6 % only, as ")
-    assert direction.sentence.endswith("or add a test that tells them apart.")
+    assert direction.sentence.endswith("or add a test that distinguishes them.")
 
 
 def test_weak_is_what_the_given_covariance_says() -> None:
     given = np.diag([0.06**2, 0.01**2, 0.04**2])
     (direction,) = judged(RNG.normal(size=(10, 3)), "abc", covariance=given).weak
     assert direction.fix == "a"
-    assert direction.sentence == "Weak: a is known to ±11.8 % only; add a test that tells it."
+    assert direction.sentence == "Weak: a is known to ±11.8 % only; add a test that determines it."
 
 
 def test_directions_in_words() -> None:
@@ -146,9 +146,10 @@ def test_directions_in_words() -> None:
     )
     gauge = next(each for each in GAUGES if "Z6" in each.moves)
     assert Direction({"Z8": 1.0, "Z6": 0.9}, 0.3, gauge, "Z6").sentence == (
-        "Weak: Z6 is known to ±30 % only, as Z6 and Z8 move together all but unseen (piston motion "
+        "Weak: Z6 is known to ±30 % only, as Z6 and Z8 change together with almost no effect "
+        "(piston motion "
         "against flow gain): only Z8/(1+Z6) is determined; fix one of them only if you know it, or "
-        "add a test that tells them apart."
+        "add a test that distinguishes them."
     )
     many = {f"Z{k}": 1.0 for k in range(9)}
     said = Direction(many, np.inf, None, "Z1").sentence
@@ -167,7 +168,7 @@ def test_an_unknown_at_its_bound_is_flagged_and_held() -> None:
     found = identifiability(np.ones((5, 2)), variables)
     assert found.at_bounds == {"Z17": "lower"}
     assert found.complete  # the two columns are alike, but one is held
-    assert any("Z17 = 0.25 stands at its lower bound" in each for each in found.sentences())
+    assert any("Z17 = 0.25 is at its lower bound" in each for each in found.sentences())
 
 
 def test_the_gauges_of_the_hoist(hoist_columns: tuple) -> None:

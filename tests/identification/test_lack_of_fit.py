@@ -86,7 +86,7 @@ def test_late_stamps_of_the_command_are_the_fixed_delay(sound) -> None:
     assert fault is not None
     assert fault.hidden
     assert fault.outside < 0.01
-    assert "the same as other values of the fixed tau" in " ".join(sound[1].assumed)
+    assert "indistinguishable from other values of the fixed tau" in " ".join(sound[1].assumed)
 
 
 def test_a_longer_delay_than_the_fixed_one_is_named(tmp_path: Path) -> None:

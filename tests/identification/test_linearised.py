@@ -72,5 +72,5 @@ def test_nothing_is_determined_by_nothing() -> None:
 
 
 def test_as_many_unknowns_as_samples_leave_no_noise() -> None:
-    with pytest.raises(InputError, match="1 sample for 1 unknown"):
+    with pytest.raises(InputError, match="1 sample for 1 parameter"):
         _ = fit([run(1, 1)], 1).spare_samples

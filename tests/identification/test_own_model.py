@@ -247,7 +247,7 @@ REFUSED: dict[str, tuple[Callable[[], Problem], str]] = {
     ),
     "no value": (
         lambda: problem(OWN, trial("a"), free=FREE[:1]),
-        "valve has no value of gain: let it be an unknown, fix it, or give p",
+        "valve has no value of gain: let it be free, fix it, or give p",
     ),
     "unknown signal": (
         lambda: problem(OwnModel(valve, given=Load(), signals={"position": "y"}), trial("a")),

@@ -128,7 +128,7 @@ def test_an_undetermined_unknown_is_open() -> None:
     found = profile(bowl(0.0), ZERO, 1.0, 0, LIMIT, 1.0)
     assert found.endings == ("open", "open")
     assert (found.lower, found.upper) == (None, None)
-    assert "as far as was looked" in found.sentences("Z6")[0]
+    assert "reaches the end of the search" in found.sentences("Z6")[0]
 
 
 def test_the_domains_edge_ends_a_side() -> None:
@@ -166,9 +166,9 @@ def test_the_root_of_a_kinked_cost_is_found() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"samples": 3}, "3 samples for 3 unknowns"),
+        ({"samples": 3}, "3 samples for 3 parameters"),
         ({"inflation": 0.5}, "cannot stand for one"),
-        ({"inflation": 40.0}, "worth 1.5 independent ones"),
+        ({"inflation": 40.0}, "count as 1.5 independent ones"),
         ({"level": 1.0}, "between 0 and 1"),
     ],
 )

@@ -177,7 +177,7 @@ def test_interrupted_with_the_best_so_far(problem: Problem) -> None:
 
 def test_impossible_problems(rise, experiment: Make, measured) -> None:
     run = experiment("run", 1.0, measured(1.0, GAIN, LAG))
-    with pytest.raises(InputError, match="at least one unknown"):
+    with pytest.raises(InputError, match="at least one parameter"):
         Problem(rise, (run,), Unknowns(()), ("y",), {"y": 0.1})
     with pytest.raises(InputError, match="at least one experiment"):
         Problem(rise, (), UNKNOWNS, ("y",), {"y": 0.1})

@@ -89,5 +89,5 @@ def test_no_residual_has_no_error_and_too_few_samples_are_refused() -> None:
     assert spectral_covariance(fit).standard_errors.tolist() == [0.0, 0.0, 0.0]
     run = LinearisedRun("run", "y", TIME[:3], np.ones(3), DESIGN[:3] + np.eye(3))
     few = linear_fit([run], unknowns_of("abc", np.ones(3)))
-    with pytest.raises(InputError, match="3 samples for 3 unknowns"):
+    with pytest.raises(InputError, match="3 samples for 3 parameters"):
         spectral_covariance(few)

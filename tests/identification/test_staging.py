@@ -1,4 +1,4 @@
-"""From a set-up to its problem: the source's weights, clocks and pressures that are free."""
+"""From a set-up to its problem: Kruse's weights, clocks and pressures that are free."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -165,7 +165,7 @@ def test_a_damaged_file_is_refused(path: Path, campaign: Campaign, tmp_path: Pat
     with pytest.raises(ParameterError, match="fit.json"):
         load_fit(path, campaign)
     path.write_text(text.replace('"Z10"', '"Z9"', 1), "utf-8")
-    with pytest.raises(FileError, match="stage pump has other unknowns .* fit again"):
+    with pytest.raises(FileError, match="stage pump has other parameters .* fit again"):
         load_fit(path, campaign)
 
 
@@ -185,7 +185,7 @@ POISON = {
     ),
     "wrong length": (
         lambda text: re.sub(r'"vector": \[[^]]+\]', '"vector": [1.0]', text, count=1),
-        "stage card has other unknowns",
+        "stage card has other parameters",
     ),
     "a number for the drive": (
         lambda text: text.replace('"nominal": ', '"nominal": 3, "was": '),

@@ -75,7 +75,7 @@ def test_correlations_that_cancel_cost_no_samples() -> None:
     fit, _ = fitted([shapes(rng) for _ in range(RUNS)], noise)
     said = " ".join(uncertainty(fit).sentences())
     assert "stay correlated over" in said
-    assert "positive and negative correlations cancel, and the samples tell as much as" in said
+    assert "positive and negative correlations cancel, and the samples count as" in said
 
 
 def test_the_sentences_say_so(campaigns: list) -> None:
@@ -125,7 +125,7 @@ def test_what_is_not_determined_has_no_number(jacobian: np.ndarray, more: dict) 
 
 def test_one_sample_is_refused() -> None:
     run = LinearisedRun("a", "speed", np.zeros(1), np.ones(1), np.ones((1, 1)))
-    with pytest.raises(InputError, match="1 sample for 1 unknown leave nothing"):
+    with pytest.raises(InputError, match="1 sample for 1 parameter leave nothing"):
         uncertainty(linear_fit([run], unknowns_of(["p"], [1.0])))
 
 

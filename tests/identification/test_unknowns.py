@@ -78,7 +78,7 @@ def test_bounds_that_are_reached() -> None:
         (lambda: bounded("a", 1.0, absolute=(0.0, 2.0), prior=Prior(1.0, 0.0)), "positive"),
         (
             lambda: Unknowns((Unknown("a", 1, 0, 2), Unknown("b", 1, 0, 2, sets=("a",)))),
-            "a is set by two unknowns",
+            "a is set by two parameters",
         ),
     ],
 )
@@ -96,7 +96,7 @@ def test_unbounded_vectors_give_no_nan() -> None:
 def test_an_unknown_is_found_by_name() -> None:
     variables = unknowns_of(["a", "b"], [1.0, 2.0])
     assert variables.index("b") == 1
-    with pytest.raises(InputError, match="no unknown c; there are a, b"):
+    with pytest.raises(InputError, match="no parameter c; there are a, b"):
         variables.index("c")
 
 

@@ -150,7 +150,7 @@ def test_a_fit_that_carries_over_is_usable(experiment, measured, stage) -> None:
     assert found.headline == "Usable: predicts held-out y to 0.66 % of its range."
     validation = statement(found, "Validation")
     assert validation.weight == "good"
-    assert "the fit carries over" in validation.sentences[0]
+    assert "no sign of overfitting" in validation.sentences[0]
 
 
 def test_what_is_required_decides(quality: Make) -> None:
@@ -194,7 +194,7 @@ def test_most_unknowns_at_bounds_is_hopeless(experiment, measured, stage) -> Non
     held = held_out(experiment, measured, 0.0 * TIME)
     found = verdict([Assessment(fitted)], [held])
     assert not found.usable
-    assert "2 of 2 unknowns stand at a bound or are not determined" in found.headline
+    assert "2 of 2 parameters are at a bound or not determined" in found.headline
 
 
 def test_an_interrupted_fit_is_not_usable(experiment, measured, stage) -> None:

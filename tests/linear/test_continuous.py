@@ -11,7 +11,7 @@ from swashplate.linear import DeadZoneError
 
 
 def test_the_closed_form_of_the_hoist_s_lag(hoist: Drive) -> None:
-    # (1 + Z6)/(Z1 Z3 Z5 Z8 √(Z9/2)) and the gain Z10 Z5/(Z3 √Z4) by the source's numbers
+    # (1 + Z6)/(Z1 Z3 Z5 Z8 √(Z9/2)) and the gain Z10 Z5/(Z3 √Z4) by Kruse's numbers
     model = hoist.replace(Z18=0.0).linearize(current=0.0, input="solenoid_force")
     tau = 1.073926 / (4.6441e-7 * 0.62542 * 0.0079568 * 1651400.0 * np.sqrt(10743000.0 / 2.0))
     assert model.time_constant == pytest.approx(tau, rel=1e-12)

@@ -50,12 +50,12 @@ LINEAR = {"interpolation": "linear"}
         (lambda: maneuvers.recorded([0, 2, 1], [0, 1, 2], **LINEAR), "row 2 .* 1.0 s after 2.0 s"),
         (lambda: maneuvers.recorded([0, math.nan], [0, 1], **LINEAR), "time .* row 1 .* is nan"),
         (lambda: maneuvers.recorded([0, 1], [math.inf, 1], **LINEAR), "voltage .* row 0 .* is inf"),
-        (lambda: maneuvers.superpose(), "at least one manoeuvre"),
+        (lambda: maneuvers.superpose(), "at least one maneuver"),
         (lambda: maneuvers.rest(1) * math.nan, "factor must be finite"),
         (lambda: "twice" * maneuvers.rest(1), "factor must be a number"),
         (lambda: maneuvers.rest(1.3).sample(), "rest 1.3 s lasts 1.3 s, at 512 Hz 665.6 samples"),
         (lambda: maneuvers.rest(1).time(0), "rate must be positive"),
-        (lambda: maneuvers.source_tests("boom"), "'boom': the source has hoist, slew, luff"),
+        (lambda: maneuvers.source_tests("boom"), "'boom': Kruse (2001) has hoist, slew, luff"),
     ],
 )
 def test_errors_say_what_is_wrong(make, message):

@@ -1,4 +1,4 @@
-"""Manoeuvres as objects: sampled, scaled, joined, added, returned, within their amplitude."""
+"""Maneuvers as objects: sampled, scaled, joined, added, returned, within their amplitude."""
 
 import math
 import pickle
@@ -119,7 +119,7 @@ def test_names(m, name):
 
 
 @pytest.mark.parametrize("m", SMOOTH.values(), ids=SMOOTH.keys())
-def test_manoeuvres_travel_to_other_processes(m):
+def test_maneuvers_travel_to_other_processes(m):
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(m))(3.0), m(3.0))
 
 
@@ -246,7 +246,7 @@ def records(draw):
 
 
 def of_one_kind():
-    """Manoeuvre and the amplitude that its name says."""
+    """Maneuver and the amplitude that its name says."""
     return st.one_of(
         seconds.map(lambda duration: (maneuvers.rest(duration), 0.0)),
         volts.map(lambda v: (maneuvers.step(v), abs(v))),

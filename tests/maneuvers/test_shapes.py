@@ -1,4 +1,4 @@
-"""Manoeuvres by name: shapes, recordings, Kruse's tests, and the words of the command line."""
+"""Maneuvers by name: shapes, recordings, Kruse's tests, and the words of the command line."""
 
 import math
 
@@ -173,7 +173,7 @@ def test_recorded_file_with_options(tmp_path):
     assert m([0.0, 1.0]).tolist() == [1.25, 2.5]
 
 
-def test_a_manoeuvre_of_months_is_refused():
+def test_a_maneuver_of_months_is_refused():
     with pytest.raises(InputError, match=r"5\.12e\+09 samples, more than the 1e\+08"):
         maneuvers.rest(1e7).sample(512.0)
 
@@ -268,8 +268,8 @@ def test_parse_makes_what_the_function_makes(text, same):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("jump:9", "'jump' is no manoeuvre: choose one of rest, step, ramp, sine, stairs, chirp"),
-        ("", "'' is no manoeuvre"),
+        ("jump:9", "'jump' is no maneuver: choose one of rest, step, ramp, sine, stairs, chirp"),
+        ("", "'' is no maneuver"),
         ("step", "missing a required argument: 'amplitude'; step takes amplitude, start, stop"),
         ("step:1,2", "too many positional arguments; step takes amplitude, start, stop, length"),
         ("step:1,end=2", "unexpected keyword argument 'end'; step takes amplitude, start, stop"),

@@ -47,7 +47,7 @@ def test_the_settled_current_is_a_jump_and_a_cubic(channel: Channel) -> None:
 
 
 def test_published_levels() -> None:
-    """Currents of the source's drives at 1, 4, 6.5 and 9 V."""
+    """Currents of Kruse's drives at 1, 4, 6.5 and 9 V."""
     expected = {
         ("hoist", "plus"): (0.3184, 0.4754, 0.6106, 0.7452),
         ("hoist", "minus"): (0.3447, 0.5093, 0.6374, 0.7474),
@@ -61,7 +61,7 @@ def test_published_levels() -> None:
         assert found == pytest.approx(currents, abs=5e-5)
 
 
-# --- the source's recursion ----------------------------------------------------------------------
+# --- Kruse's recursion ----------------------------------------------------------------------
 
 
 @pytest.mark.interpreted

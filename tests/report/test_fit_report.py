@@ -105,7 +105,7 @@ STARTS = tuple(
     StartResult(number, (0.0,), (0.0,), 9.0, cost, 10, number != 2, "done", 0.1)
     for number, cost in enumerate((3.0, 3.0, 70.0, float("inf")))
 )
-HEADS = ("unknown", "run", "parameter", "channel", "fold", "quantity")
+HEADS = ("run", "parameter", "channel", "fold", "quantity")
 NOTES = {"command": HOSTILE, "seed": "4"}
 
 
@@ -225,15 +225,15 @@ def test_estimates_and_intervals_are_those_of_the_fit(read: Page, assessments) -
 def test_no_interval_at_an_active_bound(read: Page) -> None:
     row = next(row for row in read.rows("parameters") if row["name"] == "omega")
     assert (row["lower 95 %"], row["upper 95 %"]) == ("at its upper bound", "")
-    assert re.search(r"omega = [\d.]+ stands at its upper bound: no interval is given", read.words)
+    assert re.search(r"omega = [\d.]+ is at its upper bound and has no interval", read.words)
 
 
 def test_fixed_parameters_are_listed_and_free_ones_are_not(read: Page) -> None:
     fixed = {row["name"]: row for row in read.rows("held")}
     assert {"tau", "Z1", "Z18", "zeta_plus"} <= set(fixed)
     assert not set(fixed) & {"G1_plus", "G1_minus", "omega_plus", "omega_minus", "Z10"}
-    assert fixed["Z12"]["why, as far as can be told"] == "0: this effect is left out"
-    assert fixed["Z14"]["why, as far as can be told"] == "inactive: no test reaches it"
+    assert fixed["Z12"]["reason, where known"] == "0: this effect is left out"
+    assert fixed["Z14"]["reason, where known"] == "inactive: no test reaches it"
     # in the units that people read, the number with its unit
     stop = Drive.preset("hoist").parameters.numbers["Z14"]
     assert fixed["Z14"]["unit"] == "mm"
@@ -453,7 +453,7 @@ def test_each_run_has_a_light_and_links(read: Page, write, validation) -> None:
 
 
 def test_shares_of_the_runs_add_up(read: Page) -> None:
-    rows = [row for row in read.tables["excitation"] if row[0] != "unknown"]
+    rows = [row for row in read.tables["excitation"] if row[0] != "parameter"]
     assert {row[0] for row in rows} == {"G1_plus", "G1_minus", "omega", "Z10"}
     for row in rows:
         total = sum(int(cell) for cell in row[2:] if cell)

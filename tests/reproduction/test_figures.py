@@ -1,4 +1,4 @@
-"""Each figure of the source is there, with curves that hit the source's numbers."""
+"""Each figure of the source is there, with curves that hit Kruse's numbers."""
 
 import re
 
@@ -37,7 +37,7 @@ def test_every_figure_of_the_chapters_is_in_the_catalogue(captions: dict[str, st
     assert len(wanted) == 46
 
 
-def test_each_shows_the_log_and_the_manoeuvre_of_its_caption(captions: dict[str, str]) -> None:
+def test_each_shows_the_log_and_the_maneuver_of_its_caption(captions: dict[str, str]) -> None:
     for shown in FIGURES:
         caption = captions[shown.number]
         assert re.findall(r"\w+\.dat", shown.logs) == re.findall(r"\w+\.dat", caption)

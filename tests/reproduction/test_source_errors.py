@@ -1,4 +1,4 @@
-"""The source's largest per cent errors."""
+"""Kruse's largest per cent errors."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -127,7 +127,7 @@ PULSE = np.where((TIME >= 1.0) & (TIME < 6.0), 1.0, 0.0)
 
 
 def excluded(name: str, run: ComparedRun) -> np.ndarray:
-    """Samples that one of the source's rules leaves out."""
+    """Samples that one of Kruse's rules leaves out."""
     (rule,) = (each for each in SOURCE_RULES if each.name == name)
     return np.broadcast_to(rule.excluded(run), run.time.shape)
 

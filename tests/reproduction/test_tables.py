@@ -1,4 +1,4 @@
-"""The tables are those of the source: digit for digit but for what the errata name."""
+"""The tables are those of Kruse (2001): digit for digit but for what the errata name."""
 
 import re
 
@@ -33,7 +33,7 @@ def values(made: Table) -> list[tuple[str, list[Cell]]]:
 
 
 def source_rows(text: str, number: str) -> list[list[str]]:
-    """Rows of a table in the source's text, parameters as they are printed."""
+    """Rows of a table in Kruse's text, parameters as they are printed."""
     lines = text.splitlines()
     start = next(n for n, line in enumerate(lines) if line.startswith(f"Table {number} "))
     rows = []

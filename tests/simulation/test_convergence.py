@@ -1,4 +1,4 @@
-"""Steps and rates: first order in h, and the same answer from any sampling of one manoeuvre."""
+"""Steps and rates: first order in h, and the same answer from any sampling of one maneuver."""
 
 import itertools
 import re
@@ -51,7 +51,7 @@ def test_every_rate_gives_the_same_answer(
 def test_the_filters_equation_answers_alike_at_every_rate(
     name: str, maneuver: maneuvers.Maneuver
 ) -> None:
-    """Within 0.2 % of the largest current at 512 and 2048 Hz; the source's recursion is 2 % off."""
+    """Within 0.2 % of the largest current at 512 and 2048 Hz; Kruse's recursion is 2 % off."""
     voltage = maneuver.sample(512.0)
     coarse, fine = np.arange(voltage.size) / 512.0, np.arange(4 * voltage.size - 3) / 2048.0
     published = Drive(replace(Drive.preset(name).parameters, card_switch="split"))

@@ -53,7 +53,7 @@ def test_a_drive_without_refinements_is_marched_plainly(hoist: Drive) -> None:
 
 
 def test_stiction_overshoots_by_4_percent_and_decays(hoist: Drive) -> None:
-    """The overshoot of the source's hoist steps (section 7.6): 4 % at 4 V, gone under dither."""
+    """The overshoot of Kruse's hoist steps (section 7.6): 4 % at 4 V, gone under dither."""
     settled = hoist.steady_speed(4.0)
     beyond = overshoot(refined(hoist, **STICTION), settled)
     top = int(beyond.argmax())
@@ -141,7 +141,7 @@ def test_a_plate_damped_by_next_to_nothing_is_the_plain_one(axis: Drive) -> None
 
 
 def test_a_stiff_line_is_no_line(hoist: Drive) -> None:
-    """With K_mL J well below the step the source's leakage by the flow's acceleration holds."""
+    """With K_mL J well below the step Kruse's leakage by the flow's acceleration holds."""
     light = {**LOAD, "load_inertia": 500.0}
     stiff = refined(hoist, **light, line_stiffness=1e9)
     none = refined(hoist, **light)

@@ -1,4 +1,4 @@
-"""The packaged sets hold the source's tables, digit for digit."""
+"""The packaged sets hold Kruse's tables, digit for digit."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The source's numbers: static table, limits, accelerations, time constants, figure 9.1.
+"""Kruse's numbers: static table, limits, accelerations, time constants, figure 9.1.
 
 The expected values are those of the model description, worked out from the published parameters
 apart from this code, and good to the digits given.
@@ -104,7 +104,7 @@ def test_figure_9_1_orifice_and_pump_half_as_large_again(hoist: Drive) -> None:
 
 
 @pytest.mark.parametrize("name", ["hoist", "slew", "luff"])
-def test_every_manoeuvre_settles_where_the_static_curve_says(name: str) -> None:
+def test_every_maneuver_settles_where_the_static_curve_says(name: str) -> None:
     """Steps of the campaign and their mirror images, both directions."""
     drive = Drive.preset(name)
     for test, maneuver in maneuvers.source_tests(name).items():

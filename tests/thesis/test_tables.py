@@ -1,4 +1,4 @@
-"""Tables 4.1-4.4, 7.1-7.4, 8.1-8.3: read from the source's text where it is at hand.
+"""Tables 4.1-4.4, 7.1-7.4, 8.1-8.3: read from Kruse's text where it is at hand.
 
 `test_parameters` compares the drives with the tables as they were put in order; here the text is
 read itself, signs and misprints included, so that each erratum of the tables shows.

@@ -295,7 +295,9 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
         slower.
     """
     if not FEWEST <= points <= MOST:
-        raise InputError(f"An inverse map takes {FEWEST} to {MOST} points each way, not {points}.")
+        raise InputError(
+            f"An inverse map takes {FEWEST} to {MOST} points per direction, not {points}."
+        )
     plus, minus = (_branch(drive, way, points) for way in (1.0, -1.0))
     creep = float(drive.steady_speed(0.0))
     if not minus.speed[-1] <= creep <= plus.speed[0]:

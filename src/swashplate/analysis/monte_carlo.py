@@ -89,7 +89,7 @@ def _drawn(once: Callable[[], ParameterSet | None], draws: int) -> tuple[tuple[D
         redrawn += 1
         if redrawn > MOST_REDRAWN * (len(made) + 10):
             raise InputError(
-                f"Of {redrawn + len(made)} draws only {len(made)} lie within the unknowns' bounds "
+                f"Of {redrawn + len(made)} draws only {len(made)} lie within the bounds "
                 "and the model's domain: the errors are too large for a Monte Carlo; test more, or "
                 "free fewer parameters."
             )

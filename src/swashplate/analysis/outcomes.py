@@ -478,9 +478,9 @@ def side_by_side(drives: Mapping[str, Drive], runs: Mapping[str, Simulation]) ->
 
 
 def overview_table(runs: Mapping[str, Mapping[str, Simulation]]) -> Table:
-    """Peak speeds of many runs and the limits that they meet, by axis and manoeuvre."""
+    """Peak speeds of many runs and the limits that they meet, by axis and maneuver."""
     speed = ("z.2f", "rad/s")
-    words = Column("axis"), Column("manoeuvre"), Column("samples", "d")
+    words = Column("axis"), Column("maneuver"), Column("samples", "d")
     limits = Column("limits met", wrap=True)
     made = Table("Peak speeds", (*words, Column("plus", *speed), Column("minus", *speed), limits))
     for axis, by_name in runs.items():

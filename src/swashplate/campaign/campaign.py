@@ -99,8 +99,8 @@ class Campaign(Result):
         return cls(Path(path), title, file.virtual, file.axes, tuple(experiments), tuple(ignored))
 
     def table(self) -> Table:
-        """Its experiments: axis, role, manoeuvre, length and channels."""
-        columns = (Head("run"), Head("axis"), Head("role"), Head("manoeuvre"))
+        """Its experiments: axis, role, maneuver, length and channels."""
+        columns = (Head("run"), Head("axis"), Head("role"), Head("maneuver"))
         made = Table(self.title, (*columns, Head("s", ".4g"), Head("channels", wrap=True)))
         for each in self:
             made.add(

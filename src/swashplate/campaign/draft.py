@@ -411,7 +411,7 @@ def _signal(guessed: ColumnGuess, look: _Look, counts_per_turn: float | None) ->
 
 @dataclass
 class _Draft:
-    """A run's lines, its role, and kind and direction, and the size, of its manoeuvre."""
+    """A run's lines, its role, and kind and direction, and the size, of its maneuver."""
 
     lines: list[str]
     stratum: str
@@ -447,7 +447,7 @@ def _run(look: _Look, axes: Mapping[str, list[ColumnGuess]], folder: Path) -> _D
 
 
 def _seen(look: _Look, axes: Mapping[str, list[ColumnGuess]]) -> tuple[str, str, float]:
-    """Length, rate and manoeuvres of a run for a comment; their kind, direction and size."""
+    """Length, rate and maneuvers of a run for a comment; their kind, direction and size."""
     time = None if look.time is None else look.values.get(look.time.column.name)
     if look.time is None or time is None or time.size < 2:
         return f"{len(next(iter(look.values.values()), []))} samples", "", 0.0

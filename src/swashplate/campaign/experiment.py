@@ -130,7 +130,7 @@ class Experiment(Tabular):
     input: InputSignal
     channels: Mapping[str, Channel]
     stated_maneuver: str | None = None
-    """Name that the campaign file gives to the manoeuvre."""
+    """Name that the campaign file gives to the maneuver."""
     recognised: Recognised | None = None
     ignored: tuple[tuple[float, float, str], ...] = ()
     """Windows left out of every channel: first and last instant [s], and why."""
@@ -191,7 +191,7 @@ class Experiment(Tabular):
 
     @property
     def maneuver(self) -> str:
-        """The manoeuvre, as stated or as recognised: ``"step +4 V"``, ``"free"``."""
+        """The maneuver, as stated or as recognised: ``"step +4 V"``, ``"free"``."""
         if self.stated_maneuver is not None:
             return self.stated_maneuver
         return self.recognised.name if self.recognised is not None else "free"

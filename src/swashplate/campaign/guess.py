@@ -274,7 +274,7 @@ def _searched(runs: Sequence[_Run], size: Array, scale: float) -> _Numbers:
     candidates.sort(key=lambda each: each[0])
     if (candidates[0][1].gain[tried] <= 0.0).any():
         raise InputError(
-            "The speed goes against the command: turn it round with sign = -1 in its channel."
+            "The speed goes against the command: reverse it with sign = -1 in its channel."
         )
 
     def numbers_of(vector: Array) -> _Numbers:
@@ -372,7 +372,7 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     said = {
         symbol: replace(each, source=source, status="approximate")
         if symbol in changed
-        else replace(each, source="made up: no speed tells it")
+        else replace(each, source="assumed: no speed determines it")
         for symbol, each in made.parameters.items()
     }
     return replace(

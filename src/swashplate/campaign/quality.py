@@ -57,7 +57,7 @@ NEIGHBOURS = 11
 QUIET = 0.3
 """So long the input stands still before a spike within the range of what lasts. [s]"""
 NAMED = 6
-"""Windows, or manoeuvres, that a sentence names."""
+"""Windows, or maneuvers, that a sentence names."""
 
 
 @dataclass(frozen=True)
@@ -419,7 +419,7 @@ def beyond_the_card(experiment: Experiment) -> tuple[str, ...]:
 
 
 def _unused_windows(campaign: Campaign) -> Iterator[str]:
-    """Windows that leave out or weigh no sample of any run: a misspelt manoeuvre, another clock."""
+    """Windows that leave out or weigh no sample of any run: a misspelt maneuver, another clock."""
     file = read_campaign_file(campaign.path)
     for name, axis in file.axes.items():
         runs = campaign.select(axis=name)
@@ -448,7 +448,7 @@ def _unused(
             names = list(dict.fromkeys(f"'{each.maneuver}'" for each in runs))
             more = [f"{len(names) - NAMED} others"] if len(names) > NAMED else []
             yield (
-                f"{where}: no run has the manoeuvre '{window.maneuver}', so that its window does "
+                f"{where}: no run has the maneuver '{window.maneuver}', so that its window does "
                 f"nothing; there are {', '.join([*names[:NAMED], *more])}"
             )
         elif not any(

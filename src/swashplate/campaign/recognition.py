@@ -1,6 +1,6 @@
-"""Manoeuvres recognised from nothing but the command that was logged.
+"""Maneuvers recognised from nothing but the command that was logged.
 
-`recognise` says which of the package's manoeuvres a record is (rest, step, stairs, ramp or sine),
+`recognise` says which of the package's maneuvers a record is (rest, step, stairs, ramp or sine),
 with its numbers, or that it is none of them: ``"free"``. It never guesses. The name decides which
 windows of a campaign file hold in a run, which runs are dealt into which fold, and what a table of
 errors puts together; the numbers beside it are what the name is made of.
@@ -50,7 +50,7 @@ COARSEST = 6.0
 
 @dataclass(frozen=True)
 class Recognised:
-    """The manoeuvre of a record. Numbers are rounded to what the data support.
+    """The maneuver of a record. Numbers are rounded to what the data support.
 
     Levels and amplitudes in the name are relative to the input at rest, with their sign in the
     record.
@@ -68,7 +68,7 @@ class Recognised:
 
 
 def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recognised:
-    """Name of the manoeuvre of a record, from the command alone.
+    """Name of the maneuver of a record, from the command alone.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recogn
     Returns
     -------
     Recognised
-        Of kind ``"free"`` wherever none of the manoeuvres fits: its RMS over the record must be
+        Of kind ``"free"`` wherever none of the maneuvers fits: its RMS over the record must be
         below 1 % of the peak, noise apart, and below three times that in every fiftieth part.
 
     Raises
@@ -96,7 +96,7 @@ def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recogn
     Step, stairs, ramp and sine are those of `swashplate.maneuvers`. How they return to rest is free
     as long as they do, within three quarters of the time that the command took. A sine may begin at
     any phase, but has a whole period at least, about rest. Chirps, multisines, joysticks and
-    different manoeuvres after one another are free.
+    different maneuvers after one another are free.
     """
     trace = _trace(time, voltage, unit)
     if unit == "V" and abs(trace.rest) > LARGEST_ZERO:

@@ -244,7 +244,7 @@ def _lasting(steps: Array, intervals: Array) -> float:
 
 
 def interpolate_counts(time: ArrayLike, counts: ArrayLike) -> Array:
-    """Fill the samples that share a count: the source's smoothing of an encoder's staircase.
+    """Fill the samples that share a count: Kruse's smoothing of an encoder's staircase.
 
     Parameters
     ----------
@@ -301,7 +301,7 @@ def find_lost_counts(time: ArrayLike, counts: ArrayLike) -> Rows:
     stamps = increasing(time)
     steps, intervals = np.diff(signal("counts", counts, stamps.size)), np.diff(stamps)
     if steps.size < SUSTAINED:
-        raise InputError(f"A record of {stamps.size} rows is too short to tell lost counts.")
+        raise InputError(f"A record of {stamps.size} rows is too short to find lost counts.")
     limit = MARGIN * _lasting(steps, intervals)
     return np.flatnonzero(np.abs(steps) > limit * intervals + 1.0) + 1
 

@@ -113,7 +113,7 @@ class Window(Entry):
     stop: Finite | None = Field(None, alias="to", description="Last instant [s].")
     maneuver: str | None = Field(
         None,
-        description="Only in runs of this manoeuvre, as recognised: 'step +4 V' or, with a "
+        description="Only in runs of this maneuver, as recognised: 'step +4 V' or, with a "
         "pattern, 'step *' or 'sine * 0.1 Hz'.",
     )
     why: str = Field("", description="The reason; it stands in the report.")
@@ -126,7 +126,7 @@ class Window(Entry):
 
 
 def applying(windows: Iterable[AnyWindow], maneuver: str) -> tuple[AnyWindow, ...]:
-    """The windows that hold in runs of a manoeuvre, such as ``"step +4 V"``."""
+    """The windows that hold in runs of a maneuver, such as ``"step +4 V"``."""
     return tuple(
         each for each in windows if each.maneuver is None or fnmatchcase(maneuver, each.maneuver)
     )
@@ -272,7 +272,7 @@ class Run(Entry):
     ignore: tuple[Window, ...] = Field((), description="Windows left out of every channel.")
     weights: tuple[Weight, ...] = Field((), description="Windows that count more or less.")
     weight: NotNegative = Field(1.0, description="Factor on the run's squared errors.")
-    maneuver: str | None = Field(None, description="Name of the manoeuvre, if not recognised.")
+    maneuver: str | None = Field(None, description="Name of the maneuver, if not recognised.")
     axes: dict[str, dict[str, Any]] = Field(
         {},
         description="Entries of an axis that differ in this run, as in [axes.NAME]; "
@@ -292,7 +292,7 @@ class CampaignFile(Entry):
     title: str = Field("", description="For the report.")
     virtual: bool = Field(False, description="Whether the tests are simulated.")
     format: TextOptions = Field(
-        TextOptions(), description="How text logs are written, where that cannot be told."
+        TextOptions(), description="How text logs are written, where that cannot be recognised."
     )
     axes: dict[str, Axis] = Field(min_length=1, description="The drives, by name.")
     runs: tuple[Run, ...] = Field(min_length=1, description="Their tests, a log each.")

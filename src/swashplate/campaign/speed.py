@@ -1,6 +1,6 @@
 """Speed from positions and encoder counts, and simulated speeds through the matching filter.
 
-The source's path is two low passes in a row, of 10 and of 30 Hz. What differs is what drives them
+Kruse's path is two low passes in a row, of 10 and of 30 Hz. What differs is what drives them
 over an interval between two samples. A measured position gives the interval's mean speed, its
 difference over the period. A simulated speed must give the mean too, so that of its two samples;
 driven by the earlier sample instead it comes half a sample later than the measured one.
@@ -28,11 +28,11 @@ WINDOW = 0.1
 Form = Literal["source", "exact"]
 """How the filters are made discrete.
 
-``"source"``: the source's explicit recursions, meant for 512 Hz, refused where they are unstable.
+``"source"``: Kruse's explicit recursions, meant for 512 Hz, refused where they are unstable.
 ``"exact"``: exact for a position that is straight between two samples, at any rate, even or not.
 """
 Method = Literal["source", "exact", "savitzky_golay", "difference"]
-"""How a position becomes a speed: by the source's filters for 512 Hz, by the same at any rate,
+"""How a position becomes a speed: by Kruse's filters for 512 Hz, by the same at any rate,
 without phase by a moving parabola, by the change between neighbours for comparison."""
 
 
@@ -146,7 +146,7 @@ def matched_speed(
     form :
         As of the measured path.
     aligned : bool
-        Without it, the source's own filters, whose output is half a sample later.
+        Without it, Kruse's own filters, whose output is half a sample later.
 
     Notes
     -----
@@ -247,12 +247,12 @@ def _recursion(stamps: Stamps, form: Form) -> tuple[Array, Recursion]:
         raise InputError(f"form must be 'source' or 'exact', not {form!r}.")
     if stamps.period is None:
         raise InputError(
-            "The source's form of the filters needs evenly spaced stamps; take form 'exact', or "
+            "Kruse's form of the filters needs evenly spaced stamps; take form 'exact', or "
             "resample the record first."
         )
     if b * stamps.period >= 2.0:
         raise InputError(
-            f"The source's form of the filters is unstable at {1.0 / stamps.period:.4g} Hz, as at "
+            f"Kruse's form of the filters is unstable at {1.0 / stamps.period:.4g} Hz, as at "
             f"every rate up to {0.5 * b:.4g} Hz; take form 'exact'."
         )
     keep = 1.0 - a * intervals, 1.0 - b * intervals

@@ -35,10 +35,10 @@ Hydrostatic drives: from a joystick's voltage to the speed of the shaft.
 
 A drive is a control card, a pump and a motor. Packaged are three measured
 ones, the hoist, slew and luff axes of a crane, and a neutral one to start
-your own from. A command is a file of measured voltages or a manoeuvre: a
+your own from. A command is a file of measured voltages or a maneuver: a
 name and its numbers in V, s and Hz.
 
-Manoeuvres, and some of the options that may follow their numbers:
+Maneuvers, and some of the options that may follow their numbers:
   step:9                  9 V from 1 s to 6 s         start, stop, length
   ramp:1                  1 V/s up to 10 V            limit, settle
   sine:6.5,0.1            6.5 V at 0.1 Hz             start, settle, length
@@ -114,8 +114,8 @@ def options(
 
 
 for name, panel, function, examples in (
-    ("demo", "Everything at once", fit.demo, fit.DEMO_EXAMPLES),
-    ("tour", "Everything at once", simulate.tour, simulate.TOUR_EXAMPLES),
+    ("demo", "Demonstrations", fit.demo, fit.DEMO_EXAMPLES),
+    ("tour", "Demonstrations", simulate.tour, simulate.TOUR_EXAMPLES),
     ("simulate", "Simulate", simulate.simulate, simulate.SIMULATE_EXAMPLES),
     ("compare", "Simulate", simulate.compare, simulate.COMPARE_EXAMPLES),
     ("axes", "Simulate", simulate.axes, simulate.AXES_EXAMPLES),
@@ -128,15 +128,15 @@ for name, panel, function, examples in (
     ("validate", "Identify", fit.validate, fit.VALIDATE_EXAMPLES),
     ("advise", "Identify", advise.advise, advise.ADVISE_EXAMPLES),
     ("report", "Identify", fit.report, fit.REPORT_EXAMPLES),
-    ("limits", "Understand", understand.limits, understand.LIMITS_EXAMPLES),
-    ("whatif", "Understand", understand.whatif, understand.WHATIF_EXAMPLES),
-    ("size", "Understand", understand.size, understand.SIZE_EXAMPLES),
-    ("sensitivity", "Understand", understand.sensitivity, understand.SENSITIVITY_EXAMPLES),
-    ("compensate", "Understand", understand.compensate, understand.COMPENSATE_EXAMPLES),
-    ("linearize", "Understand", linear.linearize, linear.LINEARIZE_EXAMPLES),
-    ("bode", "Understand", linear.bode, linear.BODE_EXAMPLES),
-    ("full-order", "Understand", full_order.full_order, full_order.EXAMPLES),
-    ("crane", "Understand", crane.app, ""),
+    ("limits", "Analyse", understand.limits, understand.LIMITS_EXAMPLES),
+    ("whatif", "Analyse", understand.whatif, understand.WHATIF_EXAMPLES),
+    ("size", "Analyse", understand.size, understand.SIZE_EXAMPLES),
+    ("sensitivity", "Analyse", understand.sensitivity, understand.SENSITIVITY_EXAMPLES),
+    ("compensate", "Analyse", understand.compensate, understand.COMPENSATE_EXAMPLES),
+    ("linearize", "Analyse", linear.linearize, linear.LINEARIZE_EXAMPLES),
+    ("bode", "Analyse", linear.bode, linear.BODE_EXAMPLES),
+    ("full-order", "Analyse", full_order.full_order, full_order.EXAMPLES),
+    ("crane", "Analyse", crane.app, ""),
     ("doctor", "This installation", doctor.doctor, doctor.EXAMPLES),
 ):
     if isinstance(function, typer.Typer):

@@ -42,9 +42,9 @@ Examples:
   swashplate advise hoist --free Z9 --noise stroker_pressure=0.2bar
 """
 LEGEND = (
-    "Under 'runs', one letter a run: # tells much of what is known (20 % and more), + tells "
-    "something, o has what is needed but no sample that counts shows it, . has it not, - is not "
-    "fitted here. 's' is how long it happens in all runs, 'effect' how much 1 % of the value "
+    "Under 'runs', one letter a run: # gives 20 % or more of the information, + gives less, o "
+    "meets the condition, but in no sample that is used, . does not meet it, - is not fitted "
+    "here. 's' is how long it happens in all runs, 'effect' how much 1 % of the value "
     "changes all residuals together; 1 is one standard deviation of noise."
 )
 
@@ -60,11 +60,11 @@ def excitation(
     ] = None,
     out: TableFile = None,
 ) -> None:
-    """Say before a fit what the runs can tell of each unknown, and what to fix.
+    """Show before a fit which parameters the runs determine, and what to fix.
 
     Simulates the runs with the drive as it is: which thresholds and limits they
-    reach, how much each unknown changes what was measured, and which unknowns
-    can move together unseen. Proposes a set-up in which all is determined.
+    reach, how much each parameter changes what was measured, and which
+    can change together without effect. Proposes a fit configuration in which all are determined.
     """
     from swashplate.identification.data_checks import check_sound, refuse_unsound
     from swashplate.identification.excitation import outlook, propose, proposed_setup
@@ -104,9 +104,9 @@ def excitation(
         note(f"run {number}: {name}")
     say(LEGEND)
     if not changed:
-        note("The set-up can stay as it is.")
+        note("The fit configuration can stay as it is.")
     elif write is None and any(each.proposed is not None for each in proposals):
-        note("With the starred lines (*) taken, the set-up is (--write FILE keeps it):")
+        note("With the proposals (*) applied, the fit configuration is (--write FILE keeps it):")
         note("")
         note(proposed.rstrip())
     files.say()
@@ -127,7 +127,7 @@ def advise(
     setup: SetupWord = None,
     free: Annotated[
         list[str] | None,
-        option("A parameter to be found besides, such as Z9. May be repeated.", metavar="SYMBOL"),
+        option("A further parameter to determine, such as Z9. May be repeated.", metavar="SYMBOL"),
     ] = None,
     maneuver: Annotated[
         list[str] | None,
@@ -151,7 +151,7 @@ def advise(
     tests: Annotated[int, option("Tests in the plan.", min=0)] = 4,
     out: TableFile = None,
 ) -> None:
-    """Say which test, or which added sensor, would tell most of which parameter.
+    """Recommend the test, or added sensor, that determines each parameter best.
 
     Ranks tests by the information that they would add to those made so far, at
     the drive's present values. Errors are standard errors from noise alone; a
@@ -186,9 +186,9 @@ def advise(
         plan = in_turn(bench.present, at_hand, bench.variables, tests)
         sensors = judge_sensors(bench, trials, added, beside=[each.candidate for each in plan])
     files.write(out, "Table", tables.advice_rows(ranked, sensors).write)
-    show(tables.advice_table("Tests, with the sensors at hand", ranked[:top]))
+    show(tables.advice_table("Tests with the present sensors", ranked[:top]))
     if plan:
-        show(tables.advice_table("A plan, each test chosen beside those before it", plan))
+        show(tables.advice_table("A plan, each test chosen in addition to those before it", plan))
         undetermined = [gain.name for gain in plan[-1].gains if not gain.after <= 1.0]
         if undetermined:
             say(f"- After these, {', '.join(undetermined)} would still not be known to 100 %.")

@@ -170,10 +170,10 @@ def check(
         bool, option("End with exit code 1 if there are findings.", "--strict")
     ] = False,
 ) -> None:
-    """Read a campaign with all its logs and say what the measurements are like.
+    """Check a campaign and the measurements in all its logs.
 
     Each signal's rate, jitter, longest interval, range, clipping and lost
-    counts, the manoeuvre recognised from the voltage, and below the table
+    counts, the maneuver recognised from the voltage, and below the table
     whatever someone should look into: also windows that no run takes, and runs
     that are far from what the axis's drive would do.
     """
@@ -215,7 +215,7 @@ def check(
         note(f"Ignored, and not opened: {', '.join(campaign.ignored)}.")
     if not campaign.select(role="fit"):
         note("No run has the role 'fit'.")
-    note(f"{count(findings, 'finding')}, marked by '!'." if findings else "Nothing to look into.")
+    note(f"{count(findings, 'finding')}, marked by '!'." if findings else "No findings.")
     if strict and findings:
         raise typer.Exit(1)
 
@@ -354,14 +354,14 @@ def rig(
     with working("Writing"):
         path = bench.write(tests, out, overwrite=FORCED.get())
     numbers = (Column("rows", "d"), Column("s", ".4g"))
-    words = (Column("log"), Column("manoeuvre", wrap=True), Column("role"))
+    words = (Column("log"), Column("maneuver", wrap=True), Column("role"))
     made = Table("", (*words, *numbers))
     for run in tests.runs.values():
         time = run.columns["time"]
         made.add(f"{run.stem}.csv", run.name, run.role, time.size, float(time[-1] - time[0]))
     show(made)
     note(f"Campaign: {path}")
-    note(f"Truth:    {path.parent / 'truth'} (look only after the fit)")
+    note(f"Truth:    {path.parent / 'truth'} (open it only after the fit)")
 
 
 def guess(

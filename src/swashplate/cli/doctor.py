@@ -45,7 +45,7 @@ DIGITS = 0.05
 
 
 def doctor() -> None:
-    """Tell versions, cores, compiled kernels and extras, and simulate once.
+    """Show versions, cores, compiled kernels and extras, and simulate once.
 
     Paste what it prints into a question or a report of a problem. Exit code 1
     if the simulation does not give the published speed.

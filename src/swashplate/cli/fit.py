@@ -104,7 +104,7 @@ MEASURES = (
 )
 RESIDUALS = (
     "'own' is how long residuals stay correlated, 'input' their largest correlation with the "
-    "command, at that lag (positive: after it). Residuals that owe nothing to the command stay "
+    "command, at that lag (positive: after it). Residuals unrelated to the command stay "
     "within the band at 95 % of the lags; * marks what lies beyond, as the largest may by chance."
 )
 
@@ -125,7 +125,8 @@ def fit(
     setup: SetupWord = None,
     model: OwnModel = None,
     joint: Annotated[
-        bool, option("After the stages all unknowns at once, through the chain.", "--joint")
+        bool,
+        option("After the stages, estimate all parameters at once, through the chain.", "--joint"),
     ] = False,
     begin: StartWord = None,
     starts: Annotated[int, option("More starts, spread over the bounds.", min=0)] = 0,
@@ -135,7 +136,7 @@ def fit(
     bootstrap: Annotated[int, option("Fit again to so many draws of the noise.", min=0)] = 0,
     profile: Annotated[
         list[str] | None,
-        option("Follow the cost along this unknown, or 'all'; may be repeated.", metavar="NAME"),
+        option("Profile the cost along this parameter, or 'all'; may be repeated.", metavar="NAME"),
     ] = None,
     seed: Seed = 0,
     jobs: Annotated[int, option("Processes for all of these; 0 = all cores.", min=0)] = 0,
@@ -632,7 +633,7 @@ def demo(
         start = campaign.drive("hoist").parameters
         result = fit(start, runs, setup)
         seconds = perf_counter() - begun
-        begin("judging what the data tell")
+        begin("computing intervals and verdict")
         found = judge_fit(campaign, "hoist", runs, start, setup, result, Wanted(seed=seed))
         tables = [estimates_table(each, truth=truth.parameters) for each in found.assessments]
         begin("writing the report")
@@ -641,7 +642,7 @@ def demo(
     note(f"Campaign:  {path}")
     show(*tables)
     inside, counted = truth_count(tables)
-    say(f"The truth lies within the 95 % interval for {inside} of {counted} unknowns.")
+    say(f"The truth lies within the 95 % interval for {inside} of {counted} parameters.")
     note("")
     note("Held out of the fit, and predicted")
     show(*runs_tables(found.predicted))

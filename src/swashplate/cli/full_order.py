@@ -35,8 +35,7 @@ def full_order(
         str | None,
         argument(
             "MANEUVER|FILE",
-            "A manoeuvre or a log, as in 'swashplate simulate'. Without one, a table of "
-            "manoeuvres.",
+            "A maneuver or a log, as in 'swashplate simulate'. Without one, a table of maneuvers.",
         ),
     ] = None,
     like: Annotated[
@@ -63,7 +62,7 @@ def full_order(
     *,
     sampling: Simulating,
 ) -> None:
-    """Say whether one state is enough for a drive and a command.
+    """Check whether one state is enough for a drive and a command.
 
     Gives spool and swash plate their mass back: a model with five states, whose
     physical values are completed from the drive's parameters and from assumed
@@ -72,10 +71,10 @@ def full_order(
     """
     files = Outputs((out, TABLE), (plot, FIGURE))
     if command is None and plot is not None:
-        raise InputError("--plot draws one run; name a manoeuvre or a log, such as step:9.")
+        raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
     if command is None and method != "march":
         raise InputError(
-            f"--method {method} checks one run; name a manoeuvre or a log, such as step:9."
+            f"--method {method} checks one run; name a maneuver or a log, such as step:9."
         )
     given = physical_values(physical or ())
     with working("Completing the physical values"):
@@ -96,7 +95,7 @@ def full_order(
         with progress(len(comparison.TABLE_MANEUVERS)) as begin:
             found = comparison.validity(full, sampling.rate, begin=begin)
         files.write(out, "Table", found.write)
-        said = f"{len(found.rows)} manoeuvres"
+        said = f"{len(found.rows)} maneuvers"
         tables.append(found)
         verdict, title = [comparison.validity_verdict(found)], drive.title
     else:

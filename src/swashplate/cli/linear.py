@@ -61,7 +61,7 @@ def linearize(
         option("Sample the model, with the recurrences of the simulation.", metavar="S"),
     ] = None,
     interpolation: Annotated[
-        Interpolation, option("The input between samples: a straight line, or held.")
+        Interpolation, option("The input between samples: linear, or zero-order hold.")
     ] = "linear",
     loop_gain: Annotated[
         float | None,

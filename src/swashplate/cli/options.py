@@ -47,7 +47,7 @@ CommandWord = Annotated[
     str,
     argument(
         "MANEUVER|FILE",
-        'A manoeuvre such as step:9 or "step +9 V", or a log with columns of time and voltage: '
+        'A maneuver such as step:9 or "step +9 V", or a log with columns of time and voltage: '
         "text such as .csv, .parquet, .mat, .h5, .tdms or .mf4; a column may carry its unit: "
         "'time \\[ms]'.",
     ),
@@ -152,7 +152,7 @@ class Sampling:
     interpolation: Annotated[
         Interpolation | None,
         option(
-            "The voltage between rows or samples: a straight line, or the earlier one held. Must "
+            "The voltage between rows or samples: linear, or zero-order hold. Must "
             "be given with a FILE."
         ),
     ] = None

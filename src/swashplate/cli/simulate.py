@@ -60,12 +60,12 @@ def simulate(
     out: TableFile = None,
     plot: FigureFile = None,
 ) -> None:
-    """Simulate a drive over a manoeuvre or a measured voltage.
+    """Simulate a drive over a maneuver or a measured voltage.
 
     Prints what the drive did: its largest speeds and currents, how far it went
     and how long each of its limits held it back, the dead zone only while the
     command is not 0 V. --out writes every signal of the chain, --plot draws
-    them. 'swashplate --help' lists the manoeuvres.
+    them. 'swashplate --help' lists the maneuvers.
     """
     files = Outputs((out, TABLE), (plot, FIGURE))
     with working("Simulating"):
@@ -87,15 +87,15 @@ def compare(
     first: Annotated[str, argument("A", "A packaged drive or a TOML file.")],
     second: Annotated[str, argument("B", "Another, compared with the first.")],
     maneuver: Annotated[
-        str, option('Manoeuvre for both, such as step:9 or "step +9 V".', metavar="NAME")
+        str, option('Maneuver for both, such as step:9 or "step +9 V".', metavar="NAME")
     ] = "step:9",
     rate: Rate = 512.0,
     plot: FigureFile = None,
     out: TableFile = None,
 ) -> None:
-    """Compare two drives over the same manoeuvre.
+    """Compare two drives over the same maneuver.
 
-    The settled speed is the one that the manoeuvre's largest voltage would lead
+    The settled speed is the one that the maneuver's largest voltage would lead
     to if it were held. The time to 90 % of it counts from the moment at which
     the voltage first changes. --out writes the voltage and both speeds.
     """
@@ -226,6 +226,6 @@ def tour(
         begin("drawing the settled speeds")
         save_figure(plot_steady_map(drives), out / "steady.png")
     show(overview_table(runs))
-    note(f"All signals of each run, in SI: {out}/AXIS/MANOEUVRE.csv")
+    note(f"All signals of each run, in SI: {out}/AXIS/MANEUVER.csv")
     note(f"All runs at a glance: {out / 'overview.png'}")
     note(f"Settled speed over voltage: {out / 'steady.png'}")

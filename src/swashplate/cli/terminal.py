@@ -26,7 +26,7 @@ LINE, BETWEEN = 80, 2
 NARROW = "\N{NO-BREAK SPACE}%"
 LEAST, LONGEST = 9, 30
 """Characters of a head that is broken, and of a name beside too many numbers."""
-# names of files and manoeuvres are printed as they are, whatever brackets and colons they hold
+# names of files and maneuvers are printed as they are, whatever brackets and colons they hold
 output = Console(markup=False, highlight=False, emoji=False)
 side = Console(stderr=True, markup=False, highlight=False, emoji=False)
 """Standard error: what a pipe must not carry."""

@@ -98,7 +98,7 @@ def limits(
         str | None,
         argument(
             "MANEUVER|FILE",
-            "A manoeuvre or a log, as in 'swashplate simulate': what limits the drive under it. "
+            "A maneuver or a log, as in 'swashplate simulate': what limits the drive under it. "
             "Without one, what the drive can do at all.",
         ),
     ] = None,
@@ -122,7 +122,7 @@ def limits(
     *,
     sampling: Simulating,
 ) -> None:
-    """Say what a drive can do, or what limits it under a command.
+    """Show what a drive can do, or what limits it under a command.
 
     Without a command: dead zone, gain, limits of speed and acceleration, rise
     times, and the largest sine that it follows at each frequency. With one: how
@@ -253,7 +253,7 @@ def whatif(
     maneuver: Annotated[
         str,
         option(
-            'Command for both: a manoeuvre such as step:9 or "step +9 V", or a log.',
+            'Command for both: a maneuver such as step:9 or "step +9 V", or a log.',
             metavar="NAME|FILE",
         ),
     ] = "sine:9,0.1",
@@ -275,7 +275,7 @@ def whatif(
     *,
     sampling: Sampling,
 ) -> None:
-    """See what a change of the machine does.
+    """Predict what a change of the machine does.
 
     Simulates the drive as it is and with its levers moved, over one command.
     The speed that is wanted is in proportion to the voltage, at the ratio of
@@ -345,12 +345,12 @@ def size(
     ] = None,
     tracking_deg_s: Annotated[
         float | None,
-        option("Largest RMS error that is allowed while following the manoeuvre.", metavar="DEG/S"),
+        option("Largest RMS error that is allowed while following the maneuver.", metavar="DEG/S"),
     ] = None,
     maneuver: Annotated[
         str | None,
         option(
-            "What is to be followed: the speed in proportion to this manoeuvre's voltage, at the "
+            "What is to be followed: the speed in proportion to this maneuver's voltage, at the "
             "ratio of the drive as it is. Each candidate is commanded in proportion to it, at its "
             "own ratio.",
             metavar="NAME",
@@ -412,9 +412,7 @@ def sensitivity(
     ] = None,
     maneuver: Annotated[
         str,
-        option(
-            'Command: a manoeuvre such as step:9 or "step +9 V", or a log.', metavar="NAME|FILE"
-        ),
+        option('Command: a maneuver such as step:9 or "step +9 V", or a log.', metavar="NAME|FILE"),
     ] = "step:9",
     samples: Annotated[
         int | None,
@@ -431,7 +429,7 @@ def sensitivity(
     *,
     sampling: Sampling,
 ) -> None:
-    """See which lever moves which outcome.
+    """Show which lever moves which outcome.
 
     Each lever is moved down and up by itself. With --sobol all are moved at once,
     and the variance of each outcome is shared out among them: by itself, and in
@@ -476,7 +474,7 @@ def compensate(
         argument(
             "MANEUVER|FILE",
             "What the stick does: ±10 V asks for the full speed of that way, in proportion. A "
-            "manoeuvre or a log as in 'swashplate simulate'. Says what the map buys under it.",
+            "maneuver or a log as in 'swashplate simulate'. Shows what the map gains under it.",
         ),
     ] = None,
     speeds_deg_s: Annotated[
@@ -487,7 +485,9 @@ def compensate(
             metavar="DEG/S",
         ),
     ] = None,
-    points: Annotated[int, option("Points of the map each way, 2 to 10001.", metavar="N")] = 101,
+    points: Annotated[
+        int, option("Points of the map per direction, 2 to 10001.", metavar="N")
+    ] = 101,
     out: Annotated[
         Path | None,
         option(

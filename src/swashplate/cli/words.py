@@ -349,7 +349,7 @@ def pairs_of(option: str, given: Sequence[str] | None, example: str) -> list[tup
 
 
 def maneuver_of(word: str, *drives: Drive) -> Maneuver:
-    """A manoeuvre such as ``step:9``, or the thesis's test of that name for these drives."""
+    """A maneuver such as ``step:9``, or the thesis's test of that name for these drives."""
     from swashplate.maneuvers import parse, source_tests
     from swashplate.parameters.files import AXES
 
@@ -370,7 +370,7 @@ def maneuver_of(word: str, *drives: Drive) -> Maneuver:
 
 
 def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simulation]:
-    """Name of a command, a manoeuvre or a file, and the drive's simulation over it."""
+    """Name of a command, a maneuver or a file, and the drive's simulation over it."""
     from swashplate.equations.marching.record import least_substeps
     from swashplate.logs import read_series
 
@@ -407,7 +407,7 @@ def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simul
 
 
 def trial_of(drive: Drive, command: str, options: Sampling) -> tuple[str, Trial]:
-    """Name of a command, a manoeuvre or a log, and the trial that it makes."""
+    """Name of a command, a maneuver or a log, and the trial that it makes."""
     from swashplate.analysis.outcomes import trial
 
     name, run = simulated(drive, command, options)
@@ -427,7 +427,7 @@ def _check_columns(path: str, options: Sampling) -> None:
     kind = file_kind(Path(path))
     if kind in ("campaign", "drive", "setup"):
         raise InputError(
-            f"{path} is {_NAMES[kind]}, not a command: name a manoeuvre such as step:9, or a log."
+            f"{path} is {_NAMES[kind]}, not a command: name a maneuver such as step:9, or a log."
         )
     log = open_log(path)
     for option, name in (("--time-column", options.time_column), ("--column", options.column)):

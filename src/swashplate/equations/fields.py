@@ -54,7 +54,7 @@ class Definition:
     stands_for: str = ""
     """Quantities of the machine that it stands for."""
     source: str = ""
-    """Number of the source's equation."""
+    """Number of Kruse's equation."""
 
     def __post_init__(self) -> None:
         if self.above is not None:

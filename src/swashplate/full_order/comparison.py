@@ -1,6 +1,6 @@
 """The drive with five states beside the one with one state, under the same current.
 
-`compare` has one run, `validity` a table of manoeuvres for which one state does, and `convergence`
+`compare` has one run, `validity` a table of maneuvers for which one state does, and `convergence`
 shows that it is the limit of five. The reduced model is marched in fine steps, so that what is
 compared are the equations: its own step error at 512 Hz is given beside.
 """
@@ -56,7 +56,7 @@ TABLE_MANEUVERS: tuple[tuple[str, Maneuver], ...] = (
         for frequency in (0.05, 0.1, 0.3, 1.0, 3.0)
     ),
 )
-"""Manoeuvres of the table of the reduction's validity."""
+"""Maneuvers of the table of the reduction's validity."""
 
 
 @dataclass(frozen=True)
@@ -204,15 +204,15 @@ def validity(
 ) -> Table:
     """For which of `TABLE_MANEUVERS` the one-state model is within 1 % and 0.1 %, for one drive.
 
-    A row for each manoeuvre: top speed, largest and rms difference and step error in percent of it,
+    A row for each maneuver: top speed, largest and rms difference and step error in percent of it,
     and whether the largest difference is within 1 % and 0.1 %; none where the drive does not move.
-    `begin` is called with the name of each manoeuvre before it is simulated.
+    `begin` is called with the name of each maneuver before it is simulated.
     """
     made = Table(
         "Reduced model less full-order one, in % of the top speed",
         (
             Column("axis", of="f"),
-            Column("Manoeuvre", key="maneuver"),
+            Column("Maneuver", key="maneuver"),
             Column("top", ".2f", "rad/s", key="top_speed"),
             Column("largest", ".2f", key="largest_percent"),
             Column("rms", ".2f", key="rms_percent"),
@@ -311,7 +311,7 @@ def comparison_verdict(found: Comparison) -> list[str]:
 
 
 def validity_verdict(table: Table) -> str:
-    """For how many of the manoeuvres of `validity` one state is enough, and for which it is not."""
+    """For how many of the maneuvers of `validity` one state is enough, and for which it is not."""
     found = table.to_polars()
     moving = found.filter(found["within_1_percent"].is_not_null())
     if not moving.height:

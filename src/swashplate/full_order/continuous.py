@@ -93,7 +93,7 @@ class Modes(Result):
     swash: complex
     """Swash plate on its return spring and the oil trapped behind the closed valve. [rad/s]"""
     swash_at_held_pressure: complex
-    """Swash plate on its return spring alone, the source's reckoning. [rad/s]"""
+    """Swash plate on its return spring alone, Kruse's reckoning. [rad/s]"""
 
     @staticmethod
     def frequency_hz(mode: complex) -> float:

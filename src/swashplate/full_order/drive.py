@@ -219,7 +219,7 @@ class FullOrderDrive:
 
     @classmethod
     def preset(cls, name: str) -> FullOrderDrive:
-        """The ``"hoist"``, ``"slew"`` or ``"luff"`` of the source with its assumed physical set."""
+        """Kruse's ``"hoist"``, ``"slew"`` or ``"luff"`` drive with its assumed physical set."""
         physical = PhysicalSet.preset(name)
         return cls(Drive.preset(name), physical)
 

@@ -109,7 +109,7 @@ class PhysicalSet(Mapping[str, Parameter]):
 
     @classmethod
     def preset(cls, name: str) -> PhysicalSet:
-        """An assumed set of one of the source's axes: ``"hoist"``, ``"slew"``, ``"luff"``."""
+        """An assumed set of one of Kruse's axes: ``"hoist"``, ``"slew"``, ``"luff"``."""
         return load_preset(name)
 
     @classmethod
@@ -275,9 +275,9 @@ def _check_together(owner: str, numbers: Mapping[str, float]) -> None:
     ceiling = min(numbers["supply_pressure"], numbers["relief_pressure"])
     if not abs(pressure) < ceiling:
         raise ParameterError(
-            f"{owner}: the load holds a stroker pressure of {pressure:.4g} Pa at rest, but it must "
-            f"stay below {ceiling:.4g} Pa, the smaller of supply_pressure and relief_pressure; "
-            "check load_torque, pumping_area and pumping_arm."
+            f"{owner}: the load holds a stroking pressure of {pressure:.4g} Pa at rest, but it "
+            f"must stay below {ceiling:.4g} Pa, the smaller of supply_pressure and "
+            "relief_pressure; check load_torque, pumping_area and pumping_arm."
         )
 
 

@@ -34,19 +34,19 @@ if TYPE_CHECKING:
 Rules = Literal["use", "values"]
 
 POOR = 0.5
-"""NRMSE from which a drive is not usable: a constant gain misses less of a step's record."""
+"""NRMSE from which a drive is not usable: a constant gain does better on a step's record."""
 SERIOUS = 0.2
 """NRMSE below which held-out runs that are simulated less well than fitted ones are still of use:
-80 % of the movement is followed, about what the source reached on its worst kind of test."""
+80 % of the movement is followed, about what Kruse (2001) reached on his worst kind of test."""
 CARRIES_OVER = 1.5
-"""Factor on the fitted runs' RMSE up to which held-out runs count as simulated alike: manoeuvres
+"""Factor on the fitted runs' RMSE up to which held-out runs count as simulated alike: maneuvers
 differ that much among the fitted ones."""
 FAR = 3.0
-"""Factor from which the fit does not carry over: twice what manoeuvres differ by anyway."""
+"""Factor from which the fit does not carry over: twice the normal difference between maneuvers."""
 REQUIRED = 0.10
 """Largest error of held-out runs over their range, where the user requires nothing else."""
 MOST = 0.5
-"""Share of unknowns without a value of their own from which a fit has found nothing."""
+"""Share of parameters without a value of their own from which a fit has found nothing."""
 MOVES = 0.05
 """A run that moves by less than this part of the channel's movement is not judged by itself; where
 the measurement error is known, by less than five times that."""
@@ -55,7 +55,7 @@ MISFIT = 1.2
 campaigns of slew lay between 0.97 and 1.02; in two the search ended in another optimum."""
 MODEL_ERROR = 0.01
 """Error of held-out runs over their range from which lack of fit rules out prediction: what is
-wrong is not small on known manoeuvres, and larger on others."""
+wrong is not small on known maneuvers, and larger on others."""
 DRIFTS, DRIFTS_AWAY = 0.01, 0.03
 """Change of a channel over the campaign from which values are those of a mean machine, and from
 which no one set of parameters holds."""
@@ -114,7 +114,7 @@ def percent(part: float) -> str:
 def convergence(assessments: Sequence[Assessment], planned: Sequence[str]) -> list[Criterion]:
     """That each stage came to its end."""
     made = []
-    why = "short of the optimum neither values nor intervals mean anything"
+    why = "before the optimum neither values nor intervals are meaningful"
     for each in assessments:
         name, solution = each.stage.stage.name, each.stage.solution
         state, failure = "converged", ""
@@ -150,7 +150,7 @@ def followed(qualities: Sequence[RunQuality], which: str) -> Criterion:
         f"RMSE / standard deviation, {which}",
         percent(largest),
         percent(POOR),
-        "a constant gain misses less of a step's record",
+        "a constant gain does better on a step's record",
         "use",
         "; ".join(clauses),
     )
@@ -227,7 +227,7 @@ def carried_over(fitted: Sequence[RunQuality], held: Sequence[RunQuality]) -> Cr
         "RMSE, held-out / fitted",
         f"{largest:.2g}" if largest else "small",
         f"{FAR:g}",
-        "twice what manoeuvres differ by anyway",
+        "twice the normal difference between maneuvers",
         "use",
         "; ".join(
             f"held-out {name} has {ratio:.1f} times the RMSE of the fitted runs"
@@ -247,7 +247,7 @@ def consistent(assessments: Sequence[Assessment]) -> Criterion:
         "runs contradicting others",
         f"{len(names)}",
         "0",
-        "its data are of another machine, unit or sign, and bend all estimates",
+        "its data are of another machine, unit or sign, and bias all estimates",
         "use",
         f"{listed(names)} contradicts the other runs ({found[0].sentence.rstrip('.')})"
         if found
@@ -263,12 +263,12 @@ def determined(assessments: Sequence[Assessment]) -> Criterion:
         found = each.identifiability
         lost += len(shared & {*found.at_bounds, *found.to_fix})
         total += len(shared)
-    words = f"{lost} of {total} unknowns stand at a bound or are not determined"
+    words = f"{lost} of {total} parameters are at a bound or not determined"
     return Criterion(
-        "unknowns without a value",
+        "parameters without a value",
         f"{lost} of {total}",
         f"{MOST:.0%}",
-        "a fit that leaves most open has found nothing",
+        "a fit that determines few of its parameters has found nothing",
         "use",
         words if lost > MOST * total else "",
     )
@@ -284,7 +284,7 @@ def bounded_predictions(
         "predictions left open",
         listed(names) or "none",
         "none",
-        "the prediction is then as open as the unknown",
+        "the prediction is then as uncertain as the parameter",
         "use",
         f"predictions depend on {listed(names)}, which the fitted runs leave open" if names else "",
     )
@@ -324,7 +324,7 @@ def misfit_criteria(misfit: LackOfFit, judged: Sequence[RunQuality]) -> list[Cri
                     fault.name.removesuffix(" over the campaign"),
                     size,
                     percent(DRIFTS),
-                    "no one set of parameters holds for a machine that changes",
+                    "no single set of parameters describes a machine that changes",
                     "use" if part > DRIFTS_AWAY else "values",
                     f"{fault.name} by {size}" if drifts else "",
                 )
@@ -337,7 +337,7 @@ def misfit_criteria(misfit: LackOfFit, judged: Sequence[RunQuality]) -> list[Cri
                     fault.name,
                     size if wrong or not beyond else "not seen",
                     f"{fault.plausible / 3.0:.2g} {fault.unit}",
-                    "an instrument that is off by more shows in these logs",
+                    "a larger error would be visible in these logs",
                     "values",
                     f"{fault.name} off by {size}" if wrong else "",
                 )
@@ -348,7 +348,7 @@ def misfit_criteria(misfit: LackOfFit, judged: Sequence[RunQuality]) -> list[Cri
                 "clipped channels",
                 f"{len(misfit.clipped)}",
                 "0",
-                "what lies beyond was not measured, and the fit bends to it",
+                "values beyond it were not measured, and bias the fit",
                 "use",
                 misfit.clipped[0].rstrip("."),
             )
@@ -421,7 +421,7 @@ class Verdict(Result):
     criteria: tuple[Criterion, ...] = ()
     grade: Grade = "Usable"
     validity: str = ""
-    """Sentence that names the manoeuvres and the range that it holds for, and what they never
+    """Sentence that names the maneuvers and the range that it holds for, and what they never
     reach; empty for a drive that was not fitted."""
     assumed: tuple[str, ...] = ()
     """What is assumed and cannot be checked from these logs."""
@@ -605,7 +605,7 @@ def _progress(assessments: Sequence[Assessment], planned: Sequence[str]) -> Stat
 
 def _agreement(qualities: Sequence[RunQuality], subject: str) -> Statement:
     said = [
-        f"{name}: what was measured never moves, so there is nothing to judge."
+        f"{name}: the measured signal never moves, so nothing can be judged."
         for name, found in pooled(qualities).items()
         if found.nrmse is None
     ]
@@ -619,20 +619,20 @@ def _agreement(qualities: Sequence[RunQuality], subject: str) -> Statement:
 
 def _carrying_over(fitted: Sequence[RunQuality], held: Sequence[RunQuality]) -> Statement:
     if not held:
-        words = "No run was held out: how the fit carries over to other tests was not tried."
+        words = "No run was held out: the prediction of other tests was not checked."
         return Statement("Validation", "look", (words,))
     said, look = list[str](), False
     for name, (ratio, nrmse) in held_over_fitted(fitted, held).items():
-        words = "the fit carries over"
+        words = "no sign of overfitting"
         if ratio > CARRIES_OVER:
             look = True
             near = ratio <= FAR or nrmse < SERIOUS
             words = (
-                f"the fit {'carries over with a larger error' if near else 'does not carry over'}"
+                "larger errors on other tests" if near else "the fit does not predict other tests"
             )
         said.append(
             f"{name}: the RMSE of held-out runs is {ratio:.2f} times that of fitted runs; {words} "
-            f"(up to {CARRIES_OVER:g} counts as alike)."
+            f"(limit {CARRIES_OVER:g})."
         )
     return Statement("Validation", "look" if look else "good", tuple(said))
 
@@ -722,12 +722,12 @@ def _headline(
     if untrusted:
         accuracy = f"{'held-out ' if held else 'fitted '}{_accuracy(held or fitted)}"
         return (
-            f"Usable for prediction of {_manoeuvres(experiments)} ({accuracy}); parameter values "
+            f"Usable for prediction of {_maneuvers(experiments)} ({accuracy}); parameter values "
             f"not to be trusted because {'; '.join(each.failure for each in untrusted)}."
         )
     if held:
         return f"Usable: predicts held-out {_accuracy(held)}."
-    return f"Usable as far as was tried: follows {_accuracy(fitted)}; no run was held out."
+    return f"Usable as far as tested: follows {_accuracy(fitted)}; no run was held out."
 
 
 def _accuracy(qualities: Sequence[RunQuality]) -> str:
@@ -740,7 +740,7 @@ def _accuracy(qualities: Sequence[RunQuality]) -> str:
     return listed(parts) or "channels that never move"
 
 
-def _manoeuvres(experiments: Sequence[Experiment]) -> str:
+def _maneuvers(experiments: Sequence[Experiment]) -> str:
     """``ramps, steps and sines of up to 0.3 Hz from -9 to 9 V``."""
     kinds, fastest = dict[str, None](), 0.0
     for each in experiments:
@@ -759,7 +759,7 @@ def _validity(assessments: Sequence[Assessment]) -> str:
     from swashplate.identification.excitation import acting, simulated_run
 
     experiments = fitted_runs(assessments)
-    said = f"Holds for {_manoeuvres(experiments)}"
+    said = f"Holds for {_maneuvers(experiments)}"
     if isinstance(assessments[-1].stage.problem.model, DriveModel):
         parameters, longest = assessments[-1].stage.drive.parameters, dict[str, float]()
         try:

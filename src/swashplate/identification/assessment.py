@@ -367,7 +367,7 @@ def _check(names: Sequence[str], assessments: Sequence[Assessment]) -> None:
     for name in names:
         if name != "all" and name not in known:
             machine = [each for each in known if "(" not in each]
-            raise InputError(f"There is no unknown '{name}'; there are {', '.join(machine)}.")
+            raise InputError(f"There is no parameter '{name}'; there are {', '.join(machine)}.")
 
 
 def _profiles(
@@ -553,7 +553,8 @@ def load_fit(
             [(each.name, each.run) for each in theirs],
         ) or entry.solution.vector.size != len(known):
             raise FileError(
-                f"{path}: stage {entry.name} has other unknowns than its set-up makes: fit again."
+                f"{path}: stage {entry.name} has other parameters than its fit configuration "
+                "makes: fit again."
             )
         problem = replace(problem, unknowns=Unknowns(theirs))
         parameters = with_estimates(parameters, problem, entry.solution.vector)

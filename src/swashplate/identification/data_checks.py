@@ -221,8 +221,8 @@ def _samples(experiment: Experiment, fitted: Collection[str]) -> list[Finding]:
     name, signal = experiment.name, experiment.input
     bad = ~(np.isfinite(signal.values) & np.isfinite(signal.time))
     if signal.values.size < 2:
-        said = f"its input has {_count(signal.values.size)}; two are the least, and a run that "
-        return [refusal(name, None, f"{name}: {said}tells of motion has hundreds.")]
+        said = f"its input has {_count(signal.values.size)}; at least two are needed, and a run "
+        return [refusal(name, None, f"{name}: {said}with motion has hundreds.")]
     if bad.any():
         said = f"{name}: its input is not finite at sample {int(np.argmax(bad))}; mend the log or "
         return [refusal(name, None, f"{said}cut the run with a span.")]
@@ -244,7 +244,7 @@ def _of_channel(run: str, channel: Channel) -> list[Finding]:
         )
     elif samples < 2:
         said = (
-            f"has {_count(samples)} that can count, which tells nothing of motion; leave the run "
+            f"has {_count(samples)} that can count, which shows no motion; leave the run "
             'out with role = "ignore".'
         )
     else:
@@ -274,10 +274,13 @@ def idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> l
     if idle and len(idle) == len(experiments):
         first, why = next(iter(idle.items()))
         others = ", and so it is in all other runs" if len(idle) > 1 else ""
-        said = f"{first}: {why}{others}; a drive that is not moved tells nothing: command more."
+        said = (
+            f"{first}: {why}{others}; a drive that does not move cannot be identified: "
+            "use larger commands."
+        )
         return [refusal(first, None, said)]
     return [
-        warning(run, None, f"{run}: {why}; it tells of the drive at rest alone.")
+        warning(run, None, f"{run}: {why}; it shows the drive at rest only.")
         for run, why in idle.items()
     ]
 
@@ -313,7 +316,8 @@ def short_runs(
     if short and len(short) == len(lasting):
         longest = max(short, key=lambda name: short[name])
         said = (
-            f"No run lasts: the longest, {longest}, ends {short[longest]:.3g} s after its command"
+            f"No run is long enough: the longest, {longest}, ends {short[longest]:.3g} s after "
+            "its command"
         )
         return [refusal(longest, None, f"{said} begins, and {needs}; record several seconds.")]
     return [
@@ -519,14 +523,14 @@ def contradictions(of_channels: Mapping[str, Sequence[Motion]]) -> list[Finding]
 
 def _turned(name: str, turned: Sequence[Motion], runs: int) -> list[Finding]:
     if runs > 1 and len(turned) == runs:
-        said = f"In all {runs} runs '{name}' goes against the command: turn it round with "
+        said = f"In all {runs} runs '{name}' goes against the command: reverse it with "
         return [refusal(None, name, f"{said}sign = -1 in its channel, or the input's.")]
     others = "" if runs == 1 else ", in the other runs with it"
     return [
         refusal(
             each.experiment.name,
             name,
-            f"In {each.experiment.name} '{name}' goes against the command{others}: turn it round "
+            f"In {each.experiment.name} '{name}' goes against the command{others}: reverse it "
             'with sign = -1 for this run, or leave the run out with role = "ignore".',
         )
         for each in turned
@@ -637,7 +641,7 @@ def _rank(where: str, problem: Problem) -> list[Finding]:
     """Fewer samples than unknowns, or unknowns on which nothing depends."""
     unknowns = problem.unknowns
     if problem.samples < len(unknowns):
-        said = f"{_count(problem.samples)} cannot determine {len(unknowns)} unknowns; "
+        said = f"{_count(problem.samples)} cannot determine {len(unknowns)} parameters; "
         return [refusal(None, None, f"{where}: {said}record longer runs, or free less.")]
     exact = isinstance(problem.model, EquationModel)  # any other may take minutes
     if exact and not problem.evaluate(problem.start).jacobian.any():
@@ -658,7 +662,7 @@ def beside_the_drives(campaign: Campaign) -> list[str]:
         runs = campaign.select(axis=name)
         beyond = {each.name: beyond_the_card(each) for each in runs}
         found += [
-            f"{said}; this run is not held against the drive"
+            f"{said}; this run is not compared with the drive"
             for said in chain.from_iterable(beyond.values())
         ]
         runs = tuple(each for each in runs if not beyond[each.name])

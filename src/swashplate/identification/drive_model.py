@@ -76,7 +76,7 @@ def at_rate_of(
     for name, rate in rates.items():
         if abs(rate / parameters.rate - 1.0) > OTHER_RATE:
             return at_every_rate(parameters), (
-                f"{name} is marched at {rate:.4g} Hz, but the card's filter of {parameters.name} "
+                f"{name} is simulated at {rate:.4g} Hz, but the card's filter of {parameters.name} "
                 f"is a recursion for {parameters.rate:g} Hz: the fit takes the differential "
                 "equation with the same poles, which holds at every rate.",
             )

@@ -181,12 +181,12 @@ MOST = 0.2
 """Share of a run's information from which it is one of those that tell most."""
 
 
-def _alone(name: str, share: Array, runs: Sequence[str], what: str) -> list[str]:
+def _alone(name: str, share: Array, runs: Sequence[str]) -> list[str]:
     """A sentence on an unknown that rests on one run."""
     most = int(np.argmax(share))
     if len(runs) < 2 or share[most] < ALONE:
         return []
-    return [f"{name}: {100.0 * share[most]:.0f} % of {what} of it comes from {runs[most]} alone."]
+    return [f"{name}: {100.0 * share[most]:.0f} % of its information is from {runs[most]} alone."]
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +207,7 @@ class Excitation(Result):
         """What rests on nothing, and what on one run alone."""
         said = []
         for name, share in zip(self.names, self.share.T, strict=True):
-            said += _alone(name, share, self.runs, "what is known")
+            said += _alone(name, share, self.runs)
             if not share.any():
                 said.append(f"{name}: no run depends on it.")
         return tuple(said)
@@ -307,7 +307,7 @@ class Outlook(Result):
         ]
         for name in self.names:
             share = self.shares[:, self.linearised.variables.index(name)]
-            said += _alone(name, share, list(self.simulations), "what the runs tell")
+            said += _alone(name, share, list(self.simulations))
         return tuple(said)
 
     def _missing(self, name: str) -> str:
@@ -320,7 +320,7 @@ class Outlook(Result):
         having = [run for run, s in zip(self.simulations, self._seconds(name), strict=True) if s]
         if not having:
             return f"{need}, which no run has"
-        return f"{need}: {having[0]} has it, but no sample that counts shows it"
+        return f"{need}: {having[0]} meets it, but shows it in no sample that is used"
 
     def _seconds(self, name: str) -> Array:
         seconds: Array = self.seconds[:, self.names.index(name)]
@@ -417,7 +417,7 @@ def propose(outlook: Outlook) -> Proposal:
     for direction in verdict.null:
         others = [name for name in direction.changes if name != direction.fix]
         more = f" and {len(others) - NAMED} others" if len(others) > NAMED else ""
-        told = f"the runs cannot tell it from {', '.join(others[:NAMED])}{more}"
+        told = f"the runs cannot distinguish it from {', '.join(others[:NAMED])}{more}"
         reasons[direction.fix] = told if direction.gauge is None else direction.gauge.determined
     notes = [f"{name} belongs to one run and stays free." for name in reasons if "(" in name]
     reasons = {name: why for name, why in reasons.items() if "(" not in name}
@@ -496,7 +496,8 @@ def proposed_setup(setup: Setup, proposals: Sequence[Proposal]) -> Setup:
     stages = tuple(each.proposed for each in proposals if each.proposed is not None)
     if not stages:
         raise InputError(
-            "The runs determine none of the unknowns, so that there is no set-up to propose: test "
+            "The runs determine none of the parameters, so that there is no fit configuration to "
+            "propose: test "
             "what exercises them first."
         )
     return setup.model_copy(update={"stages": stages})

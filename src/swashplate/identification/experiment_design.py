@@ -71,11 +71,11 @@ class Sensor(NamedTuple):
 
 
 def default_sensors(drive: Drive) -> tuple[Sensor, ...]:
-    """Those of the source's tests: an ammeter around both leads and, where known, its encoder."""
+    """Those of Kruse's tests: an ammeter around both leads and, where known, its encoder."""
     if drive.name not in COUNTS_PER_TURN:
         return assumed_sensors(drive, ("rectified_current", "shaft_speed"))
     rounding = 2.0 * np.pi / COUNTS_PER_TURN[drive.name] / np.sqrt(12.0)
-    encoder = Sensor("encoder_counts", float(rounding), origin="rounding of the source's encoder")
+    encoder = Sensor("encoder_counts", float(rounding), origin="rounding of Kruse's encoder")
     return (*assumed_sensors(drive, ("rectified_current",)), encoder)
 
 
@@ -146,7 +146,8 @@ def measured_sensors(
         deviation = float(np.sqrt(np.mean(np.concatenate([run.residual for run in runs]) ** 2)))
         if not deviation > NOISELESS:
             raise InputError(
-                f"The residuals of '{name}' are as good as zero: without noise any test is perfect."
+                f"The residuals of '{name}' are practically zero: without noise any test is "
+                "perfect."
             )
         noise = problem.scales[name] * deviation
         share = noise / max(float(np.ptp(each.values)) for each in measured)
@@ -272,10 +273,10 @@ def _together(setup: Setup, free: Sequence[str], parameters: ParameterSet) -> St
         if {name, symbol} & set(stage.free) or (
             stage.forces is not None and symbol in ("Z19", "Z20", "Z21", "Z22")
         ):
-            raise InputError(f"{name} is free in the set-up already.")
+            raise InputError(f"{name} is free in the fit configuration already.")
         columns = CATALOGUE[symbol].columns if name == symbol else (name,)
         if any(not np.isfinite(parameters.numbers[column]) for column in columns):
-            raise InputError(f"{name} is off in the drive, so that no test can tell it.")
+            raise InputError(f"{name} is off in the drive, so no test can determine it.")
         positive = all(parameters.numbers[column] > 0.0 for column in columns)
         zero = any(parameters.numbers[column] == 0.0 for column in columns)
         more[name] = Free(bounds=(-1.0, 1.0)) if zero else Free(relative=(0.5, 2.0), log=positive)
@@ -446,7 +447,7 @@ def _judge(present: Array, candidate: Candidate, variables: Unknowns) -> Advice:
 
 def _check(name: str, rows: Array, count: int) -> None:
     if rows.ndim != 2 or rows.shape[1] != count:
-        raise InputError(f"{name}: {count} unknowns need as many columns, not {rows.shape}.")
+        raise InputError(f"{name}: {count} parameters need as many columns, not {rows.shape}.")
     if not np.isfinite(rows).all():
         raise InputError(f"{name}: the derivatives must be finite.")
 
@@ -501,7 +502,7 @@ def judge_sensors(
 ) -> tuple[SensorAdvice, ...]:
     """For each sensor, one by one, the test in which it tells most, and what it adds there.
 
-    `beside` are names of manoeuvres that count as made where the bench has no tests yet.
+    `beside` are names of maneuvers that count as made where the bench has no tests yet.
     """
     known = [bench.present]
     if not len(bench.present):

@@ -377,7 +377,7 @@ def _origin(stage: Stage, problem: Problem, *settings: object) -> dict[str, str]
             digest.update(np.ascontiguousarray(array).tobytes())
     return {
         "version of swashplate": __version__,
-        "stage of the set-up": _mark(stage.model_dump_json()),
+        "stage of the fit configuration": _mark(stage.model_dump_json()),
         "tolerances": _mark(settings),
         "nominal values": _mark(known),
         "runs and their weights": digest.hexdigest(),

@@ -202,19 +202,19 @@ class Direction(NamedTuple):
         begin, end = "", f". Fix {self.fix}."
         if self.weak:
             begin = f"Weak: {self.fix} is known to ±{100.0 * self.half_width:.3g} % only"
-            end = "; fix one of them only if you know it, or add a test that tells them apart."
+            end = "; fix one of them only if you know it, or add a test that distinguishes them."
             if len(self.changes) == 1:
-                return f"{begin}; add a test that tells it."
+                return f"{begin}; add a test that determines it."
         if self.gauge is not None:
             together = listed(sorted(self.changes, key=_in_order))
-            how = "move together all but unseen" if self.weak else "can move together unseen"
+            how = f"change together {'with almost no' if self.weak else 'without'} effect"
             words = f"{together} {how} ({self.gauge.name}): {self.gauge.determined}"
             return f"{begin}{', as ' if begin else ''}{words}{end}"
         moves = ", ".join(f"{name} {by:+.2g} %" for name, by in [*self.changes.items()][:NAMED])
         if len(self.changes) > NAMED:
             moves += f" and {len(self.changes) - NAMED} others"
         if self.weak:
-            return f"{begin}, as {moves} move together all but unseen{end}"
+            return f"{begin}, as {moves} change together with almost no effect{end}"
         change = "together change" if len(self.changes) > 1 else "changes"
         return f"{moves} {change} nothing{end}"
 
@@ -269,13 +269,13 @@ class Identifiability(Result):
         free = int(np.count_nonzero(self.variables.free))
         noun = "combination" if self.rank == 1 else "combinations"
         said = [
-            "All unknowns stand at a bound: there is nothing left to determine."
+            "All parameters are at a bound: there is nothing left to determine."
             if not free
-            else "The tests determine none of the unknowns."
+            else "The tests determine none of the parameters."
             if not self.rank
-            else f"The tests determine {self.rank} {noun} of {free} free unknowns."
+            else f"The tests determine {self.rank} {noun} of {free} free parameters."
             if self.rank < free
-            else f"The tests determine all {free} free unknowns."
+            else f"The tests determine all {free} free parameters."
         ]
         if self.unexcited:
             said.append(
@@ -286,8 +286,8 @@ class Identifiability(Result):
         return (
             *said,
             *(
-                f"{name} = {self.variables.estimates[self.variables.index(name)]:.4g} stands at "
-                f"its {side} bound: no interval is given for it; those of the others let it move."
+                f"{name} = {self.variables.estimates[self.variables.index(name)]:.4g} is at its "
+                f"{side} bound and has no interval; the intervals of the others let it change."
                 for name, side in self.at_bounds.items()
             ),
         )

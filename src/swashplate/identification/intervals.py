@@ -359,15 +359,15 @@ class Uncertainty(Result):
     def sentences(self) -> tuple[str, ...]:
         """What the errors rest on."""
         if not self.noisy:
-            return ("The residuals are exactly zero: errors of zero say nothing of other tests.",)
+            return ("The residuals are exactly zero: errors of zero do not apply to other tests.",)
         said = list(line_sentences(self.lines))
         for colour in self.colours:
             if colour.length:
                 worth = (
-                    f"{colour.inflation:.3g} samples are worth one"
+                    f"{colour.inflation:.3g} samples count as one independent sample"
                     if colour.inflation > 1.05
-                    else "positive and negative correlations cancel, and the samples tell as much "
-                    "as independent ones"
+                    else "positive and negative correlations cancel, and the samples count as "
+                    "independent ones"
                 )
                 said.append(
                     f"Residuals of {colour.channel} stay correlated over {colour.duration:.3g} s: "
@@ -377,27 +377,29 @@ class Uncertainty(Result):
                 said.append(f"Residuals of {colour.channel} are white.")
             if colour.drifting:
                 said.append(
-                    f"That is a large part of a run: those of {colour.channel} are a model error "
-                    "or a tone rather than noise, and intervals cover noise alone."
+                    f"That is a large part of a run: residuals of {colour.channel} are model error "
+                    "or a spectral line rather than noise, and intervals cover noise only."
                 )
         said += self.priors
         for end in self.ends:
             side, name = "upper" if end.upper else "lower", self.own.variables.names[end.number]
             if end.better is not None:
                 said.append(
-                    f"Moving {name} met a better optimum, cost {end.better:.6g}: start from more "
-                    "points."
+                    f"The profile of {name} found a better optimum, cost {end.better:.6g}: fit "
+                    "from more starts."
                 )
             elif not np.isfinite(end.distance):
                 said.append(
                     f"{name} has no {side} end: the cost does not rise enough on that side."
                 )
             else:
-                said.append(f"The {side} end of {name} is that of its profile, which is lopsided.")
+                said.append(
+                    f"The {side} end of {name} is that of its profile, which is asymmetric."
+                )
         known = self.own.determined & (np.diag(self.own.matrix) > 0.0)
         if known.any() and (self.handed or self.fixed.any()):
             what = [
-                *(["what the stages before do not know"] if self.handed else []),
+                *(["the uncertainty of earlier stages"] if self.handed else []),
                 *(["the standard uncertainty of fixed parameters"] if self.fixed.any() else []),
             ]
             wider = np.where(known, self.quoted.standard_errors, 1.0) / np.where(
@@ -405,8 +407,8 @@ class Uncertainty(Result):
             )
             most = int(np.argmax(wider))
             said.append(
-                f"Intervals take in {' and '.join(what)}, which widens them by a factor of "
-                f"{float(np.median(wider[known])):.2f} in the middle and of {wider[most]:.2f} for "
+                f"Intervals include {' and '.join(what)}, which widens them by a factor of "
+                f"{float(np.median(wider[known])):.2f} in the median and of {wider[most]:.2f} for "
                 f"{self.own.variables.names[most]}."
             )
         return tuple(said)
@@ -529,8 +531,8 @@ def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tu
         part = f"{percent:.0f}" if percent >= 10.0 else f"{percent:.2g}"
         spread = f"{100.0 * prior.deviation:.3g} %" if unknown.log else f"{prior.deviation:.4g}"
         said.append(
-            f"The prior of {unknown.name}, {prior.mean:.5g} ± {spread}, makes up "
-            f"{part} % of what is known of it; the estimate lies "
+            f"The prior of {unknown.name}, {prior.mean:.5g} ± {spread}, contributes "
+            f"{part} % of the information on it; the estimate lies "
             f"{abs(pull):.2g} deviations {'above' if pull >= 0.0 else 'below'} its mean."
         )
     return tuple(said)

@@ -87,7 +87,7 @@ class Fault:
         """It as a likely cause, in words."""
         return (
             f"{self.name} by {self.size:+.3g} {self.unit} "
-            f"(explains {100.0 * self.share:.0f} % of what is left)"
+            f"(explains {100.0 * self.share:.0f} % of the remaining residuals)"
         )
 
     @property
@@ -95,11 +95,13 @@ class Fault:
         """It as an assumption, in words."""
         if isfinite(self.standard_error):
             return (
-                f"{self.name}: an error below {2.0 * self.standard_error:.2g} {self.unit} does not "
-                "show"
+                f"{self.name}: an error below {2.0 * self.standard_error:.2g} {self.unit} is not "
+                "visible"
             )
         others = ", ".join(self.same_as)
-        return f"{self.name}: the same as other values of {others} (to {self.outside:.0e})"
+        return (
+            f"{self.name}: indistinguishable from other values of {others} (to {self.outside:.0e})"
+        )
 
 
 @dataclass(frozen=True)
@@ -270,7 +272,7 @@ def clipped_channels(experiments: Sequence[Experiment]) -> tuple[str, ...]:
                 unit = runs[0][name].unit
                 said.append(
                     f"'{name}' stands at exactly {end:.6g} {unit} while the input moves by "
-                    f"{moved:.3g} {runs[0].input.unit}: it is clipped there. Say limits = "
+                    f"{moved:.3g} {runs[0].input.unit}: it is clipped there. Set limits = "
                     f"[{low:.6g}, {high:.6g}] in its channel, and such samples are ignored."
                 )
     return tuple(said)

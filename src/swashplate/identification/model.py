@@ -478,8 +478,7 @@ class OwnModel(Result, EquationModel):
             p = made(model.parameters, numbers)
         except KeyError as error:
             raise InputError(
-                f"{model.name} has no value of {error.args[0]}: let it be an unknown, fix it, or "
-                "give p."
+                f"{model.name} has no value of {error.args[0]}: let it be free, fix it, or give p."
             ) from None
         given = self.given
         if isinstance(given, Mapping):

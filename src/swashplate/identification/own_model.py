@@ -260,7 +260,9 @@ class ModelParameters(Result):
 def _unknown(name: str, entry: Range | Unknown) -> Unknown:
     if isinstance(entry, Unknown):
         if name not in (entry.name, *entry.sets):
-            raise InputError(f"'{name}' is free as the unknown '{entry.name}': give both one name.")
+            raise InputError(
+                f"'{name}' is free as the parameter '{entry.name}': give both one name."
+            )
         return entry
     try:
         low, start, high = (float(number) for number in entry[:3])

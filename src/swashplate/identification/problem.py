@@ -64,7 +64,7 @@ class Problem(Result):
         if isinstance(self.model, OfEquations):
             object.__setattr__(self, "model", OwnModel(self.model))
         if not self.unknowns:
-            raise InputError("A fit needs at least one unknown.")
+            raise InputError("A fit needs at least one parameter.")
         if not self.experiments:
             raise InputError("A fit needs at least one experiment.")
         if not any(weight.any() for run in self.weights for weight in run.values()):
@@ -370,8 +370,9 @@ class LinearisedFit(Result):
         if self.samples - self.rank < 1:
             raise InputError(
                 f"{self.samples} sample{'s' if self.samples > 1 else ''} for {self.rank} "
-                f"unknown{'s' if self.rank > 1 else ''} leave nothing to tell the noise from; take "
-                "more samples or fewer unknowns."
+                f"parameter{'s' if self.rank > 1 else ''} leave nothing to estimate the noise "
+                "from; take "
+                "more samples or fewer parameters."
             )
 
 

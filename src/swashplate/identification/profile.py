@@ -228,7 +228,7 @@ class Profile(Result):
             )
         reasons: dict[Ending, str] = {
             "bound": "reaches its bound before the cost rises enough",
-            "open": "can go as far as was looked without the cost rising enough",
+            "open": "reaches the end of the search before the cost rises enough",
             "domain": "reaches the edge of the model's domain before the cost rises enough",
         }
         return tuple(
@@ -278,13 +278,13 @@ def threshold(
     if not inflation >= 1.0 or not np.isfinite(inflation):
         raise InputError(f"{inflation:g} samples cannot stand for one; 1 is the least.")
     if samples <= unknowns:
-        raise InputError(f"{samples} samples for {unknowns} unknowns tell nothing of the noise.")
+        raise InputError(f"{samples} samples for {unknowns} parameters do not determine the noise.")
     if freedom is None:
         freedom = samples / inflation - unknowns
     if not freedom > 0.0:
         raise InputError(
-            f"{samples} samples are worth {samples / inflation:.1f} independent ones, no more than "
-            f"the {unknowns} unknowns: no interval follows from them."
+            f"{samples} samples count as {samples / inflation:.1f} independent ones, no more than "
+            f"the {unknowns} parameters: no interval follows from them."
         )
     from scipy.special import stdtrit
 
@@ -334,7 +334,7 @@ def profile(
             "The residuals are exactly zero: there is no noise that a profile could weigh against."
         )
     if not bounds[0] <= vector[index] <= bounds[1]:
-        raise InputError("The optimum of a profile lies outside the bounds of its unknown.")
+        raise InputError("The optimum of a profile lies outside the bounds of its parameter.")
     optimum = Point(float(vector[index]), cost, vector)
     sides = [
         ProfileSide(minimise, optimum, index, rise, direction, step, bound, most)

@@ -163,9 +163,9 @@ class CrossValidation(Result):
                 said.append(f"{name} did not converge.")
             if fold.lost:
                 said.append(
-                    f"{name} loses {', '.join(fold.lost)}: only the runs held out tell of "
-                    f"{'them' if len(fold.lost) > 1 else 'it'}, so no prediction of theirs can be "
-                    "good where it counts."
+                    f"{name} loses {', '.join(fold.lost)}: only the held-out runs "
+                    f"determine {'them' if len(fold.lost) > 1 else 'it'}, so their prediction is "
+                    "not reliable."
                 )
         varying = [
             f"{each.name} ±{100.0 * each.error / abs(each.mean):.2g} %"

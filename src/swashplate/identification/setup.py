@@ -255,7 +255,8 @@ def load_setup(name: str | Path) -> Setup:
         return validated(parse_toml(read_text(name), str(name)), Setup, str(name))
     if name not in setup_names():
         raise ParameterError(
-            f"There is no packaged set-up '{name}'; there are {', '.join(setup_names())}, or give "
+            f"There is no packaged fit configuration '{name}'; there are "
+            f"{', '.join(setup_names())}, or give "
             "a .toml file."
         )
     text = files("swashplate.identification").joinpath("setups", f"{name}.toml").read_text("utf-8")

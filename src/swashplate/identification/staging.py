@@ -45,7 +45,8 @@ def check_weights(stage: Stage, experiments: Sequence[Experiment], channels: Seq
     if weighed and not kinds & set(weighed):
         raise InputError(
             f"The stage '{stage.name}' weighs {', '.join(dict.fromkeys(weighed))}, but the runs "
-            f"have {', '.join(sorted(kinds))}: add weights for that, or take a set-up without."
+            f"have {', '.join(sorted(kinds))}: add weights for that, or take a fit "
+            "configuration without."
         )
 
 
@@ -89,7 +90,8 @@ def setup_of(campaign: Campaign, axis: str, name: str | None = None) -> Setup:
         return load_setup(drive)
     except ParameterError:
         raise InputError(
-            f"There is no packaged set-up for the drive '{drive}': give one of your own, a .toml "
+            f"There is no packaged fit configuration for the drive '{drive}': give one of your "
+            "own, a .toml "
             "file with stages and free parameters; 'swashplate guess' reads one off the logs."
         ) from None
 
@@ -211,7 +213,7 @@ def _channels(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, ...
         had = ", ".join(dict.fromkeys(c.kind for e in experiments for c in e.channels.values()))
         hint = ""
         if stage.part == "card":
-            hint = "; without a current, let 'swashplate guess' write start and set-up"
+            hint = "; without a current, let 'swashplate guess' write start and fit configuration"
         raise InputError(
             f"The stage '{stage.name}' fits {', '.join(kinds)}, but the runs to fit have "
             f"{had or 'no channel'}{hint}."

@@ -79,7 +79,7 @@ def estimates_table(
         f"Stage {stage.stage.name}",
         (
             Column("stage", of="f"),
-            Column("unknown"),
+            Column("parameter"),
             Column("meaning", of="p"),
             UNIT if truth is None else Column("unit", of="pf"),
             Column("nominal", number),
@@ -213,7 +213,7 @@ def fixed_table(fit: Fit, truth: ParameterSet | None = None) -> Table:
             Column("value", ".5g"),
             UNIT,
             Column("truth", ".5g", of="" if truth is None else "tpf"),
-            Column("why, as far as can be told"),
+            Column("reason, where known"),
             Column("source"),
         ),
         si=True,
@@ -263,7 +263,7 @@ def bounds_table(fit: StageFit) -> Table:
     made = Table(
         f"Bounds of stage {fit.stage.name}",
         (
-            Column("unknown"),
+            Column("parameter"),
             Column("start", ".5g"),
             Column("lowest", ".5g"),
             Column("highest", ".5g"),
@@ -307,7 +307,7 @@ def runs_tables(
             name,
             (
                 Column("run", wrap=True),
-                Column("manoeuvre", of="pf"),
+                Column("maneuver", of="pf"),
                 Column("role", of="pf"),
                 Column("channel", of="pf"),
                 Column("start", key="initial_state"),
@@ -464,7 +464,7 @@ def _spreads(found: CrossValidation, assessments: Sequence[Assessment]) -> Table
     made = Table(
         "Estimates over the folds",
         (
-            Column("unknown"),
+            Column("parameter"),
             UNIT,
             Column("all runs", ".5g"),
             *(Column(each, none=NONE) for each in errors),
@@ -507,7 +507,7 @@ def outlook_table(look: Outlook, runs: Sequence[str]) -> Table:
     made = Table(
         f"Stage {look.stage.name}",
         (
-            Column("unknown"),
+            Column("parameter"),
             Column("needs", wrap=True),
             Column("s", ".3g"),
             Column("effect", ".3g"),
@@ -525,7 +525,7 @@ def outlook_table(look: Outlook, runs: Sequence[str]) -> Table:
 def outlook_rows(looks: Sequence[Outlook]) -> Table:
     """The same for a file, a row for each unknown and run."""
     columns = ("seconds", "share", "effect of 1 %")
-    words = ("stage", "unknown", "needs", "run")
+    words = ("stage", "parameter", "needs", "run")
     made = Table("", (*map(Column, words), *(Column(each, ".6g") for each in columns)))
     for look in looks:
         for k, name in enumerate(look.names):
@@ -551,7 +551,7 @@ def excitation_table(assessment: Assessment) -> tuple[Table, list[str]]:
     heads = (Column(run, ".0f", shade=True) for run in runs)
     made = Table(
         f"Stage {assessment.stage.stage.name}",
-        (Column("unknown"), Column("change for 1 %", ".2g"), *heads),
+        (Column("parameter"), Column("change for 1 %", ".2g"), *heads),
     )
     for k, unknown in enumerate(unknowns):
         if unknown.run is not None:
@@ -607,9 +607,11 @@ def advice_table(title: str, judged: Sequence[Advice | SensorAdvice]) -> Table:
 def best_tests_table(gains: Sequence[Gain], best: Mapping[str, tuple[str, Gain]]) -> Table:
     """What is known of each unknown, and which test would tell most of it."""
     errors = (Column("error now", "s"), Column("then", "s"))
-    made = Table("For each unknown", (Column("unknown"), *errors, Column("best test", wrap=True)))
+    made = Table(
+        "For each parameter", (Column("parameter"), *errors, Column("best test", wrap=True))
+    )
     for gain in gains:
-        test, after = best.get(gain.name, ("none tells more", gain))
+        test, after = best.get(gain.name, ("no further information", gain))
         made.add(gain.name, _error(gain.before), _error(after.after), test)
     return made
 
@@ -621,7 +623,7 @@ def _error(error: float) -> str:
 def advice_rows(ranked: Sequence[Advice], sensors: Sequence[SensorAdvice]) -> Table:
     """All that was judged for a file, a row for each test, sensor and unknown."""
     heads = ("relative error before", "relative error after", "first to determine", "D-gain")
-    start = ("test", "added sensor", "duration", "unknown")
+    start = ("test", "added sensor", "duration", "parameter")
     made = Table("", tuple(map(Column, (*start, *heads))))
     judged = [("", each.candidate, each) for each in ranked]
     judged += [(each.sensor.kind, each.maneuver, each.advice) for each in sensors]

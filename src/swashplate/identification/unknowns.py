@@ -152,7 +152,7 @@ class Unknowns(Result, Sequence[Unknown]):
         for each in self.items:
             for target in each.targets:
                 if (each.run, target) in taken:
-                    raise ParameterError(f"{target} is set by two unknowns; let one set it.")
+                    raise ParameterError(f"{target} is set by two parameters; let one set it.")
                 taken.add((each.run, target))
 
     def __getitem__(self, index):  # type: ignore[no-untyped-def]
@@ -185,7 +185,7 @@ class Unknowns(Result, Sequence[Unknown]):
             If there is none of that name.
         """
         if name not in self.names:
-            raise InputError(f"There is no unknown {name}; there are {', '.join(self.names)}.")
+            raise InputError(f"There is no parameter {name}; there are {', '.join(self.names)}.")
         return self.names.index(name)
 
     @cached_property

@@ -94,7 +94,7 @@ def residual_test(
     call every one of them a finding.
     """
     if time.size < 8:
-        raise InputError(f"{time.size} samples tell nothing of correlation; 8 are the least.")
+        raise InputError(f"{time.size} samples show no correlation; at least 8 are needed.")
     first = float(residual[0])
     grid = grid_of(time)
     most = max(int(LONGEST * grid.size), 1)

@@ -328,7 +328,7 @@ def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
         Its ending says what it is: text (CSV and its kin), Parquet, MATLAB (all versions), HDF5,
         TDMS, MDF 4, or what an installed package reads.
     options : TextOptions, optional
-        How a text file is written, where that cannot be told from it.
+        How a text file is written, where that cannot be recognised from it.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Manoeuvres: the voltage that a joystick commands over time, for tests of a drive.
+"""Maneuvers: the voltage that a joystick commands over time, for tests of a drive.
 
 `step`, `ramp`, `sine`, `stairs`, `chirp`, `multisine`, `recorded`, `recorded_file` and `rest`
 make one; `+` puts one
@@ -9,8 +9,8 @@ the cubic return to (0 V, 0 V/s) lasts at the end, None or 0 for none; `length`,
 function raises InputError, one sentence, for a number that is not finite or out of its range. What
 goes beyond the ±10 V of a joystick is for the simulation to refuse.
 
-No voltage exceeds the manoeuvre's `amplitude`, at any instant: that of a step, sine, chirp or
-multisine, a ramp's `limit`, the largest of stairs and recorded voltages; of manoeuvres one after
+No voltage exceeds the maneuver's `amplitude`, at any instant: that of a step, sine, chirp or
+multisine, a ramp's `limit`, the largest of stairs and recorded voltages; of maneuvers one after
 another it is the largest, of superposed ones the sum. The return starts with the slope that the
 command ends with. Where the cubic would then leave the amplitude, as after a fast sine, it starts
 with the steepest slope of that sign with which it stays within, at the amplitude itself with none.

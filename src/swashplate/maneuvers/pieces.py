@@ -1,4 +1,4 @@
-"""Manoeuvres as objects: curves one after another, to be sampled, scaled, joined and added."""
+"""Maneuvers as objects: curves one after another, to be sampled, scaled, joined and added."""
 # ruff: noqa: D102 - what the two methods of every curve return is said once, by Curve
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def interval(starts: npt.ArrayLike, time: Array) -> npt.NDArray[np.intp]:
 
 
 class Curve(Protocol):
-    """What a piece of a manoeuvre follows; both methods take an array of times [s]."""
+    """What a piece of a maneuver follows; both methods take an array of times [s]."""
 
     def __call__(self, time: Array, /) -> Array:
         """Voltage [V], in an array of the same shape."""
@@ -231,17 +231,17 @@ def window(start: float, settle: float | None, length: float) -> tuple[float, fl
 
 
 LONGEST = 100_000_000
-"""Samples that a manoeuvre may have; more is a mistake and would not fit into memory."""
+"""Samples that a maneuver may have; more is a mistake and would not fit into memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A voltage from `start` on, until the next piece starts or the manoeuvre ends.
+    """A voltage from `start` on, until the next piece starts or the maneuver ends.
 
     Attributes
     ----------
     start : float
-        From the beginning of the manoeuvre. [s]
+        From the beginning of the maneuver. [s]
     curve : Curve
         Voltage [V] and its slope [V/s] over the time since `start` [s].
     """
@@ -263,7 +263,7 @@ class Maneuver(Result):
     pieces : tuple of Piece
         In the order of their starts, the first at 0. At a jump the later piece holds.
     amplitude : float
-        What the manoeuvre states and its voltage never exceeds, inf where it states none. [V]
+        What the maneuver states and its voltage never exceeds, inf where it states none. [V]
     """
 
     name: str
@@ -344,7 +344,7 @@ class Maneuver(Result):
 
 
 def superpose(*maneuvers: Maneuver) -> Maneuver:
-    """Sum of the voltages of manoeuvres, as long as the longest; its amplitude is theirs added.
+    """Sum of the voltages of maneuvers, as long as the longest; its amplitude is theirs added.
 
     Raises
     ------
@@ -352,7 +352,7 @@ def superpose(*maneuvers: Maneuver) -> Maneuver:
         If there is none.
     """
     if not maneuvers:
-        raise InputError("superpose needs at least one manoeuvre.")
+        raise InputError("superpose needs at least one maneuver.")
     length = max(each.length for each in maneuvers)
     name = " with ".join(each.name for each in maneuvers)
     together = Sum(tuple(_padded(each, length) for each in maneuvers))
@@ -369,7 +369,7 @@ def _padded(short: Maneuver, length: float) -> Maneuver:
 
 @dataclass(frozen=True)
 class SplineReturn:
-    """What `spline_return` makes: an end, `duration` [s] long, for the manoeuvre it is added to."""
+    """What `spline_return` makes: an end, `duration` [s] long, for the maneuver it is added to."""
 
     duration: float
 
@@ -401,7 +401,7 @@ def spline_return(duration: float) -> SplineReturn:
 
 
 def returned(before: Maneuver, name: str, length: float) -> Maneuver:
-    """Add to a manoeuvre the return that ends at `length` [s], to the last bit."""
+    """Add to a maneuver the return that ends at `length` [s], to the last bit."""
     level, slope = float(before(before.length)), float(before.slope(before.length))
     within = before.amplitude if math.isfinite(before.amplitude) else 0.0
     curve = return_within(within, level, slope, length - before.length)
@@ -419,16 +419,16 @@ def settled(
 
 
 def sampled(command: npt.ArrayLike | Maneuver, rate: float) -> npt.ArrayLike:
-    """Samples of a manoeuvre at a rate [Hz], anything else as it is.
+    """Samples of a maneuver at a rate [Hz], anything else as it is.
 
     Raises
     ------
     InputError
-        For words: a manoeuvre's are read by `parse`.
+        For words: a maneuver's are read by `parse`.
     """
     if isinstance(command, str):
         raise InputError(
-            f"The voltage is the text '{command}': give samples, or a manoeuvre such as "
+            f"The voltage is the text '{command}': give samples, or a maneuver such as "
             f"maneuvers.parse('{command}')."
         )
     return command.sample(rate) if isinstance(command, Maneuver) else command

@@ -1,4 +1,4 @@
-"""Manoeuvres by name: rest, step, ramp, stairs, sines, multisine, recordings, Kruse's tests."""
+"""Maneuvers by name: rest, step, ramp, stairs, sines, multisine, recordings, Kruse's tests."""
 
 import inspect
 import math
@@ -345,7 +345,7 @@ def recorded_file(
     interpolation, length :
         As in `recorded`.
     options : TextOptions, optional
-        How a text file is written, where that cannot be told from it.
+        How a text file is written, where that cannot be recognised from it.
 
     Raises
     ------
@@ -393,7 +393,7 @@ _AXES = {
 
 
 def source_tests(axis: str) -> dict[str, Maneuver]:
-    """Runs of the source's test campaign on the axis "hoist", "slew" or "luff".
+    """Runs of Kruse's test campaign on the axis "hoist", "slew" or "luff".
 
     Returns
     -------
@@ -406,7 +406,7 @@ def source_tests(axis: str) -> dict[str, Maneuver]:
         If there is no such axis.
     """
     if axis not in _AXES:
-        raise InputError(f"no tests of axis {axis!r}: the source has {', '.join(_AXES)}.")
+        raise InputError(f"no tests of axis {axis!r}: Kruse (2001) has {', '.join(_AXES)}.")
     settle, ramps, steps, sines = _AXES[axis]
     runs = [replace(ramp(slope, settle=settle), name=f"ramp {slope:+g} V/s") for slope in ramps]
     runs += [replace(step(volts), name=f"step {volts:+g} V") for volts in steps]
@@ -423,12 +423,12 @@ _COMMANDS: dict[str, Callable[..., Maneuver]] = {
 
 
 def parse(text: str) -> Maneuver:
-    """Make a manoeuvre from a command line's "sine:6.5,0.1,length=40" or "stairs:2/4/0,dwell=3".
+    """Make a maneuver from a command line's "sine:6.5,0.1,length=40" or "stairs:2/4/0,dwell=3".
 
     Parameters
     ----------
     text : str
-        Name of a function that makes a manoeuvre, colon, its arguments by position or keyword, in
+        Name of a function that makes a maneuver, colon, its arguments by position or keyword, in
         V, s and Hz. A list is written 2/4/0, the band of a multisine low:high:count.
 
     Raises
@@ -438,7 +438,7 @@ def parse(text: str) -> Maneuver:
     """
     name, _, arguments = text.partition(":")
     if name not in _COMMANDS:
-        raise InputError(f"{name!r} is no manoeuvre: choose one of {', '.join(_COMMANDS)}.")
+        raise InputError(f"{name!r} is no maneuver: choose one of {', '.join(_COMMANDS)}.")
     items = [item.rpartition("=") for item in arguments.split(",")] if arguments else []
     positional = [_value(value) for _, equals, value in items if not equals]
     keywords = {key.strip(): _value(value) for key, equals, value in items if equals}

@@ -8,7 +8,7 @@ The card has two channels, one for each solenoid. Each sees the command times it
 3. a second-order filter with a Coulomb-like term,
 4. a limiter of the output's rate with a decay at its end.
 
-The filter has two forms. The source's recursion (eq. 3.6) belongs to its sample rate of 512 Hz: at
+The filter has two forms. Kruse's recursion (eq. 3.6) belongs to its sample rate of 512 Hz: at
 another rate the same ζ and ω describe another response. With the option `exact` the equation behind
 it, I*'' + 2ζω I*' + C sign(I*') + ω² I* = ω² I_ss, is solved over each step instead, so that ζ, ω
 and C mean the same at every rate.
@@ -244,7 +244,7 @@ def channel_level(voltage: float, p: Channel) -> float:
     return steady_current(voltage, 1.0 if voltage > p.V_dz else 0.0, p)
 
 
-# --- the source's recursion ----------------------------------------------------------------------
+# --- Kruse's recursion ----------------------------------------------------------------------
 
 
 @equation
@@ -259,7 +259,7 @@ def coulomb_sign(change: float, h: float, literal: Flag) -> float:
 def filtered_current(
     now: float, before: float, steady: float, p: Channel, h: float, literal: Flag
 ) -> float:
-    """I* at the next sample by the source's recursion, Kruse eq. 3.6. [A]
+    """I* at the next sample by Kruse's recursion, eq. 3.6. [A]
 
     Of I* at this sample and the one before and of I_ss [A]; `literal` takes the literal sign of the
     rate. Stable for ωh < 2ζ and ζωh < 1 + ω²h²/4 only (Jury).

@@ -26,7 +26,7 @@ WELL_CONDITIONED = 0.25
 
 DRIVEN = "a current beyond Z17"
 
-# What no measurement of speed can tell apart, by the symmetries' names; the weights stand on the
+# What no measurement of speed determines apart, by the symmetries' names; the weights stand on the
 # parameters. Two are not powers: 1 + Z6 goes with "motion", Z2 moves by Z1 Z9 along "zero".
 PRESSURE, ZERO, TRAVEL, FORCE = "pressure", "zero", "travel", "force"
 MOTION, TILT, ANGLE = "motion", "tilt", "angle"

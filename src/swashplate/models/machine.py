@@ -1,6 +1,6 @@
 """A machine from the spool to the load: its quantities and the equations of its parts.
 
-Parameters are physical: arms, springs, masses, areas, oil and load. The source's equations are
+Parameters are physical: arms, springs, masses, areas, oil and load. Kruse's equations are
 Kruse (2001) 6.13-6.19 (spool), 6.31-6.35 (flow and oil), 6.34-6.38 and 6.48-6.53 (swash plate) and
 6.39-6.46 (motor and load).
 

@@ -1,4 +1,4 @@
-"""What goes beyond the source's equations: friction, hysteresis, ripple, damping, leakage, line.
+"""What goes beyond Kruse's equations: friction, hysteresis, ripple, damping, leakage, line.
 
 Each is off unless its option is on (`PumpOptions` of `swashplate.models.displacement_control`).
 docs/refinements.md says what each explains.
@@ -15,7 +15,7 @@ friction holds it, and goes on to its balance as the dither lets go.
 
 Hysteresis of the solenoids: the force lags behind the current, however slowly it moves.
 
-Ripple of the motor's cam ring: displacement that varies with the shaft's angle. The source saw 5.5
+Ripple of the motor's cam ring: displacement that varies with the shaft's angle. Kruse saw 5.5
 cycles a turn of the drum, the larger the heavier the load (sections 1.2 and 9, figures 9.2, 9.3).
 
 Damping of the swash plate: it turns towards its equilibrium instead of standing there. With a
@@ -34,7 +34,7 @@ Line between pump and motor: oil that is compressed and an inertia that has to b
     T' = k (Ω_0 - Ω - K_mL T),  J Ω' = T - C_g.
 
 T is the motor's torque, P_hi - P_lo = K_mf T (eq. 6.41); Ω_0 the speed that the pump's flow would
-give a stiff line; k = B/(K_mf² V) its stiffness felt at the shaft. The source takes the line as
+give a stiff line; k = B/(K_mf² V) its stiffness felt at the shaft. Kruse (2001) takes the line as
 stiff (k → ∞), which leaves Ω = Ω_0 - K_mL (C_g + J Ω').
 """
 
@@ -155,7 +155,7 @@ def accelerating_leakage(motor_leakage: float, load_inertia: float, Z10: float) 
 def load_leakage(tangent: float, swash_rate: float, Z12: float) -> float:
     """Speed lost to leakage while the load accelerates. [rad/s]
 
-    Z12 cos α_sw dα_sw/dt, the form that the source's own derivation gives in place of the printed
+    Z12 cos α_sw dα_sw/dt, the form that Kruse's own derivation gives in place of the printed
     one (erratum 22).
     """
     return Z12 * (swash_rate / sqrt(1.0 + tangent * tangent))

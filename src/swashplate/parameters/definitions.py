@@ -47,7 +47,7 @@ def definition_of(each: Declared, block: Block) -> Definition:
 
 
 def _collected() -> Iterator[Definition]:
-    """All parameters in the order of the source's tables, the refinements last."""
+    """All parameters in the order of Kruse's tables, the refinements last."""
     for each in declared_by(Card):
         yield definition_of(each, "control_card")
     for each in declared_by(Pump):

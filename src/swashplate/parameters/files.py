@@ -82,16 +82,16 @@ class SetFile(BaseModel):
     pump_motor: dict[str, Entry]
     model: ModelOptions = ModelOptions()
     refinements: dict[str, Entry] = {}
-    """What goes beyond the source's equations; all of it is off where it is not given."""
+    """What goes beyond Kruse's equations; all of it is off where it is not given."""
 
 
 # --- reading and writing --------------------------------------------------------------------------
 
-AXES = ("hoist", "slew", "luff")  # The source's three axes.
+AXES = ("hoist", "slew", "luff")  # Kruse's three axes.
 
 
 def preset_names() -> tuple[str, ...]:
-    """Names of the packaged sets, the source's axes first."""
+    """Names of the packaged sets, Kruse's axes first."""
     names = {path.name.removesuffix(".toml") for path in _folder("").iterdir() if path.is_file()}
     return (*AXES, *sorted(names - set(AXES) - {"__init__.py"}))
 

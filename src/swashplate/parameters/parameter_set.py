@@ -61,7 +61,7 @@ class Parameter(Result):
 
     @property
     def symbol(self) -> str:
-        """Symbol in the source, e.g. ``Z16``."""
+        """Symbol in Kruse (2001), e.g. ``Z16``."""
         return self.definition.symbol
 
     @property
@@ -101,7 +101,7 @@ class ParameterSet(Mapping[str, Parameter]):
     coulomb_sign: CoulombSign = "smooth"
     card_switch: CardSwitch = "sampled"
     rate: float | None = None
-    """Rate that the recursion of the card's filter belongs to, 512 for the source's; None is the
+    """Rate that the recursion of the card's filter belongs to, 512 for Kruse's; None is the
     filter's differential equation, whose ζ, ω and C mean the same at every rate. [Hz]"""
     options: frozenset[str] = frozenset()
     """Terms of the pump that count: of `swashplate.parameters.definitions.OPTIONS`."""
@@ -200,7 +200,7 @@ class ParameterSet(Mapping[str, Parameter]):
         return replace(self, parameters=parameters, options=self.options & own, equations=())
 
     def refuse_refinements(self, what: str) -> None:
-        """Refuse the set where a computation knows the source's equations alone.
+        """Refuse the set where a computation knows Kruse's equations alone.
 
         Parameters
         ----------

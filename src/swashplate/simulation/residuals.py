@@ -193,7 +193,7 @@ def _switched_on(parameters: ParameterSet, asked: frozenset[str]) -> ParameterSe
 OUTPUTS = ("current", "current_positive", "current_negative", "shaft_speed", "shaft_position")
 """Signals that have sensitivities."""
 PUMP_COLUMNS = tuple(name for name, path in PATHS.items() if path.startswith("pump.Z"))
-"""Columns of the pump and motor of the source."""
+"""Columns of the pump and motor of Kruse (2001)."""
 ALL_COLUMNS = (
     *PUMP_COLUMNS,
     *(name for name in PATHS if name.endswith("_plus") and name not in PUMP_COLUMNS),

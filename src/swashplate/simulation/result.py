@@ -191,7 +191,7 @@ class Simulation(Signals):
 
     @property
     def refined(self) -> bool:
-        """Whether an option beyond the source's equations is on, or the motor's constant known."""
+        """Whether an option beyond Kruse's equations is on, or the motor's constant known."""
         options = self.instance.parts[1].options
         names = ("friction", "hysteresis", "ripple", "damping", "leakage", "line")
         known = self.pump.motor_constant > 0.0

@@ -219,8 +219,8 @@ def test_a_drive_of_ones_own_says_whose_tests_it_runs() -> None:
     [
         ({"severity": "awful"}, "severity is 'awful'; it is one of clean, realistic, harsh."),
         ({"seed": -1}, "seed must be a whole number from 0 up, not -1."),
-        ({"maneuvers": []}, "A campaign needs at least one manoeuvre."),
-        ({"maneuvers": [STEP, STEP]}, "Two manoeuvres have the same name"),
+        ({"maneuvers": []}, "A campaign needs at least one maneuver."),
+        ({"maneuvers": [STEP, STEP]}, "Two maneuvers have the same name"),
         ({"maneuvers": {"a b": STEP, "a/b": STEP, "a_b": SINE}}, "would have the same file"),
         ({"channels": ("counts",)}, "There is no channel 'counts'; there are signed_current"),
         ({"channels": ()}, "channels must be one or more kinds, each once."),

@@ -1,4 +1,4 @@
-"""Test bench: manoeuvres in; logs, a campaign file and, apart, the truth out."""
+"""Test bench: maneuvers in; logs, a campaign file and, apart, the truth out."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ Array = NDArray[np.float64]
 TRIES = 100
 """Draws after which no set of parameters within the rules is expected any more."""
 COUNTS_PER_TURN = {"hoist": 400.0 * 120.0 / 19.0, "luff": 635.0 * 4.0, "slew": 81_000.0 * 7.0}
-"""Counts in a turn of the output: 2526.3, 2540 and 567,000 in the source's tables."""
+"""Counts in a turn of the output: 2526.3, 2540 and 567,000 in Kruse's tables."""
 HELD_BACK = {
     "hoist": ("step +6.5 V", "step -6.5 V", "sine 6.5 V 0.1 Hz"),
     "slew": ("sine 4 V 0.1 Hz",),
     "luff": ("step +6.5 V", "sine 6.5 V 0.1 Hz"),
 }
-"""Tests of the source kept for validation: those of middle size, within what the others excite."""
+"""Kruse's tests kept for validation: those of middle size, within what the others excite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +53,9 @@ class VirtualRun:
     """One simulated test."""
 
     name: str
-    """Of the manoeuvre."""
+    """Of the maneuver."""
     stem: str
-    """Of its file: axis and manoeuvre."""
+    """Of its file: axis and maneuver."""
     role: Literal["fit", "validate"]
     columns: Mapping[str, Array]
     """What was logged, SI: ``"time"`` [s], ``"voltage"`` [V] and the channels; NaN is an empty
@@ -82,7 +82,7 @@ class VirtualTests:
     channels: tuple[ChannelKind, ...]
     counts_per_turn: float
     runs: Mapping[str, VirtualRun]
-    """By the names of the manoeuvres, in their order."""
+    """By the names of the maneuvers, in their order."""
 
     def __repr__(self) -> str:
         return (
@@ -111,7 +111,7 @@ def run(
     drive : str or Drive
         Name of a packaged drive, or a drive: the one that a fit starts from.
     maneuvers : mapping or iterable of Maneuver, optional
-        By default the source's tests of the axis.
+        By default Kruse's tests of the axis.
     seed : int
         Not negative. The same seed gives the same logs, each of them whatever runs beside it.
     severity : {"clean", "realistic", "harsh"}
@@ -132,7 +132,7 @@ def run(
     counts_per_turn : float, optional
         Of the encoder, for one turn of the shaft; by default the axis's.
     validate : collection of str, optional
-        Names of the runs that are kept for validation; by default, of the source's tests, those of
+        Names of the runs that are kept for validation; by default, of Kruse's tests, those of
         middle size (`HELD_BACK`), and none of others.
 
     Returns
@@ -143,7 +143,7 @@ def run(
     Raises
     ------
     InputError
-        For an unknown name, a number out of range, two manoeuvres of one name, or a manoeuvre that
+        For an unknown name, a number out of range, two maneuvers of one name, or a maneuver that
         cannot be simulated at 512 Hz.
     """
     nominal = Drive.preset(drive) if isinstance(drive, str) else drive
@@ -187,7 +187,7 @@ def run(
         runs[name] = VirtualRun(name, stem, role, columns, happened)
     stems = [each.stem.lower() for each in runs.values()]
     if len(set(stems)) < len(stems):
-        raise InputError("Two manoeuvres would have the same file; give them other names.")
+        raise InputError("Two maneuvers would have the same file; give them other names.")
     return VirtualTests(
         axis,
         nominal,
@@ -213,9 +213,9 @@ def _named(
         listed = list(maneuvers)
         tests = {each.name: each for each in listed}
         if len(tests) < len(listed):
-            raise InputError("Two manoeuvres have the same name; give them in a mapping by name.")
+            raise InputError("Two maneuvers have the same name; give them in a mapping by name.")
     if not tests:
-        raise InputError("A campaign needs at least one manoeuvre.")
+        raise InputError("A campaign needs at least one maneuver.")
     return tests
 
 
@@ -285,7 +285,7 @@ def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -
     tests : VirtualTests
         What `run` simulated.
     folder : path
-        New or empty: logs as CSV, named after axis and manoeuvre, and campaign.toml. In its folder
+        New or empty: logs as CSV, named after axis and maneuver, and campaign.toml. In its folder
         ``truth`` lie truth.toml and the parameters that were simulated.
     overwrite : bool
         Allow a folder that holds something, and replace files of the same names.
@@ -350,7 +350,7 @@ def campaign_text(tests: VirtualTests) -> str:
     lines = [
         f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.",
         f"# Instruments: {tests.severity}; refinements: {refinements}; seed {tests.seed}.",
-        "# What was simulated stands in truth/truth.toml: look only after the fit.",
+        "# What was simulated stands in truth/truth.toml: open it only after the fit.",
         f"title = {toml_string(f'Virtual tests, {tests.axis}')}",
         "virtual = true",
         "",

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 Interpolation = Literal["linear", "previous"]
 
 SOURCE_RATE = 512.0
-"""Rate of the source's logs; no step is longer than one of its samples. [Hz]"""
+"""Rate of Kruse's logs; no step is longer than one of its samples. [Hz]"""
 LONGEST = 100_000_000
 """Steps that a record may take: 54 hours at 512 Hz. More is a mistake, in a unit perhaps."""
 SLOWEST, FASTEST = 10.0, 100_000.0

@@ -265,7 +265,7 @@ def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> C
 def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None) -> list[Figure]:
     """Figures of everything that was measured: a page for each axis and eight of its runs.
 
-    A row is a run: over it its name, manoeuvre, role, rate and gaps; its input and channels side by
+    A row is a run: over it its name, maneuver, role, rate and gaps; its input and channels side by
     side. A column has one unit and one scale; positions, whose zero is free, have it about the
     middle of each run. What is ignored is shaded and hatched, weights that differ stand along the
     foot with their factors, samples at the end of their instrument's range are barred, gaps in the

@@ -271,7 +271,7 @@ def _estimates(
     ]
     shown = [(each, about) for each, about in rows if None not in (each.lower, each.upper)]
     if not shown:
-        raise InputError("No unknown has an interval with two ends: there is nothing to draw.")
+        raise InputError("No parameter has an interval with two ends: there is nothing to draw.")
     reach: list[float] = []
     for place, (each, about) in enumerate(shown):
         assert each.lower is not None

@@ -197,7 +197,7 @@ def _handles(run: Compared) -> list[Line2D | Patch]:
 # --- an encoder or a position ---------------------------------------------------------------------
 
 SOURCE_RATE = 512.0
-"""Rate that the source's explicit filters are made for. [Hz]"""
+"""Rate that Kruse's explicit filters are made for. [Hz]"""
 WIDE = 2.0
 """Width of the line that lies under the staircase and must show on both sides of it. [pt]"""
 ROUGH = "#d2d2d2"
@@ -299,7 +299,7 @@ def plot_encoder(
         An encoder, or another position.
     methods : sequence of Method, optional
         How the speed is made (`campaign.speed_of`). By default all that the stamps and the
-        channel allow: the plain difference; the source's filters, in their exact form where the
+        channel allow: the plain difference; Kruse's filters, in their exact form where the
         stamps are uneven or not at 512 Hz; Savitzky and Golay's where they are even. The legend
         names them.
     window : (float, float), optional

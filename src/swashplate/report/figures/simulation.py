@@ -116,7 +116,9 @@ def plot_simulation(simulation: Simulation, *, title: str | None = None) -> Figu
         _spool(run.spool_position, run.orifice_opening, ends)._replace(
             limits=acting(Limit.ORIFICE, Limit.SPOOL)
         ),
-        Panel("stroker pressure", "Pa", (Trace(run.stroker_pressure, BLUE),), acting(Limit.RELIEF)),
+        Panel(
+            "stroking pressure", "Pa", (Trace(run.stroker_pressure, BLUE),), acting(Limit.RELIEF)
+        ),
         _swash(run.swash_angle, (pump.Z13_plus, -pump.Z13_minus))._replace(
             limits=acting(Limit.SWASH_STOP)
         ),
@@ -216,7 +218,7 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
             limits=holding(Limit.SPOOL, full.spool_hold)
         ),
         _swash(full.swash_angle, stops)._replace(limits=holding(Limit.SWASH_STOP, full.plate_hold)),
-        Panel("stroker pressure", "Pa", pressure, relief, least=1e5),
+        Panel("stroking pressure", "Pa", pressure, relief, least=1e5),
         Panel("motor\npressure drop", "Pa", drop, least=1e5),
     ]
     return _chain(panels, found.time, full.name if title is None else title)
@@ -338,7 +340,7 @@ def _differences(
 # --- many runs of several axes --------------------------------------------------------------------
 
 KINDS = ("ramp", "step", "sine")
-"""Kinds of manoeuvre in the order of their columns; others follow as they come."""
+"""Kinds of maneuver in the order of their columns; others follow as they come."""
 PANEL = 1.45
 """Height of a panel. [inch]"""
 _ROOM = 1.12
@@ -356,7 +358,7 @@ def plot_maneuvers_overview(
     Parameters
     ----------
     runs : mapping
-        Name of an axis to its runs, by names whose first word is the kind of manoeuvre: ``"step"``
+        Name of an axis to its runs, by names whose first word is the kind of maneuver: ``"step"``
         of ``"step +9 V"``. Runs of one kind are drawn over one another, each in the colour of its
         largest command; all commands are drawn to one scale.
     title : str, optional

@@ -142,7 +142,7 @@ def sensitivity_chart(found: Identifiability, shown: Sequence[bool]) -> Markup:
             bar.format(look, NAMES, top + 3.0, long),
             _text(NAMES + long + 5.0, top + 12.0, f"{found.sensitivity[k]:.3g}"),
         ]
-    words = "Change of all weighted residuals for 1 % of each unknown, logarithmic"
+    words = "Change of all weighted residuals for 1 % of each parameter, logarithmic"
     return _svg(WIDE, ROW * len(moving) + 4.0, words, parts, "chart")
 
 

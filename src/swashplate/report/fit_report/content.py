@@ -258,7 +258,7 @@ def _qualities(runs: Sequence[ShownRun], role: Role | None = None) -> list[RunQu
 
 def _agreement_section(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> Section:
     error = Column("error / range", ".1%", none=NONE)
-    columns = (Column(""), Column("run"), Column("role"), Column("manoeuvre"), Column("judged by"))
+    columns = (Column(""), Column("run"), Column("role"), Column("maneuver"), Column("judged by"))
     overview = Table("", (*columns, error, Column("why"), Column("findings")))
     for number, (run, (look, why)) in enumerate(zip(runs, run_lights(runs, findings), strict=True)):
         part = run_error(run)
@@ -351,7 +351,7 @@ def _setup_section(
         bounds = tables.bounds_table(each)
         blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
         blocks += listed_block(_stage_words(each))
-        summary = f"Bounds of {count(len(bounds.rows), 'unknown')}"
+        summary = f"Bounds of {count(len(bounds.rows), 'parameter')}"
         blocks.append(Block("details", [Block("table", bounds, "bounds")], summary))
     return Section("setup", "Configuration", blocks)
 
@@ -368,7 +368,7 @@ def _stage_words(fit: StageFit) -> list[str]:
         words += [f"Weight on {kind.replace('_', ' ')}: {_window(each)}." for each in windows]
     own = sum(each.run is not None for each in problem.unknowns)
     if own:
-        words.append(f"Besides there are {own} unknowns of single runs, bounded out of reach.")
+        words.append(f"Besides there are {own} parameters of single runs, with wide bounds.")
     return words
 
 
@@ -445,7 +445,7 @@ def _parameter_section(
         blocks.append(
             text(
                 "Truth is what was simulated, in the scales that the fit kept fixed: it was moved "
-                "to the fixed values along those directions that the tests cannot tell. Other "
+                "to the fixed values along those directions that the tests do not determine. Other "
                 "fixed parameters that are not true shift the estimates, and no interval covers "
                 f"that. {inside} of {counted} intervals hold it."
             )
@@ -454,7 +454,7 @@ def _parameter_section(
         blocks += [Block("heading", table.title, "h3"), Block("table", table, "parameters")]
         own = tables.estimates_table(each, own=True)
         if own.rows:
-            summary = f"{count(len(own.rows), 'unknown')} of single runs"
+            summary = f"{count(len(own.rows), 'parameter')} of single runs"
             blocks.append(Block("details", [Block("table", own, "parameters")], summary))
     fixed = tables.fixed_table(fit, truth)
     if fixed.rows:
@@ -464,7 +464,7 @@ def _parameter_section(
 
 def _excitation_section(assessments: Sequence[Assessment]) -> Section:
     words = (
-        "Per cent of what is known of an unknown (its squared derivatives) that comes from each "
+        "Per cent of the information on a parameter (its squared derivatives) that comes from each "
         "run, at the optimum. A row with one dark cell rests on one run."
     )
     blocks = [text(words)]
@@ -502,7 +502,7 @@ def _identifiability_section(assessments: Sequence[Assessment]) -> Section:
         except InputError as error:
             blocks.append(text(f"There are no intervals: {error}"))
         without = f"; none: {', '.join(found.unexcited)}" if found.unexcited else ""
-        words = f"Change of all weighted residuals for 1 % of each unknown{without}"
+        words = f"Change of all weighted residuals for 1 % of each parameter{without}"
         drawn = [Block("figure", charts.sensitivity_chart(found, general), words)]
         blocks.append(Block("details", drawn, "Sensitivity"))
         blocks += _correlations(each, general)
@@ -552,7 +552,7 @@ def _profile_section(fit: Fit, profiles: Sequence[StageProfile]) -> Section:
         said = [text(words, "remark") for words in given.profile.sentences(name)]
         tiles.append(Block("tile", [Block("figure", drawn, f"{name} ({given.stage})"), *said]))
     words = (
-        "The least cost with one unknown fixed, above that of the optimum; the dashed line ends "
+        "The lowest cost with one parameter fixed, above that of the optimum; the dashed line ends "
         "the interval."
     )
     blocks = [text(words), Block("tiles", tiles)] if tiles else []
