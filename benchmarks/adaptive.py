@@ -5,20 +5,20 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from swashplate.models.pump import (
+from swashplate.models.displacement_control import (
     Pump,
     PumpConstants,
     arm_sine,
     orifice_opening,
     plate_motion,
     pressure_rate,
-    shaft_speed,
     solenoid_force,
     solenoids_of,
     spool_balance,
     swash_angle,
     swash_tangent,
 )
+from swashplate.models.pump import shaft_speed
 
 Array = NDArray[np.float64]
 

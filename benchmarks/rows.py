@@ -12,8 +12,8 @@ from table import Row, duration, times
 from timing import Timing, cores_used, in_turns, one_core
 
 from swashplate import Drive, Serial, SquaredError, maneuvers
-from swashplate.equations.marching.march import Stored
 from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.pieces import addresses, run_once
 from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.run import arrays_of, march_of

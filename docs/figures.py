@@ -22,6 +22,11 @@ FIGURES = {
         "--plot what-if.png",
     ),
     "full-order.png": ("full-order hoist step:4 --plot full-order.png",),
+    "crane.png": (
+        "crane run tg3637 --slew 1 --until slew_deg=45 --variant volts --variant volts:zv-joint "
+        "--variant inverse:zv-joint --variant inverse:zv-tip --variant ideal:zv-tip "
+        "--plot crane.png",
+    ),
     "encoder.png": (
         "rig hoist --out virtual",
         "campaign plot virtual/campaign.toml --run hoist_sine_4_V_0.1_Hz --channel counts "

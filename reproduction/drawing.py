@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyBboxPatch
 
 from reproduction.content import Diagram, Figure, Panel, Role
-from swashplate.report.lines import draw, draw_broken, fit_time
+from swashplate.report.lines import draw, fit_time
 from swashplate.report.style import (
     BLUE,
     CYCLE,
@@ -132,7 +132,7 @@ def draw_panel(ax: Axes, panel: Panel, tall: float) -> None:
     for curve, color in zip(panel.curves, colors, strict=True):
         width = _WIDTHS[curve.role]
         if curve.held:
-            draw_broken(ax, curve.time, curve.values, color, held=True, width=width)
+            draw(ax, curve.time, curve.values, color, held=True, width=width)
         else:
             draw(ax, curve.time, curve.values, color, width=width)
     for level in panel.levels:

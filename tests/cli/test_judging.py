@@ -127,7 +127,8 @@ def test_the_report_is_written_again(done: Words, fitted: Fit, tmp_path: Path) -
 
 
 def test_figures_stand_beside_it(done: Words, fitted: Fit, tmp_path: Path) -> None:
-    done("report", "fitted", "virtual/campaign.toml", "--figures", "pdf", "--out", "print")
+    words = ("--figures", "pdf", "--data", "all.parquet", "--out", "print")
+    assert "Samples:   all.parquet" in done("report", "fitted", "virtual/campaign.toml", *words)
     names = sorted(each.name for each in (tmp_path / "print" / "figures").iterdir())
     assert names == ["overlay-01-hoist_step_4_V.pdf", "overlay-02-hoist_step_-5_V.pdf"]
 

@@ -25,6 +25,7 @@ from swashplate.equations.equation import interpreted, is_function
 from swashplate.equations.model import Window
 from swashplate.equations.syntax import plain
 from swashplate.models import card, full_order, machine, pump
+from swashplate.models import displacement_control as control
 
 POINTS, FEWER = 100, 30
 SLOW = 25
@@ -108,7 +109,7 @@ OWN_RANGES: dict[str, dict[str, tuple[float, float]]] = {
     "machine.mixture_modulus": {"pressure": (2e5, 1e7)},
     "full_order.stopped": {"position": (-1.0, 1.0), "lower": (-0.5, -0.2), "upper": (0.2, 0.5)},
     "library.clipped": {"lower": (-0.5, -0.2), "upper": (0.2, 0.5)},
-    "pump.swash_angle": {"tangent": (-0.5, 0.5)},
+    "control.swash_angle": {"tangent": (-0.5, 0.5)},
 }
 
 
@@ -127,7 +128,7 @@ class Draw:
     def parameter(self, name: str) -> float:
         """A value about that of a packaged set."""
         numbers = self.drive.parameters.numbers
-        usual = INSTEAD.get(name, pump.Pump._field_defaults.get(name, 0.0))
+        usual = INSTEAD.get(name, control.Pump._field_defaults.get(name, 0.0))
         value = numbers.get(name, numbers.get(f"{name}_plus", usual))
         value = usual if value == 0.0 or abs(value) == inf else value
         return value * self.uniform(0.7, 1.3)
@@ -139,7 +140,7 @@ class Draw:
             return H
         if name in ("direction", "sign"):
             return self.random.choice([1.0, -1.0])
-        if name in pump.Pump._fields or name in card.Channel._fields:
+        if name in control.Pump._fields or name in card.Channel._fields:
             return self.parameter(name)
         raise AssertionError(f"{self.name}: say in RANGES what '{name}' can be")
 
@@ -181,7 +182,7 @@ class Draw:
         """One argument after the other, each consistent with those that it follows from."""
         options = {name: self.flags(kind) for name, kind in hints.items() if name == "options"}
         known: dict[str, Any] = {"h": H, **options}
-        own = full_order.Plant if self.name.startswith("full_order.") else pump.Pump
+        own = full_order.Plant if self.name.startswith("full_order.") else control.Pump
         known["p"] = self.parameters(hints.get("p", own))
         for name in (*[n for n in ("k", "state", "inputs", "signals") if n in hints], *hints):
             if name not in known:
@@ -195,12 +196,12 @@ class Draw:
             return self.channel()
         if kind is machine.Machine:
             return self.machine()
-        if kind is pump.Solenoids:
-            return pump.Solenoids(*(self.parameter(name) for name in kind._fields))
+        if kind is control.Solenoids:
+            return control.Solenoids(*(self.parameter(name) for name in kind._fields))
         if kind is full_order.Plant:
-            solenoids = self.parameters(pump.Solenoids)
+            solenoids = self.parameters(control.Solenoids)
             return full_order.Plant(self.machine(), solenoids)
-        return pump.Pump(*(self.parameter(name) for name in pump.Pump._fields))
+        return control.Pump(*(self.parameter(name) for name in control.Pump._fields))
 
     def argument(self, name: str, kind: Any, known: dict[str, Any]) -> Any:
         p = known["p"]
@@ -232,14 +233,14 @@ class Draw:
             return kind(
                 self.number("current"), self.uniform(0.8, 1.2), self.number("load_torque"), supply
             )
-        if kind is pump.PumpConstants:
-            options = known.get("options") or self.flags(pump.PumpOptions)
+        if kind is control.PumpConstants:
+            options = known.get("options") or self.flags(control.PumpOptions)
             return interpreted(pump.pump_constants)(p, H, options)
         if kind is pump.PumpState:
             return self.pump_state(known)
         if kind is pump.PumpSignals:
             return self.pump_signals(known)
-        if kind in (machine.Machine, pump.Solenoids, full_order.Plant):
+        if kind in (machine.Machine, control.Solenoids, full_order.Plant):
             return self.parameters(kind)
         if kind is full_order.Motion:
             return kind(
@@ -268,7 +269,7 @@ class Draw:
 
     def pump_state(self, known: dict[str, Any]) -> pump.PumpState:
         k = known.get("k") or interpreted(pump.pump_constants)(
-            known["p"], H, known.get("options") or pump.PumpOptions()
+            known["p"], H, known.get("options") or control.PumpOptions()
         )
         pressures = [self.uniform(0.98 * k.lower, 0.98 * k.upper) for _ in range(2)]
         return pump.PumpState(
@@ -287,7 +288,7 @@ class Draw:
 
     def pump_signals(self, known: dict[str, Any]) -> pump.PumpSignals:
         p = known["p"]
-        options = known.get("options") or pump.PumpOptions()
+        options = known.get("options") or control.PumpOptions()
         state = known.get("state") or self.pump_state(known)
         inputs = known.get("inputs") or self.argument("inputs", pump.PumpInputs, known)
         k = known.get("k") or interpreted(pump.pump_constants)(p, H, options)

@@ -94,6 +94,7 @@ def run(folder: Path, text: str = EQUATIONS) -> dict[str, Any]:
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_kernels_are_kept_until_what_they_reach_changes(tmp_path: Path) -> None:
     first = run(tmp_path)
     assert (first["march"], first["march hits"]) == (46.0, 0)
@@ -112,6 +113,7 @@ def test_kernels_are_kept_until_what_they_reach_changes(tmp_path: Path) -> None:
     assert (constant["march"], constant["march hits"], constant["other hits"]) == (64.0, 0, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", ["empty index", "cut data", "garbage", "a changed byte"])
 def test_damaged_files_are_dropped(tmp_path: Path, damage: str) -> None:
     run(tmp_path)
@@ -232,6 +234,7 @@ def generate(folder: Path, **environment: str) -> subprocess.CompletedProcess[st
     )
 
 
+@pytest.mark.slow
 def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
     cache = str(tmp_path / "cache")
     assert generate(tmp_path, NUMBA_CACHE_DIR=cache).stdout == "(15.0, 7.0, 4.0) 0\n"
@@ -239,6 +242,14 @@ def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
     assert len(list((tmp_path / "cache" / "swashplate_generated").glob("*.py"))) == 1
 
 
+@pytest.mark.slow
+def test_kept_with_the_user_where_no_folder_is_named(tmp_path: Path) -> None:
+    home = {"HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "home" / "cache")}
+    generate(tmp_path, NUMBA_CACHE_DIR="", **home)
+    assert list((tmp_path / "home").rglob("generated/machine_*.py"))
+
+
+@pytest.mark.slow
 def test_many_workers_at_once(tmp_path: Path) -> None:
     (tmp_path / "machine.py").write_text(EQUATIONS)
     env = {**os.environ, "NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
@@ -276,6 +287,16 @@ def test_modules_that_nobody_used_lately_are_removed(tmp_path: Path) -> None:
     assert left(modules, code) == {"kept_2.py", "kept_2.march-3.py311.nbi", "tidied"}
 
 
+def test_beyond_a_size_those_go_first_that_were_not_used_for_longest(tmp_path: Path) -> None:
+    for k in range(5):
+        files(tmp_path, f"module_{k}.py", f"module_{k}.march-3.py311.nbi", age=100.0 * k)
+    tidy([tmp_path], largest=50)
+    assert left(tmp_path) == {
+        name for k in (0, 1) for name in (f"module_{k}.py", f"module_{k}.march-3.py311.nbi")
+    }
+
+
+@pytest.mark.slow
 def test_the_folder_is_tidied_once_a_day_and_use_counts(tmp_path: Path) -> None:
     modules = tmp_path / "cache" / "swashplate_generated"
     environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
@@ -296,6 +317,7 @@ def test_the_folder_is_tidied_once_a_day_and_use_counts(tmp_path: Path) -> None:
     assert own.exists()
 
 
+@pytest.mark.slow
 def test_a_function_that_moved_in_its_file_is_kept_once(tmp_path: Path) -> None:
     run(tmp_path)
     before = sorted(path.name for path in (tmp_path / "cache").rglob("machine.march-*"))

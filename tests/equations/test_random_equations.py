@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from swashplate.equations import derive, equation
 
-pytestmark = pytest.mark.interpreted
+pytestmark = [pytest.mark.interpreted, pytest.mark.slow]
 
 
 class Gains(NamedTuple):

@@ -14,8 +14,8 @@ from swashplate.equations import (
     replaced,
     simulate,
 )
+from swashplate.models.displacement_control import Pump, spool_balance, stopped_spool
 from swashplate.models.drive import drive
-from swashplate.models.pump import Pump, spool_balance, stopped_spool
 
 
 def test_a_single_model_and_no_further_parameter() -> None:

@@ -13,18 +13,19 @@ from swashplate.equations.code import FUNCTIONS
 from swashplate.equations.equation import is_function
 from swashplate.equations.syntax import plain
 from swashplate.models import card, pump
+from swashplate.models import displacement_control as control
 from swashplate.models.card import CardOptions
-from swashplate.models.pump import Pump, PumpOptions
+from swashplate.models.displacement_control import Pump, PumpOptions
 
 OPTIONS: dict[str, Any] = dict.fromkeys(("literal", "split", "steep", "symmetric"))
 CASES = [
     (pump.pump_sample, ("state.pressure", "inputs.current", "p"), PumpOptions()),
     (pump.pump_step, ("state.pressure", "signals", "p"), PumpOptions()),
-    (pump.spool_balance, ("force", "arm_sine", "p.Z4", "p.Z5", "p.Z18"), None),
-    (pump.orifice_opening, ("position", "p.Z14", "p.Z16_plus", "p.Z16_minus"), None),
-    (pump.solenoid_force, ("current", "p.Z17", "p.Z19_plus", "p.Z22_minus"), None),
-    (pump.leaky_step, ("pressure", "opening", "Z6", "Z7", "Z8", "Z9"), None),
-    (pump.pressure_rate, ("pressure", "opening", "Z6", "Z8", "Z9"), None),
+    (control.spool_balance, ("force", "arm_sine", "p.Z4", "p.Z5", "p.Z18"), None),
+    (control.orifice_opening, ("position", "p.Z14", "p.Z16_plus", "p.Z16_minus"), None),
+    (control.solenoid_force, ("current", "p.Z17", "p.Z19_plus", "p.Z22_minus"), None),
+    (control.leaky_step, ("pressure", "opening", "Z6", "Z7", "Z8", "Z9"), None),
+    (control.pressure_rate, ("pressure", "opening", "Z6", "Z8", "Z9"), None),
     (card.limited_current, ("target", "previous", "p.lim1", "p.lim2", "decay"), None),
     (card.filtered_current, ("now", "before", "steady", "p"), None),
     (card.card_sample, ("state", "p"), CardOptions()),
@@ -80,11 +81,12 @@ def test_texts_are_short(function: Any, by: tuple[str, ...], options: Any) -> No
 PRINT = """
 import sys
 from swashplate.equations import derive
+from swashplate.models import displacement_control as control
 from swashplate.models import pump
 cases = [
-    (pump.leaky_step, ("opening", "Z6", "Z7", "Z8", "Z9"), {"symmetric": None}),
-    (pump.spool_balance, ("p.Z5", "p.Z4", "force"), {}),
-    (pump.pump_step, ("state", "p"), {"options": pump.PumpOptions()}),
+    (control.leaky_step, ("opening", "Z6", "Z7", "Z8", "Z9"), {"symmetric": None}),
+    (control.spool_balance, ("p.Z5", "p.Z4", "force"), {}),
+    (pump.pump_step, ("state", "p"), {"options": control.PumpOptions()}),
 ]
 texts = [derive(f, by, options=o).texts for f, by, o in cases[:: int(sys.argv[1])]]
 print(sorted({t for each in texts for t in each.values()}))

@@ -12,9 +12,9 @@ from swashplate.equations.marching.jacobian import jacobian, residuals
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
 from swashplate.full_order import path_of
+from swashplate.models.displacement_control import Solenoids
 from swashplate.models.full_order import Substeps
 from swashplate.models.machine import Machine
-from swashplate.models.pump import Solenoids
 
 Array = np.ndarray
 

@@ -4,7 +4,7 @@ import pytest
 
 from swashplate import Drive
 from swashplate.models.card import Card, Channel
-from swashplate.models.pump import Pump
+from swashplate.models.displacement_control import Pump
 
 
 def card_of(drive: Drive) -> Card:

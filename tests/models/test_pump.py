@@ -16,8 +16,10 @@ from swashplate.equations.library import (
     small_arctangent,
     soft_threshold,
 )
+from swashplate.models import displacement_control as control
 from swashplate.models import pump as model
-from swashplate.models.pump import Pump, PumpInputs, PumpOptions
+from swashplate.models.displacement_control import Pump, PumpOptions
+from swashplate.models.pump import PumpInputs
 from swashplate.parameters import definitions
 
 H = 1.0 / 512.0
@@ -53,7 +55,7 @@ def test_arctangent_is_within_two_units_in_the_last_place(t: float) -> None:
 def test_steep_and_flat_swash_plates_give_the_same_angle(pump: Pump) -> None:
     p = pump._replace(Z13_plus=0.39, Z13_minus=0.39)
     for tangent in np.linspace(-TAN_22_5, TAN_22_5, 101):
-        assert model.swash_angle(tangent, p, None) == model.swash_angle(tangent, p, True)
+        assert control.swash_angle(tangent, p, None) == control.swash_angle(tangent, p, True)
 
 
 @interpreted
@@ -64,7 +66,7 @@ def test_spool_is_the_tangent_of_the_angles_difference(
     assume(cos(asin(a) - asin(s)) > 0.05)
     p = pump._replace(Z4=0.05, Z5=0.008, Z18=plus)
     expected = p.Z5 * tan(asin(a) - asin(s)) + plus
-    x = model.spool_balance(a * sqrt(p.Z4) / p.Z5, s, p)
+    x = control.spool_balance(a * sqrt(p.Z4) / p.Z5, s, p)
     assert x == pytest.approx(expected, rel=1e-10, abs=1e-13)
 
 
@@ -78,7 +80,7 @@ def test_spool_solves_the_force_balance(pump: Pump, a: float, s: float) -> None:
     """
     spring, d1 = 0.23, 0.008
     force = a * spring / d1
-    x = model.spool_balance(force, s, pump._replace(Z4=spring**2, Z5=d1, Z18=0.0))
+    x = control.spool_balance(force, s, pump._replace(Z4=spring**2, Z5=d1, Z18=0.0))
     moment = spring * (d1 * s + x * sqrt(1 - s * s)) / sqrt(d1**2 + x**2)
     assert moment == pytest.approx(d1 * force, rel=1e-9, abs=1e-12)
 
@@ -87,7 +89,7 @@ def test_spool_solves_the_force_balance(pump: Pump, a: float, s: float) -> None:
 def test_the_other_form_of_the_spool_takes_over_where_angles_are_large(pump: Pump) -> None:
     a, s = sin(1.2), sin(1.1)
     assert a * a + s * s > 1.0
-    x = model.spool_balance(a * sqrt(0.05) / 0.008, s, pump._replace(Z4=0.05, Z5=0.008, Z18=0.0))
+    x = control.spool_balance(a * sqrt(0.05) / 0.008, s, pump._replace(Z4=0.05, Z5=0.008, Z18=0.0))
     assert x == pytest.approx(0.008 * tan(0.1), rel=1e-12)
 
 
@@ -96,13 +98,13 @@ def test_force_keeps_the_sign_of_even_powers(pump: Pump) -> None:
     """Erratum 1: -0.5 A, dead zone 0.1: e = -0.4; 10 e + 4 e² + 2 e³ - 50 e⁴ by hand."""
     p = pump._replace(Z17=0.1, Z19_minus=10.0, Z20_minus=4.0, Z21_minus=2.0, Z22_minus=-50.0)
     expected = -4.0 + 0.64 - 0.128 - 1.28
-    assert model.solenoid_force(-0.5, p) == pytest.approx(expected, rel=1e-14)
+    assert control.solenoid_force(-0.5, p) == pytest.approx(expected, rel=1e-14)
 
 
 @interpreted
 @given(st.floats(-2.0, 2.0), st.floats(0.0, 1.0))
 def test_effective_current_is_beyond_a_symmetric_dead_zone(i: float, Z17: float) -> None:
-    found = model.effective_current(i, Z17)
+    found = control.effective_current(i, Z17)
     assert found == pytest.approx(np.sign(i) * max(abs(i) - Z17, 0.0))
     assert faded(found) == pytest.approx(found, abs=1e-30)
     assert soft_threshold(i, 0.0) == i
@@ -115,7 +117,7 @@ def test_effective_current_is_beyond_a_symmetric_dead_zone(i: float, Z17: float)
 )
 def test_opening_stops_at_the_orifices(pump: Pump, position: float, opening: float) -> None:
     p = pump._replace(Z14=3e-3, Z16_plus=2e-4, Z16_minus=3e-4)
-    assert model.orifice_opening(position, p) == opening
+    assert control.orifice_opening(position, p) == opening
 
 
 # --- stroking piston -----------------------------------------------------------------------------
@@ -127,7 +129,7 @@ def test_opening_stops_at_the_orifices(pump: Pump, position: float, opening: flo
 def test_tight_step_integrates_the_rate_exactly(opening: float, symmetric: bool | None) -> None:
     args = (0.1, 0.0, 1.6e6, 1.0e7)
     solution = solve_ivp(
-        lambda _, p: [model.pressure_rate(p[0], opening, *args, symmetric)],
+        lambda _, p: [control.pressure_rate(p[0], opening, *args, symmetric)],
         (0.0, 20 * H),
         [4e5],
         rtol=1e-11,
@@ -135,7 +137,7 @@ def test_tight_step_integrates_the_rate_exactly(opening: float, symmetric: bool 
     )
     p = 4e5
     for _ in range(20):
-        p = model.tight_step(p, opening, *args, H, symmetric)
+        p = control.tight_step(p, opening, *args, H, symmetric)
     assert p == pytest.approx(solution.y[0, -1], rel=1e-9)
 
 
@@ -144,13 +146,13 @@ def test_tight_step_integrates_the_rate_exactly(opening: float, symmetric: bool 
 def test_leaky_step_integrates_the_rate(symmetric: bool | None) -> None:
     args = (0.1, 2.0, 1.6e6, 1.0e7)
     solution = solve_ivp(
-        lambda _, p: [model.pressure_rate(p[0], -1e-4, *args, symmetric)],
+        lambda _, p: [control.pressure_rate(p[0], -1e-4, *args, symmetric)],
         (0.0, H),
         [4e5],
         rtol=1e-12,
         atol=1e-4,
     )
-    p = model.leaky_step(4e5, -1e-4, *args, H, symmetric)
+    p = control.leaky_step(4e5, -1e-4, *args, H, symmetric)
     assert p == pytest.approx(solution.y[0, -1], rel=1e-10)
 
 
@@ -158,10 +160,10 @@ def test_leaky_step_integrates_the_rate(symmetric: bool | None) -> None:
 def test_pressure_cannot_be_pumped_beyond_the_supply() -> None:
     p = 0.0
     for _ in range(5):
-        p = model.tight_step(p, 1.0, 0.0, 0.0, 1e6, 1e6, H, None)
+        p = control.tight_step(p, 1.0, 0.0, 0.0, 1e6, 1e6, H, None)
     assert p == 1e6
     for _ in range(5):
-        p = model.tight_step(p, -1.0, 0.0, 0.0, 1e6, 1e6, H, True)
+        p = control.tight_step(p, -1.0, 0.0, 0.0, 1e6, 1e6, H, True)
     assert p == -1e6
 
 

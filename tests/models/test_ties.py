@@ -7,9 +7,10 @@ import pytest
 
 from swashplate.equations import derive
 from swashplate.equations.library import faded, small_arctangent, soft_threshold
-from swashplate.models import card, pump
+from swashplate.models import card
+from swashplate.models import displacement_control as control
 from swashplate.models.card import Channel
-from swashplate.models.pump import Pump
+from swashplate.models.displacement_control import Pump
 
 pytestmark = pytest.mark.interpreted
 
@@ -37,9 +38,9 @@ def partials(
     return tuple(found.get((0, i), 0.0) for i in range(len(derived.inputs)))
 
 
-@pytest.mark.parametrize("function", [pump.effective_current, soft_threshold])
+@pytest.mark.parametrize("function", [control.effective_current, soft_threshold])
 def test_edges_of_a_dead_zone_belong_to_it(function: Any) -> None:
-    by = ("current", "Z17") if function is pump.effective_current else ("value", "width")
+    by = ("current", "Z17") if function is control.effective_current else ("value", "width")
     assert partials(function, by, 0.25, 0.25) == (0.0, 0.0)
     assert partials(function, by, -0.25, 0.25) == (0.0, 0.0)
     assert partials(function, by, 0.5, 0.25) == (1.0, -1.0)
@@ -52,9 +53,9 @@ def test_edge_of_the_solenoids_dead_zone_has_no_force_and_no_slope() -> None:
     by = ("current", "p.Z17", "p.Z19_plus", "p.Z19_minus")
     p = pump_with(Z17=0.25, Z19_plus=2.0, Z19_minus=3.0)
     for current in (0.25, -0.25):
-        assert partials(pump.solenoid_force, by, current, p) == (0.0, 0.0, 0.0, 0.0)
+        assert partials(control.solenoid_force, by, current, p) == (0.0, 0.0, 0.0, 0.0)
     p = p._replace(Z17=0.0)
-    assert partials(pump.solenoid_force, by, 0.0, p) == (2.0, -2.0, 0.0, 0.0)
+    assert partials(control.solenoid_force, by, 0.0, p) == (2.0, -2.0, 0.0, 0.0)
 
 
 def test_edge_of_the_cards_dead_zone_belongs_to_the_dead_side() -> None:
@@ -88,30 +89,30 @@ def test_a_command_that_begins_at_the_threshold_has_a_slope() -> None:
 def test_on_an_orifices_limit_the_limited_side_counts(position: float, expected: tuple) -> None:
     p = pump_with(Z14=1e-3, Z16_plus=2e-4, Z16_minus=3e-4)
     by = ("position", "p.Z14", "p.Z16_plus", "p.Z16_minus")
-    assert partials(pump.orifice_opening, by, position, p) == expected
+    assert partials(control.orifice_opening, by, position, p) == expected
 
 
 def test_where_stroke_and_orifice_coincide_the_orifice_counts() -> None:
     p = pump_with(Z14=1e-3, Z16_plus=1e-3, Z16_minus=1e-3)
     by = ("position", "p.Z14", "p.Z16_plus", "p.Z16_minus")
-    assert partials(pump.orifice_opening, by, 5e-3, p) == (0.0, 0.0, 1.0, 0.0)
+    assert partials(control.orifice_opening, by, 5e-3, p) == (0.0, 0.0, 1.0, 0.0)
 
 
 @pytest.mark.parametrize("steep", [None, True])
 def test_on_a_stop_the_stop_counts(steep: Any) -> None:
     p = pump_with(Z13_plus=0.3, Z13_minus=0.2)
     by = ("tangent", "p.Z13_plus", "p.Z13_minus")
-    assert partials(pump.swash_angle, by, 0.4, p, steep, steep=steep) == (0.0, 1.0, 0.0)
-    assert partials(pump.swash_angle, by, -0.4, p, steep, steep=steep) == (0.0, 0.0, -1.0)
+    assert partials(control.swash_angle, by, 0.4, p, steep, steep=steep) == (0.0, 1.0, 0.0)
+    assert partials(control.swash_angle, by, -0.4, p, steep, steep=steep) == (0.0, 0.0, -1.0)
     at_stop = p._replace(Z13_plus=small_arctangent(0.3))
-    assert partials(pump.swash_angle, by, 0.3, at_stop, steep, steep=steep) == (0.0, 1.0, 0.0)
+    assert partials(control.swash_angle, by, 0.3, at_stop, steep, steep=steep) == (0.0, 1.0, 0.0)
 
 
 def test_where_stop_and_relief_coincide_the_stop_counts() -> None:
     stop = tan(0.25) / 1e-6
     p = pump_with(Z1=1e-6, Z13_plus=0.25, Z13_minus=0.25, Z15=stop)
     by = ("p.Z1", "p.Z13_plus", "p.Z13_minus", "p.Z15")
-    derived = derive(pump.pressure_limits, by)
+    derived = derive(control.pressure_limits, by)
     got = derived.python(p)
     found = dict(zip(derived.entries, got[4:], strict=True))
     for output in (2, 3):
@@ -162,10 +163,10 @@ def test_without_head_the_flow_has_no_slope(symmetric: Any) -> None:
     """At δP = Z9 the root's slope is infinite; it counts as none."""
     arguments = (1e6, 1e-4, 0.1, 0.0, 1e6, 1e6, symmetric)
     by_pressure, by_supply = partials(
-        pump.pressure_rate, ("pressure", "Z9"), *arguments, symmetric=symmetric
+        control.pressure_rate, ("pressure", "Z9"), *arguments, symmetric=symmetric
     )
     assert (by_pressure, by_supply) == (0.0, 0.0)
-    assert partials(pump.head_root, ("head",), 0.0) == (0.0,)
+    assert partials(control.head_root, ("head",), 0.0) == (0.0,)
 
 
 def test_leakage_that_is_zero_has_a_derivative() -> None:
@@ -173,7 +174,7 @@ def test_leakage_that_is_zero_has_a_derivative() -> None:
     h = 1.0 / 512.0
     for pressure, opening in ((3e5, 1e-4), (-2e5, -1.5e-4), (1e5, 2e-5)):
         arguments = (pressure, opening, 0.07, 0.0, 1.65e6, 1.07e7, h)
-        (tight,) = partials(pump.tight_step, ("Z7",), *arguments, None, symmetric=None)
-        (leaky,) = partials(pump.leaky_step, ("Z7",), *arguments, None, symmetric=None)
+        (tight,) = partials(control.tight_step, ("Z7",), *arguments, None, symmetric=None)
+        (leaky,) = partials(control.leaky_step, ("Z7",), *arguments, None, symmetric=None)
         assert tight == pytest.approx(leaky, rel=1e-3)
         assert tight != 0.0

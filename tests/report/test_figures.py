@@ -22,7 +22,7 @@ from swashplate.analysis import (
 )
 from swashplate.full_order.comparison import compare
 from swashplate.report import figures
-from swashplate.report.lines import MOST_POINTS, MOST_RUNS, SHADES
+from swashplate.report.lines import COLUMNS, MOST_SPANS, SHADES
 from swashplate.units import shown_in
 
 LEVERS = ("orifice", "pump", "relief")
@@ -189,8 +189,8 @@ def test_an_hour_is_drawn_by_few_points_and_few_spans(hoist: Drive) -> None:
     run = hoist.simulate(8.0 * np.sin(0.2 * time) + 1.5 * np.sin(20.0 * time))
     figure = figures.plot_simulation(run)
     for panel, ax in enumerate(figure.axes):
-        assert max(len(line.get_xdata()) for line in ax.lines) <= MOST_POINTS + 4
-        assert all(len(spans) <= MOST_RUNS for spans in shades(figure, panel).values())
+        assert max(len(line.get_xdata()) for line in ax.lines) <= 2 * COLUMNS + 4
+        assert all(len(spans) <= MOST_SPANS for spans in shades(figure, panel).values())
     assert lines(figure, 5)[0].max() == pytest.approx(DEGREE * run.shaft_speed.max())
 
 

@@ -4,12 +4,14 @@ import json
 import re
 import shutil
 import subprocess
+import zlib
 from base64 import b64decode
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 from swashplate import Campaign, Channel, Drive, FileError, InputError, maneuvers
@@ -25,7 +27,7 @@ from swashplate.identification.solving import StartResult
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.tables import ignored_words
 from swashplate.identification.validation import Measures, predict, run_qualities
-from swashplate.report.figures import plot_overlay, save_fit_figures, save_run_figures
+from swashplate.report.figures import plot_fit, plot_overlay, save_fit_figures, save_run_figures
 from swashplate.report.fit_report import print_report, write_fit_report, write_validation_report
 from swashplate.report.fit_report.runs import (
     Shown,
@@ -34,6 +36,7 @@ from swashplate.report.fit_report.runs import (
     predicted_runs,
     run_data,
     shown_runs,
+    write_samples,
 )
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
@@ -182,6 +185,18 @@ def read(page: Path) -> Page:
     return Page(page.read_text("utf-8"))
 
 
+@pytest.fixture
+def write(tmp_path: Path, campaign: Campaign, fitted: Fit, assessments):
+    """Write the report of the fit with other entries; what stands in it."""
+
+    def written(**entries) -> Page:
+        entries = {"fit": fitted, "campaign": campaign, "assessments": assessments, **entries}
+        write_fit_report(path=tmp_path / "fit.html", **entries)
+        return Page((tmp_path / "fit.html").read_text("utf-8"))
+
+    return written
+
+
 def number(text: str) -> float:
     """A table's number: true minus, power of ten apart, unit behind."""
     plain_text = text.replace("−", "-").replace(",", "")
@@ -219,6 +234,10 @@ def test_fixed_parameters_are_listed_and_free_ones_are_not(read: Page) -> None:
     assert not set(fixed) & {"G1_plus", "G1_minus", "omega_plus", "omega_minus", "Z10"}
     assert fixed["Z12"]["why, as far as can be told"] == "0: this effect is left out"
     assert fixed["Z14"]["why, as far as can be told"] == "inactive: no test reaches it"
+    # in the units that people read, the number with its unit
+    stop = Drive.preset("hoist").parameters.numbers["Z14"]
+    assert fixed["Z14"]["unit"] == "mm"
+    assert number(fixed["Z14"]["value"]) == pytest.approx(1e3 * stop, rel=1e-4)
 
 
 def test_rmse_and_fit_of_a_run_are_recomputed(read: Page, fitted: Fit) -> None:
@@ -248,12 +267,6 @@ def test_initial_state_and_ignored_windows_stand_beside_every_fit_percent(
     assert all("initial state rest" in each and "ignored:" in each for each in beside)
 
 
-def test_a_run_that_was_held_out_is_marked(read: Page, campaign: Campaign) -> None:
-    (held,) = campaign.select(role="validate")
-    roles = {row["run"]: row["role"] for row in read.rows("agreement")}
-    assert [name for name, role in roles.items() if role == "validate"] == [held.name]
-
-
 def test_a_position_is_judged_by_its_speed_too(read: Page) -> None:
     channels = {row["channel"] for row in read.rows("agreement")}
     assert channels == {"current", "counts", "speed from counts"}
@@ -261,17 +274,10 @@ def test_a_position_is_judged_by_its_speed_too(read: Page) -> None:
 
 
 def unpacked(found: dict) -> np.ndarray:
-    """Numbers of `runs.packed`, read bit by bit as its docstring says."""
-    bits = iter(np.unpackbits(np.frombuffer(b64decode(found["code"]), np.uint8)).tolist())
-    values = []
-    for row in range(found["size"]):
-        if row % 256 == 0:
-            k = int("".join(str(next(bits)) for _ in range(5)), 2)
-        zeros = next(place for place, bit in enumerate(bits) if bit)
-        length, high = (32, 0) if zeros == 24 else (k, zeros << k)
-        number = high + int("0" + "".join(str(next(bits)) for _ in range(length)), 2)
-        values.append(number // 2 if number % 2 == 0 else -(number + 1) // 2)
-    whole = np.array(values, dtype=float)
+    """Numbers of `runs.packed`, read as its docstring says."""
+    planes = np.frombuffer(zlib.decompress(b64decode(found["code"])), np.uint8)
+    number = (256.0 ** np.arange(4)) @ planes.reshape(4, found["size"])
+    whole = np.where(number % 2, -(number + 1) / 2, number / 2)
     for _ in range(found["order"]):
         whole = np.cumsum(whole)
     return found["zero"] + found["step"] * whole
@@ -281,7 +287,7 @@ def unpacked(found: dict) -> np.ndarray:
     ("values", "step"),
     [
         (np.sin(np.arange(3000) / 50.0), None),
-        (np.random.default_rng(0).standard_cauchy(1000), 0.1),  # some take all 32 bits
+        (np.random.default_rng(0).standard_cauchy(1000), 0.1),  # some take all four bytes
         (np.arange(600) / 512.0, 1.0 / 512.0 / 16.0),
         (np.full(300, 7.0), None),
         (np.array([3.0]), None),
@@ -302,6 +308,21 @@ def test_samples_of_a_run_are_in_the_page(read: Page, fitted: Fit) -> None:
     rms = float(np.sqrt(np.mean(residual**2)))
     error = measured - experiment["current"].values
     assert float(np.abs(error).max()) < rms / 16.0
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_every_sample_can_be_had_as_a_table(tmp_path, assessments, validation, ending: str) -> None:
+    path = tmp_path / f"samples.{ending}"
+    write_samples(shown_runs(assessments, validation), path)
+    table = pl.read_csv(path) if ending == "csv" else pl.read_parquet(path)
+    assert {*table["channel"]} == {"current", "counts", "speed from counts"}
+    (held,) = validation
+    own = table.filter(role="validate", run=held.experiment.name, channel="current")
+    np.testing.assert_allclose(own["measured"], held.experiment["current"].values)
+    np.testing.assert_allclose(own["simulated"], held.simulated)
+    np.testing.assert_allclose(own["time"], held.experiment["current"].time)
+    ignored = table.filter(role="fit", channel="current", weight=0.0)
+    assert 0.0 < ignored["time"].max() < 0.5
 
 
 def test_a_long_run_costs_few_bytes(validation) -> None:
@@ -350,29 +371,12 @@ def test_virtual_tests_are_called_that(read: Page) -> None:
     assert "measured simulated residual" not in " ".join(read.words.split())
 
 
-def test_hostile_names_stay_text(tmp_path, campaign, fitted, assessments, validation) -> None:
+def test_hostile_names_stay_text(write, campaign: Campaign, validation) -> None:
     held = [replace(each, experiment=replace(each.experiment, name=HOSTILE)) for each in validation]
-    path = tmp_path / "fit.html"
-    write_fit_report(
-        fitted,
-        replace(campaign, title=HOSTILE),
-        path,
-        assessments=assessments,
-        validation=held,
-        notes={HOSTILE: HOSTILE},
-    )
-    text = path.read_text("utf-8")
-    assert HOSTILE not in text
-    tags = Page(text).tags
-    assert not [tag for tag, _ in tags if tag == "img"]
-    assert not [attributes for _, attributes in tags if "onerror" in attributes]
-    assert HOSTILE in Page(text).words
-
-
-def test_without_validation_it_says_so(tmp_path, campaign, fitted, assessments) -> None:
-    path = tmp_path / "fit.html"
-    write_fit_report(fitted, campaign, path, assessments=assessments)
-    assert "No run was held out" in path.read_text("utf-8")
+    named = replace(campaign, title=HOSTILE)
+    page = write(campaign=named, validation=held, notes={HOSTILE: HOSTILE})
+    assert HOSTILE in page.words
+    assert not [tag for tag, of in page.tags if tag == "img" or "onerror" in of]
 
 
 def test_the_headline_is_the_verdict(read: Page, assessments, validation) -> None:
@@ -380,13 +384,10 @@ def test_the_headline_is_the_verdict(read: Page, assessments, validation) -> Non
     assert judged.headline in read.words
 
 
-def test_truth_stands_beside_the_estimates(
-    tmp_path: Path, campaign, fitted, assessments, read: Page
-) -> None:
+def test_truth_stands_beside_the_estimates(write, assessments, read: Page) -> None:
     truth = Drive.preset("hoist").replace(omega=(75.0, 80.0), G1=(0.051, 0.056)).parameters
-    path = tmp_path / "fit.html"
-    write_fit_report(fitted, campaign, path, assessments=assessments, truth=truth)
-    page = Page(path.read_text("utf-8"))
+    page = write(truth=truth)
+    assert "No run was held out" in page.words
     assert "truth" not in read.rows("parameters")[0]
     row = next(row for row in page.rows("parameters") if row["name"] == "G1_plus")
     assert number(row["truth"]) == pytest.approx(0.051, rel=1e-4)
@@ -434,14 +435,13 @@ def test_the_first_screen_is_for_the_owner(read: Page, fitted: Fit, validated: P
     assert "Change first:" in read.words
 
 
-def test_each_run_has_a_light_and_links(read: Page, tmp_path, campaign, fitted, validation) -> None:
+def test_each_run_has_a_light_and_links(read: Page, write, validation) -> None:
     rows = read.rows("overview")
     assert [row["role"] for row in rows] == ["fit", "fit", "validate"]
+    assert rows[-1]["run"] == validation[0].experiment.name
     (held,) = validation
     wrong = replace(held, simulated=0.0 * held.simulated, measures=Measures(10, 1.0, 1.0))
-    path = tmp_path / "fit.html"
-    write_fit_report(fitted, campaign, path, validation=[wrong])
-    page = Page(path.read_text("utf-8"))
+    page = write(validation=[wrong])
     lights = [of["class"] for tag, of in page.tags if tag == "span" and of.get("role") == "img"]
     assert lights[0] == "light bad"  # of the verdict
     assert lights[-1] == "light bad"
@@ -462,24 +462,13 @@ def test_shares_of_the_runs_add_up(read: Page) -> None:
     assert "G1_minus: no run depends on it" in read.words
 
 
-def test_cross_validation_has_a_section(tmp_path: Path, campaign, fitted, assessments) -> None:
+def test_cross_validation_has_a_section(write, fitted: Fit) -> None:
     held = HeldRun("a", "step +4 V", "current", "A", Measures(10, 0.05, 0.5), 0.2)
     folds = tuple(
-        Fold(
-            number,
-            (f"run {number}",),
-            (FoldEstimate("card", "G1_plus", "A/V", value),),
-            (),
-            (held,),
-            True,
-            "",
-        )
-        for number, value in enumerate((0.05, 0.06))
+        Fold(number, ("a",), (FoldEstimate("card", "G1_plus", "A/V", v),), (), (held,), True, "")
+        for number, v in enumerate((0.05, 0.06))
     )
-    path = tmp_path / "fit.html"
-    found = CrossValidation(0, 2, folds)
-    write_fit_report(fitted, campaign, path, assessments=assessments, folds=found)
-    page = Page(path.read_text("utf-8"))
+    page = write(folds=CrossValidation(0, 2, folds))
     (row,) = page.rows("held-out")
     assert (row["fit %"], row["RMSE held out"], row["unit"]) == ("90.00", "50", "mA")
     assert [each[0] for each in page.tables["folds"][1:]] == ["1", "2"]
@@ -490,12 +479,11 @@ def test_cross_validation_has_a_section(tmp_path: Path, campaign, fitted, assess
     assert "Cross-validation" in page.words
 
 
-def test_starts_of_each_stage_are_drawn(tmp_path: Path, campaign, fitted, assessments) -> None:
+def test_starts_of_each_stage_are_drawn(write, fitted: Fit) -> None:
     first, second = fitted.stages
-    searched = replace(fitted, stages=(replace(first, starts=STARTS), second))
-    path = tmp_path / "fit.html"
-    write_fit_report(searched, campaign, path)
-    page = Page(path.read_text("utf-8"))
+    page = write(
+        fit=replace(fitted, stages=(replace(first, starts=STARTS), second)), assessments=None
+    )
     assert "card: 2 of 4 starts reached the best cost, 3." in page.words
     assert "1 left the model's domain" in page.words
     assert sum(tag == "circle" for tag, _ in page.tags) == 3
@@ -514,7 +502,9 @@ def validated(tmp_path_factory, campaign: Campaign, fitted: Fit) -> Path:
 def test_a_validation_has_no_fit(validated: Path, campaign: Campaign, fitted: Fit) -> None:
     page = Page(validated.read_text("utf-8"))
     assert HOSTILE not in validated.read_text("utf-8")
-    assert set(page.tables) == {*("numbers", "overview", "agreement", "residuals", "data", "notes")}
+    assert set(page.tables) == {
+        *("numbers", "overview", "agreement", "residuals", "criteria", "data", "notes")
+    }
     roles = {row["run"]: row["role"] for row in page.rows("agreement")}
     assert roles == {each.name: each.role for each in campaign}
     predicted = predict(fitted.parameters, campaign.experiments)
@@ -528,26 +518,36 @@ def test_figures_of_a_validation(tmp_path: Path, campaign: Campaign, fitted: Fit
 
 
 def test_a_page_that_cannot_be_written_leaves_the_old_one(
-    tmp_path, campaign, fitted, assessments
+    tmp_path: Path, write, campaign: Campaign, fitted: Fit, assessments
 ) -> None:
     with pytest.raises(FileError, match="cannot be written"):
-        write_fit_report(
-            fitted, campaign, tmp_path / "no folder" / "fit.html", assessments=assessments
-        )
-    path = tmp_path / "fit.html"
-    path.write_text("old")
+        write_fit_report(fitted, campaign, tmp_path / "none" / "fit.html", assessments=assessments)
+    (tmp_path / "fit.html").write_text("old")
     with pytest.raises(InputError, match="one assessment for each stage"):
-        write_fit_report(fitted, campaign, path, assessments=assessments[:1])
-    assert path.read_text() == "old"
-    assert [each.name for each in tmp_path.iterdir()] == ["fit.html"]
-
-
-def test_a_profile_of_no_stage_is_refused(tmp_path, campaign, fitted, assessments) -> None:
+        write(assessments=assessments[:1])
     profile = StageProfile("brake", Profile(0, 1.0, (), 1.0, None, None, ("open", "open"), None))
     with pytest.raises(InputError, match="'brake' belongs to no stage; there are card, pump"):
-        write_fit_report(
-            fitted, campaign, tmp_path / "f.html", assessments=assessments, profiles=[profile]
-        )
+        write(profiles=[profile])
+    assert [each.read_text() for each in tmp_path.iterdir()] == ["old"]
+
+
+def test_a_fit_at_a_glance(assessments, fitted: Fit) -> None:
+    values = {name: v for each in fitted.stages for name, v in each.values.items()}
+    about = {"G1_plus": 2.0 * values["G1_plus"], "Z10": values["Z10"]}
+    run = next(each for each in assessments[1].runs if each.channel == "counts")
+    speed, command, estimates = plot_fit(run, assessments, about).axes
+    measured, simulated = (line.get_ydata() for line in speed.lines)
+    np.testing.assert_allclose(measured, np.degrees(run.experiment["counts"].values))
+    np.testing.assert_allclose(simulated, np.degrees(run.simulated))
+    assert command.get_ylabel() == "voltage (V)"
+    assert [text.get_text() for text in estimates.get_yticklabels()] == ["G1_plus", "Z10"]
+    bars = [line for line in estimates.lines if len(line.get_xdata()) == 2]
+    # half of twice itself, and itself
+    assert np.mean(bars[0].get_xdata()) == pytest.approx(-50.0, abs=1.0)
+    assert np.mean(bars[1].get_xdata()) == pytest.approx(0.0, abs=1.0)
+    assert bars[0].get_color() != bars[1].get_color()
+    with pytest.raises(InputError, match="nothing to draw"):
+        plot_fit(run, assessments, {})
 
 
 @pytest.mark.parametrize("kind", ["svg", "pdf"])
@@ -617,8 +617,9 @@ def browsed(tmp_path: Path):
 
 
 def test_the_page_renders_and_zooms_in_a_browser_without_errors(
-    page: Path, tmp_path: Path, fitted: Fit, browsed
+    page: Path, validated: Path, tmp_path: Path, fitted: Fit, browsed
 ) -> None:
+    assert browsed(validated).count('data-drawn="yes"') == 4
     zoomed = tmp_path / "zoomed.html"
     zoomed.write_text(page.read_text("utf-8").replace("</body>", ZOOM), "utf-8")
     made = browsed(zoomed)
@@ -652,10 +653,6 @@ def test_without_a_browser_it_says_so(page: Path, tmp_path: Path, monkeypatch) -
     with pytest.raises(FileError, match=r"No browser was found .* install Chromium"):
         print_report(page, tmp_path / "fit.pdf")
     assert not list(tmp_path.glob("*.pdf"))
-
-
-def test_a_validation_renders_in_a_browser_without_errors(validated: Path, browsed) -> None:
-    assert browsed(validated).count('data-drawn="yes"') == 4
 
 
 def test_ignored_windows_in_words(fitted: Fit) -> None:

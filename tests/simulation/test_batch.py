@@ -8,8 +8,8 @@ from numba import config, njit
 
 from swashplate import Drive, InputError, ParameterError, SquaredError
 from swashplate.equations.marching.lanes import lanes_of
+from swashplate.models.displacement_control import PumpOptions
 from swashplate.models.drive import pump_drive
-from swashplate.models.pump import PumpOptions
 
 
 @pytest.mark.traced

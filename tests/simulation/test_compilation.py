@@ -10,6 +10,8 @@ import pytest
 
 import swashplate
 
+pytestmark = pytest.mark.slow
+
 SCRIPT = """
 import numpy as np
 from swashplate import Drive
@@ -52,7 +54,7 @@ def test_a_changed_equation_is_never_answered_from_the_cache(package: Path) -> N
 
     # an equation that the march inlines changes, at the same length and with the same time stamp,
     # which is all that Numba itself would look at
-    component = package / "models" / "pump.py"
+    component = package / "models" / "displacement_control.py"
     stat = component.stat()
     text = component.read_text("utf-8")
     assert "gain = 0.25 * Z8 * h" in text

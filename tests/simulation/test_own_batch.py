@@ -155,6 +155,7 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
         many(output="position", to=tmp_path / "file")
 
 
+@pytest.mark.slow
 def test_executors_give_the_same(tmp_path: Path) -> None:
     """Of a packaged model, which other processes can import."""
     hoist = Drive.preset("hoist")

@@ -1,16 +1,19 @@
 """A drive with an equation of one's own has all that a drive has."""
 
 import pickle
+from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import numpy as np
 import pytest
 
-from swashplate import Drive, InputError, ParameterError, maneuvers
+from swashplate import Campaign, Drive, InputError, ParameterError, maneuvers
 from swashplate.analysis import envelope
 from swashplate.equations import Definition, equation
+from swashplate.identification import fit, load_setup
 from swashplate.models.card import Channel, steady_current
-from swashplate.models.pump import Pump, shaft_speed, spool_balance
+from swashplate.models.displacement_control import Pump, spool_balance
+from swashplate.models.pump import shaft_speed
 
 RATE = 512.0
 COMMAND = maneuvers.sine(4.0, 0.8, start=0.05, length=1.5, settle=0.3).sample(RATE)
@@ -118,6 +121,49 @@ def test_the_cards_equations_can_be_replaced() -> None:
     assert drive.linearize(4.0).gain == pytest.approx(slope, rel=1e-5)
     batch = drive.simulate_many({"Z10": [12.0, PLAIN["Z10"].value]}, voltage=np.full(2048, 4.0))
     assert np.array_equal(batch.output[1], run.shaft_speed)
+
+
+CAMPAIGN = """
+[axes.hoist]
+time = { column = "time", unit = "s" }
+input = { kind = "voltage", column = "u", unit = "V", interpolation = "linear" }
+channels.ammeter = { kind = "signed_current", column = "i", unit = "A" }
+
+[[runs]]
+file = "test.csv"
+"""
+SETUP = """
+title = "map"
+
+[[stages]]
+name = "map"
+part = "card"
+channels = ["signed_current"]
+
+[stages.free]
+G1 = { relative = [0.5, 2.0] }
+"""
+
+
+@equation
+def proportional(command: float, share: float, p: Channel) -> float:
+    """A card without jump, whose dead zone lies at zero."""
+    return p.G1 * max(command, 0.0)
+
+
+def test_a_replaced_equation_of_the_card_goes_into_stepper_and_fit(tmp_path: Path) -> None:
+    truth = PLAIN.at_every_rate().with_equation(steady_current, proportional).replace(G1=0.08)
+    run = truth.simulate(COMMAND)
+    stepper = truth.stepper(1.0 / RATE)
+    assert [stepper.step(volts).shaft_speed for volts in COMMAND] == run.shaft_speed.tolist()
+    table = np.column_stack([run.time, COMMAND, run.current])
+    np.savetxt(tmp_path / "test.csv", table, "%.17g", ",", header="time,u,i", comments="")
+    (tmp_path / "campaign.toml").write_text(CAMPAIGN)
+    tests = Campaign.from_toml(tmp_path / "campaign.toml")
+    (tmp_path / "setup.toml").write_text(SETUP)
+    found = fit(truth.replace(G1=0.06), tests, load_setup(tmp_path / "setup.toml"))
+    assert found.drive["G1"].value.plus == pytest.approx(0.08, rel=1e-6)
+    assert found.drive["G1"].value.minus == pytest.approx(0.08, rel=1e-6)
 
 
 class Unnamed(NamedTuple):

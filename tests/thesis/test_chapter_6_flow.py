@@ -11,9 +11,10 @@ import sympy as sp
 from swashplate import Drive, PhysicalSet, maneuvers
 from swashplate.equations.equation import interpreted
 from swashplate.equations.fields import made
-from swashplate.models import machine, pump
+from swashplate.models import displacement_control as control
+from swashplate.models import machine
+from swashplate.models.displacement_control import Pump
 from swashplate.models.machine import Machine
-from swashplate.models.pump import Pump
 
 A_A, A_S, rho, C_d, k = sp.symbols("A_A A_S rho C_d k", positive=True)
 supply, tank, port_a, port_b = sp.symbols("supply tank port_a port_b", real=True)
@@ -21,9 +22,9 @@ speed_wide, speed_narrow = sp.symbols("speed_wide speed_narrow", positive=True)
 P, Delta, x = sp.symbols("P Delta_P x", real=True)
 
 oil_pressure_rate = interpreted(machine.oil_pressure_rate)
-orifice_opening = interpreted(pump.orifice_opening)
+orifice_opening = interpreted(control.orifice_opening)
 piston_speed = interpreted(machine.piston_speed)
-flow_head = interpreted(pump.flow_head)
+flow_head = interpreted(control.flow_head)
 valve_flow = interpreted(machine.valve_flow)
 valve_opening = interpreted(machine.valve_opening)
 

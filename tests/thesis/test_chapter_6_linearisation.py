@@ -9,7 +9,7 @@ import sympy as sp
 from swashplate import Drive
 from swashplate.equations import derive
 from swashplate.equations.fields import made
-from swashplate.models.pump import Pump, pressure_rate, spool_balance
+from swashplate.models.displacement_control import Pump, pressure_rate, spool_balance
 
 d1, d3, d4, k_f, A_s, k_r, C_o, B, V = sp.symbols("d1 d3 d4 k_f A_s k_r C_o B V", positive=True)
 F, plate, rise, x, Delta, P0 = sp.symbols("F alpha_sw delta_P x_eff Delta_P P0", real=True)

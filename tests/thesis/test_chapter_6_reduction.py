@@ -12,19 +12,20 @@ from swashplate import Drive, maneuvers
 from swashplate.equations.equation import interpreted
 from swashplate.equations.fields import made
 from swashplate.full_order import QUANTITIES, FullOrderDrive, PhysicalSet
-from swashplate.models import machine, pump
+from swashplate.models import displacement_control as control
+from swashplate.models import machine
+from swashplate.models.displacement_control import Pump
 from swashplate.models.machine import Machine
-from swashplate.models.pump import Pump
 from swashplate.parameters import CATALOGUE
 
 holding_pressure = interpreted(machine.holding_pressure)
 static_pressure = interpreted(machine.static_pressure)
-orifice_opening = interpreted(pump.orifice_opening)
-pressure_rate = interpreted(pump.pressure_rate)
-solenoid_force = interpreted(pump.solenoid_force)
-swash_angle = interpreted(pump.swash_angle)
-swash_rate = interpreted(pump.swash_rate)
-swash_tangent = interpreted(pump.swash_tangent)
+orifice_opening = interpreted(control.orifice_opening)
+pressure_rate = interpreted(control.pressure_rate)
+solenoid_force = interpreted(control.solenoid_force)
+swash_angle = interpreted(control.swash_angle)
+swash_rate = interpreted(control.swash_rate)
+swash_tangent = interpreted(control.swash_tangent)
 
 A_s, A_p, B, V, k_r, d4, d5 = sp.symbols("A_s A_p B V k_r d4 d5", positive=True)
 C_o, K_L, K, C_g, Delta, P0 = sp.symbols("C_o K_L K_mf C_g Delta_P P0", positive=True)

@@ -10,9 +10,10 @@ from swashplate import Drive
 from swashplate.equations.equation import interpreted
 from swashplate.equations.fields import made
 from swashplate.full_order import PhysicalSet
-from swashplate.models import machine, pump
+from swashplate.models import displacement_control as control
+from swashplate.models import machine
+from swashplate.models.displacement_control import Pump
 from swashplate.models.machine import Machine
-from swashplate.models.pump import Pump
 
 d1, d3, J_fa, m_sp, k_f = sp.symbols("d1 d3 J_fa m_sp k_f", positive=True)
 x, xd, xdd, F = sp.symbols("x xd xdd F", real=True)
@@ -20,11 +21,11 @@ a, ad, add = sp.symbols("alpha alpha_d alpha_dd", real=True)
 b, bd, bdd = sp.symbols("beta beta_d beta_dd", real=True)
 Z4, Z5 = sp.symbols("Z4 Z5", positive=True)
 
-arm_sine = interpreted(pump.arm_sine)
+arm_sine = interpreted(control.arm_sine)
 feedback_moment = interpreted(machine.feedback_moment)
 feedback_sine = interpreted(machine.feedback_sine)
 spool_acceleration = interpreted(machine.spool_acceleration)
-spool_balance = interpreted(pump.spool_balance)
+spool_balance = interpreted(control.spool_balance)
 spool_inertia = interpreted(machine.spool_inertia)
 
 PUMP = made(Pump, Drive.preset("hoist").parameters.numbers)

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive
-from swashplate.equations.marching.march import Stored
+from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Instance, Part, observe_kernel
-from swashplate.models.pump import PumpOptions
+from swashplate.models.displacement_control import PumpOptions
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result, Tabular, short
 from swashplate.simulation.instance import instance_of

@@ -18,6 +18,7 @@ from swashplate.__about__ import __version__
 from swashplate.cli import (
     advise,
     campaign,
+    crane,
     doctor,
     fit,
     full_order,
@@ -61,6 +62,7 @@ Examples:
   swashplate limits fitted/drive.toml step:9          what limits it
   swashplate whatif hoist --scale orifice=1.5 --maneuver step:9
   swashplate full-order hoist step:9                  is one state enough
+  swashplate crane run tg3637 --slew 1 --until slew_deg=45
   swashplate demo                                     everything at once
 
 Files are written in SI, whole or not at all. What is wrong is said in one
@@ -134,6 +136,7 @@ for name, panel, function, examples in (
     ("linearize", "Understand", linear.linearize, linear.LINEARIZE_EXAMPLES),
     ("bode", "Understand", linear.bode, linear.BODE_EXAMPLES),
     ("full-order", "Understand", full_order.full_order, full_order.EXAMPLES),
+    ("crane", "Understand", crane.app, ""),
     ("doctor", "This installation", doctor.doctor, doctor.EXAMPLES),
 ):
     if isinstance(function, typer.Typer):

@@ -45,6 +45,7 @@ from swashplate.cli.words import (
 )
 from swashplate.errors import InputError
 from swashplate.tables import (
+    TABLE,
     Form,
     check_folder,
     check_place,
@@ -521,6 +522,13 @@ def report(
     ] = None,
     pdf: PrintedReport = None,
     figures: PrintFigures = None,
+    data: Annotated[
+        Path | None,
+        option(
+            "Write all samples, measured and simulated, as one table: .csv or .parquet.",
+            metavar="FILE",
+        ),
+    ] = None,
     truth: Annotated[
         str | None,
         option(
@@ -537,7 +545,12 @@ def report(
     """
     from swashplate.campaign import Campaign
     from swashplate.identification.assessment import judge_stored
+    from swashplate.report.fit_report import shown_runs, write_samples
 
+    if data is not None:
+        ending(data, TABLE)
+        check_place(data)
+        check_free(data)
     folder = fitted if fitted.is_dir() else fitted.parent
     if out is not None and out != folder:  # the fit's own report is written again
         check_free(out / "report.html")
@@ -558,6 +571,9 @@ def report(
     place = made_folder(out or folder)
     for line in _shown(found, place, pdf=pdf, figures=figures, truth=true):
         note(line)
+    if data is not None:
+        write_samples(shown_runs(found.assessments, found.predicted), data)
+        note(f"Samples:   {data}")
     say(found.verdict.headline)
 
 

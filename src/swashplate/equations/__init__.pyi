@@ -14,15 +14,15 @@ from .library import soft_threshold as soft_threshold
 from .loops import interpolate as interpolate
 from .loops import repeated as repeated
 from .loops import root as root
-from .marching.jacobian import state_paths as state_paths
 from .marching.lanes import report as report
 from .marching.use import Run as Run
 from .marching.use import instance_of as instance_of
-from .marching.use import parameter_paths as parameter_paths
 from .marching.use import sensitivities as sensitivities
 from .marching.use import simulate as simulate
 from .model import Model as Model
 from .model import Tap as Tap
 from .model import Window as Window
 from .model import join as join
+from .model import parameter_paths as parameter_paths
+from .model import state_paths as state_paths
 from .replacement import replaced as replaced

@@ -58,20 +58,10 @@ def derived_function(
     *,
     chained: bool = False,
 ) -> Derived:
-    """The function of some results of straight code, with their derivatives.
+    """The function of some results of ruled straight code, with their derivatives.
 
-    Parameters
-    ----------
-    name, says : str
-        Name of the function, perhaps with `UNNAMED` in it, and its docstring.
-    formals : sequence of str
-        Its arguments.
-    code : Code
-        Ruled.
-    results : sequence of (str, Node)
-        Paths and nodes of what it returns.
-    by : sequence of (str, str)
-        Paths of what is differentiated by, and the names of them in the code.
+    `formals` are its arguments, `results` and `by` paths of what is returned and differentiated by,
+    with nodes and names of them in the code; `name` may have `UNNAMED` in it.
     """
     found = Derivatives(code, [n for _, n in results], [n for _, n in by], chained=chained)
     values = [node for _, node in results]
@@ -89,28 +79,12 @@ def derived_function(
 
 
 class Derivatives:
-    """Some results of straight code with their derivatives, as straight code.
+    """Some results of ruled straight code with their derivatives by some names, as straight code.
 
-    Parameters
-    ----------
-    code : Code
-        Ruled.
-    results : sequence of Node
-        What is differentiated.
-    by : sequence of str
-        Names of what it is differentiated by.
-    chained : bool
-        Whether a result that others follow is swept once: their adjoints end at it, and go on with
-        its derivatives. That is shorter where the results are links of one chain.
-
-    Attributes
-    ----------
-    items : list of Item
-        What leads to the results and their derivatives.
-    entries, partials : tuple of (int, int), list of Node
-        Numbers of result and name of each derivative that is not structurally zero, and what it is.
-    hints : dict
-        Names for expressions, should they need one.
+    `chained` is shorter where the results are links of one chain: one that others follow is swept
+    once, their adjoints end at it, and go on with its derivatives. `items` lead to the results and
+    to `partials`, of which `entries` has the numbers of result and name; what is structurally zero
+    is not among them. `hints` are names for expressions, should they need one.
     """
 
     def __init__(

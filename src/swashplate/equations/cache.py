@@ -267,18 +267,9 @@ def _beside(folder: Path) -> list[Path]:
 def tidy(folders: Iterable[Path], unused: float = UNUSED, largest: int = LARGEST) -> None:
     """Remove generated modules that were not used lately, with their machine code.
 
-    Other processes may use the folders at once: what they miss, they write and compile anew.
-
-    Parameters
-    ----------
-    folders : iterable of Path
-        Those of modules and of their machine code; whatever belongs to one module begins with its
-        name.
-    unused : float
-        Time after which it goes. [s]
-    largest : int
-        What all files may take; beyond it those go first that were not used for the longest time.
-        [bytes]
+    Those go that nobody used for a time [s], and beyond a size of all files [bytes] those first
+    that were not used for longest. Whatever belongs to one module begins with its name. Other
+    processes may use the folders at once: what they miss, they write and compile anew.
     """
     modules: dict[str, list[Path]] = {}
     used: dict[str, float] = {}

@@ -163,17 +163,7 @@ Item = Let | Choice | Rule | Call
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Function:
-    """A generated function: its text, and what came of it.
-
-    Attributes
-    ----------
-    name : str
-        Of the function.
-    source : str
-        Its text.
-    names : dict
-        What the text refers to, other generated functions among it.
-    """
+    """A generated function: its name, its text, and what that refers to."""
 
     name: str
     source: str
@@ -260,24 +250,17 @@ def fresh_name(stem: str, taken: set[str]) -> str:
 class Code:
     """Straight code under construction.
 
-    Parameters
-    ----------
-    taken : iterable of str
-        Names that stand for something else; shared if it is a set.
-    ruled : bool
-        Whether equations with declared derivatives stay together, as differentiation needs it.
+    `taken` names stand for something else; a set is shared. In `ruled` code equations with declared
+    derivatives stay together, as differentiation needs it.
     """
 
     def __init__(self, taken: Iterable[str] = (), *, ruled: bool = False) -> None:
         self.items: list[Item] = []
         self.taken: set[str] = taken if isinstance(taken, set) else {*taken, *RESERVED}
         self.ruled = ruled
-        self.names: dict[str, Function] = {}
-        """Generated functions that texts of it call."""
-        self.origins: dict[str, str] = {}
-        """Equation that each name comes from."""
-        self.under_way: list[Parsed] = []
-        """Equations that are being read."""
+        self.names: dict[str, Function] = {}  # Generated functions that texts of it call.
+        self.origins: dict[str, str] = {}  # Equation that each name comes from.
+        self.under_way: list[Parsed] = []  # Equations that are being read.
 
     @property
     def repeats(self) -> bool:

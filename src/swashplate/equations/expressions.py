@@ -13,20 +13,7 @@ ARITHMETIC = ("+", "-", "*", "/", "**", "neg")
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 LOGIC = ("and", "or", "not")
 LEAVES = ("number", "name")
-CALLED = (
-    "sqrt",
-    "exp",
-    "log",
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "atan2",
-    "hypot",
-    "floor",
-)
+CALLED = tuple("sqrt exp log sin cos tan asin acos atan atan2 hypot floor".split())  # noqa: SIM905
 """Operations that are functions of `math`."""
 CHEAP = {*LEAVES, *COMPARISONS, *LOGIC, "+", "-", "*", "neg", "min", "max", "abs", "if"}
 """Operations that can be done for nothing on any numbers: no error, no call of a library."""
@@ -39,21 +26,10 @@ ATOM = 10
 class Node:
     """A scalar expression: an operation with its operands, a number, or a name.
 
-    Attributes
-    ----------
-    op : str
-        Operation; "number" or "name" for a leaf.
-    args : tuple of Node
-    value : object
-        Of a number itself, of a name its text, of a power its exponent.
-    kind : str
-        "float", "int" or "bool".
-    reads : frozenset of str
-        Names in it.
-    moves : frozenset of str
-        Those of them that its value follows continuously: not those of a decision.
-    cheap : bool
-        Whether all of it is `CHEAP`.
+    `op` is the operation, "number" or "name" for a leaf; `value` of a number itself, of a name its
+    text, of a power its exponent; `kind` "float", "int" or "bool"; `reads` the names in it, `moves`
+    those of them that its value follows continuously, not those of a decision; `cheap` says whether
+    all of it is `CHEAP`.
     """
 
     __slots__ = ("_same", "args", "cheap", "kind", "moves", "op", "reads", "serial", "value")

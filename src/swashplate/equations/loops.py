@@ -16,7 +16,7 @@ from swashplate.equations.code import Call, Code, Function, Tuple, Value, leaves
 from swashplate.equations.equation import inlined
 from swashplate.equations.expressions import ONE, ZERO, Node, make
 from swashplate.equations.syntax import Parsed
-from swashplate.equations.writing import UNNAMED, function_text, named_by_text
+from swashplate.equations.writing import UNNAMED, function_source, function_text, named_by_text
 
 S = TypeVar("S")
 Read = Callable[[Code, Any, Mapping[str, Value]], Value]
@@ -176,12 +176,9 @@ class _Inner:
 
     source: Parsed
     code: Code
-    leading: list[str]
-    """Scalars of its first arguments."""
-    formals: list[str]
-    """Scalars of the others."""
-    actuals: list[Node]
-    """What these stand for where it is called."""
+    leading: list[str]  # Scalars of its first arguments.
+    formals: list[str]  # Scalars of the others.
+    actuals: list[Node]  # What these stand for where it is called.
     result: Value
 
     @property
@@ -249,10 +246,8 @@ def solved(
     ends = [inner.code.fresh(each) for each in ("low", "high")]
     given = ", ".join([*ends, *inner.formals])
     name = f"root_of_{inner.function.name}"
-    text = (
-        f'def {name}({given}):\n    """Root of {residual.name}."""\n'
-        f"    return root({inner.function.name}, {given})\n"
-    )
+    line = f"return root({inner.function.name}, {given})"
+    text = function_source(f"{name}({given})", f"Root of {residual.name}.", [line], "")
     function = Function(name, text, {"root": root, inner.function.name: inner.function})
     result = code.fresh("root")
     arguments = (low, high, *inner.actuals)
@@ -296,18 +291,11 @@ def _root_derivative(
         inputs = tuple(names[k] for k in by)
         says = f"Root of {inner.source.name} with its derivatives by {listing(inputs)}."
         name = f"{function.name}_{UNNAMED}"
-        name, text = named_by_text(name, _function(name, given, says, lines))
+        name, text = named_by_text(name, function_source(f"{name}({given})", says, lines, ""))
         references = {function.name: function, derived.name: derived}
         return Derived(name, text, references, ("value",), inputs, tuple(entries))
 
     return derivative
-
-
-def _function(name: str, given: str, says: str, lines: Sequence[str]) -> str:
-    """Text of a function."""
-    return "\n".join(
-        [f"def {name}({given}):", f'    """{says}"""', *(f"    {x}" for x in lines), ""]
-    )
 
 
 def repetition(
@@ -332,7 +320,7 @@ def repetition(
         f"return {states}",
     ]
     name = f"repeated_{inner.function.name}"
-    text = _function(name, given, f"{step.name}, repeated.", lines)
+    text = function_source(f"{name}({given})", f"{step.name}, repeated.", lines, "")
     function = Function(name, text, {inner.function.name: inner.function})
     results = tuple(code.fresh(each) for each in state.fields)
     nodes = [node for _, node in leaves(state)]
@@ -404,7 +392,9 @@ def _repeated_derivative(
         given = [names[k] for k in by]
         says = f"{inner.source.name}, repeated, with its derivatives by {listing(given)}."
         name = f"{function.name}_{UNNAMED}"
-        name, text = named_by_text(name, _function(name, ", ".join(names), says, lines))
+        name, text = named_by_text(
+            name, function_source(f"{name}({', '.join(names)})", says, lines, "")
+        )
         references = {"blank": blank, derived.name: derived}
         return Derived(name, text, references, tuple(now), tuple(given), tuple(entries))
 

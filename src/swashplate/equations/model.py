@@ -251,6 +251,15 @@ class Model:
                 return Link(signal, (Source(j, signal),))
         return None
 
+    def prefix(self, part: int) -> str:
+        """What stands before a part's paths: its name and a dot, if there are several."""
+        return f"{self.parts[part].name}." if len(self.parts) > 1 else ""
+
+    def places(self, kind: str) -> tuple[tuple[int, str], ...]:
+        """Part and path of every number of its parameters, given or state, in flat order."""
+        kinds = [getattr(part, kind) for part in self.parts]
+        return tuple((i, p) for i, each in enumerate(kinds) if each for p in floats_of(each))
+
     def tap(self, name: str) -> Tap:
         """How an input is looked at."""
         return self.taps.get(name, Tap(name))
@@ -385,6 +394,16 @@ def _source(name: str, parts: Sequence[Model], signal: str) -> Source:
             return Source(j, signal)
     known = ", ".join(each for part in parts for each in part.signal_names)
     raise InputError(f"Model {name}: a link asks for '{signal}', but the parts have {known}.")
+
+
+def parameter_paths(model: Model) -> tuple[str, ...]:
+    """Paths of all parameters, in the order of the flat array."""
+    return tuple(f"{model.prefix(i)}{path}" for i, path in model.places("parameters"))
+
+
+def state_paths(model: Model) -> tuple[str, ...]:
+    """Paths of all states, in the order of the flat array."""
+    return tuple(f"{model.prefix(i)}{path}" for i, path in model.places("state"))
 
 
 def place(tap: Tap, delay: float, h: float) -> Place:

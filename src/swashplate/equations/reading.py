@@ -48,19 +48,20 @@ FEW = 8
 """Operations that may be done in vain, so that a branch becomes a conditional expression."""
 ARGUMENTS = {"atan2": (2, 2), "hypot": (2, 2), "min": (2, 99), "max": (2, 99)}
 """Least and largest number of arguments of functions that take more than one."""
+LOOPS = {
+    "root": ("residual, low, high", "give it low, high and the rest"),
+    "repeated": (
+        "step, count, state",
+        "let it take a state, the number of the repetition and the rest",
+    ),
+}
+"""What loops take before the arguments of their equation, and what such an equation must take."""
 
 
 def read(code: Code, equation: Any, given: Mapping[str, Value]) -> Value:
     """Append what an equation does to some code, and return its result.
 
-    Parameters
-    ----------
-    code : Code
-        Where it is done.
-    equation : equation
-        What is done.
-    given : mapping of str to Value
-        Its arguments by name; those that are left out have their defaults.
+    Arguments that are not `given` by name have their defaults.
 
     Raises
     ------
@@ -298,36 +299,25 @@ class _Reader:
 
     def value(self, node: ast.expr, env: Environment) -> Value:
         """Value of any expression."""
-        if isinstance(node, ast.Constant):
-            return Flag(None) if node.value is None else ex.number(node.value)  # type: ignore[arg-type]
-        if isinstance(node, ast.Name):
-            return self.variable(node, env)
-        if isinstance(node, ast.Attribute):
-            return self.attribute(node, env)
-        if isinstance(node, ast.Subscript):
-            return self.element(node, env)
-        if isinstance(node, ast.Tuple):
-            return Tuple(None, tuple(self.value(each, env) for each in node.elts))
-        if isinstance(node, ast.BinOp):
-            return self.binary(node, env)
-        if isinstance(node, ast.UnaryOp):
-            if isinstance(node.op, ast.Not):
-                test = self.test(node.operand, env)
-                return ex.number(not test.value) if test.op == "number" else make("not", test)
-            inner = self.scalar(node.operand, env)
-            if isinstance(node.op, ast.UAdd):
-                return inner
-            return ex.number(-inner.value) if inner.op == "number" else make("neg", inner)
-        if isinstance(node, ast.Compare):
-            return self.comparison(node, env)
-        if isinstance(node, ast.BoolOp):
-            return self.logic(node, env)
-        if isinstance(node, ast.IfExp):
-            return self.conditional(node, env)
-        assert isinstance(node, ast.Call)
-        return self.call(node, env)
+        made: Value = getattr(self, f"on_{type(node).__name__.lower()}")(node, env)
+        return made
 
-    def variable(self, node: ast.Name, env: Environment) -> Value:
+    def on_constant(self, node: ast.Constant, env: Environment) -> Value:
+        return Flag(None) if node.value is None else ex.number(node.value)  # type: ignore[arg-type]
+
+    def on_tuple(self, node: ast.Tuple, env: Environment) -> Value:
+        return Tuple(None, tuple(self.value(each, env) for each in node.elts))
+
+    def on_unaryop(self, node: ast.UnaryOp, env: Environment) -> Value:
+        if isinstance(node.op, ast.Not):
+            test = self.test(node.operand, env)
+            return ex.number(not test.value) if test.op == "number" else make("not", test)
+        inner = self.scalar(node.operand, env)
+        if isinstance(node.op, ast.UAdd):
+            return inner
+        return ex.number(-inner.value) if inner.op == "number" else make("neg", inner)
+
+    def on_name(self, node: ast.Name, env: Environment) -> Value:
         if node.id in env:
             return env[node.id]
         if node.id in self.local:
@@ -350,7 +340,7 @@ class _Reader:
             )
         return value
 
-    def attribute(self, node: ast.Attribute, env: Environment) -> Value:
+    def on_attribute(self, node: ast.Attribute, env: Environment) -> Value:
         """Value of a field, or of a constant of a module."""
         base = node.value
         if isinstance(base, ast.Name) and base.id not in env and base.id not in self.local:
@@ -367,7 +357,7 @@ class _Reader:
             )
         return value.items[value.fields.index(node.attr)]
 
-    def element(self, node: ast.Subscript, env: Environment) -> Value:
+    def on_subscript(self, node: ast.Subscript, env: Environment) -> Value:
         """Value of an element of a tuple."""
         index = self.scalar(node.slice, env)
         if index.op != "number" or type(index.value) is not int:
@@ -377,7 +367,7 @@ class _Reader:
             self.refuse(node, f"the element {index.value}, which is not there", "count from 0")
         return value.items[index.value]
 
-    def binary(self, node: ast.BinOp, env: Environment) -> Node:
+    def on_binop(self, node: ast.BinOp, env: Environment) -> Node:
         """Value of an arithmetic operation, exactly as written."""
         op = ARITHMETIC[type(node.op)]
         left = self.scalar(node.left, env)
@@ -393,7 +383,7 @@ class _Reader:
             return right if ex.is_number(left, 1.0) else left
         return make(op, left, right)
 
-    def comparison(self, node: ast.Compare, env: Environment) -> Node:
+    def on_compare(self, node: ast.Compare, env: Environment) -> Node:
         """A comparison, also of several terms, and `is None`."""
         left = self.value(node.left, env)
         found = ex.number(True)
@@ -409,7 +399,7 @@ class _Reader:
             left = right
         return found
 
-    def logic(self, node: ast.BoolOp, env: Environment) -> Node:
+    def on_boolop(self, node: ast.BoolOp, env: Environment) -> Node:
         """`and` and `or`; what must not be done in vain is put behind the test."""
         conjunction = isinstance(node.op, ast.And)
         test = ex.number(conjunction)
@@ -429,7 +419,7 @@ class _Reader:
             test = found
         return test
 
-    def conditional(self, node: ast.IfExp, env: Environment) -> Value:
+    def on_ifexp(self, node: ast.IfExp, env: Environment) -> Value:
         """Value of a conditional expression."""
         test = self.test(node.test, env)
         if test.op == "number":
@@ -454,7 +444,7 @@ class _Reader:
             called = ast.unparse(function)
             self.refuse(function, f"a call of the unknown {called}", "define or import it")
 
-    def call(self, node: ast.Call, env: Environment) -> Value:
+    def on_call(self, node: ast.Call, env: Environment) -> Value:
         """Value of a call."""
         found = self.callee(node.func)
         if found in MATH or found in CHOICES:
@@ -471,9 +461,7 @@ class _Reader:
         special[plain(interpolate)] = self.interpolate
         if plain(found) in special:
             return special[plain(found)](node, env)
-        if not isinstance(plain(found), FunctionType) or (
-            plain(found) is found and not _interpreted()
-        ):
+        if not _is_equation(found):
             text = ast.unparse(node.func)
             self.refuse(node, f"a call of {text}", f"make {text} an @equation")
         callee = parsed(found)
@@ -500,32 +488,9 @@ class _Reader:
                 given[name] = self.constant(node, name, defaults[name])
         return given
 
-    def given_equation(self, node: ast.Call, what: str) -> Parsed:
-        """The equation that a loop is given by its name."""
-        first = node.args[0]
-        named = isinstance(first, ast.Attribute)
-        named |= isinstance(first, ast.Name) and first.id not in self.local
-        found = self.callee(first) if named else None
-        f = plain(found)
-        if not isinstance(f, FunctionType) or (f is found and not _interpreted()):
-            self.refuse(node, f"{what} of something else", "give it the name of an @equation")
-        return parsed(found)
-
     def root(self, node: ast.Call, env: Environment) -> Value:
         """Value of `root`."""
-        if len(node.args) < 3 or node.keywords:
-            self.refuse(
-                node, "root with other arguments", "write root(residual, low, high, a, b, ...)"
-            )
-        residual = self.given_equation(node, "root")
-        low, high = (self.scalar(each, env) for each in node.args[1:3])
-        rest = [self.value(each, env) for each in node.args[3:]]
-        if len(residual.arguments) != len(rest) + 1:
-            self.refuse(
-                node,
-                f"root of {residual.name} with other arguments",
-                "give it low, high and the rest",
-            )
+        residual, (low, high, *rest) = self.inner(node, env, "root", 1)
         found = solved(self.code, residual, low, high, rest, read)
         if found is None:
             self.refuse(node, "a residual that is a tuple", "return one float")
@@ -533,29 +498,35 @@ class _Reader:
 
     def repeated(self, node: ast.Call, env: Environment) -> Value:
         """Value of `repeated`."""
-        if len(node.args) < 3 or node.keywords:
-            self.refuse(
-                node,
-                "repeated with other arguments",
-                "write repeated(step, count, state, a, b, ...)",
-            )
-        step = self.given_equation(node, "repeated")
-        count = self.scalar(node.args[1], env)
-        state, *rest = (self.value(each, env) for each in node.args[2:])
-        if len(step.arguments) != len(rest) + 2:
-            self.refuse(
-                node,
-                f"repeated of {step.name} with other arguments",
-                "let it take a state, the number of the repetition and the rest",
-            )
+        step, (count, state, *rest) = self.inner(node, env, "repeated", 2)
         found = repetition(self.code, step, count, state, rest, read)
         if found is None:
-            self.refuse(
-                node,
-                f"repeated of {step.name}, which does not return a state",
-                "let it take and return the same named tuple of floats",
-            )
+            what = f"repeated of {step.name}, which does not return a state"
+            self.refuse(node, what, "let it take and return the same named tuple of floats")
         return found
+
+    def inner(
+        self, node: ast.Call, env: Environment, word: str, leading: int
+    ) -> tuple[Parsed, list[Any]]:
+        """The equation that a loop is given by its name, and the loop's other arguments.
+
+        `leading` are the arguments of the equation that the loop itself gives it.
+        """
+        taken, takes = LOOPS[word]
+        if len(node.args) < 3 or node.keywords:
+            self.refuse(node, f"{word} with other arguments", f"write {word}({taken}, a, b, ...)")
+        first = node.args[0]
+        named = isinstance(first, ast.Attribute)
+        named |= isinstance(first, ast.Name) and first.id not in self.local
+        found = self.callee(first) if named else None
+        if not _is_equation(found):
+            self.refuse(node, f"{word} of something else", "give it the name of an @equation")
+        numbers = [self.scalar(each, env) for each in node.args[1 : 4 - leading]]
+        rest = [self.value(each, env) for each in node.args[4 - leading :]]
+        inner = parsed(found)
+        if len(inner.arguments) != leading + len(node.args) - 3:
+            self.refuse(node, f"{word} of {inner.name} with other arguments", takes)
+        return inner, [*numbers, *rest]
 
     def interpolate(self, node: ast.Call, env: Environment) -> Value:
         """Value of `interpolate`."""
@@ -610,5 +581,7 @@ def _meanings(items: Sequence[Item]) -> dict[str, Node]:
     return meanings
 
 
-def _interpreted() -> bool:
-    return bool(config.DISABLE_JIT)  # type: ignore[attr-defined]
+def _is_equation(found: Any) -> bool:
+    """Whether something may be an equation: a function that is compiled, if any is."""
+    interpreted = bool(config.DISABLE_JIT)  # type: ignore[attr-defined]
+    return isinstance(plain(found), FunctionType) and (plain(found) is not found or interpreted)

@@ -18,14 +18,10 @@ from types import FunctionType
 from typing import Any, NoReturn
 from weakref import WeakKeyDictionary
 
+from swashplate.equations.expressions import CALLED
 from swashplate.errors import EquationError
 
-MATH: dict[Any, str] = {
-    getattr(math, name): name
-    for name in (
-        "sqrt exp log sin cos tan asin acos atan atan2 hypot floor".split()  # noqa: SIM905
-    )
-}
+MATH: dict[Any, str] = {getattr(math, name): name for name in CALLED}
 """Functions of `math` that an equation may call."""
 CHOICES: dict[Any, str] = {min: "min", max: "max", abs: "abs"}
 ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
@@ -56,10 +52,10 @@ INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.Continue: ("continue", "use if within the loop"),
     ast.Match: ("match", "use if and elif"),
     ast.Lambda: ("lambda", "write an equation of its own"),
-    ast.ListComp: ("a comprehension", "write the terms out, or a loop over a literal range"),
-    ast.SetComp: ("a comprehension", "write the terms out, or a loop over a literal range"),
-    ast.DictComp: ("a comprehension", "write the terms out, or a loop over a literal range"),
-    ast.GeneratorExp: ("a comprehension", "write the terms out, or a loop over a literal range"),
+    **dict.fromkeys(
+        (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp),
+        ("a comprehension", "write the terms out, or a loop over a literal range"),
+    ),
     ast.List: ("a list", "use a tuple or a named tuple"),
     ast.Set: ("a set", "use a tuple or a named tuple"),
     ast.Dict: ("a dictionary", "use a named tuple"),
@@ -96,20 +92,6 @@ INSTEAD_OF_BUILTIN = {
 
 PLAIN = (ast.Name, ast.Attribute, ast.IfExp, ast.BoolOp, ast.Tuple, ast.If, ast.Pass)
 """Nodes that need no check of their own."""
-CHECKS: dict[type[ast.AST], str] = {
-    ast.Assign: "assign",
-    ast.AnnAssign: "annassign",
-    ast.AugAssign: "augassign",
-    ast.Return: "returned",
-    ast.For: "loop",
-    ast.BinOp: "binop",
-    ast.UnaryOp: "unaryop",
-    ast.Constant: "constant",
-    ast.Subscript: "subscript",
-    ast.Compare: "compare",
-    ast.Call: "call",
-}
-"""Methods of `_Check` that look at a node."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,7 +261,7 @@ class _Check:
         kind = type(node)
         if kind in INSTEAD:
             self.refuse(node, *INSTEAD[kind])
-        check = getattr(self, CHECKS.get(kind, ""), None)
+        check = getattr(self, f"on_{kind.__name__.lower()}", None)
         if check is not None:
             check(node)
         elif isinstance(node, ast.expr) and kind not in PLAIN:
@@ -289,7 +271,7 @@ class _Check:
 
     # -- statements --------------------------------------------------------------------------------
 
-    def assign(self, node: ast.Assign) -> None:
+    def on_assign(self, node: ast.Assign) -> None:
         pending = list(node.targets)
         while pending:
             target = pending.pop()
@@ -304,20 +286,20 @@ class _Check:
             elif not isinstance(target, ast.Name):
                 self.refuse(target, "an assignment to an element", "assign to a name")
 
-    def annassign(self, node: ast.AnnAssign) -> None:
+    def on_annassign(self, node: ast.AnnAssign) -> None:
         if node.value is None or not isinstance(node.target, ast.Name):
             self.refuse(node, "a declaration", "assign a value to a name")
 
-    def augassign(self, node: ast.AugAssign) -> None:
+    def on_augassign(self, node: ast.AugAssign) -> None:
         if not isinstance(node.target, ast.Name):
             self.refuse(node, "a declaration", "assign a value to a name")
         self.operator(node.op, node, node.value)
 
-    def returned(self, node: ast.Return) -> None:
+    def on_return(self, node: ast.Return) -> None:
         if node.value is None:
             self.refuse(node, "a return of nothing", "return a value")
 
-    def loop(self, node: ast.For) -> None:
+    def on_for(self, node: ast.For) -> None:
         call = node.iter
         literal = (
             isinstance(call, ast.Call)
@@ -346,19 +328,19 @@ class _Check:
                 "write sqrt(a), or exp(b * log(a))",
             )
 
-    def binop(self, node: ast.BinOp) -> None:
+    def on_binop(self, node: ast.BinOp) -> None:
         self.operator(node.op, node, node.right)
 
-    def unaryop(self, node: ast.UnaryOp) -> None:
+    def on_unaryop(self, node: ast.UnaryOp) -> None:
         if isinstance(node.op, ast.Invert):
             self.refuse(node, *INSTEAD_OF_OPERATOR[ast.Invert])
 
-    def constant(self, node: ast.Constant) -> None:
+    def on_constant(self, node: ast.Constant) -> None:
         if not (node.value is None or isinstance(node.value, bool | int | float)):
             what = "a string" if isinstance(node.value, str) else f"{node.value!r}"
             self.refuse(node, what, "an equation knows real numbers only; use options for choices")
 
-    def subscript(self, node: ast.Subscript) -> None:
+    def on_subscript(self, node: ast.Subscript) -> None:
         if not self.is_index(node.slice):
             self.refuse(node, "an index that is no whole number", "write the number, as in s[0]")
 
@@ -370,7 +352,7 @@ class _Check:
         counter = isinstance(index, ast.Name) and index.id in self.counters
         return counter or _whole(index) is not None
 
-    def compare(self, node: ast.Compare) -> None:
+    def on_compare(self, node: ast.Compare) -> None:
         for op, right in zip(node.ops, node.comparators, strict=True):
             if isinstance(op, ast.Is | ast.IsNot):
                 if not (isinstance(right, ast.Constant) and right.value is None):
@@ -378,7 +360,7 @@ class _Check:
             elif type(op) not in COMPARISONS:
                 self.refuse(node, "`in`", "compare with == and or")
 
-    def call(self, node: ast.Call) -> None:
+    def on_call(self, node: ast.Call) -> None:
         function = node.func
         if node in self.ranges:
             return

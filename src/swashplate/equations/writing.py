@@ -74,27 +74,9 @@ def _spread(items: Iterable[Item]) -> Iterator[Item]:
 class Writer:
     """Text of some items of straight code and of the results that they lead to.
 
-    Parameters
-    ----------
-    taken : set of str
-        Names that stand for something else.
-    items : sequence of Item
-        What is done.
-    results : sequence of Node
-        What is wanted of it.
-    hints : mapping of Node to str
-        Names for expressions, should they need one.
-
-    Attributes
-    ----------
-    lines : list of str
-        Text of the items.
-    texts : list of str
-        Of the results, by names that the lines make.
-    functions : dict
-        Generated functions that are called, by name.
-    inner : dict of str to str
-        Names that only one side of a choice makes, with a number of their type.
+    `taken` names stand for something else; `hints` are names for expressions, should they need one.
+    The items are `lines`, which call `functions` by name, the results `texts` by names that the
+    lines make. `inner` are names that only one side of a choice makes, with a number of their type.
     """
 
     def __init__(
@@ -285,6 +267,17 @@ def lines_of(code: Code, wanted: Iterable[Node]) -> list[str]:
 
 
 # --- functions ------------------------------------------------------------------------------------
+
+
+def indented(lines: Iterable[str]) -> list[str]:
+    """Lines moved in."""
+    return [f"    {line}" for line in lines]
+
+
+def function_source(head: str, says: str, lines: Iterable[str], mark: str = "@kernel") -> str:
+    """Text of a function."""
+    head = f"{mark}\ndef {head}:" if mark else f"def {head}:"
+    return "\n".join([head, f'    """{says}"""', *indented(lines), ""])
 
 
 def function_text(

@@ -21,6 +21,7 @@ from swashplate.equations.derivatives import derive
 from swashplate.equations.equation import inlined
 from swashplate.equations.marching.run import module
 from swashplate.errors import DomainError
+from swashplate.models.displacement_control import solenoid_force
 from swashplate.models.full_order import (
     Motion,
     Plant,
@@ -30,7 +31,6 @@ from swashplate.models.full_order import (
     free_rates,
 )
 from swashplate.models.machine import Machine
-from swashplate.models.pump import solenoid_force
 from swashplate.results import Result, short
 
 Array = NDArray[np.float64]

@@ -15,18 +15,18 @@ from swashplate.drive import Drive
 from swashplate.equations.cache import kernel
 from swashplate.equations.equation import interpreted
 from swashplate.equations.marching.jacobian import jacobian
-from swashplate.equations.marching.march import Stored
 from swashplate.equations.marching.observation import Observation, ObservedRecord
+from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, Record, record_of
 from swashplate.equations.marching.run import Instance, Part, Start, check_start, marched
 from swashplate.errors import DomainError, InputError
 from swashplate.full_order.continuous import Case, Feed, Modes, modes_of, solve, state_matrix
 from swashplate.full_order.physical_set import PhysicalSet, from_lumped
 from swashplate.models import full_order as model
+from swashplate.models.displacement_control import Solenoids, solenoid_force
 from swashplate.models.drive import Source
 from swashplate.models.full_order import Motion, PlantSignals, plant_signals
 from swashplate.models.machine import Machine, fastest_rate
-from swashplate.models.pump import Solenoids, solenoid_force
 from swashplate.parameters.parameter_set import Change
 from swashplate.simulation.instance import PATHS, card_of, card_options, check_filter_stability
 from swashplate.simulation.result import Named, Signals, signal

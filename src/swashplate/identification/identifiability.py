@@ -17,7 +17,15 @@ from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.problem import TOLERANCE, triangular_factor, whitening
 from swashplate.identification.staging import true_value
 from swashplate.identification.unknowns import Unknowns
-from swashplate.models.pump import ANGLE, FORCE, MOTION, PRESSURE, TILT, TRAVEL, ZERO
+from swashplate.models.displacement_control import (
+    ANGLE,
+    FORCE,
+    MOTION,
+    PRESSURE,
+    TILT,
+    TRAVEL,
+    ZERO,
+)
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.equations.adjoints import Derived
 from swashplate.equations.derivatives import derive
 from swashplate.equations.fields import floats_of, value_at
-from swashplate.equations.marching.march import HOLDS, taps_of
+from swashplate.equations.marching.part import HOLDS, taps_of
 from swashplate.equations.marching.run import Instance, Started, called, outside
 from swashplate.equations.model import Link, Model, Window, arguments_of
 from swashplate.errors import DomainError, InputError

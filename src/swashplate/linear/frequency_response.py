@@ -17,7 +17,7 @@ from swashplate.equations.marching.record import FASTEST, SOURCE_RATE
 from swashplate.equations.marching.run import marched
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.drive import slowest_lag
-from swashplate.models.pump import Pump
+from swashplate.models.displacement_control import Pump
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Tabular

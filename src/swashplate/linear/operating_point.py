@@ -13,12 +13,8 @@ from swashplate.equations.equation import interpreted
 from swashplate.equations.marching.run import Instance, called
 from swashplate.errors import DomainError, InputError
 from swashplate.models.card import Card
-from swashplate.models.pump import (
-    Pump,
-    moment_sine,
-    overpowered,
-    solenoid_force,
-)
+from swashplate.models.displacement_control import Pump, moment_sine, solenoid_force
+from swashplate.models.pump import overpowered
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import card_of, instance_of, without_ripple

@@ -13,11 +13,9 @@ from swashplate.models.card import (
     channel_level,
     flowing_card,
 )
+from swashplate.models.displacement_control import Pump, PumpConstants, PumpOptions
 from swashplate.models.pump import (
-    Pump,
-    PumpConstants,
     PumpInputs,
-    PumpOptions,
     PumpSignals,
     pump,
     pump_rates,

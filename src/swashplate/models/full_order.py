@@ -20,6 +20,7 @@ from swashplate.equations.library import clipped
 from swashplate.equations.loops import repeated, root
 from swashplate.equations.model import Model, join
 from swashplate.models.card import card
+from swashplate.models.displacement_control import Solenoids, solenoid_force
 from swashplate.models.drive import current_sum, signed_current, source
 from swashplate.models.machine import (
     Machine,
@@ -48,7 +49,6 @@ from swashplate.models.machine import (
     valve_flow,
     valve_opening,
 )
-from swashplate.models.pump import Solenoids, solenoid_force
 
 
 class Plant(NamedTuple):

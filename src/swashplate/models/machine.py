@@ -17,7 +17,7 @@ from swashplate.equations.equation import equation
 from swashplate.equations.fields import MINUS, Definition, Flag
 from swashplate.equations.library import clipped
 from swashplate.equations.loops import root
-from swashplate.models.pump import flow_head, head_root
+from swashplate.models.displacement_control import flow_head, head_root
 
 ATMOSPHERE = 101325.0
 """Pressure in the reservoir. [Pa]"""

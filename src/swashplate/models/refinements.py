@@ -1,7 +1,7 @@
 """What goes beyond the source's equations: friction, hysteresis, ripple, damping, leakage, line.
 
-Each is off unless its option is on (`swashplate.models.pump.PumpOptions`). docs/refinements.md says
-what each explains.
+Each is off unless its option is on (`PumpOptions` of `swashplate.models.displacement_control`).
+docs/refinements.md says what each explains.
 
 Friction of solenoid and spool (Kruse 2001, section 7.6). The friction f holds the spool back
 against its feedback spring: it stands d = f/k short of the place at which solenoid and spring

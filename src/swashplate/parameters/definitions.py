@@ -4,7 +4,7 @@ The symbols are those of Kruse (2001). A directional parameter has a plus and a 
 by the sign of the signal it acts on; both are stored as magnitudes.
 
 A definition stands once, on the field of `swashplate.models.card.Card` or
-`swashplate.models.pump.Pump` that holds the value.
+`swashplate.models.displacement_control.Pump` that holds the value.
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,7 +16,7 @@ from swashplate.equations.fields import Declared, declared_by
 from swashplate.equations.fields import Definition as Meaning
 from swashplate.errors import ParameterError
 from swashplate.models.card import Card
-from swashplate.models.pump import Pump
+from swashplate.models.displacement_control import Pump
 
 Block = Literal["control_card", "pump_motor", "refinements", "physical"]
 
@@ -73,8 +73,8 @@ DEFAULTS: dict[str, float] = {s: d.default for s, d in REFINEMENTS.items() if d.
 """What a refinement is where a set does not give it."""
 
 SWITCHES: dict[str, str] = {each.symbol: each.switch for each in _ALL if each.switch}
-"""Option of the pump (`swashplate.models.pump.PumpOptions`) that a parameter belongs to, by symbol;
-each has one value."""
+"""Option of the pump (`PumpOptions` of `swashplate.models.displacement_control`) that a parameter
+belongs to, by symbol; each has one value."""
 
 OPTIONS: tuple[str, ...] = tuple(dict.fromkeys(SWITCHES.values()))
 """Those options, along the chain."""

@@ -17,7 +17,12 @@ from numpy.typing import NDArray
 from swashplate.equations.cache import kernel
 from swashplate.errors import ParameterError
 from swashplate.models.card import Channel, channel_level
-from swashplate.models.pump import Pump, moment_sine, solenoid_force, solenoids_of
+from swashplate.models.displacement_control import (
+    Pump,
+    moment_sine,
+    solenoid_force,
+    solenoids_of,
+)
 from swashplate.parameters.definitions import (
     DEFAULTS,
     OPTIONS,

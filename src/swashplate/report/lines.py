@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,14 @@ from swashplate.report.style import (
     GREY,
     LINE,
     THIN,
+    VERMILION,
     Dashes,
     MarginLabel,
     dress,
     label_margin,
     zero_line,
 )
-from swashplate.simulation.result import Limit, Simulation
+from swashplate.simulation.result import Limit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,56 +31,17 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-# --- simulated signals ----------------------------------------------------------------------------
+# --- lines ---------------------------------------------------------------------------------------
 
-MOST_POINTS = 16_384
-"""A line of more samples is drawn as its envelope of about as many points: 32 s at 512 Hz."""
-LONG = 8 * MOST_POINTS
+GAP = 5.0
+"""A step of the stamps longer than this many median steps is a gap."""
+COLUMNS = 8192
+"""Stretches of time of which a long line keeps the extremes; twice as many samples, 32 s at 512 Hz,
+are drawn as they are."""
+COARSE = 1000
+"""The same where many panels share a page: two or three a dot of a panel."""
+LONG = 131_072
 """A line of more samples is likely to fill its panel, and is drawn thinner."""
-
-
-def draw(
-    ax: Axes,
-    time: Array,
-    values: Array,
-    color: ColorType,
-    *,
-    dashes: Dashes = "solid",
-    width: float = LINE,
-    zorder: float = 2.0,
-) -> None:
-    """Draw a signal over time; a long one by its envelope, a very long one thinner."""
-    stamps, heights = envelope(time, values)
-    if values.size > LONG:
-        width *= 0.6
-    ax.plot(
-        stamps,
-        heights,
-        color=color,
-        linestyle=dashes,
-        linewidth=width,
-        solid_capstyle="butt",
-        solid_joinstyle="round",
-        zorder=zorder,
-    )
-
-
-def envelope(time: Array, values: Array, most: int = MOST_POINTS) -> tuple[Array, Array]:
-    """The lowest and highest sample of each of many short stretches; a short signal as it is.
-
-    Every point returned is a sample, the first and the last among them.
-    """
-    if values.size <= most:
-        return time, values
-    stretch = -(-values.size // (most // 2))
-    whole = values.size - values.size % stretch
-    starts = np.arange(0, whole, stretch)
-    rows = values[:whole].reshape(-1, stretch)
-    ends = [0, values.size - 1]
-    if whole < values.size:
-        ends += [whole + int(values[whole:].argmin()), whole + int(values[whole:].argmax())]
-    kept = np.unique(np.concatenate((starts + rows.argmin(1), starts + rows.argmax(1), ends)))
-    return time[kept], values[kept]
 
 
 def fit_time(ax: Axes, *times: Array) -> None:
@@ -117,16 +79,6 @@ def rows_within(time: Array, window: tuple[float, float] | None, what: str) -> s
             "holds two at least."
         )
     return slice(first, after)
-
-
-# --- measured signals -----------------------------------------------------------------------------
-# The envelope above counts samples, which is right for a simulation's even grid. Measured stamps
-# are uneven and have gaps, so that stretches of time are taken here.
-
-GAP = 5.0
-"""A step of the stamps longer than this many median steps is a gap."""
-COLUMNS = 1000
-"""Stretches of time of which a long line keeps the extremes: two or three a dot of a panel."""
 
 
 def gap_rows(time: Array) -> Rows:
@@ -192,19 +144,11 @@ def broken(
     return np.insert(time[rows], places, time[breaks]), np.insert(values[rows], places, np.nan)
 
 
-def alone(size: int, breaks: Rows) -> Mask:
-    """(size,) whether a sample has a break, or nothing, on both sides: no line would show it."""
-    apart = np.ones(size + 1, dtype=np.bool_)
-    apart[1:-1] = False
-    apart[breaks + 1] = True
-    return apart[1:] & apart[:-1]
-
-
-def draw_broken(
+def draw(
     ax: Axes,
     time: Array,
     values: Array,
-    color: str,
+    color: ColorType,
     *,
     shown: Mask | None = None,
     held: bool = False,
@@ -212,8 +156,9 @@ def draw_broken(
     width: float = LINE,
     zorder: float = 2.0,
     label: str | None = None,
+    columns: int = COLUMNS,
 ) -> None:
-    """Draw a measured signal: no line across a gap, a dot where a sample is alone.
+    """Draw a signal: no line across a gap, a dot where a sample is alone.
 
     A long signal is drawn by its extremes (`thinned`).
 
@@ -231,6 +176,8 @@ def draw_broken(
         Draw a staircase: each sample holds up to the next.
     dashes, width, zorder, label :
         Of the line.
+    columns : int
+        Stretches of time of which a long line keeps the extremes.
     """
     breaks = gap_rows(time)
     if shown is not None:
@@ -240,43 +187,36 @@ def draw_broken(
         time, values, breaks = time[kept], values[kept], np.flatnonzero(apart)
     if not time.size:
         return
+    if values.size > LONG:
+        width *= 0.6
     style: Literal["default", "steps-post"] = "steps-post" if held else "default"
-    ax.plot(
-        *broken(time, values, breaks),
-        color=color,
-        linestyle=dashes,
-        linewidth=width,
-        drawstyle=style,
-        solid_capstyle="butt",
-        solid_joinstyle="round",
-        zorder=zorder,
-        label=label,
-    )
-    lonely = alone(time.size, breaks)
-    if lonely.any():
-        ax.plot(
-            time[lonely],
-            values[lonely],
-            color=color,
-            linestyle="none",
-            marker=".",
-            markersize=2.0 * width,
-            markeredgewidth=0.0,
-            zorder=zorder,
-        )
+    how: dict[str, Any] = {"color": color, "zorder": zorder}
+    joints: dict[str, Any] = {"solid_capstyle": "butt", "solid_joinstyle": "round"}
+    points = broken(time, values, breaks, columns)
+    ax.plot(*points, ls=dashes, lw=width, drawstyle=style, label=label, **joints, **how)
+    # with a break, or nothing, on both sides no line would show it
+    apart = np.ones(time.size + 1, dtype=np.bool_)
+    apart[1:-1] = False
+    apart[breaks + 1] = True
+    if (lonely := apart[1:] & apart[:-1]).any():
+        dots: dict[str, Any] = {"marker": ".", "markersize": 2.0 * width, "markeredgewidth": 0.0}
+        ax.plot(time[lonely], values[lonely], linestyle="none", **dots, **how)
 
 
-# --- limits that act ------------------------------------------------------------------------------
+# --- stretches of time ----------------------------------------------------------------------------
 
-MOST_RUNS = 2000
+MOST_SPANS = 1000
 """More stretches than this on one panel are merged where none could see the gap between them."""
 
 
 class Shade(NamedTuple):
-    """Colour of a limit and its name in the legend."""
+    """How stretches of time of one meaning look, and what the legend calls them."""
 
     color: str
     name: str
+    edge: str = ""
+    hatch: str | None = None
+    """A grey print shows it too."""
 
 
 # Opaque, so that what is shown is what the legend shows. Where limits act together, the later one
@@ -289,77 +229,83 @@ SHADES = {
     Limit.SWASH_STOP: Shade("#b5e0cb", "swash stop (speed)"),
     Limit.RELIEF: Shade("#f3b79b", "relief valve"),
 }
+IGNORED = Shade("#ececec", "ignored", "#d2d2d2", "////")
+MASKED = Shade("#fbe6c6", "masked", "#eccb94", "\\\\\\\\")
 
 
-def shade_limits(ax: Axes, simulation: Simulation, limits: Iterable[Limit]) -> None:
-    """Shade a panel wherever one of the limits acts."""
-    for limit in limits:
-        shade_stretches(ax, active_spans(simulation, limit), limit)
-
-
-def shade_stretches(ax: Axes, spans: Array, limit: Limit) -> None:
-    """Shade stretches of time, shape (m, 2), in the colour of a limit."""
-    if not spans.size:
-        return
-    color, name = SHADES[limit]
-    left, right = spans[:, 0], spans[:, 1]
-    corners = np.empty((spans.shape[0], 4, 2))
-    corners[:, :, 0] = np.stack((left, right, right, left), axis=1)
-    corners[:, :, 1] = (0.0, 0.0, 1.0, 1.0)
-    from matplotlib.collections import PolyCollection
-
-    ax.add_collection(
-        PolyCollection(
-            list(corners),
-            transform=ax.get_xaxis_transform(),
-            facecolor=color,
-            edgecolor=color,  # a thin edge, so that a single sample can be seen too
-            linewidth=0.4,
-            zorder=0.2 + 0.01 * int(limit).bit_length(),
-            label=name,
-        ),
-        autolim=False,
-    )
-
-
-def active_spans(simulation: Simulation, limit: Limit) -> Array:
-    """Beginning and end of each stretch of time in which a limit acts, shape (m, 2). [s]"""
-    return stretches(simulation.active(limit), simulation.time, simulation.record.rate)
-
-
-def stretches(active: NDArray[np.bool_], time: Array, rate: float) -> Array:
+def stretches(time: Array, active: Mask) -> Array:
     """Beginning and end of each stretch of active samples, shape (m, 2). [s]
 
-    A sample stands for the time up to half way to its neighbours.
+    Ends reach half a usual step further: a sample stands for its surroundings. Where the step to
+    the next sample is shorter than usual, they may reach over it.
     """
     turns = np.flatnonzero(np.diff(active, prepend=False, append=False))
-    half = 0.5 / rate
-    spans = np.stack((time[turns[::2]] - half, time[turns[1::2] - 1] + half), axis=1)
-    return merged(spans, float(time[-1] - time[0]) / MOST_RUNS)
+    half = 0.5 * float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    return np.stack((time[turns[::2]] - half, time[turns[1::2] - 1] + half), axis=1)
 
 
-def merged(spans: Array, gap: float, most: int = MOST_RUNS) -> Array:
-    """Join neighbours closer than `gap` if there are more than `most` spans."""
+def merged(spans: Array, most: int = MOST_SPANS) -> Array:
+    """Join neighbours closer than 1 / `most` of all if there are more than `most` spans."""
     if spans.shape[0] <= most:
         return spans
-    apart = spans[1:, 0] - spans[:-1, 1] >= gap
+    apart = spans[1:, 0] - spans[:-1, 1] >= (spans[-1, 1] - spans[0, 0]) / most
     first = np.concatenate(([True], apart))
     last = np.concatenate((apart, [True]))
     return np.stack((spans[first, 0], spans[last, 1]), axis=1)
 
 
-def shade_handles(simulation: Simulation) -> list[Patch]:
-    """Handles for a legend of the limits that act anywhere in a simulation."""
-    return [shade_handle(limit) for limit in SHADES if simulation.active(limit).any()]
+def shade(ax: Axes, spans: Array, look: Shade) -> None:
+    """Shade stretches of time [s], shape (m, 2)."""
+    if not spans.size:
+        return
+    from matplotlib.collections import PolyCollection
+
+    left, right = merged(spans).T
+    x, y = np.stack((left, right, right, left), axis=1), np.array([0.0, 0.0, 1.0, 1.0])
+    ax.add_collection(
+        PolyCollection(
+            list(np.stack(np.broadcast_arrays(x, y), axis=2)),
+            transform=ax.get_xaxis_transform(),
+            facecolor=look.color,
+            edgecolor=look.edge or look.color,  # thin, so that a single sample can be seen too
+            hatch=look.hatch,
+            linewidth=0.4,
+            zorder=0.3,
+            label=look.name,
+        ),
+        autolim=False,
+    )
 
 
-def shade_handle(limit: Limit) -> Patch:
-    """Handle for a legend of one limit."""
+def shade_handle(look: Shade, words: str = "") -> Patch:
+    """Handle for a legend of shaded stretches."""
     from matplotlib.patches import Patch
 
-    color, name = SHADES[limit]
-    return Patch(facecolor=color, edgecolor="#00000030", linewidth=0.5, label=name)
+    how: dict[str, Any] = {"facecolor": look.color, "edgecolor": look.edge or "#00000030"}
+    return Patch(hatch=look.hatch, linewidth=0.5, label=words or look.name, **how)
 
+
+def mark_gaps(ax: Axes, time: Array) -> None:
+    """Point from the upper edge at each gap of the stamps [s], however short it is."""
+    rows = gap_rows(time)
+    if rows.size:
+        middles = 0.5 * (time[rows] + time[rows + 1])
+        where: dict[str, Any] = {
+            "transform": ax.get_xaxis_transform(),
+            "clip_on": False,
+            "zorder": 4.0,
+        }
+        ax.plot(middles, np.ones(middles.size), **GAP_MARK, **where)
+
+
+GAP_MARK: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "v",
+    "markersize": 3.5,
+    "markeredgewidth": 0.0,
+    "color": VERMILION,
+    "label": "gap in the stamps",
+}
 
 # --- panels with names in the margin --------------------------------------------------------------
 

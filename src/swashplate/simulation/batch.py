@@ -9,13 +9,12 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations import Model, instance_of, parameter_paths, state_paths
-from swashplate.equations.fields import floats_of
 from swashplate.equations.library import TAN_22_5
 from swashplate.equations.marching.lanes import LANES, march_lanes
 from swashplate.equations.marching.march import output_of
@@ -93,19 +92,8 @@ class Batch(Result):
     marched, called by its number."""
 
 
-class _Block(NamedTuple):
-    """Up to LANES sets that share the options which the kernels are compiled for."""
-
-    sets: Indices
-    options: tuple[Any, ...]
-
-
-class _Marched(NamedTuple):
-    """What is told of a block's sets: those that failed with their worst margin."""
-
-    sets: Indices
-    values: Array | None  # costs or outputs, None where the outputs are in their place already
-    failed: list[tuple[int, float]]
+Block = tuple[Indices, tuple[Any, ...]]
+"""Up to LANES sets, and the options that they share: kernels are compiled for those."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,9 +105,7 @@ class _Sets:
     record: Record
     records: Mapping[str, Array]  # external signals on the record's grid
     output: str
-    measured: Array
-    weight: Array
-    keep: bool  # whether outputs are wanted, not costs
+    cost: SquaredError | None
     to: Path | None
     place: Array | None = field(default=None, repr=False)  # (m, n), within this process
 
@@ -127,10 +113,28 @@ class _Sets:
         """Without what other processes have no use for."""
         return {**self.__dict__, "place": None}
 
+    def compared(self) -> tuple[Array, Array]:
+        """Measured values and weights on the march's grid, zero weight between the samples."""
+        # zeros that nobody writes to take no memory
+        measured, weight = np.zeros(self.record.values.size), np.zeros(self.record.values.size)
+        if self.cost is not None:
+            time, every = self.record.time, slice(None, None, self.record.substeps)
+            seen = Observation(self.cost.output, time, self.cost.measured, self.cost.weight)
+            weight[every] = seen.weight
+            measured[every] = np.where(weight[every] > 0.0, seen.values, 0.0)
+        return measured, weight
 
-def _march(shared: _Sets, blocks: Sequence[_Block]) -> list[_Marched]:
-    """March blocks of sets; their outputs go into one file if into any."""
-    made, record = [], shared.record
+
+def _march(
+    shared: _Sets, blocks: Sequence[Block]
+) -> list[tuple[Indices, Array | None, list[tuple[int, float]]]]:
+    """March blocks of sets; their outputs go into one file if into any.
+
+    Of each block the sets, their costs or outputs unless these are in their place already, and
+    those that failed with their worst margin.
+    """
+    made, record, keep = [], shared.record, shared.cost is None
+    measured, weight = shared.compared()
     table: dict[str, Array] = {}
     for sets, options in blocks:
         padded, size = np.resize(sets, LANES), sets.size
@@ -141,14 +145,14 @@ def _march(shared: _Sets, blocks: Sequence[_Block]) -> list[_Marched]:
             shared.records,
             record.step,
             shared.output,
-            measured=shared.measured,
-            weight=shared.weight,
-            keep=shared.keep,
+            measured=measured,
+            weight=weight,
+            keep=keep,
         )
         worst = found.worst[:size]
         bad = ~(np.isfinite(found.end[:size]) & (worst > 0.0))
         values: Array | None = np.where(bad, np.inf, found.cost[:size])
-        if shared.keep:
+        if keep:
             values = found.outputs[:size, :: record.substeps]
             values[bad] = np.nan
             if shared.to is not None:
@@ -157,15 +161,14 @@ def _march(shared: _Sets, blocks: Sequence[_Block]) -> list[_Marched]:
             elif shared.place is not None:
                 shared.place[sets] = values
                 values = None
-        failed = list(zip(sets[bad].tolist(), worst[bad].tolist(), strict=True))
-        made.append(_Marched(sets, values, failed))
+        made.append((sets, values, list(zip(sets[bad].tolist(), worst[bad].tolist(), strict=True))))
     if shared.to is not None:
-        _write(shared.to / _file(blocks), {"time": record.time, **table})
+        _write(_file(shared.to, blocks), {"time": record.time, **table})
     return made
 
 
-def _file(blocks: Sequence[_Block]) -> str:
-    return f"{blocks[0].sets[0]:08d}.parquet"
+def _file(folder: Path, blocks: Sequence[Block]) -> Path:
+    return folder / f"{blocks[0][0][0]:08d}.parquet"
 
 
 def _write(path: Path, columns: Mapping[str, Array]) -> None:
@@ -182,19 +185,23 @@ def _write(path: Path, columns: Mapping[str, Array]) -> None:
 
 def _run(
     shared: _Sets,
-    blocks: Sequence[_Block],
+    blocks: Sequence[Block],
     count: int,
     failures: dict[int, str],
     why: Callable[[float], str],
     executor: Executor | None,
 ) -> Batch:
     """March all blocks wherever the executor runs them."""
-    samples, several = shared.record.time.size, 1
-    values = np.full(count, np.inf) if not shared.keep else None
+    samples, several, keep = shared.record.time.size, 1, shared.cost is None
+    values = None if keep else np.full(count, np.inf)
     if shared.to is not None:
+        if not keep:
+            raise InputError(
+                "Outputs are written to files, costs are not: leave out one of to and cost."
+            )
         _make_folder(shared.to)
         several = max(SAMPLES_A_FILE // (samples * LANES), 1)
-    elif shared.keep:
+    elif keep:
         values = _outputs(count, samples)
         shared = replace(shared, place=values)
     items = [blocks[k : k + several] for k in range(0, len(blocks), several)]
@@ -205,8 +212,8 @@ def _run(
             if found is not None:
                 assert values is not None
                 values[sets] = found
-    files = tuple(shared.to / _file(each) for each in items) if shared.to else ()
-    kept, costs = (values, None) if shared.keep else (None, values)
+    files = tuple(_file(shared.to, each) for each in items) if shared.to else ()
+    kept, costs = (values, None) if keep else (None, values)
     return Batch(costs, kept, dict(sorted(failures.items())), files)
 
 
@@ -295,7 +302,7 @@ def simulate_many(
     """
     instance = instance_of(model, p, options=options, given=given)
     records = records_of(instance, inputs, rate)
-    paths, several = parameter_paths(model), len(model.parts) > 1
+    paths = parameter_paths(model)
     values, count = _given_sets(changes)
     starts = [f"start.{path}" for path in state_paths(model)]
     for path in values:
@@ -307,14 +314,10 @@ def simulate_many(
     if not observed:
         raise InputError(f"{model.name}: say which output of the sets is wanted, or give a cost.")
     output_of(model, observed)
-    held, delays = dict(zip(paths, instance.params, strict=True)), set()
-    givens = []
-    for part in model.parts:
-        prefix = f"{part.name}." if several else ""
-        delays |= {f"{prefix}{tap.delay}" for tap in part.taps.values() if tap.delay}
-        if part.given is not None:
-            givens += [f"given {prefix}{path}" for path in floats_of(part.given)]
-    held |= dict(zip(givens, instance.given, strict=True))
+    taps = [(i, tap) for i, part in enumerate(model.parts) for tap in part.taps.values()]
+    delays = {f"{model.prefix(i)}{tap.delay}" for i, tap in taps if tap.delay}
+    givens = [f"given {model.prefix(i)}{path}" for i, path in model.places("given")]
+    held = dict(zip((*paths, *givens), (*instance.params, *instance.given), strict=True))
     numbers = {**{path: np.full(count, number) for path, number in held.items()}, **values}
     failures: dict[int, str] = {}
     for path, column in values.items():
@@ -324,14 +327,14 @@ def simulate_many(
             failures[int(i)] = f"{model.name}: {path} is {column[i]:g}, but must be {rule}."
     good = np.setdiff1d(np.arange(count), list(failures))
     record = Record(next(iter(records.values())), 0.0, float(rate), 1)
-    shared = _shared(model, numbers, record, records, observed, cost, to)
+    shared = _Sets(model, numbers, record, records, observed, cost, Path(to) if to else None)
 
     def why(worst: float) -> str:
         if worst > 0.0:
             return f"{model.name}: the numbers grow beyond all bounds under this input."
         return f"{model.name}: {outside(model, worst, 'input')}"
 
-    blocks = [_Block(good[k : k + LANES], instance.options) for k in range(0, good.size, LANES)]
+    blocks = [(good[k : k + LANES], instance.options) for k in range(0, good.size, LANES)]
     return _run(shared, blocks, count, failures, why, executor)
 
 
@@ -364,7 +367,7 @@ def simulate_drives(
     records = {"voltage" if by_voltage else "current": record.values}
     models = models_of(parameters.equations)
     model = models.drive if by_voltage else models.pump_drive
-    shared = _shared(model, by_path, record, records, observed, cost, to)
+    shared = _Sets(model, by_path, record, records, observed, cost, Path(to) if to else None)
 
     def why(worst: float) -> str:
         return f"{parameters.name}: {OVERFLOW if worst > 0.0 else OVERPOWERED}"
@@ -396,7 +399,7 @@ def _blocks(
     failures: Mapping[int, str],
     changed: Iterable[str],
     by_voltage: bool,
-) -> list[_Block]:
+) -> list[Block]:
     """Blocks of sets that share the options which the kernels are compiled for."""
     stops = np.tan(np.maximum(numbers["Z13_plus"], numbers["Z13_minus"]))
     masks: dict[str, NDArray[np.bool_]] = {"steep": stops >= TAN_22_5}
@@ -411,7 +414,7 @@ def _blocks(
         members = good[(kinds[good] == kind).all(axis=1)]
         on = {name: True if each else None for name, each in zip(masks, kind, strict=True)}
         options = card, base._replace(**on)
-        found += [_Block(members[k : k + LANES], options) for k in range(0, members.size, LANES)]
+        found += [(members[k : k + LANES], options) for k in range(0, members.size, LANES)]
     return found
 
 
@@ -431,34 +434,3 @@ def _given_sets(changes: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], int
         listed = ", ".join(f"{name} {each.size}" for name, each in values.items())
         raise InputError(f"All parameters need the same number of sets, at least one: {listed}.")
     return values, sizes.pop()
-
-
-def _shared(
-    model: Model,
-    numbers: Mapping[str, Array],
-    record: Record,
-    records: Mapping[str, Array],
-    output: str,
-    cost: SquaredError | None,
-    to: str | Path | None,
-) -> _Sets:
-    """Sets with what of them is wanted."""
-    if to is not None and cost is not None:
-        raise InputError(
-            "Outputs are written to files, costs are not: leave out one of to and cost."
-        )
-    compared = _comparison(cost, record)
-    folder = None if to is None else Path(to)
-    return _Sets(model, numbers, record, records, output, *compared, cost is None, folder)
-
-
-def _comparison(cost: SquaredError | None, record: Record) -> tuple[Array, Array]:
-    """Measured values and weights on the march's grid, zero weight between the samples."""
-    # zeros that nobody writes to take no memory
-    measured, weight = np.zeros(record.values.size), np.zeros(record.values.size)
-    if cost is not None:
-        seen = Observation(cost.output, record.time, cost.measured, cost.weight)
-        weights = np.asarray(seen.weight)
-        measured[:: record.substeps] = np.where(weights > 0.0, seen.values, 0.0)
-        weight[:: record.substeps] = weights
-    return measured, weight

@@ -19,6 +19,7 @@ from swashplate.equations.replacement import Replacement, again, uses
 from swashplate.equations.syntax import plain
 from swashplate.errors import InputError
 from swashplate.models.card import Card, CardOptions, Channel
+from swashplate.models.displacement_control import Pump, PumpOptions
 from swashplate.models.drive import Source as CurrentSource
 from swashplate.models.drive import (
     drive,
@@ -27,7 +28,6 @@ from swashplate.models.drive import (
     pump_drive,
     settled_drive,
 )
-from swashplate.models.pump import Pump, PumpOptions
 from swashplate.parameters.definitions import OWN
 from swashplate.parameters.parameter_set import ParameterSet
 
@@ -87,7 +87,8 @@ def with_equation(parameters: ParameterSet, made: Replacement) -> ParameterSet:
     if not uses(models.drive, made.old):
         raise InputError(
             f"{plain(made.old).__name__} is no equation of the drive: swashplate.models.card, "
-            "swashplate.models.pump and swashplate.models.refinements have those."
+            "swashplate.models.displacement_control, swashplate.models.pump and "
+            "swashplate.models.refinements have those."
         )
     if made.parameters is not None and not uses(models.pump_drive, made.old):
         raise InputError(

@@ -96,7 +96,7 @@ def jacobian(
     Columns are symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and
     ``"start_pressure"``. What the record does not depend on gives zeros.
     """
-    names = wanted_columns(columns)
+    names = wanted_columns(tuple(columns))
     instance, inner, paths, moved = made_ready(parameters, observed, names, own)
     found = engine.jacobian(instance, observed, paths, inner, moved=moved, out=out, block=block)
     return found._replace(names=(*names, *observed.own_columns))
@@ -111,19 +111,15 @@ def triangle(
     block: int = BLOCK,
 ) -> Triangle:
     """Triangular factor of [J r]; arguments as in `jacobian`, which is never held."""
-    names = wanted_columns(columns)
+    names = wanted_columns(tuple(columns))
     instance, inner, paths, moved = made_ready(parameters, observed, names, own)
     found = engine.triangle(instance, observed, paths, inner, moved=moved, block=block)
     return found._replace(names=(*names, *observed.own_columns))
 
 
-def wanted_columns(columns: Sequence[str]) -> tuple[str, ...]:
-    """Columns that are asked for, symbols taken apart; refused where one is asked for twice."""
-    return _wanted(tuple(columns))
-
-
 @lru_cache(maxsize=256)
-def _wanted(columns: tuple[str, ...]) -> tuple[str, ...]:
+def wanted_columns(columns: tuple[str, ...]) -> tuple[str, ...]:
+    """Columns that are asked for, symbols taken apart; refused where one is asked for twice."""
     names: list[str] = []
     for name in columns:
         names += [name] if name == START_PRESSURE else columns_of([name])
@@ -144,13 +140,8 @@ def moved_by(
     }
     moved["card"] = any(moved.values())
     moved["pump"] = any(each.signal not in CURRENTS for each in observed.observations)
-    return [moved[part] for part in _parts(tuple(names))]
-
-
-@lru_cache(maxsize=256)
-def _parts(names: tuple[str, ...]) -> list[str]:
-    """What of the drive each column belongs to."""
-    return [path_of(name).removeprefix("start.").rpartition(".")[0] for name in names]
+    paths = (path.removeprefix("start.") for path in _paths(tuple(names)))
+    return [moved[path.rpartition(".")[0]] for path in paths]
 
 
 @lru_cache(maxsize=256)

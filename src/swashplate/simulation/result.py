@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.marching.march import Stored
+from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Instance, observe_kernel
 from swashplate.errors import InputError
-from swashplate.models.pump import Pump
+from swashplate.models.displacement_control import Pump
 from swashplate.results import Tabular, figures
 
 if TYPE_CHECKING:

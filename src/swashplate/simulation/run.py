@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code import generating
-from swashplate.equations.marching.march import Sampler, Stored
+from swashplate.equations.marching.march import Sampler
+from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Instance, Start, Started, called, marched
 from swashplate.equations.model import Model
 from swashplate.errors import DomainError, InputError
-from swashplate.models.pump import PumpConstants, PumpInputs, PumpState
+from swashplate.models.displacement_control import PumpConstants
+from swashplate.models.pump import PumpInputs, PumpState
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import (

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.code import generating
-from swashplate.equations.marching.march import Stored, advance_source
+from swashplate.equations.marching.march import advance_source
+from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import Interpolation, least_substeps
 from swashplate.equations.marching.run import Start, check_domain, check_start, module
 from swashplate.equations.model import Model

@@ -19,24 +19,14 @@ from swashplate.equations import expressions as ex
 from swashplate.equations.adjoints import Derivatives, Derived, derived_function
 from swashplate.equations.code import Code, Let, generating, leaves
 from swashplate.equations.expressions import Node, text
-from swashplate.equations.marching.march import (
-    PartCode,
-    Sampler,
-    Start,
-    Stored,
-    function_source,
-    indented,
-    march_source,
-    output_of,
-    rest_of,
-    settled_of,
-)
+from swashplate.equations.marching.march import Sampler, march_source, output_of
+from swashplate.equations.marching.part import PartCode, Start, Stored, rest_of, settled_of
 from swashplate.equations.marching.pieces import PIECE, Planned, piece
 from swashplate.equations.marching.rows import STRIDE
 from swashplate.equations.marching.run import module
 from swashplate.equations.model import Model, Source, arguments_of
 from swashplate.equations.reading import read
-from swashplate.equations.writing import Writer, lines_of
+from swashplate.equations.writing import Writer, function_source, indented, lines_of
 from swashplate.errors import InputError
 
 PAIR = 2
@@ -54,12 +44,9 @@ class Entry(NamedTuple):
 class By(NamedTuple):
     """What something is differentiated by."""
 
-    kind: str
-    """``p``, ``k``, ``state``, ``tap`` or ``signal``."""
-    path: str
-    """Of parameter or state; name of a constant; number of a tap; signal of another part."""
-    part: int = -1
-    """The other part."""
+    kind: str  # ``p``, ``k``, ``state``, ``tap`` or ``signal``.
+    path: str  # Of parameter or state; name of a constant; number of a tap; signal of another part.
+    part: int = -1  # The other part.
 
 
 @dataclass
@@ -69,10 +56,8 @@ class Group:
     states: tuple[str, ...]
     after: tuple[bool, ...]
     """Whether a state's row holds the derivative behind the sample, as its signal needs it."""
-    stored: tuple[bool, ...]
-    """Whether anyone reads a state's row."""
-    piece: int = -1
-    """Piece that runs the recurrence; -1 where kernels of the library do, for one state or two."""
+    stored: tuple[bool, ...]  # Whether anyone reads a state's row.
+    piece: int = -1  # Piece that runs the recurrence; -1 where a kernel does, for one state.
 
 
 @dataclass
@@ -81,8 +66,7 @@ class Component:
 
     piece: int
     groups: list[Group]
-    signals: bool = False
-    """Whether the piece fills in signals and their derivatives as well."""
+    signals: bool = False  # Whether the piece fills in signals and their derivatives as well.
 
 
 @dataclass
@@ -93,16 +77,14 @@ class PartGraph:
     entries: dict[tuple[str, By], Entry] = field(default_factory=dict)
     """By result (``state.x``, ``signals.y``) and what it is derived by."""
     components: list[Component] = field(default_factory=list)
-    signal_piece: int = -1
-    """Piece that fills in the derivatives of signals, -1 for none."""
+    signal_piece: int = -1  # Piece that fills in the derivatives of signals, -1 for none.
     value_piece: int = -1
     """Piece that computes signals which the march does not leave, -1 for none."""
     aliases: dict[str, str] = field(default_factory=dict)
     """Signals that are a state behind the sample, as far as derivatives go."""
     constants: set[tuple[str, str]] = field(default_factory=set)
     """Constant and parameter that it depends on."""
-    delays: dict[int, str] = field(default_factory=dict)
-    """Path of the delay of each tap."""
+    delays: dict[int, str] = field(default_factory=dict)  # Path of the delay of each tap.
     started: set[tuple[str, str]] = field(default_factory=set)
     """State and parameter that it depends on at the start."""
 
@@ -114,8 +96,7 @@ class Starting(NamedTuple):
     that other parts need (``signal``).
     """
 
-    results: tuple[tuple[str, str], ...]
-    """Kind and name of each."""
+    results: tuple[tuple[str, str], ...]  # Kind and name of each.
     arguments: tuple[str, ...]
     by: tuple[By, ...]
     """What each input of `derived` is: a parameter, or a signal of a part before."""
@@ -132,45 +113,25 @@ class Graph:
     """A model's whole structure."""
 
     parts: list[PartGraph]
-    stored: dict[Stored, int]
-    """Rows of the numbers that the march leaves in the block."""
-    rows: int
-    """Rows of numbers and partial derivatives together."""
-    links: dict[str, dict[str, float]]
-    """Partial derivatives of observed links by their sources."""
-    observed: list[tuple[Stored, bool]]
-    """What is observed, and whether as an integral."""
+    stored: dict[Stored, int]  # Rows of the numbers that the march leaves in the block.
+    rows: int  # Rows of numbers and partial derivatives together.
+    links: dict[str, dict[str, float]]  # Partial derivatives of observed links by their sources.
+    observed: list[tuple[Stored, bool]]  # What is observed, and whether as an integral.
     values: dict[tuple[int, str], int]
     """Row of each signal that the march does not leave, by part and path."""
-    sources: list[Source]
-    """Signals that other parts or observed links need."""
+    sources: list[Source]  # Signals that other parts or observed links need.
     starts: list[dict[str, Starting]]
     """What is known of each part where it starts at rest and, if it can, settled."""
-    codes: list[PartCode]
-    """The parts' code."""
-    signals: tuple[str, ...]
-    """External signals that are given as records."""
-    pieces: tuple[Planned, ...]
-    """The march, and what the parts' graphs name by number."""
+    codes: list[PartCode]  # The parts' code.
+    signals: tuple[str, ...]  # External signals that are given as records.
+    pieces: tuple[Planned, ...]  # The march, and what the parts' graphs name by number.
 
 
 @generating
 def graph_of(
     model: Model, signals: tuple[str, ...], options: tuple[Any, ...], observed: tuple[str, ...]
 ) -> Graph:
-    """A model's structure, and the pieces of its march.
-
-    Parameters
-    ----------
-    model : Model
-        What is marched.
-    signals : tuple of str
-        External signals given as records.
-    options : tuple
-        Options of each part.
-    observed : tuple of str
-        Signals whose derivatives are wanted.
-    """
+    """A model's structure for some observed signals, and the pieces of its march."""
     return _Builder(model, signals, options, observed).build()
 
 
@@ -188,11 +149,9 @@ class _Builder:
             model, signals, options, [place for place, _ in self.observed], ruled=True
         )
         self.parts = self.sampler.used()
-        self.pieces: list[Planned] = []
-        """The march, made last, comes first."""
+        self.pieces: list[Planned] = []  # The march, made last, comes first.
         self.stored: dict[Stored, int] = {}
-        self.row_of: dict[str, int] = {}
-        """Row of each number by its name in the code."""
+        self.row_of: dict[str, int] = {}  # Row of each number by its name in the code.
         self.rows = 0
         self.graphs: list[PartGraph] = []
         self.starts: list[dict[str, Starting]] = []
@@ -297,13 +256,6 @@ class _Builder:
         for source in self.sampler.sources:
             found[part.source(source)] = By("signal", source.signal, source.part)
         return found
-
-    def _plain(self, part: PartCode, name: str) -> bool:
-        """Whether a name comes from outside, without being differentiated by."""
-        samples = {each for tap in part.taps for each in part.tap_samples(tap)}
-        fractions = {part.fraction(tap) for tap in part.taps}
-        given = {node.value for _, node in leaves(part.given)}
-        return name in samples | fractions | given or name == "h" or name.startswith("x_")
 
     def _arguments(self, part: PartCode, read: Iterable[str]) -> tuple[list[str], list[str]]:
         """Lines ahead of a loop over known samples, and those at the head of its body."""
@@ -461,7 +413,7 @@ class _Builder:
                     for path, behind in zip(bare, after, strict=True)
                 )
                 groups.append(Group(bare, after, stored))
-                if len(bare) > 2:
+                if len(bare) > 1:
                     groups[-1].piece = self._recurrence(graph, f"{own}_{bare[0]}", groups[-1])
             graph.components.append(Component(filled, groups, together))
         starts = {"rest": self._starting(part, rest_of(part))}
@@ -491,8 +443,10 @@ class _Builder:
             if s.part == part.part
         }
         known = {name: by for name, by in self._by(part).items() if by.kind in ("p", "signal")}
+        given = {"h", *map(part.fraction, part.taps), *(n.value for _, n in leaves(part.given))}
+        outside = given.union(known, *map(part.tap_samples, part.taps))
         read = code.reads(results.values())
-        arguments = sorted(each for each in read if each in known or self._plain(part, each))
+        arguments = sorted(each for each in read if each in outside or each.startswith("x_"))
         active = [each for each in arguments if each in known]
         named = [(f"{kind} {name}", node) for (kind, name), node in results.items()]
         name = f"{part.own.name}_start"
@@ -627,19 +581,12 @@ def _sum(terms: Sequence[str]) -> str:
 
 def _weakly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> list[list[str]]:
     """States in groups that share no derivative."""
-    group = {each: {each} for each in states}
+    group = {each: frozenset((each,)) for each in states}
     for out, inputs in flows.items():
         for inp in inputs:
-            if group[out] is not group[inp]:
-                merged = group[out] | group[inp]
-                for each in merged:
-                    group[each] = merged
-    found: list[list[str]] = []
-    for each in states:
-        members = [other for other in states if other in group[each]]
-        if members not in found:
-            found.append(members)
-    return found
+            merged = group[out] | group[inp]
+            group |= dict.fromkeys(merged, merged)
+    return [[each for each in states if each in some] for some in dict.fromkeys(group.values())]
 
 
 def _strongly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> list[list[str]]:
@@ -656,12 +603,7 @@ def _strongly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) ->
         each: tuple(other for other in states if other in reach[each] and each in reach[other])
         for each in states
     }
-    order = TopologicalSorter(
-        {
-            group[each]: {group[i] for i in flows[each] if i in group} - {group[each]}
-            for each in states
-        }
-    )
+    order: TopologicalSorter[tuple[str, ...]] = TopologicalSorter()
     for each in states:
         order.add(group[each], *({group[i] for i in flows[each] if i in group} - {group[each]}))
     return [list(members) for members in order.static_order()]

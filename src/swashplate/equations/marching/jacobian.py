@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code import generating, leaves
-from swashplate.equations.fields import floats_of, value_at
+from swashplate.equations.fields import value_at
 from swashplate.equations.marching.graph import Graph, graph_of
 from swashplate.equations.marching.layout import Layout, Slot, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, Own
@@ -23,7 +23,14 @@ from swashplate.equations.marching.rows import (
     room_for,
     rooms,
 )
-from swashplate.equations.marching.run import Instance, Places, Start, arrays_of, check_domain
+from swashplate.equations.marching.run import (
+    Instance,
+    Places,
+    Start,
+    arrays_of,
+    begun,
+    check_domain,
+)
 from swashplate.equations.marching.triangle import ROWS, aligned, upright
 from swashplate.equations.model import Model, Source
 from swashplate.errors import DomainError, InputError
@@ -41,10 +48,8 @@ Slopes = dict[str, float]
 class StartSlopes(NamedTuple):
     """Derivatives at the start, of all parts."""
 
-    constants: dict[Slot, float]
-    """Of constants by parameters."""
-    states: dict[tuple[int, str], Slopes]
-    """Of states by parameters, by part and path."""
+    constants: dict[Slot, float]  # Of constants by parameters.
+    states: dict[tuple[int, str], Slopes]  # Of states by parameters, by part and path.
 
 
 @generating
@@ -56,21 +61,13 @@ def rest_slopes(graph: Graph, instance: Instance, h: float) -> StartSlopes:
 def start_slopes(
     graph: Graph, instance: Instance, first: Mapping[str, float], h: float, start: Start
 ) -> StartSlopes:
-    """Derivatives of the state at the start by all parameters.
-
-    Parameters
-    ----------
-    first : mapping of str to float
-        External signals as they were before the first sample.
-    """
+    """Derivatives of the state at the start by all parameters, at signals as they were before."""
     model = instance.model
-    several = len(model.parts) > 1
     constants: dict[Slot, float] = {}
     states: dict[tuple[int, str], Slopes] = {}
     signals: dict[tuple[int, str], tuple[float, Slopes]] = {}
     for code, starts in zip(graph.codes, graph.starts, strict=True):
         i, own = code.part, instance.parts[code.part]
-        prefix = f"{model.parts[i].name}." if several else ""
         values: dict[str, float] = {"h": h}
         values |= {node.value: value_at(own.p, path) for path, node in leaves(code.p)}
         values |= {node.value: value_at(own.given, path) for path, node in leaves(code.given)}
@@ -88,7 +85,7 @@ def start_slopes(
             if key[0] == "k":
                 constants[Slot("k", i, key[1], by.path)] = slope
                 continue
-            own_column = {f"{prefix}{by.path}": 1.0}
+            own_column = {f"{model.prefix(i)}{by.path}": 1.0}
             inner = own_column if by.kind == "p" else signals[by.part, by.path][1]
             for column, factor in inner.items():
                 made[key][column] = made[key].get(column, 0.0) + slope * factor
@@ -105,17 +102,12 @@ def tangents_of(
 ) -> Array:
     """Derivatives of the states at the first sample, in their places.
 
-    Parameters
-    ----------
-    own : iterable of str
-        Paths of states that the run starts from as its own unknowns: nothing else moves them.
+    `own` are paths of states that the run starts from as its own unknowns: nothing else moves them.
     """
     tangent = np.zeros(layout.tangents)
-    several = len(model.parts) > 1
     free = set(own)
     for (part, path), found in layout.places.items():
-        full = f"{model.parts[part].name}.{path}" if several else path
-        if full in free:
+        if f"{model.prefix(part)}{path}" in free:
             for c, at in found.items():
                 tangent[at] = 1.0 if path in started_by(model, part, columns[c]) else 0.0
         else:
@@ -168,23 +160,10 @@ NOTHING_OWN = Own()
 def residuals(
     instance: Instance, observed: ObservedRecord, own: Own = NOTHING_OWN, *, block: int = BLOCK
 ) -> Array:
-    """Weighted residuals of all observations, one after the other.
+    """(m,) weighted residuals of all observations, one after the other, 0 where the weight is.
 
-    Parameters
-    ----------
-    instance : Instance
-        The model with its numbers.
-    observed : ObservedRecord
-        The record, and what was measured under it.
-    own : Own
-        Values of the experiment's own unknowns.
-    block : int
-        Samples marched at a time, 2 to 512.
-
-    Returns
-    -------
-    (m,) array
-        weight · (simulated - measured) in the signals' SI units; 0 where the weight is.
+    Of each weight · (simulated - measured) in its signal's SI unit; `own` are values of the
+    experiment's own unknowns, `block` the samples marched at a time, 2 to 512.
 
     Raises
     ------
@@ -317,11 +296,7 @@ def _march(
     missing = [c for c in columns if c.startswith("start.") and c[6:] not in own.start]
     if missing:
         raise InputError(f"{missing[0]} is a column, so Own needs a value of it.")
-    states, paths = started.flat, state_paths(instance.model) if own.start else []
-    for path, value in own.start.items():
-        if path not in paths:
-            raise InputError(f"There is no state '{path}' to start from; {', '.join(paths)}.")
-        states[paths.index(path)] = value
+    states = begun(instance, started, own.start)
     if observed.start == "rest":
         slopes = rest_slopes(graph, instance, h)
     else:
@@ -366,13 +341,3 @@ def _with_numbers(layout: Layout, constants: Mapping[Slot, float], places: Place
         tap = slot.kind == "tap"
         scale[at] *= places.slope[int(slot.first)] if tap else constants[slot]
     return program._replace(terms=program.terms._replace(scale=scale))
-
-
-def state_paths(model: Model) -> list[str]:
-    """Paths of all states, in the order of the flat array."""
-    several = len(model.parts) > 1
-    return [
-        f"{part.name}.{path}" if several else path
-        for part in model.parts
-        for path in floats_of(part.state)
-    ]

@@ -1,8 +1,15 @@
 """Many sets of one model side by side: LANES of them in the innermost loop of one march.
 
-The equations stand in that loop as straight code (`straight`), which the compiler turns into vector
-instructions. Arithmetic is as strict as in the plain march, so that each set's numbers are the same
-to the last bit, whatever its neighbours are.
+The equations stand in that loop as straight code, which the compiler turns into vector instructions
+if there is nothing in it but arithmetic on rows of neighbouring numbers. Hence
+
+- a decision is not a branch: both ways are computed, and one result is taken;
+- what does not change over the march is computed once, ahead of it: the compiler moves it out of a
+  loop over samples by itself, but not out of one over lanes within;
+- a call of a library has a loop of its own, between those that become vectors.
+
+Arithmetic is as strict as in the plain march, so that each set's numbers are the same to the last
+bit, whatever its neighbours are.
 """
 
 from __future__ import annotations
@@ -10,34 +17,167 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import config, types
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.code import generating, leaves
+from swashplate.equations.code import Call, Choice, Code, Item, Let, Rule, generating, leaves
 from swashplate.equations.expressions import Node, text
-from swashplate.equations.marching.march import (
-    Sampler,
-    function_source,
-    indented,
-    lower,
-    output_of,
-    rest_of,
-)
+from swashplate.equations.marching.march import Sampler, lower, output_of
+from swashplate.equations.marching.part import rest_of
 from swashplate.equations.marching.run import module
-from swashplate.equations.marching.straight import CALLED, VECTOR, Statement, Straight
 from swashplate.equations.marching.triangle import aligned
 from swashplate.equations.model import Model
-from swashplate.equations.writing import lines_of
+from swashplate.equations.writing import function_source, indented, lines_of
 
 Array = NDArray[np.float64]
 
 LANES = 16
 """Sets marched side by side: two vectors of eight where the processor has them, else four of 4."""
 
+
+# --- without branches -----------------------------------------------------------------------------
+
+
+def _choose(test: bool, one: Any, two: Any) -> Any:
+    return one if test else two
+
+
+def _selected(typing: Any, test: Any, one: Any, two: Any) -> Any:
+    kind = types.boolean if one == two == types.boolean else types.float64
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return builder.select(*values)
+
+    return kind(types.boolean, kind, kind), generate
+
+
+CALLED: dict[str, Any] = {"choose": intrinsic(_selected)}
+"""What the text calls. ``choose(test, a, b)`` is one of two numbers that both have been computed:
+from ``a if test else b`` the compiler makes a choice between two addresses, and gathers."""
+if config.DISABLE_JIT:  # type: ignore[attr-defined]
+    # a root that nobody asks for may be one of a number below zero, which compiled code allows
+    CALLED = {"choose": _choose, "sqrt": np.sqrt}
+
+SHORT = 16
+"""Statements that are not worth a loop of their own."""
+VECTOR = {*ex.CHEAP, "choose", "/", "sqrt", "**"}
+"""Operations that processors have for many numbers at once."""
+
+
+def is_vector(node: Node) -> bool:
+    """Whether a processor can compute an expression for many lanes at once."""
+    return node.op in VECTOR and all(map(is_vector, node.args))
+
+
+def is_flat(item: Item) -> bool:
+    """Whether all of an item can be computed for many lanes at once, whatever its tests say."""
+    if isinstance(item, Choice):
+        merged = [node for each in item.merged for node in each[1:]]
+        return all(map(is_flat, (*item.then, *item.other))) and all(map(is_vector, merged))
+    return isinstance(item, Let) and is_vector(item.node)
+
+
+def made_by(item: Choice | Call) -> tuple[str, ...]:
+    """Names that an item gives their values."""
+    return tuple(name for name, _, _ in item.merged) if isinstance(item, Choice) else item.results
+
+
+class Statement(NamedTuple):
+    """Lines that give some names their values."""
+
+    names: tuple[str, ...]
+    lines: list[str]
+    reads: frozenset[str]
+    vector: bool  # Whether a processor can do it for many lanes at once.
+
+
+class Straight:
+    """Code of a sample without branches, and what can be computed ahead of the march.
+
+    Names in `still` do not change over the march: what follows nothing but them is `ahead`, the
+    rest stands in `loops` over lanes. `fresh` gives a name that is not taken.
+    """
+
+    def __init__(self, still: Iterable[str], fresh: Callable[[str], str]) -> None:
+        self.still, self.fresh = {"h", *still}, fresh
+        self.ahead: list[Statement] = []
+        self.loops: list[list[Statement]] = [[]]
+        self._moved: dict[Node, Node] = {}
+
+    def add(self, code: Code, items: Iterable[Item]) -> None:
+        """Append items of some code."""
+        for item in items:
+            if isinstance(item, Let):
+                self.let(item.name, item.node)
+            elif isinstance(item, Choice) and is_flat(item):
+                self.add(code, (*item.then, *item.other))
+                for name, one, two in item.merged:
+                    self.let(name, ex.make("if", item.test, one, two))
+            else:
+                assert not isinstance(item, Rule)
+                names = made_by(item)
+                alone = Code(code.taken)
+                alone.items = [item]
+                made = [*map(ex.name, names)]
+                reads = frozenset(alone.reads(made))
+                self._append(Statement(names, lines_of(alone, made), reads, False))
+                code.names |= alone.names
+
+    def let(self, name: str, node: Node) -> None:
+        """Append a name and what it stands for."""
+        made = node if node.reads <= self.still else self.node(node)
+        self._append(Statement((name,), [f"{name} = {text(made)}"], made.reads, is_vector(made)))
+
+    def _append(self, statement: Statement) -> None:
+        if statement.names and statement.reads <= self.still:
+            self.still.update(statement.names)
+            self.ahead.append(statement)
+        else:
+            if self.loops[-1] and self.loops[-1][-1].vector != statement.vector:
+                self.loops.append([])
+            self.loops[-1].append(statement)
+
+    def cut(self) -> None:
+        """Begin another loop over lanes, unless the present one is short.
+
+        While one vector waits for its own results, a processor looks only so far ahead for others.
+        """
+        if len(self.loops[-1]) > SHORT:
+            self.loops.append([])
+
+    def become(self, row: str, node: Node) -> None:
+        """Append what becomes of a row."""
+        made = self.node(node)
+        self._append(Statement((), [f"{row} = {text(made)}"], made.reads, True))
+
+    def node(self, node: Node) -> Node:
+        """An expression without branches, and without what can be computed ahead of the march."""
+        if node.op in ex.LEAVES:
+            return node
+        if node.reads and node.reads <= self.still:
+            if node not in self._moved:
+                name = self.fresh("still")
+                self.let(name, node)
+                self._moved[node] = ex.name(name, node.kind)
+            return self._moved[node]
+        args = [self.node(each) for each in node.args]
+        if node.op == "if" and node.kind != "int":
+            return ex.make("choose", *args, kind=node.kind)
+        if node.op == "and":
+            return reduce(lambda a, b: ex.make("choose", a, b, ex.number(False), kind="bool"), args)
+        if node.op == "or":
+            return reduce(lambda a, b: ex.make("choose", a, ex.number(True), b, kind="bool"), args)
+        return ex.make(node.op, *args, value=node.value)
+
+
+# --- the march ------------------------------------------------------------------------------------
 
 CALLS = re.compile(r"([A-Za-z_]\w*)\(")
 CALLED_ONCE = re.compile(r"_[0-9a-f]{8}$")
@@ -259,11 +399,9 @@ class Delayed(NamedTuple):
     """How one of the model's taps looks at its signal."""
 
     number: int
-    delay: str | None
-    """Path of the parameter."""
+    delay: str | None  # Path of the parameter.
     ahead: float
-    fraction: int | None
-    """Row of the fraction of a sample, if anything reads it."""
+    fraction: int | None  # Row of the fraction of a sample, if anything reads it.
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,8 +414,7 @@ class Lanes:
     columns: Mapping[str, tuple[int, float | None]]
     """Row and default of each parameter and given that is read, as `march_lanes` takes them."""
     taps: Sequence[Delayed]
-    starts: Mapping[str, int]
-    """Row of each state, as `march_lanes` takes them."""
+    starts: Mapping[str, int]  # Row of each state, as `march_lanes` takes them.
 
 
 @generating
@@ -290,7 +427,7 @@ def lanes_of(
     columns: dict[str, tuple[int, float | None]] = {}
     taps, starts = [], {}
     for part in sampler.used():
-        prefix = f"{part.own.name}." if len(model.parts) > 1 else ""
+        prefix = model.prefix(part.part)
         defaults, states = part.own.parameters._field_defaults, dict(leaves(part.state))
         for name, path in part.parameters.items():
             if name in rows:
@@ -310,14 +447,10 @@ def lanes_of(
 class Marched(NamedTuple):
     """What LANES sets leave."""
 
-    cost: Array
-    """(LANES,) sum of weighted squared errors."""
-    worst: Array
-    """(LANES,) worst margin of the domain, infinite without one."""
-    end: Array
-    """(LANES,) a sum that is finite where all numbers are."""
-    outputs: Array
-    """(LANES, n) the output, or (LANES, 0)."""
+    cost: Array  # (LANES,) sum of weighted squared errors.
+    worst: Array  # (LANES,) worst margin of the domain, infinite without one.
+    end: Array  # (LANES,) a sum that is finite where all numbers are.
+    outputs: Array  # (LANES, n) the output, or (LANES, 0).
 
 
 def march_lanes(
@@ -334,22 +467,10 @@ def march_lanes(
 ) -> Marched:
     """March LANES sets over one record, from rest but for what the numbers say.
 
-    Parameters
-    ----------
-    numbers : mapping of str to (LANES,) array
-        Every parameter by its path, and every given, ``"given "`` before it; parameters that a type
-        has a default for may be left out. States at the first sample, ``"start."`` before their
-        paths, where they are not those at rest.
-    records : mapping of str to (n,) array
-        External signals, zero before.
-    h : float
-        Step. [s]
-    output : str
-        Signal that is kept or compared.
-    measured, weight : (n,) arrays
-        What it is compared with, and the weight of each squared error.
-    keep : bool
-        Whether the output is kept.
+    `numbers` has (LANES,) values of every parameter by its path, and every given, ``"given "``
+    before it; parameters that a type has a default for may be left out. States at the first sample,
+    ``"start."`` before their paths, where they are not those at rest. The output is compared with
+    (n,) `measured` values under the `weight` of each squared error.
     """
     lanes = lanes_of(model, tuple(records), options, output)
     block = aligned(len(lanes.rows), LANES)

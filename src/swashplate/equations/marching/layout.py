@@ -60,19 +60,13 @@ class Layout:
     """A program without the numbers that depend on parameters, and the memory it needs."""
 
     program: Program
-    way: Indices
-    """(r, d) see `Plan.way`."""
-    pieces: frozenset[int]
-    """Numbers of the pieces that are called."""
-    slots: tuple[tuple[int, Slot], ...]
-    """Terms with a factor of this kind."""
+    way: Indices  # (r, d) see `Plan.way`.
+    pieces: frozenset[int]  # Numbers of the pieces that are called.
+    slots: tuple[tuple[int, Slot], ...]  # Terms with a factor of this kind.
     rows: int
-    constant: Mapping[int, float]
-    """Rows that hold just one value."""
-    tangents: int
-    """Numbers in the vector of tangents."""
-    columns: Mapping[str, int]
-    """Number of each column by its path."""
+    constant: Mapping[int, float]  # Rows that hold just one value.
+    tangents: int  # Numbers in the vector of tangents.
+    columns: Mapping[str, int]  # Number of each column by its path.
     places: Mapping[tuple[int, str], Mapping[int, int]]
     """Place of a tangent by part and state, and by the number of the column."""
 
@@ -85,20 +79,10 @@ def layout_of(
     observed: tuple[int, ...],
     whole: tuple[bool, ...],
 ) -> Layout:
-    """What to do in every block for some columns.
+    """What to do in every block for some columns: paths of parameters, and ``start.`` of a state.
 
-    Parameters
-    ----------
-    graph : Graph
-        Structure of the model.
-    model : Model
-        The model.
-    columns : tuple of str
-        Paths of parameters, and ``start.`` with the path of a state.
-    observed : tuple of int
-        For each observation, which of the graph's observed signals it is.
-    whole : tuple of bool
-        Whether it sees every sample of the record, and all of its rows are kept.
+    `observed` says for each observation which of the graph's observed signals it is, and `whole`
+    whether it sees every sample of the record, and all of its rows are kept.
     """
     return _Planner(graph, model, columns).layout(observed, whole)
 
@@ -107,8 +91,7 @@ class _Chain(NamedTuple):
     """A recurrence of one state."""
 
     todo: tuple[int, int, int, int]
-    factor: int
-    """Place of what a step leaves of it."""
+    factor: int  # Place of what a step leaves of it.
     columns: list[tuple[int, int, int, int]]
     """Of each column its number, the rows of input and result, and its place among the tangents."""
 
@@ -122,8 +105,7 @@ class _Planner:
         self.tangents = 1  # the first belongs to idle columns
         self.places: dict[tuple[int, str], dict[int, int]] = {}
         self.references: dict[tuple[str, int, str], dict[int, Reference]] = {}
-        self.made: list[tuple[int, list[Term]]] = []
-        """Rows that are sums of terms."""
+        self.made: list[tuple[int, list[Term]]] = []  # Rows that are sums of terms.
         self.todo: list[tuple[int, int, int, int]] = []
         self.chains: list[_Chain] = []
         self.columns_of: list[Indices] = [np.zeros(0, dtype=np.int64)]
@@ -198,14 +180,11 @@ class _Planner:
         self.rows += 1
         return self.rows - 1
 
-    def _prefix(self, part: int) -> str:
-        return f"{self.model.parts[part].name}." if len(self.model.parts) > 1 else ""
-
     def _terms(
         self, part: PartGraph, entries: Mapping[By, Entry], c: int, within: Sequence[str] = ()
     ) -> Iterator[Term]:
         """What moves a result with a column, apart from the states of its own group."""
-        prefix, column = self._prefix(part.part), self.columns[c]
+        prefix, column = self.model.prefix(part.part), self.columns[c]
         name = column.removeprefix(prefix) if column.startswith(prefix) else ""
         for by, entry in entries.items():
             constant = entry.row < 0
@@ -262,7 +241,7 @@ class _Planner:
         """
         since, whose = len(self.made), list[int]()
         found: list[list[tuple[int, int, int]]] = []
-        prefix = self._prefix(part.part)
+        prefix = self.model.prefix(part.part)
         for c, column in enumerate(self.columns):
             terms = [
                 list(self._terms(part, by_result.get(f"state.{path}", {}), c, group.states))
@@ -294,13 +273,11 @@ class _Planner:
         abreast = PAIR if generated else ABREAST
         found += [[(self._constant(0.0), self.idle, 0)] * k] * (-len(found) % abreast)
         states = group.states
-        numbers = (
-            [len(found)]
-            if generated
-            else [
-                self._factor(by_result, path, other) * STRIDE for path in states for other in states
-            ]
-        )
+        numbers = [len(found)]
+        if not generated:
+            entry = by_result.get(f"state.{states[0]}", {}).get(By("state", states[0]), Entry(-1))
+            row = entry.row if entry.row >= 0 else self._constant(entry.value)
+            numbers = [row * STRIDE]
         for i, after in enumerate(group.after):
             numbers += [each[i][0] * STRIDE for each in found]
             numbers += [each[i][1] * STRIDE for each in found]
@@ -312,7 +289,7 @@ class _Planner:
         if generated:
             self.todo.append((CHAIN, group.piece, begin, begin + len(numbers)))
         else:
-            self.todo.append((RECUR, k, begin, begin + len(numbers)))
+            self.todo.append((RECUR, 0, begin, begin + len(numbers)))
         if k == 1 and early and not group.after[0]:
             columns = [(c, *each[0]) for c, each in zip(whose, found, strict=False)]
             self.chains.append(_Chain(self.todo[-1], numbers[0], columns))
@@ -367,13 +344,6 @@ class _Planner:
             (COMBINE, since, len(self.made), 0),
             (FOLLOW, r, begin, begin + len(numbers)),
         ]
-
-    def _factor(self, by_result: Mapping[str, Mapping[By, Entry]], path: str, other: str) -> int:
-        """Row of the derivative of a state behind the sample by another one at it."""
-        entry = by_result.get(f"state.{path}", {}).get(By("state", other))
-        if entry is None:
-            return self._constant(0.0)
-        return entry.row if entry.row >= 0 else self._constant(entry.value)
 
     def _signals(self, part: PartGraph, by_result: Mapping[str, Mapping[By, Entry]]) -> None:
         """Derivatives of the signals of a part that others need."""
@@ -448,7 +418,7 @@ def _by_result(part: PartGraph) -> dict[str, dict[By, Entry]]:
 
 def started_by(model: Model, part: int, column: str) -> tuple[str, ...]:
     """Paths of a part's states that a column such as ``start.pump.pressure`` sets."""
-    prefix = f"start.{model.parts[part].name}." if len(model.parts) > 1 else "start."
+    prefix = f"start.{model.prefix(part)}"
     if not column.startswith(prefix):
         return ()
     name = column.removeprefix(prefix)

@@ -17,40 +17,20 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property, lru_cache
 from itertools import chain
-from typing import Any, NamedTuple, get_type_hints
+from typing import Any
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.code import Code, Flag, Let, Tuple, Value, fixed, leaves, rebuilt
+from swashplate.equations.code import Code, Let, Value, leaves
 from swashplate.equations.equation import inlined
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.fields import floats_of
+from swashplate.equations.marching.part import GUESSED, Guessed, PartCode, Stored
 from swashplate.equations.marching.pieces import PIECE
-from swashplate.equations.marching.straight import GUESSED, Guessed
-from swashplate.equations.model import (
-    Equation,
-    Link,
-    Model,
-    Source,
-    Tap,
-    Window,
-    arguments_of,
-    linear,
-    mean_over_sample,
-    previous,
-)
+from swashplate.equations.model import Model, Source
 from swashplate.equations.reading import read
-from swashplate.equations.syntax import plain
-from swashplate.equations.writing import lines_of
+from swashplate.equations.writing import function_source, indented, lines_of
 from swashplate.errors import InputError
-
-HOLDS: dict[str, Equation] = {
-    "linear": linear,
-    "previous": previous,
-    "mean": mean_over_sample,
-}
-
 
 _OWN = """
 n m j c lane first last worst h half value error total count span used progress values lines
@@ -68,265 +48,10 @@ def sample_at(record: Any, index: int, before: float) -> float:
     return record[index] if index >= 0 else before
 
 
-class Stored(NamedTuple):
-    """A number of a part that is kept."""
-
-    part: int
-    kind: str
-    """``signals``, ``state``, ``limits``, ``input``, ``link``, or ``tap`` for a tap's sample."""
-    path: str = ""
-    """Of the number; name of the input or link; input and number of a tap's sample, ``at.0``."""
-
-
-class TapOf(NamedTuple):
-    """A tap of a part, with the number of its place among all taps of the model."""
-
-    part: int
-    input: str
-    number: int
-    tap: Tap
-
-
-def taps_of(model: Model, signals: Sequence[str]) -> tuple[TapOf, ...]:
-    """All taps on signals that are given as records, numbered."""
-    return _taps_of(model, tuple(signals))
-
-
-@lru_cache(maxsize=256)
-def _taps_of(model: Model, signals: tuple[str, ...]) -> tuple[TapOf, ...]:
-    found: list[TapOf] = []
-    for i, part in enumerate(model.parts):
-        for name in part.input_types:
-            tap = part.tap(name)
-            outside = model.link_of(i, name) is None and tap.signal in signals
-            if outside and part.looked_at(name):
-                found.append(TapOf(i, name, len(found), tap))
-    return tuple(found)
-
-
-class PartCode:
-    """One sample of a part as straight code.
-
-    Parameters
-    ----------
-    model : Model
-        The whole model.
-    part : int
-        Number of the part.
-    signals : sequence of str
-        External signals that are given as records; for the others the default parameter counts.
-    options : object
-        Options of the part.
-    taken : set of str
-        Names that are in use already.
-    ruled : bool
-        Whether equations with declared derivatives stay calls, as differentiation needs it.
-    """
-
-    def __init__(
-        self,
-        model: Model,
-        part: int,
-        signals: Sequence[str],
-        options: Any,
-        taken: set[str] | None = None,
-        *,
-        ruled: bool = False,
-    ) -> None:
-        self.model, self.part, self.own = model, part, model.parts[part]
-        self.records, self.options = tuple(signals), options
-        self.prologue = Code(set() if taken is None else taken, ruled=ruled)
-        self.code = Code(self.prologue.taken, ruled=ruled)
-        self.prefix = f"{self.own.name}_" if len(model.parts) > 1 else ""
-        self.code.taken.add("h")
-        self.taps = [each for each in taps_of(model, signals) if each.part == part]
-        for tap in self.taps:
-            self.code.taken |= {*self.tap_samples(tap), self.fraction(tap), self.whole(tap)}
-        self.p = self._names(self.own.parameters, "p")
-        self.given = self._names(self.own.given, "given") if self.own.given else Tuple(None, ())
-        self.state = self._names(self.own.state, "s")
-        self.known: dict[str, Value] = {"p": self.p, "h": ex.name("h"), "given": self.given}
-        self.known["state"] = self.state
-        if self.own.constants is not None:
-            self.known["k"] = self._call(self.prologue, self.own.constants)
-        self.inputs: dict[str, Value] = {}
-        for name in self.own.input_types:
-            self.inputs[name] = self._input(name)
-        self.known |= self.inputs
-        self.entry = list(self.code.items)
-        """Items that make the inputs; a start needs them, too."""
-        if self.own.inputs is not None:
-            self.known["inputs"] = Tuple(self.own.inputs, tuple(self.inputs.values()))
-        if self.own.sample is not None:
-            self.known["signals"] = self._call(self.code, self.own.sample)
-        self.following = self._call(self.code, self.own.step)
-        self._check_type(self.own.step, self.following, self.own.state)
-
-    def _check_type(self, equation: Equation, made: Value, kind: type[Any]) -> None:
-        """Refuse what an equation returns unless it is of a type, and all of it numbers."""
-        cls = made.cls if isinstance(made, Tuple) else None
-        numbers = tuple(path for path, node in leaves(made) if node.kind in ("float", "int"))
-        if cls is not kind or numbers != floats_of(kind):
-            raise InputError(
-                f"Model {self.own.name}: {plain(equation).__name__} must return a {kind.__name__} "
-                "of numbers on every way."
-            )
-
-    def _names(self, kind: Any, letter: str) -> Value:
-        hints = get_type_hints(kind)
-
-        def made(kind: Any, hints: Mapping[str, Any], path: str) -> Value:
-            items: list[Value] = []
-            for name in kind._fields:
-                inner = hints[name]
-                below = f"{path}{name}"
-                if isinstance(inner, type) and hasattr(inner, "_fields"):
-                    items.append(made(inner, get_type_hints(inner), f"{below}_"))
-                else:
-                    taken = self.code.fresh(f"{letter}_{self.prefix}{below}")
-                    items.append(ex.name(taken))
-            return Tuple(kind, tuple(items))
-
-        return made(kind, hints, "")
-
-    def _call(self, code: Code, equation: Equation, **more: Value) -> Value:
-        return self.call(code, equation, {**self.known, **more})
-
-    def call(self, code: Code, equation: Equation, known: Mapping[str, Value]) -> Value:
-        """Append a call of one of the part's equations, of what is known by argument."""
-        given = {name: known[name] for name in arguments_of(equation) if name in known}
-        if "options" in arguments_of(equation):
-            given["options"] = fixed(self.options) or Flag("unknown", "options")
-        made, name = read(code, equation, given), plain(equation).__name__
-        before = {*code.taken}
-        made = code.named(made, name if isinstance(made, Node) else "")
-        code.origins |= dict.fromkeys(code.taken - before, name)
-        return made
-
-    def _input(self, name: str) -> Value:
-        """An input as a name, a window of names, or what a hold makes of one."""
-        link = self.model.link_of(self.part, name)
-        if link is not None:
-            return self.linked(link)
-        tap = self.own.tap(name)
-        found = next((each for each in self.taps if each.input == name), None)
-        if found is None:
-            if tap.signal in self.records:
-                return ex.name(f"x_{tap.signal}")
-            if name not in self.own.defaults:
-                # refused where the model is given its numbers; a constant keeps the code whole
-                return ex.ZERO
-            return value_of(self.p, self.own.defaults[name])
-        samples = [ex.name(each) for each in self.tap_samples(found)]
-        fraction = ex.name(self.fraction(found))
-        window = Tuple(Window, (Tuple(None, tuple(samples)), fraction))
-        if tap.width:
-            return window
-        return self._call(self.code, HOLDS[tap.hold], window=window)
-
-    def linked(self, link: Link) -> Node:
-        """A signal between parts, from the names of its sources."""
-        sources = {each.signal: ex.name(self.source(each)) for each in link.sources}
-        if link.equation is None:
-            return next(iter(sources.values()))
-        made = self.code.named(read(self.code, link.equation, sources), link.name)
-        assert isinstance(made, Node)
-        return made
-
-    def source(self, source: Source) -> str:
-        """Name of a signal that another part needs."""
-        return f"x_{self.model.parts[source.part].name}_{source.signal.replace('.', '_')}"
-
-    def tap_samples(self, tap: TapOf) -> list[str]:
-        """Names of a tap's samples, newest first."""
-        return [f"{self.prefix}{tap.input}_{j}" for j in range(tap.tap.samples)]
-
-    def fraction(self, tap: TapOf) -> str:
-        """Name of the rest of a tap's place."""
-        return f"{self.prefix}{tap.input}_f"
-
-    def whole(self, tap: TapOf) -> str:
-        """Name of the whole samples of a tap's place."""
-        return f"{self.prefix}{tap.input}_whole"
-
-    @cached_property
-    def margin(self) -> Node | None:
-        """Margin of the domain."""
-        if self.own.domain is None:
-            return None
-        made = self._call(self.code, self.own.domain)
-        if not isinstance(made, Node):
-            raise InputError(
-                f"Model {self.own.name}: {plain(self.own.domain).__name__} must return one number, "
-                "the margin."
-            )
-        return made
-
-    @cached_property
-    def limits(self) -> list[Node]:
-        """The limits, in their order."""
-        if self.own.limits is None:
-            return []
-        return [node for _, node in leaves(self._call(self.code, self.own.limits))]
-
-    def signal(self, path: str) -> Node:
-        """A signal, or a number of the state, by its path."""
-        if "signals" in self.known and path in dict(leaves(self.known["signals"])):
-            return dict(leaves(self.known["signals"]))[path]
-        return dict(leaves(self.state))[path]
-
-    def node(self, stored: Stored) -> Node:
-        """A number that is kept."""
-        if stored.kind == "tap":
-            name, number = stored.path.split(".")
-            tap = next(each for each in self.taps if each.input == name)
-            return ex.name(self.tap_samples(tap)[int(number)])
-        if stored.kind == "input":
-            made = self.inputs[stored.path]
-            assert isinstance(made, Node)
-            return made
-        if stored.kind == "state":
-            return dict(leaves(self.state))[stored.path]
-        return self.signal(stored.path)
-
-    @cached_property
-    def parameters(self) -> dict[str, str]:
-        """Path of each parameter by the name that stands for it."""
-        return {node.value: path for path, node in leaves(self.p)}
-
-
-def value_of(value: Value, path: str) -> Node:
-    """What lies at a path."""
-    return dict(leaves(value))[path]
-
-
-class Numbers:
-    """Where a model's parameters, givens and states lie in flat arrays."""
-
-    def __init__(self, model: Model) -> None:
-        self.parameters = [
-            (i, path) for i, part in enumerate(model.parts) for path in floats_of(part.parameters)
-        ]
-        self.given = [
-            (i, path)
-            for i, part in enumerate(model.parts)
-            if part.given is not None
-            for path in floats_of(part.given)
-        ]
-        self.states = [
-            (i, path) for i, part in enumerate(model.parts) for path in floats_of(part.state)
-        ]
-
-
 class Sampler:
     """One sample of a whole model: the code of its parts, and what of it is needed.
 
-    Parameters
-    ----------
-    model, signals, options :
-        As of `PartCode`; options of each part.
-    wanted : sequence of Stored
-        Numbers that are kept at every sample; parts that none of them needs are left out.
+    `wanted` are numbers that are kept at every sample; parts that none of them needs are left out.
     """
 
     def __init__(
@@ -344,7 +69,6 @@ class Sampler:
             PartCode(model, i, signals, options[i], taken, ruled=ruled)
             for i in range(len(model.parts))
         ]
-        self.numbers = Numbers(model)
         self.wanted = tuple(wanted)
         self.ends: list[list[Node]] = [[] for _ in self.parts]
         """Results of each part that are needed."""
@@ -428,8 +152,8 @@ class Sampler:
         return [
             f"{node.value} = {array}[{places.index((part.part, path))}]"
             for names, array, places in (
-                (part.p, "params", self.numbers.parameters),
-                (part.given, "given", self.numbers.given),
+                (part.p, "params", self.model.places("parameters")),
+                (part.given, "given", self.model.places("given")),
             )
             for path, node in leaves(names)
             if node.value in read
@@ -526,27 +250,19 @@ class Sampler:
         assert isinstance(made, Node)
         return code, made
 
-    def margin(self, part: PartCode) -> list[str]:
-        """Lines that keep the worst margin."""
-        if part.margin is None:
-            return []
-        return [f"worst = {text(lower(ex.name('worst'), part.margin))}"]
+    def _flat(self, part: PartCode) -> list[tuple[str, str]]:
+        """Names of a part's states, each with its place in a flat array."""
+        names, places = dict(leaves(part.state)), self.model.places("state")
+        carried = self.carried[part.part]
+        return [(names[p].value, f"states[{places.index((part.part, p))}]") for p in carried]
 
-    def load(self, part: PartCode, array: str = "states") -> list[str]:
-        """Lines that take a part's state out of a flat array."""
-        names = dict(leaves(part.state))
-        return [
-            f"{names[path].value} = {array}[{self.numbers.states.index((part.part, path))}]"
-            for path in self.carried[part.part]
-        ]
+    def load(self, part: PartCode) -> list[str]:
+        """Lines that take a part's state out of the flat array."""
+        return [f"{name} = {place}" for name, place in self._flat(part)]
 
-    def save(self, part: PartCode, array: str = "states") -> list[str]:
+    def save(self, part: PartCode) -> list[str]:
         """Lines that put it back."""
-        names = dict(leaves(part.state))
-        return [
-            f"{array}[{self.numbers.states.index((part.part, path))}] = {names[path].value}"
-            for path in self.carried[part.part]
-        ]
+        return [f"{place} = {name}" for name, place in self._flat(part)]
 
     def step(self, part: PartCode) -> list[str]:
         """Lines that take a part's state to the next sample, all of it at once."""
@@ -562,16 +278,6 @@ def lower(one: Node, two: Node) -> Node:
     """The lower of two margins; not a number once one of them was none."""
     test = ex.make("or", ex.make("<=", one, two), ex.make("!=", one, one))
     return ex.choose(test, one, two)
-
-
-def indented(lines: Iterable[str], depth: int = 1) -> list[str]:
-    """Lines moved in."""
-    return [f"{'    ' * depth}{line}" for line in lines]
-
-
-def function_source(head: str, says: str, lines: Iterable[str], mark: str = "@kernel") -> str:
-    """Text of a function."""
-    return "\n".join([mark, f"def {head}:", f'    """{says}"""', *indented(lines), ""])
 
 
 def march_source(
@@ -591,9 +297,8 @@ def march_source(
     samples: list[list[str]] = []
     for part in parts:
         code = part.code
-        if (
-            part is parts[-1]
-        ):  # the longest chain from sample to sample; others need not wait for it
+        if part is parts[-1]:
+            # the longest chain from sample to sample; others need not wait for it
             guessed = sampler.guessed(part)
             made = [ex.name(each.name) for each in guessed.ahead.items if isinstance(each, Let)]
             lines += lines_of(guessed.ahead, made)
@@ -674,7 +379,9 @@ def advance_source(
         lines += sampler.stored(part, stored, lambda row: f"out[{row}]")
     lines.append("worst = inf")
     for part in parts:
-        lines += [*sampler.margin(part), *sampler.step(part), *sampler.save(part)]
+        if part.margin is not None:
+            lines.append(f"worst = {text(lower(ex.name('worst'), part.margin))}")
+        lines += [*sampler.step(part), *sampler.save(part)]
     lines.append("return worst")
     texts = [
         function_source(
@@ -690,48 +397,6 @@ def advance_source(
         ),
     ]
     return "\n\n".join(texts), sampler.names
-
-
-class Start(NamedTuple):
-    """A part's state at the start as straight code."""
-
-    code: Code
-    value: Value
-
-
-def rest_of(part: PartCode) -> Start:
-    """State at rest: every signal is zero, or what its default parameter is."""
-    code = Code(part.code.taken, ruled=part.code.ruled)
-    own = part.own
-    if own.rest is None:
-        defaults = own.state._field_defaults
-        nodes = [
-            ex.number(float(defaults.get(path.split(".")[0], 0.0)))
-            for path, _ in leaves(part.state)
-        ]
-        return Start(code, rebuilt(part.state, iter(nodes)))
-    inputs: dict[str, Value] = {}
-    for name in own.input_types:
-        if name in own.defaults:
-            inputs[name] = value_of(part.p, own.defaults[name])
-        elif own.tap(name).width:
-            zeros = (ex.ZERO,) * own.tap(name).width
-            inputs[name] = Tuple(Window, (Tuple(None, zeros), ex.ZERO))
-        else:
-            inputs[name] = ex.ZERO
-    known = {**part.known, **inputs}
-    if own.inputs is not None:
-        known["inputs"] = Tuple(own.inputs, tuple(inputs.values()))
-    return Start(code, part.call(code, own.rest, known))
-
-
-def settled_of(part: PartCode) -> Start | None:
-    """Steady state under the inputs as they come, None where the part has no equation for it."""
-    if part.own.settled is None:
-        return None
-    code = Code(part.code.taken, ruled=part.code.ruled)
-    code.items = list(part.entry)
-    return Start(code, part.call(code, part.own.settled, part.known))
 
 
 def observe_source(

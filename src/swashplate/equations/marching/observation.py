@@ -116,8 +116,7 @@ class ObservedRecord:
 
     record: Record
     observations: Sequence[Observation]
-    driven_by: str = "voltage"
-    """The signal that the record is of."""
+    driven_by: str = "voltage"  # The signal that the record is of.
     start: Start = "rest"
     others: Mapping[str, Array] = field(default_factory=dict)
     """Further signals from outside, on the grid of the record."""
@@ -171,19 +170,10 @@ class ObservedRecord:
         return float(self.record.values.min()), float(self.record.values.max())
 
     def plan(self, own: Own, first_own: int) -> Plan:
-        """What the march needs to know of the observations.
+        """What the march needs to know of the observations, at values of their own unknowns.
 
-        Parameters
-        ----------
-        own : Own
-            Values of the experiment's own unknowns.
-        first_own : int
-            Column of the first of the observations' own unknowns.
-
-        Raises
-        ------
-        InputError
-            If there are not as many offsets as observations.
+        `first_own` is the column of the first of these; an `InputError` says if there are not as
+        many offsets as observations.
         """
         offsets = _one_each(own.offsets, self, "offset")
         clocks = _one_each(own.clock_offsets, self, "clock offset")
@@ -268,20 +258,10 @@ def _every_sample(
 
 
 def _cells(record: Record, time: Array, moving: bool) -> tuple[NDArray[np.int64], Array, Array]:
-    """Where stamps lie on the grid.
+    """Where stamps lie on the grid: (m,) point at or before each, how far behind it, in steps.
 
-    Parameters
-    ----------
-    moving : bool
-        Whether the slopes are wanted.
-
-    Returns
-    -------
-    cell, fraction : (m,) arrays
-        Point of the grid at or before a stamp, and how far behind it the stamp lies, in steps.
-    slopes : (2, m) array
-        Weights of the slopes before and behind that point in the derivative by time: on a grid
-        point the mean of both sides, as a central difference has it; (2, 0) if not wanted. [1/s]
+    And (2, m) weights of the slopes before and behind that point in the derivative by time, on a
+    grid point the mean of both sides, as a central difference has it; (2, 0) unless `moving`. [1/s]
     """
     last = record.values.size - 1
     at = (time - record.start) * (record.rate * record.substeps)

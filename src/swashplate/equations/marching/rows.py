@@ -34,44 +34,34 @@ OUTWARDS = 8
 class Terms(NamedTuple):
     """Rows that are sums of products of other rows, each known by its first place in the block."""
 
-    target: Indices
-    """(t,) rows to be made."""
-    first: Indices
-    """(t + 1,) first term of each, and how many there are."""
-    a: Indices
-    """(s,) row of a term's first factor."""
-    b: Indices
-    """(s,) row of its second factor, -1 for none."""
-    scale: Array
-    """(s,) number that multiplies a term."""
+    target: Indices  # (t,) rows to be made.
+    first: Indices  # (t + 1,) first term of each, and how many there are.
+    a: Indices  # (s,) row of a term's first factor.
+    b: Indices  # (s,) row of its second factor, -1 for none.
+    scale: Array  # (s,) number that multiplies a term.
 
 
 class Program(NamedTuple):
     """What is done in every block, in order."""
 
-    derived: int
-    """Columns."""
+    derived: int  # Columns.
     todo: Indices
     """(w, 4) in each row one of
 
     - CALL, number of a piece: call it;
     - COMBINE, first and end of the terms' targets: make rows of the block;
-    - RECUR, number k of states, first place and end in `columns`: run a recurrence;
-    - CHAIN, number of a piece, first place and end in `columns`: run one that was generated;
+    - RECUR, 0, first place and end in `columns`: run a recurrence of one state;
+    - CHAIN, number of a piece, first place and end in `columns`: run one of several states;
     - FOLLOW, an observation, first place and end in `columns`: run a recurrence of one state whose
       weighted results are that observation's derivatives.
     """
-    terms: Terms
-    """Of all rows that are made, those of the observations behind the others."""
-    seen: int
-    """First target that is a row of the observations."""
+    terms: Terms  # Of all rows that are made, those of the observations behind the others.
+    seen: int  # First target that is a row of the observations.
     columns: Indices
-    """For each recurrence what runs it takes: k² places of its factors, then the `columns` of
+    """For each recurrence what runs it takes: the place of its factor, then the `columns` of
     `follow`; the number of columns, then theirs; what `follow_out` takes."""
-    value: Indices
-    """(r,) row of each observation's signal."""
-    integral: NDArray[np.bool_]
-    """(r,) whether an observation is its signal's integral."""
+    value: Indices  # (r,) row of each observation's signal.
+    integral: NDArray[np.bool_]  # (r,) whether an observation is its signal's integral.
 
 
 CALL, COMBINE, RECUR, FOLLOW, CHAIN = 0, 1, 2, 3, 4
@@ -81,28 +71,21 @@ SET, ADD, DONE = 0, 1, 2
 class Plan(NamedTuple):
     """Where all observations look, one after the other; m samples in all, r observations."""
 
-    first: Indices
-    """(r + 1,) first sample of each, and m."""
+    first: Indices  # (r + 1,) first sample of each, and m.
     cell: Indices
     """(m,) point of the grid at or before the stamp, never falling within an observation."""
-    fraction: Array
-    """(m,) how far behind it the stamp lies, in steps, 0 to 1."""
+    fraction: Array  # (m,) how far behind it the stamp lies, in steps, 0 to 1.
     back: Array
     """(m,) weight of the slope before the point in the derivative by time; empty if not wanted."""
-    ahead: Array
-    """(m,) weight of the slope behind it. [1/s]"""
-    measured: Array
-    """(m,) measured values, less the offset that is assumed in them."""
-    weight: Array
-    """(m,)"""
+    ahead: Array  # (m,) weight of the slope behind it. [1/s]
+    measured: Array  # (m,) measured values, less the offset that is assumed in them.
+    weight: Array  # (m,)
     regular: NDArray[np.bool_]
     """(r,) whether an observation has its stamps on successive points of the grid."""
     kept: Array
     """(r, q) what a step leaves of a value that passes a low pass; 0 where there is none."""
-    offset_column: Indices
-    """(r,) column of the derivative by the offset, -1 if not wanted."""
-    clock_column: Indices
-    """(r,) column of the derivative by the clock offset, -1 if not wanted."""
+    offset_column: Indices  # (r,) column of the derivative by the offset, -1 if not wanted.
+    clock_column: Indices  # (r,) column of the derivative by the clock offset, -1 if not wanted.
     way: Indices
     """(r, d) how the derivatives that the march gives get to the sink, one of SET, ADD and DONE."""
 
@@ -110,41 +93,27 @@ class Plan(NamedTuple):
 class Sink(NamedTuple):
     """Where weighted rows go: all residuals or derivatives of a column each, residuals last."""
 
-    rows: Array
-    """(k + 1, m) all rows, or (k + 1, ROWS) where a triangle is wanted."""
-    to: Indices
-    """(d,) where the derivatives go that the march gives."""
-    own: Indices
-    """(k - d,) where those by the observations' own unknowns go."""
-    factor: Array
-    """(k + 1, k + 1) triangle, (0, 0) where all rows are wanted."""
-    squares: Array
-    """(r,) sum of squared residuals of each observation."""
+    rows: Array  # (k + 1, m) all rows, or (k + 1, ROWS) where a triangle is wanted.
+    to: Indices  # (d,) where the derivatives go that the march gives.
+    own: Indices  # (k - d,) where those by the observations' own unknowns go.
+    factor: Array  # (k + 1, k + 1) triangle, (0, 0) where all rows are wanted.
+    squares: Array  # (r,) sum of squared residuals of each observation.
 
 
 class Room(NamedTuple):
     """Memory to work in; d columns, r observations, up to q low passes each."""
 
-    flat: Array
-    """The block."""
-    table: Array
-    """(rows, STRIDE) the same."""
+    flat: Array  # The block.
+    table: Array  # (rows, STRIDE) the same.
     seen: Array
     """(r, d + 2, STRIDE) of each observation its derivatives, the signal, and an idle row."""
-    flat_seen: Array
-    """The same."""
-    columns: Indices
-    """(r, 4, j) these rows of each observation, for `follow`."""
-    passed: Array
-    """(r, q, d + 2) outputs of the low passes at the next sample."""
-    integrals: Array
-    """(r, d + 1, 3) see `integrate_row`."""
-    aside: Array
-    """(STRIDE,) room for a row that is needed for a moment."""
-    products: Array
-    """Room for `absorb`."""
-    progress: Indices
-    """(r,) first stamp of each observation that is not yet dealt with."""
+    flat_seen: Array  # The same.
+    columns: Indices  # (r, 4, j) these rows of each observation, for `follow`.
+    passed: Array  # (r, q, d + 2) outputs of the low passes at the next sample.
+    integrals: Array  # (r, d + 1, 3) see `integrate_row`.
+    aside: Array  # (STRIDE,) room for a row that is needed for a moment.
+    products: Array  # Room for `absorb`.
+    progress: Indices  # (r,) first stamp of each observation that is not yet dealt with.
 
 
 @lru_cache(maxsize=16)
@@ -225,15 +194,8 @@ def combine(flat: Array, terms: Terms, first: int, end: int, count: int, into: A
 def follow(a: Array, columns: Indices, flat: Array, count: int, tangent: Array) -> None:
     """Run y[n+1] = a[n] y[n] + g[n], several columns side by side.
 
-    Parameters
-    ----------
-    a : (m,) array
-        What a step leaves of y.
-    columns : (4, j) array
-        Places of the inputs g and of the results in `flat`, which may be the same, of y in
-        `tangent`, and whether the result at n is y[n+1], not y[n].
-    tangent : array
-        y at the first sample, replaced by that behind the last one.
+    Rows of `columns` are the places of the inputs g and of the results in `flat`, which may be the
+    same, of y in `tangent`, and whether the result at n is y[n+1], not y[n].
     """
     behind = columns[3, 0] != 0
     for c in range(0, columns.shape[1], ABREAST):
@@ -256,18 +218,11 @@ def follow(a: Array, columns: Indices, flat: Array, count: int, tangent: Array) 
 def follow_out(
     columns: Indices, flat: Array, tangent: Array, q: Array, sink: Sink, at: int, count: int
 ) -> None:
-    """Run y[n+1] = a[n] y[n] + g[n] as `follow`, and put q[n] y[n] into the sink.
+    """Run y[n+1] = a[n] y[n] + g[n] as `follow`, and put q[n] y[n] into the sink from `at` on.
 
-    Parameters
-    ----------
-    columns : array
-        Place of a in `flat`, then for each OUTWARDS columns the place of the first g, the others
-        in the rows behind it; their places in `tangent`; and their numbers among the derivatives.
-        A column may stand there several times.
-    q : (m,) array
-        What the result is multiplied by.
-    at, count : int
-        First place in the sink, and how many.
+    `columns` are the place of a in `flat`, then for each OUTWARDS columns the place of the first g,
+    the others in the rows behind it; their places in `tangent`; and their numbers among the
+    derivatives. A column may stand there several times.
     """
     a, out, size = flat[columns[0] :], sink.rows.reshape(-1), sink.rows.shape[1]
     for c in range(1, columns.size, 1 + 2 * OUTWARDS):
@@ -296,38 +251,10 @@ def follow_out(
 
 
 @subroutine
-def follow_pair(places: Indices, columns: Indices, flat: Array, count: int, tangent: Array) -> None:
-    """`follow` for two states that move each other, which most filters have: places of A first."""
-    a00, a01 = flat[places[0] :], flat[places[1] :]
-    a10, a11 = flat[places[2] :], flat[places[3] :]
-    behind, other_behind = columns[3, 0] != 0, columns[7, 0] != 0
-    for c in range(0, columns.shape[1], 2):
-        p0, p1, q0, q1 = columns[2, c], columns[2, c + 1], columns[6, c], columns[6, c + 1]
-        g0, g1 = flat[columns[0, c] :], flat[columns[0, c + 1] :]
-        f0, f1 = flat[columns[4, c] :], flat[columns[4, c + 1] :]
-        d0, d1 = flat[columns[1, c] :], flat[columns[1, c + 1] :]
-        e0, e1 = flat[columns[5, c] :], flat[columns[5, c + 1] :]
-        y0, y1, z0, z1 = tangent[p0], tangent[p1], tangent[q0], tangent[q1]
-        for m in range(count):
-            # what has long been known first: the chain then waits for one product alone
-            n0, n1 = a00[m] * y0 + (a01[m] * z0 + g0[m]), a00[m] * y1 + (a01[m] * z1 + g1[m])
-            o0, o1 = a11[m] * z0 + (a10[m] * y0 + f0[m]), a11[m] * z1 + (a10[m] * y1 + f1[m])
-            d0[m], d1[m] = n0 if behind else y0, n1 if behind else y1
-            e0[m], e1[m] = o0 if other_behind else z0, o1 if other_behind else z1
-            y0, y1, z0, z1 = n0, n1, o0, o1
-        tangent[p0], tangent[p1], tangent[q0], tangent[q1] = y0, y1, z0, z1
-
-
-@subroutine
 def integrate_row(row: Array, first: int, count: int, step: float, state: Array) -> None:
-    """Replace a rate by its trapezoidal integral over the whole record.
+    """Replace a rate, in `count` places, by its trapezoidal integral over the whole record.
 
-    Parameters
-    ----------
-    row : (m,) array
-        Rate in `count` places from `first` on, replaced.
-    state : (3,) array
-        Integral and rate at the sample before, and 1.0 once there is one.
+    `state` holds integral and rate at the sample before, and 1.0 once there is one.
     """
     total, last = state[0], state[1]
     for n in range(first, first + count):
@@ -353,14 +280,8 @@ def low_pass(
 ) -> None:
     """Replace the rows of an observation by what a first-order low pass makes of them.
 
-    Parameters
-    ----------
-    kept : float
-        What a step leaves of the output, the input held: exp(-pole · h).
-    fresh : bool
-        Whether the record begins here: the output begins with the input.
-    factor : (m,) array
-        Room for `follow`, whose arguments the others are.
+    `kept` is what a step leaves of the output, exp(-pole · h); a `fresh` record begins with the
+    input; the others are arguments of `follow`, `factor` room for one.
     """
     gain = 1.0 - kept
     for m in range(count):
@@ -387,16 +308,8 @@ def place(
 ) -> None:
     """Weighted rows of the problem at some stamps of an observation, from its rows on the grid.
 
-    Parameters
-    ----------
-    seen : (d + 2, q) array
-        On the grid: derivatives by the d columns that the drive's march gives, and the signal.
-    base : int
-        Point of the grid at place 0 of `seen`.
-    r, at, count : int
-        The observation, the first of its stamps and how many.
-    sink, to :
-        What to fill, and from which place of its rows on.
+    `seen` holds the derivatives that the march gives, and the signal, from the grid's point `base`
+    on; `at` is the first of the stamps, `to` the first place in the rows of the sink.
     """
     derived, end = sink.to.size, at + count
     # slices, because a place that may be negative to the compiler keeps it from vectorising
@@ -452,23 +365,10 @@ def rotate(
     used: int,
     products: Array,
 ) -> int:
-    """Weighted rows into the triangle, those of weight 0 left out.
+    """Weighted rows into the triangle, those of weight 0 left out; arguments as in `place`.
 
-    Parameters
-    ----------
-    seen, base, plan, r, sink :
-        As in `place`.
-    stamps : (int, int)
-        The first stamp of the observation, and the one behind the last.
-    used : int
-        Rows that wait in the sink to be rotated.
-    products : array
-        Room for `absorb`.
-
-    Returns
-    -------
-    int
-        Rows that wait now.
+    `stamps` are the first one and the one behind the last; `used` rows wait in the sink to be
+    rotated, and as many as are returned wait now.
     """
     at, end = stamps
     while at < end:
@@ -512,19 +412,8 @@ def deliver(
 ) -> int:
     """What a block adds to the problem, once signals and derivatives of it are known.
 
-    Parameters
-    ----------
-    used : int
-        Rows that wait in the sink to be rotated.
-    span : (int, int, int)
-        First sample of the block, how many it has, and how many the record has.
-    step : float
-        h. [s]
-
-    Returns
-    -------
-    int
-        Rows that wait now.
+    `span` is the first sample of the block, how many it has, and how many the record has; `used`
+    rows wait in the sink to be rotated, and as many as are returned wait now.
     """
     first, count, size = span
     derived = program.derived
@@ -583,18 +472,10 @@ def march_observed(
 ) -> None:
     """March block by block, and compare what comes with what was observed.
 
-    Parameters
-    ----------
-    pieces : (p,) array
-        Addresses of the generated pieces; the first one marches.
-    arrays : tuple of array
-        What they take, from ``records`` on (see `pieces.PIECE`).
-    grid : (int, int, float)
-        Samples of the record, most of them in a block, and the step. [1, 1, s]
-    tangent : array
-        Derivatives of the states at the first sample, replaced by those behind the last.
-    program, plan, sink, room :
-        What to do, where to look, what to fill, where to work.
+    `pieces` are addresses, of the march first, and `arrays` what they take from ``records`` on (see
+    `pieces.PIECE`). `grid` says how many samples the record has and a block at most, and the step.
+    `tangent` holds the derivatives of the states at the first sample, replaced by those behind the
+    last.
     """
     size, block, h = grid
     used, count, flat = int(plan.first[0]), 0, room.flat
@@ -608,12 +489,8 @@ def march_observed(
             elif what == COMBINE:
                 combine(flat, program.terms, a, b, count, flat)
             elif what == RECUR:
-                places = program.columns[b : b + a * a]
-                chosen = program.columns[b + a * a : c].reshape(4 * a, (c - b - a * a) // (4 * a))
-                if a == 1:
-                    follow(flat[places[0] :], chosen, flat, count, tangent)
-                else:
-                    follow_pair(places, chosen, flat, count, tangent)
+                chosen = program.columns[b + 1 : c].reshape(4, (c - b - 1) // 4)
+                follow(flat[program.columns[b] :], chosen, flat, count, tangent)
             elif what == CHAIN:
                 taken = (program.columns[b + 1 : c], arrays[3], tangent, *arrays[5:])
                 call(pieces[a], count, program.columns[b], h, (arrays[0], arrays[1], *taken))

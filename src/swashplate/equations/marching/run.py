@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -14,10 +15,11 @@ from numpy.typing import NDArray
 from swashplate.equations.cache import generated, kernel
 from swashplate.equations.code import compiled_names, generating
 from swashplate.equations.equation import inlined, interpreted
-from swashplate.equations.fields import floats_of, made, numbers_of, value_at
-from swashplate.equations.marching.march import Stored, march_source, observe_source, taps_of
+from swashplate.equations.fields import floats_of, is_real, made, numbers_of, value_at
+from swashplate.equations.marching.march import march_source, observe_source
+from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.pieces import Planned, addresses, piece, pointers, run_once
-from swashplate.equations.model import Link, Model, Place, Window, arguments_of, place
+from swashplate.equations.model import Link, Model, Place, Window, arguments_of, place, state_paths
 from swashplate.equations.syntax import plain
 from swashplate.errors import DomainError, InputError
 
@@ -50,8 +52,7 @@ class Started(NamedTuple):
     """States of all parts at the first sample, and what they follow from."""
 
     states: tuple[Any, ...]
-    before: Mapping[str, float]
-    """External signals before the record."""
+    before: Mapping[str, float]  # External signals before the record.
     arguments: tuple[Mapping[str, Any], ...]
     """Of each part what its equations take, by the arguments' names."""
 
@@ -84,7 +85,7 @@ class Instance:
 
     @cached_property
     def params(self) -> Array:
-        """All parameters as numbers, in the order of `march.Numbers`."""
+        """All parameters as numbers, in the order of `Model.places`."""
         return np.array([number for part in self.parts for number in numbers_of(part.p)])
 
     @cached_property
@@ -99,7 +100,7 @@ class Instance:
         if key in self._places:
             return self._places[key]
         found: list[Place] = []
-        for each in taps_of(self.model, signals):
+        for each in taps_of(self.model, tuple(signals)):
             name, p = each.tap.delay, self.parts[each.part].p
             delay = float(value_at(p, name)) if name else 0.0
             if not 0.0 <= delay < math.inf:
@@ -316,43 +317,47 @@ def marched(
     started: Started,
     stored: tuple[Stored, ...],
     cause: str = "input",
+    begin: Mapping[str, float] = MappingProxyType({}),
 ) -> tuple[Array, Flags]:
-    """March over whole records.
-
-    Parameters
-    ----------
-    records : mapping of str to (n,) array
-        External signals on the grid.
-    started : Started
-        Where it begins.
-    stored : tuple of Stored
-        What is kept.
-    cause : str
-        What drives the model, for the sentence of a `DomainError`.
+    """March over whole records from where it begins, or from states by path, keeping some numbers.
 
     Returns
     -------
-    out : (r, n) array
-        Numbers that are kept, in their order.
-    flags : (f, n) array
-        Limits that are kept, as bits.
+    out, flags : (r, n), (f, n) arrays
+        What is kept, in its order: numbers, and limits as bits.
 
     Raises
     ------
     DomainError
-        If the model leaves its domain, or a number overflows.
+        If the model leaves its domain, or a number overflows; `cause` is what drives the model.
     """
     signals, size = tuple(records), next(iter(records.values())).size
     numbers = tuple(each for each in stored if each.kind != "limits")
     ordered = (*numbers, *(each for each in stored if each.kind == "limits"))
     planned = march_of(instance.model, signals, instance.options, ordered)
-    table, states, met = np.empty((len(stored), size)), started.flat, np.array([np.inf])
+    table, met = np.empty((len(stored), size)), np.array([np.inf])
+    states = begun(instance, started, begin)
     values = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
     places = instance.places(signals, h)
     arrays = arrays_of(instance, values, started, places, states, met, table.reshape(-1))
     run_once(addresses((planned,), (0,)), arrays, size, h)
     check_domain(instance, states, float(met[0]), cause)
     return table[: len(numbers)], table[len(numbers) :].astype(np.uint8)
+
+
+def begun(instance: Instance, started: Started, begin: Mapping[str, float]) -> Array:
+    """States as numbers, some of them as given by path."""
+    states = started.flat
+    known = state_paths(instance.model) if begin else ()
+    for path, value in begin.items():
+        if path not in known:
+            raise InputError(
+                f"{instance.name} has no state '{path}' to start from; it has {', '.join(known)}."
+            )
+        if not is_real(value) or not np.isfinite(value):
+            raise InputError(f"{path} begins at {value!r}, but must be a finite number.")
+        states[known.index(path)] = value
+    return states
 
 
 def arrays_of(

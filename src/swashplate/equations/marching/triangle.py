@@ -69,14 +69,8 @@ def dot(a: Array, b: Array, room: Array) -> float:
 def absorb(rows: Array, factor: Array, room: Array) -> None:
     """Rotate a block of rows into the triangular factor of all rows before it.
 
-    Parameters
-    ----------
-    rows : (k, ROWS) array
-        The block, column by column; rows that it lacks are zeros. Used up.
-    factor : (k, k) array
-        Upper triangle, zeros before the first block; replaced by the factor of it and the block.
-    room : (EIGHTH,) array
-        Room to work in.
+    (k, ROWS) `rows` column by column, zeros where it lacks some, are used up; the (k, k) upper
+    triangle `factor`, zeros before the first block, is replaced; `room` has EIGHTH places.
     """
     for j in range(rows.shape[0]):
         pivot = rows[j]

@@ -27,13 +27,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.fields import floats_of, is_real, made, numbers_of, value_at
-from swashplate.equations.marching.jacobian import jacobian, state_paths
-from swashplate.equations.marching.march import Stored, output_of
+from swashplate.equations.fields import floats_of, is_real, value_at
+from swashplate.equations.marching.jacobian import jacobian
+from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Own, every_sample
+from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import Record
-from swashplate.equations.marching.run import Instance, Part, Start, Started, marched
-from swashplate.equations.model import Model
+from swashplate.equations.marching.run import Instance, Part, Start, marched
+from swashplate.equations.model import Model, parameter_paths
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]
@@ -151,35 +152,6 @@ def records_of(
     return found
 
 
-def started(
-    instance: Instance,
-    records: Mapping[str, Array],
-    h: float,
-    start: Start,
-    begin: Mapping[str, float],
-) -> Started:
-    """Where a run begins: at rest or settled, with some numbers of the state as given."""
-    first = {name: float(values[0]) for name, values in records.items()}
-    found = instance.start(first, h, start)
-    known = state_paths(instance.model)
-    for path in begin:
-        if path not in known:
-            raise InputError(
-                f"{instance.name} has no state '{path}' to start from; it has {', '.join(known)}."
-            )
-        if not is_real(begin[path]) or not np.isfinite(begin[path]):
-            raise InputError(f"{path} begins at {begin[path]!r}, but must be a finite number.")
-    states = list(found.states)
-    for i, part in enumerate(instance.model.parts):
-        prefix = f"{part.name}." if len(instance.model.parts) > 1 else ""
-        numbers = {
-            path: begin.get(f"{prefix}{path}", number)
-            for path, number in zip(floats_of(part.state), numbers_of(states[i]), strict=True)
-        }
-        states[i] = made(part.state, numbers)
-    return found._replace(states=tuple(states))
-
-
 def simulate(
     model: Model,
     p: Any,
@@ -218,7 +190,7 @@ def simulate(
     instance = instance_of(model, p, options=options, given=given)
     records = records_of(instance, inputs, rate)
     h = 1.0 / rate
-    begun = started(instance, records, h, start, begin or {})
+    begun = instance.start({name: float(v[0]) for name, v in records.items()}, h, start)
     stored: list[Stored] = []
     names: list[str] = []
     for i, part in enumerate(model.parts):
@@ -229,7 +201,7 @@ def simulate(
     for name, link in model.links.items():
         stored.append(Stored(link.after, "link", name))
         names.append(name)
-    out, _ = marched(instance, records, h, begun, tuple(stored))
+    out, _ = marched(instance, records, h, begun, tuple(stored), begin=begin or {})
     signals = dict(zip(names, out, strict=True))
     for name, rate_of in model.integrals.items():
         total = np.zeros_like(signals[rate_of])
@@ -278,13 +250,3 @@ def sensitivities(
     record, rest = Record(records[first], 0.0, rate, 1), {name: records[name] for name in others}
     observed = every_sample(record, output, first, start, rest)
     return jacobian(instance, observed, columns, Own(begin or {})).columns
-
-
-def parameter_paths(model: Model) -> tuple[str, ...]:
-    """Paths of all parameters, in the order of the flat array."""
-    several = len(model.parts) > 1
-    return tuple(
-        f"{part.name}.{path}" if several else path
-        for part in model.parts
-        for path in floats_of(part.parameters)
-    )

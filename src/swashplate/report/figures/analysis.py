@@ -35,8 +35,7 @@ from swashplate.analysis import (
 from swashplate.errors import InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.lines import (
-    MOST_POINTS,
-    MOST_RUNS,
+    COLUMNS,
     SHADES,
     Array,
     draw,
@@ -223,13 +222,13 @@ def plot_limit_timeline(
     draw(speed, run.time, unit.factor * run.shaft_speed, BLUE)
     for ax in (command, speed):
         zero_line(ax)
-    _bars(rows, timeline, float(run.time[-1] - run.time[0]))
+    _bars(rows, timeline)
     fit_time(rows, run.time)
     label_below(rows, "time (s)")
     return figure
 
 
-def _bars(ax: Axes, timeline: LimitTimeline, length: float) -> None:
+def _bars(ax: Axes, timeline: LimitTimeline) -> None:
     dress(ax)
     count = len(timeline.limits)
     ax.set_ylim(max(count, 1) - 0.5, -0.5)
@@ -237,7 +236,7 @@ def _bars(ax: Axes, timeline: LimitTimeline, length: float) -> None:
     ax.grid(False, axis="y")
     for row, (limit, spans) in enumerate(zip(timeline.limits, timeline.spans, strict=True)):
         ax.broken_barh(
-            [(begin, end - begin) for begin, end in merged(spans, length / MOST_RUNS).tolist()],
+            [(begin, end - begin) for begin, end in merged(spans).tolist()],
             (row - 0.5 * BAR, BAR),
             facecolor=SHADES[limit].color,
             edgecolor=GREY,
@@ -357,7 +356,7 @@ def plot_bands(band: Bands, *, title: str | None = None) -> Figure:
 
 def shade_band(ax: Axes, band: Bands, color: ColorType, *, about: Array | float = 0.0) -> None:
     """Shade a band of speeds; a long one by every so many samples."""
-    step, factor = max(-(-band.time.size // MOST_POINTS), 1), display_unit("rad/s").factor
+    step, factor = max(-(-band.time.size // (2 * COLUMNS)), 1), display_unit("rad/s").factor
     lower, upper = (factor * (each - about)[::step] for each in (band.lower, band.upper))
     ax.fill_between(
         band.time[::step], lower, upper, color=color, alpha=0.25, linewidth=0.0, zorder=1.6

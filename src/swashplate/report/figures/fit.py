@@ -26,7 +26,7 @@ from swashplate.report.fit_report.runs import (
     run_words,
     shown_runs,
 )
-from swashplate.report.lines import draw_broken
+from swashplate.report.lines import COARSE, IGNORED, draw, shade
 from swashplate.report.style import (
     BLUE,
     FAINT,
@@ -148,7 +148,7 @@ def plot_overlay(run: ShownRun, *, virtual: bool = False) -> Figure:
     drive = run.experiment.input
     dress(axes[0], run.input_label)
     held = drive.interpolation == "previous"
-    draw_broken(axes[0], drive.time, run.input_unit.factor * drive.values, INK, held=held)
+    draw(axes[0], drive.time, run.input_unit.factor * drive.values, INK, held=held, columns=COARSE)
     for place, shown in enumerate(run.channels):
         upper, lower = axes[1 + 2 * place], axes[2 + 2 * place]
         time, factor = shown.channel.time, shown.unit.factor
@@ -157,16 +157,15 @@ def plot_overlay(run: ShownRun, *, virtual: bool = False) -> Figure:
         for ax, label, kind in zip((upper, lower), labels, ("overlay", "residual"), strict=True):
             dress(ax, in_lines(label, int((HEIGHTS[kind] - 0.25) / LETTER)))
         zero_line(lower)
-        draw_broken(upper, time, factor * shown.channel.values, GREY)
-        draw_broken(upper, time, factor * shown.quality.simulated, VERMILION)
-        draw_broken(lower, time, residual, BLUE)
+        draw(upper, time, factor * shown.channel.values, GREY, columns=COARSE)
+        draw(upper, time, factor * shown.quality.simulated, VERMILION, columns=COARSE)
+        draw(lower, time, residual, BLUE, columns=COARSE)
         for ax, values in ((upper, factor * shown.channel.values), (lower, residual)):
             if off_scale(shown.channel, values).any():
                 counted = values[shown.channel.used]
                 room = 0.1 * float(np.ptp(counted))
                 ax.set_ylim(float(counted.min()) - room, float(counted.max()) + room)
-            for first, last in ignored_windows(shown.channel):
-                ax.axvspan(first, last, color=FAINT, alpha=0.35, linewidth=0.0)
+            shade(ax, np.reshape(ignored_windows(shown.channel), (-1, 2)), IGNORED)
     axes[-1].set_xlim(float(drive.time[0]), float(drive.time[-1]))
     label_below(axes[-1], "time (s)")
     axes[0].set_title("\n".join(said), loc="left", fontsize=NORMAL - 1.0, color=INK, pad=20.0)

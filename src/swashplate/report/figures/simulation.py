@@ -19,16 +19,16 @@ from swashplate.linear import UNITS
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.lines import (
     NARROW,
+    SHADES,
     WIDE,
     Array,
     Mark,
     Trace,
-    active_spans,
     draw,
     fill_panel,
     fit_time,
+    shade,
     shade_handle,
-    shade_stretches,
     stretches,
 )
 from swashplate.report.style import (
@@ -102,7 +102,7 @@ def plot_simulation(simulation: Simulation, *, title: str | None = None) -> Figu
     pump, run = simulation.pump, simulation
 
     def acting(*limits: Limit) -> tuple[tuple[Limit, Array], ...]:
-        return tuple((limit, active_spans(run, limit)) for limit in limits)
+        return tuple((limit, stretches(run.time, run.active(limit))) for limit in limits)
 
     ends = (pump.Z16_plus, -pump.Z16_minus)
     current = (
@@ -186,7 +186,7 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
     machine = full.case.p.machine
 
     def holding(limit: Limit, held: Flags) -> tuple[tuple[Limit, Array], ...]:
-        return ((limit, stretches(held != 0, found.time, full.record.rate)),)
+        return ((limit, stretches(found.time, held != 0)),)
 
     command = (
         Panel("current", "A", (Trace(full.current, INK),))
@@ -240,11 +240,11 @@ def _swash(angle: Array, stops: Stops) -> Panel:
 def _chain(panels: Sequence[Panel], time: Array, title: str) -> Figure:
     """The panels one under another, with a legend of the limits that act anywhere."""
     acting = {limit for panel in panels for limit, spans in panel.limits if spans.size}
-    legend = [shade_handle(limit) for limit in Limit if limit in acting]
+    legend = [shade_handle(SHADES[limit]) for limit in Limit if limit in acting]
     figure, axes = sheet([panel.height for panel in panels], title, legend=legend)
     for ax, panel in zip(axes, panels, strict=True):
         for limit, spans in panel.limits:
-            shade_stretches(ax, spans, limit)
+            shade(ax, spans, SHADES[limit])
         largest = max(float(np.abs(trace.values).max()) for trace in panel.traces)
         # an angle within the machine stays in degrees, whatever the shaft's is shown in
         unit = display_unit(panel.si, max(largest, panel.least) or inf)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from swashplate.analysis import dead_zone, saturation
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -61,26 +62,12 @@ class SteadyValues(NamedTuple):
 def steady_values(drive: Drive) -> SteadyValues:
     """Steady states of a drive from -10 to 10 V."""
     voltage = _commands(drive)
-    dead = drive.parameters.numbers["Z17"]
-    full = {way: drive.steady_speed(way * FULL_VOLTAGE) for way in (-1.0, 1.0)}
-
-    def is_dead(volts: Array) -> NDArray[np.bool_]:
-        return np.asarray(np.abs(drive.steady_current(volts)) <= dead)
-
-    def still_changes(volts: Array) -> NDArray[np.bool_]:
-        final = full[float(np.sign(volts[-1]))]
-        return np.asarray(~np.isclose(drive.steady_speed(volts), final, rtol=1e-9, atol=0.0))
-
-    ends = (-FULL_VOLTAGE, FULL_VOLTAGE)
-    low, high = (last_holding(is_dead, end) for end in ends)
-    saturation = tuple(last_holding(still_changes, end) for end in ends)
-    below, above = (None if abs(volts) > 0.999 * FULL_VOLTAGE else volts for volts in saturation)
     return SteadyValues(
         voltage,
         drive.steady_current(voltage),
         drive.steady_speed(voltage),
-        (low, high),
-        (below, above),
+        (dead_zone(drive, -1.0).inside, dead_zone(drive, 1.0).inside),
+        (saturation(drive, -1.0), saturation(drive, 1.0)),
         float(drive.steady_speed(0.0)),
     )
 
@@ -92,24 +79,6 @@ def _commands(drive: Drive) -> Array:
     jumps = (plus, np.nextafter(plus, np.inf), -minus, np.nextafter(-minus, -np.inf))
     even = np.linspace(-FULL_VOLTAGE, FULL_VOLTAGE, POINTS)
     return np.unique(np.clip(np.concatenate((even, jumps)), -FULL_VOLTAGE, FULL_VOLTAGE))
-
-
-def last_holding(holds: Callable[[Array], NDArray[np.bool_]], end: float) -> float:
-    """The last command on the way from 0 V to an end before something first fails to hold. [V]
-
-    It is found to a millionth of a volt; 0 if it does not even hold there.
-    """
-    low, high = 0.0, end
-    while abs(high - low) > 1e-6:
-        grid = np.linspace(low, high, 201)
-        failed = ~holds(grid)
-        if not failed.any():
-            return high
-        first = int(np.argmax(failed))
-        if first == 0:
-            return low
-        low, high = float(grid[first - 1]), float(grid[first])
-    return low
 
 
 # --- figure ---------------------------------------------------------------------------------------
@@ -203,25 +172,12 @@ def _write_table(ax: Axes, values: Values, looks: Mapping[str, Stroke]) -> None:
     for number, row in enumerate(rows):
         height = 1.0 - (number + 0.5) / len(rows)
         for place, words in zip(places, row, strict=True):
-            ax.text(
-                place,
-                height,
-                words,
-                transform=ax.transAxes,
-                fontsize=SMALL,
-                color=INK if number else GREY,
-                va="center",
-            )
+            color = INK if number else GREY
+            write(ax, words, (place, height), (0.0, 0.0), color=color, va="center")
         if number:
-            look = looks[list(values)[number - 1]]
-            ax.plot(
-                [0.0, 0.03],
-                [height] * 2,
-                transform=ax.transAxes,
-                color=look.color,
-                linestyle=look.dashes,
-                linewidth=2.0,
-            )
+            color, dashes = looks[list(values)[number - 1]]
+            how: dict[str, Any] = {"color": color, "linestyle": dashes, "linewidth": 2.0}
+            ax.plot([0.0, 0.03], [height] * 2, transform=ax.transAxes, **how)
 
 
 def _cells(name: str, values: SteadyValues) -> tuple[str, ...]:
@@ -280,18 +236,15 @@ def _fill(
         # the wider first, so that curves which lie on one another can be told
         width = min(LINE + WIDER * (len(curves) - 1 - index), WIDEST)
         for ax in row:
-            ax.plot(
-                values.voltage, heights, color=look.color, linestyle=look.dashes, linewidth=width
-            )
-        row[1].plot(
-            values.dead_zone,
-            [0.04 + 0.045 * index] * 2,
-            transform=row[1].get_xaxis_transform(),
-            color=look.color,
-            linewidth=3.0,
-            solid_capstyle="butt",
-            label=f"dead zone {name}",
-        )
+            how: dict[str, Any] = {
+                "color": look.color,
+                "linestyle": look.dashes,
+                "linewidth": width,
+            }
+            ax.plot(values.voltage, heights, **how)
+        bar: dict[str, Any] = {"color": look.color, "linewidth": 3.0, "solid_capstyle": "butt"}
+        foot = row[1].get_xaxis_transform()
+        row[1].plot(values.dead_zone, [0.04 + 0.045 * index] * 2, transform=foot, **bar)
         wide = max(wide, float(np.abs(heights).max()))
         inside = np.abs(values.voltage) <= CLOSE_UP
         close = max(close, float(np.abs(heights[inside]).max()))
@@ -303,17 +256,9 @@ def _name_dead_zones(ax: Axes, values: Iterable[SteadyValues]) -> None:
     zones = [each.dead_zone for each in values]
     widest = max(high for _, high in zones)
     if any(low < high for low, high in zones) and widest < 0.5 * CLOSE_UP:
+        how: dict[str, Any] = {"coords": ax.get_xaxis_transform(), "color": GREY, "va": "center"}
         box = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
-        write(
-            ax,
-            "dead zone",
-            (widest, 0.04),
-            (5.0, 0.0),
-            coords=ax.get_xaxis_transform(),
-            color=GREY,
-            va="center",
-            bbox=box,
-        )
+        write(ax, "dead zone", (widest, 0.04), (5.0, 0.0), bbox=box, **how)
 
 
 def _mark_speeds(

@@ -16,7 +16,7 @@ from swashplate.campaign import Campaign, examine, quality_table
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
-from swashplate.identification.acceptance import Statement, Verdict, Weight, starts_of, verdict
+from swashplate.identification.acceptance import Statement, Verdict, starts_of, verdict
 from swashplate.identification.assessment import Assessment, StageProfile, assess
 from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.identifiability import in_the_fits_scales
@@ -134,8 +134,9 @@ def write_fit_report(
             shared[3],
             _setup_section(campaign, fit.nominal, fit.setup.title, notes, fit.stages),
         ]
-    content = {**head, "what": "Fit", "facts": f"{head['drive']} · {facts}"}
-    write_text(page([each for each in sections if each.blocks], content), path)
+        content = {**head, "what": "Fit", "facts": f"{head['drive']} · {facts}"}
+        made = page([each for each in sections if each.blocks], content)
+    write_text(made, path)
 
 
 def write_validation_report(
@@ -389,59 +390,27 @@ def _window(weight: object) -> str:
 def _verdict_section(
     judged: Verdict, assessments: Sequence[Assessment], runs: Sequence[ShownRun], findings: int
 ) -> Section:
-    said = statements(judged, assessments, runs, findings)
-    return Section("verdict", "Verdict in detail", [Block("terms", said, "verdict")])
-
-
-def statements(
-    judged: Verdict, assessments: Sequence[Assessment], runs: Sequence[ShownRun], findings: int
-) -> tuple[Statement, ...]:
-    """The statements of a verdict in the order in which the report gives them.
-
-    Parameters
-    ----------
-    judged : Verdict
-        The judgement.
-    assessments : sequence of Assessment
-        One for each stage; none for a drive that was only held against runs.
-    runs : sequence of ShownRun
-        Fitted and held out.
-    findings : int
-        Findings about the campaign's data.
-    """
-    held = _qualities(runs, "validate")
+    """The judgements, what each rests on, and the criteria."""
     measured = {
         "Agreement": quality_sentences(_qualities(runs, "fit" if assessments else None)),
-        "Validation": quality_sentences(held),
+        "Validation": quality_sentences(_qualities(runs, "validate")),
     }
-    made = [
+    said = [
         each._replace(sentences=(*measured.get(each.subject, ()), *each.sentences))
         for each in judged.statements
     ]
-    if assessments:
-        said = tuple(
-            f"{each.stage.stage.name}: {words}"
-            for each in assessments
-            for words in uncertainty_sentences(each)
-        )
-        made.append(Statement("Uncertainty", "plain", said))
-    if judged.criteria:
-        lines = (
-            f"{'Met' if each.passed else 'NOT MET'}: {each.name}: {each.value} "
-            f"(limit {each.limit}; {each.reason})."
-            for each in sorted(judged.criteria, key=lambda each: each.passed)
-        )
-        failed = {each.rules for each in judged.criteria if not each.passed}
-        weight: Weight = "bad" if "use" in failed else "look" if failed else "good"
-        made.append(Statement("Acceptance criteria", weight, tuple(lines)))
     if judged.validity:
-        made.append(Statement("Range of validity", "plain", (judged.validity,)))
+        said.append(Statement("Range of validity", "plain", (judged.validity,)))
     if judged.assumed:
-        made.append(Statement("Assumed, cannot be checked", "plain", judged.assumed))
+        said.append(Statement("Assumed, cannot be checked", "plain", judged.assumed))
     if findings:
         words = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
-        made.append(Statement("Data", "look", (words,)))
-    return tuple(made)
+        said.append(Statement("Data", "look", (words,)))
+    blocks = [Block("terms", said, "verdict")]
+    if judged.criteria:
+        made = tables.criteria_table(judged)
+        blocks += [Block("heading", made.title, "h3"), Block("table", made, "criteria")]
+    return Section("verdict", "Verdict in detail", blocks)
 
 
 def quality_sentences(qualities: Sequence[RunQuality]) -> tuple[str, ...]:
@@ -455,14 +424,6 @@ def quality_sentences(qualities: Sequence[RunQuality]) -> tuple[str, ...]:
             f"{tables.conditions(runs, name)}."
         )
     return tuple(said)
-
-
-def uncertainty_sentences(assessment: Assessment) -> tuple[str, ...]:
-    """What the intervals rest on, or why there are none."""
-    try:
-        return assessment.uncertainty.sentences()
-    except InputError as error:
-        return (f"There are no intervals: {error}",)
 
 
 # --- what the data tell ---------------------------------------------------------------------------
@@ -536,7 +497,10 @@ def _identifiability_section(assessments: Sequence[Assessment]) -> Section:
         if directions.rows:
             blocks.append(Block("table", directions, "directions"))
         blocks.append(Block("heading", "What the intervals rest on", "h4"))
-        blocks += listed_block(uncertainty_sentences(each))
+        try:
+            blocks += listed_block(each.uncertainty.sentences())
+        except InputError as error:
+            blocks.append(text(f"There are no intervals: {error}"))
         without = f"; none: {', '.join(found.unexcited)}" if found.unexcited else ""
         words = f"Change of all weighted residuals for 1 % of each unknown{without}"
         drawn = [Block("figure", charts.sensitivity_chart(found, general), words)]

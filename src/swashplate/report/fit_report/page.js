@@ -7,21 +7,21 @@
 
   // --- samples, as `runs.packed` writes them ---
 
-  function unpacked({ size, zero, step, order, code }) {
+  async function inflated(code) {
     const bytes = Uint8Array.from(atob(code), (letter) => letter.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+    return new Uint8Array(await new Response(stream).arrayBuffer());
+  }
+
+  const runs = [...document.querySelectorAll("script[id^=samples]")].map((each) => JSON.parse(each.textContent));
+  const packed = runs.flatMap((run) => [run.input, ...run.channels]).flatMap((each) => [each.time, ...each.signals]);
+  const ready = Promise.all(packed.map(async (each) => (each.bytes = await inflated(each.code))));
+
+  function unpacked({ size, zero, step, order, bytes }) {
     const values = new Float64Array(size);
-    let [place, k] = [0, 0];
-    const bit = () => (bytes[place >> 3] >> (7 - (place++ & 7))) & 1;
-    const read = (bits) => {
-      let value = 0;
-      for (; bits > 0; bits--) value = 2 * value + bit();
-      return value;
-    };
     for (let row = 0; row < size; row++) {
-      if (row % 256 === 0) k = read(5);
-      let zeros = 0;
-      while (!bit()) zeros++;
-      const number = zeros === 24 ? read(32) : zeros * 2 ** k + read(k);
+      let number = 0;
+      for (let plane = 3; plane >= 0; plane--) number = 256 * number + bytes[plane * size + row];
       values[row] = number % 2 ? -(number + 1) / 2 : number / 2;
     }
     for (; order > 0; order--) for (let row = 1; row < size; row++) values[row] += values[row - 1];
@@ -30,7 +30,7 @@
 
   /** Signals of a run: the input, then of each channel what was simulated and measured, and the residual. */
   function samples(number) {
-    const run = JSON.parse(document.getElementById(`samples-${number}`).textContent);
+    const run = runs[number];
     const clock = (each) => ({ time: unpacked(each.time), breaks: new Set(each.breaks) });
     const input = { ...clock(run.input), held: run.held, lines: [["input", unpacked(run.input.signals[0])]] };
     const channels = run.channels.map((each) => {
@@ -275,14 +275,26 @@
       if (figure.width && figure.width !== target.clientWidth && !matchMedia("print").matches) figure.draw();
     }
   }));
-  for (const each of figures.keys()) {
-    near.observe(each);
-    sized.observe(each);
-  }
   const showAll = (width) => figures.forEach((each) => each.draw(width));
-  addEventListener("beforeprint", () => showAll(PRINTED));
-  addEventListener("afterprint", () => showAll());
-  if (location.hash === "#all") showAll();
+  function start() {
+    for (const [each, figure] of figures) {
+      if (each.getBoundingClientRect().top < innerHeight) figure.draw();
+      near.observe(each);
+      sized.observe(each);
+    }
+    addEventListener("beforeprint", () => showAll(PRINTED));
+    addEventListener("afterprint", () => showAll());
+    if (location.hash === "#all") showAll();
+  }
+  // A browser without a window prints at the load event, which a document still open holds up.
+  const hold = document.createElement("iframe");
+  hold.hidden = true;
+  document.body.append(hold);
+  hold.contentDocument.open();
+  ready.then(start).finally(() => {
+    hold.contentDocument.close();
+    hold.remove();
+  });
 
   // A link into folded details opens them, and paper shows them.
   const opened = () => {

@@ -5,7 +5,9 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
+from zlib import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,7 @@ from swashplate.identification.tables import ignored_words, start_words
 from swashplate.identification.validation import RunQuality, ignored_windows, with_speeds
 from swashplate.report.lines import gap_rows, thinned
 from swashplate.report.style import in_lines
-from swashplate.tables import quantity
+from swashplate.tables import quantity, write_table
 from swashplate.units import DisplayUnit, display_unit
 
 Array = NDArray[np.float64]
@@ -29,8 +31,6 @@ FINE = 16
 """Steps in the rms of a residual, and in the interval of uneven stamps."""
 LETTERS = {"input": 13, "overlay": 24, "residual": 14}
 """That fit along a panel's axis."""
-BLOCK, ESCAPE, LONGEST = 256, 24, 32
-"""Numbers that share a parameter; quotients from which a number stands as its bits; how many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +166,33 @@ def run_words(quality: RunQuality) -> str:
     return " · ".join([*parts, f"ignored: {ignored_words(run, channel)}"])
 
 
-# --- samples --------------------------------------------------------------------------------------
+def write_samples(runs: Sequence[ShownRun], path: str | Path) -> None:
+    """Write all samples of runs, measured and simulated, as one table, CSV or Parquet, in SI.
+
+    A row is a sample: ``run``, ``role``, ``stage`` (empty for a run that was held out),
+    ``channel``, ``unit``, ``time`` [s], ``measured``, ``simulated``, ``weight``.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written, or has another ending.
+    """
+    import polars as pl
+
+    parts = []
+    for run in runs:
+        for each in run.channels:
+            channel, simulated = each.channel, each.quality.simulated
+            arrays = {"time": channel.time, "measured": channel.values, "simulated": simulated}
+            names = {"run": run.name, "role": run.role, "stage": each.stage}
+            names |= {"channel": each.quality.channel, "unit": channel.unit}
+            columns = [pl.lit(words).alias(name) for name, words in names.items()]
+            made = pl.DataFrame({**arrays, "weight": channel.weight})
+            parts.append(made.select(*columns, pl.all()))
+    write_table(pl.concat(parts), path)
+
+
+# --- samples of the page --------------------------------------------------------------------------
 
 
 def run_data(run: ShownRun) -> dict[str, Any]:
@@ -178,9 +204,7 @@ def run_data(run: ShownRun) -> dict[str, Any]:
 
     Notes
     -----
-    Signals are rounded to 1/65,535 of their range, residuals to 1/16 of their rms. The page decodes
-    them at once, so that a browser may print it in the moment in which it was opened: the
-    browser's own decompression would answer too late.
+    Signals are rounded to 1/65,535 of their range, residuals to 1/16 of their rms.
     """
     drive = run.experiment.input
     return {
@@ -226,7 +250,7 @@ def _signals(
 
 
 def packed(values: Array, step: float | None = None) -> dict[str, Any]:
-    """Numbers as whole multiples of a step, differenced and in Rice's code, as base64.
+    """Numbers as whole multiples of a step, differenced, deflated and in base64.
 
     Parameters
     ----------
@@ -239,9 +263,8 @@ def packed(values: Array, step: float | None = None) -> dict[str, Any]:
     -------
     dict
         ``size``, ``zero`` and ``step``: value = zero + step · number. ``order``: how many times the
-        numbers were differenced. ``code``: of each 256 numbers five bits, the parameter k, then of
-        each n (0, -1, 1, -2 ... as 0, 1, 2, 3 ...) n >> k zeros, a one, and the k lowest bits; 24
-        zeros and a one are followed by all 32 bits.
+        numbers were differenced. ``code``: 0, -1, 1, -2 ... as 0, 1, 2, 3 ... of four bytes each,
+        the lowest bytes of all numbers first.
     """
     zero = float(np.median(values)) if values.size else 0.0
     reach = float(np.ptp(values)) if values.size else 0.0
@@ -252,29 +275,7 @@ def packed(values: Array, step: float | None = None) -> dict[str, Any]:
         orders.append(np.diff(orders[-1], prepend=0))
     sizes = [float(np.log2(1.0 + np.abs(each)).sum()) for each in orders]
     order = int(np.argmin(sizes))
-    number = np.where(orders[order] < 0, -2 * orders[order] - 1, 2 * orders[order])
-    data = b64encode(_rice(number)).decode("ascii")
-    return {"size": values.size, "zero": zero, "step": step, "order": order, "code": data}
-
-
-def _rice(number: NDArray[np.int64]) -> bytes:
-    firsts = np.arange(0, number.size, BLOCK)
-    sizes = np.diff(firsts, append=number.size)
-    means = np.add.reduceat(number, firsts) / sizes if number.size else np.empty(0)
-    per_block = np.floor(np.log2(np.maximum(0.7 * means, 1.0))).astype(np.int64)
-    k = np.repeat(per_block, sizes)
-    zeros = number >> k
-    escaped = zeros >= ESCAPE
-    zeros[escaped], k[escaped] = ESCAPE, LONGEST
-    head = np.zeros(number.size, dtype=np.int64)
-    head[firsts] = 5
-    starts = np.cumsum(head + zeros + 1 + k) - (zeros + 1 + k)
-    bits = np.zeros(int(starts[-1] + zeros[-1] + 1 + k[-1]) if number.size else 0, dtype=np.uint8)
-    for place in range(5):
-        bits[starts[firsts] - 5 + place] = per_block >> (4 - place) & 1
-    bits[starts + zeros] = 1
-    ends = starts + zeros + k
-    for place in range(int(k.max(initial=0))):
-        has = k > place
-        bits[ends[has] - place] = number[has] >> place & 1
-    return np.packbits(bits).tobytes()
+    number = np.where(orders[order] < 0, -2 * orders[order] - 1, 2 * orders[order]).astype("<u4")
+    planes = number.view(np.uint8).reshape(-1, 4).T.tobytes()
+    code = b64encode(compress(planes, 9)).decode("ascii")
+    return {"size": values.size, "zero": zero, "step": step, "order": order, "code": code}

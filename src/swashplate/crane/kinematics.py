@@ -1,0 +1,192 @@
+"""Kinematics of a rotary boom crane: from shaft angles to the boom's tip, and back.
+
+Axes are right-handed with z up: x forward, y to port. Joints have the drives' signs: a positive
+command hoists, slews to starboard (right), lifts the boom. All in closed form and without angles of
+the boom: its cosine and sine follow from the luff rope's length by the law of cosines.
+"""
+
+from math import atan2, cos, sin, sqrt
+from typing import NamedTuple
+
+from swashplate.equations import equation
+
+
+class Vector(NamedTuple):
+    """A position or velocity. [m] or [m/s]"""
+
+    x: float
+    y: float
+    z: float
+
+
+class Geometry(NamedTuple):
+    """Lengths of a crane; `Crane` has them with source and status."""
+
+    boom: float
+    """B, foot to tip. [m]"""
+    foot: float
+    """a, slew axis to the boom's foot. [m]"""
+    axis: Vector
+    """c, slew axis at the height of the foot, in the ship's frame. [m]"""
+    sheave: float
+    """D, foot to the sheave on the tower's top. [m]"""
+    sheave_cos: float
+    sheave_sin: float
+    """Cosine and sine of γ, the elevation of that sheave from the foot."""
+    hoist: float
+    """r_h/n_h, hoisted height for each radian of the hoist's shaft. [m]"""
+    luff: float
+    """r_l/n_l, luff rope taken in for each radian of the luff's shaft. [m]"""
+    coupling: float
+    """κ, hook's descent for each metre that the luff rope shortens."""
+
+
+class Home(NamedTuple):
+    """Where the crane stands while all shafts are at zero."""
+
+    slew: float
+    """ψ₀, 0 forward, positive to starboard. [rad]"""
+    luff_rope: float
+    """ℓ(β₀). [m]"""
+    rope: float
+    """L₀, tip to load. [m]"""
+
+
+class Shafts(NamedTuple):
+    """Angles of the three shafts from home; the slew's is the turret's own. [rad]"""
+
+    hoist: float
+    slew: float
+    luff: float
+
+
+class Boom(NamedTuple):
+    """Cosine and sine of the boom's elevation β."""
+
+    cos: float
+    sin: float
+
+
+class Rotation(NamedTuple):
+    """Matrix from the ship's frame to the inertial one, row by row."""
+
+    xx: float
+    xy: float
+    xz: float
+    yx: float
+    yy: float
+    yz: float
+    zx: float
+    zy: float
+    zz: float
+
+
+@equation
+def rotation(roll: float, pitch: float, yaw: float) -> Rotation:
+    """R = Rz(yaw) Ry(pitch) Rx(roll); roll lifts port, pitch lowers the bow, yaw turns to port."""
+    cf, sf, ct, st, cy, sy = cos(roll), sin(roll), cos(pitch), sin(pitch), cos(yaw), sin(yaw)
+    return Rotation(
+        cy * ct,
+        cy * st * sf - sy * cf,
+        cy * st * cf + sy * sf,
+        sy * ct,
+        sy * st * sf + cy * cf,
+        sy * st * cf - cy * sf,
+        -st,
+        ct * sf,
+        ct * cf,
+    )
+
+
+@equation
+def to_inertial(r: Rotation, p: Vector, shift: Vector) -> Vector:
+    """Position in the inertial frame of a point of the ship, R p + s. [m]"""
+    return Vector(
+        shift.x + r.xx * p.x + r.xy * p.y + r.xz * p.z,
+        shift.y + r.yx * p.x + r.yy * p.y + r.yz * p.z,
+        shift.z + r.zx * p.x + r.zy * p.y + r.zz * p.z,
+    )
+
+
+@equation
+def to_ship(r: Rotation, v: Vector) -> Vector:
+    """Components along the ship's axes of an inertial vector, Rᵀ v."""
+    return Vector(
+        r.xx * v.x + r.yx * v.y + r.zx * v.z,
+        r.xy * v.x + r.yy * v.y + r.zy * v.z,
+        r.xz * v.x + r.yz * v.y + r.zz * v.z,
+    )
+
+
+@equation
+def luff_rope(boom: Boom, g: Geometry) -> float:
+    """Luff rope between tower and boom, ℓ = √(B² + D² - 2 B D cos(γ - β)). [m]"""
+    cosine = g.sheave_cos * boom.cos + g.sheave_sin * boom.sin
+    return sqrt(g.boom * g.boom + g.sheave * g.sheave - 2.0 * g.boom * g.sheave * cosine)
+
+
+@equation
+def boom_of(rope: float, g: Geometry) -> Boom:
+    """Boom whose luff rope is that long, β = γ - acos((B² + D² - ℓ²)/(2 B D))."""
+    sides = g.boom * g.boom + g.sheave * g.sheave
+    c = min(max((sides - rope * rope) / (2.0 * g.boom * g.sheave), -1.0), 1.0)
+    s = sqrt(1.0 - c * c)
+    return Boom(g.sheave_cos * c + g.sheave_sin * s, g.sheave_sin * c - g.sheave_cos * s)
+
+
+@equation
+def boom_at(shaft: float, g: Geometry, home: Home) -> Boom:
+    """Boom at an angle of the luff's shaft [rad], positive lifts."""
+    return boom_of(home.luff_rope - g.luff * shaft, g)
+
+
+@equation
+def tip_of(slew: float, boom: Boom, g: Geometry) -> Vector:
+    """Tip in the ship's frame, c + (ρ cos ψ, -ρ sin ψ, B sin β) with ρ = a + B cos β. [m]"""
+    reach = g.foot + g.boom * boom.cos
+    return Vector(
+        g.axis.x + reach * cos(slew), g.axis.y - reach * sin(slew), g.axis.z + g.boom * boom.sin
+    )
+
+
+@equation
+def rope_length(shafts: Shafts, g: Geometry, home: Home) -> float:
+    """Rope below the tip, L = L₀ - r_h θ_h/n_h - κ (ℓ(β) - ℓ(β₀)). [m]"""
+    return home.rope - g.hoist * shafts.hoist + g.coupling * g.luff * shafts.luff
+
+
+@equation
+def shafts_for(x: float, y: float, now: Shafts, g: Geometry, home: Home) -> Shafts:
+    """Shaft angles that put the tip over a point of the deck's plane, the slew by the nearer way.
+
+    Parameters
+    ----------
+    x, y : float
+        Wanted tip in the ship's frame; beyond the boom's reach it is the nearest reach. [m]
+    now : Shafts
+        Where the shafts are; the hoist's is returned as it is. [rad]
+    """
+    e_x, e_y = x - g.axis.x, y - g.axis.y
+    c = min(max((sqrt(e_x * e_x + e_y * e_y) - g.foot) / g.boom, 0.0), 1.0)
+    rope = luff_rope(Boom(c, sqrt(1.0 - c * c)), g)
+    before = home.slew + now.slew
+    # the turn from where it stands, within ±180 degrees: no jump behind the stern
+    cross = -e_y * cos(before) - e_x * sin(before)
+    along = e_x * cos(before) - e_y * sin(before)
+    return Shafts(now.hoist, now.slew + atan2(cross, along), (home.luff_rope - rope) / g.luff)
+
+
+@equation
+def reach_rate(boom: Boom, g: Geometry) -> float:
+    """Loss of reach for each radian of the luff's shaft, -∂ρ/∂θ_l > 0. [m]
+
+    dℓ/dβ = -B D sin(γ - β)/ℓ and dρ/dβ = -B sin β.
+    """
+    sine = g.sheave_sin * boom.cos - g.sheave_cos * boom.sin
+    return g.luff * boom.sin * luff_rope(boom, g) / (g.sheave * sine)
+
+
+@equation
+def elevation(boom: Boom) -> float:
+    """Elevation β of the boom. [rad]"""
+    return atan2(boom.sin, boom.cos)

@@ -1,0 +1,632 @@
+"""The closed loop: stick, control, actuation, three drives, kinematics and rope in one pass.
+
+One sample after the other, at the drives' own rate:
+
+1. what control sees is the last sample, as a controller's computer has it;
+2. the stick's commands become wanted speeds of the shafts, through the path of the tip if control
+   asks for it, and these become speeds (ideal drives) or voltages;
+3. each drive takes its voltage by the engine's compiled step;
+4. shafts move the tip, the ship moves the crane, the tip leads the load.
+
+Open loop is the same kernel without what closes it, a stepper the same kernel over one sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf, pi, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.analysis.compensation import InverseMap
+from swashplate.crane.control import GIVES, SEEN, Law, Settings
+from swashplate.crane.kinematics import (
+    Boom,
+    Geometry,
+    Home,
+    Rotation,
+    Shafts,
+    Vector,
+    boom_at,
+    elevation,
+    reach_rate,
+    rope_length,
+    rotation,
+    shafts_for,
+    tip_of,
+    to_inertial,
+    to_ship,
+)
+from swashplate.crane.rope import GRAVITY, Air, first_step, rope_step
+from swashplate.drive import Drive
+from swashplate.equations import equation, inlined, instance_of, kernel
+from swashplate.equations.code import generating
+from swashplate.equations.marching.march import advance_source
+from swashplate.equations.marching.part import Stored
+from swashplate.equations.marching.run import Instance, check_domain, module
+from swashplate.equations.model import Model
+from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.simulation.instance import check_filter_stability
+from swashplate.simulation.instance import instance_of as instance_of_drive
+
+Array = NDArray[np.float64]
+
+IDEAL, VOLTS, INVERSE, DIRECT = range(4)
+"""Actuation: speeds at once; 10 V for full speed; the inverse map's voltage; voltages as given."""
+ROWS = (
+    *("voltage_hoist", "voltage_slew", "voltage_luff"),
+    *("speed_hoist", "speed_slew", "speed_luff"),
+    *("shaft_hoist", "shaft_slew", "shaft_luff"),
+    *("tip_x", "tip_y", "tip_z", "load_x", "load_y", "load_z"),
+    *("pull", "rope", "wanted_x", "wanted_y", "boom_cos", "boom_sin"),
+)
+"""What the loop leaves of each sample."""
+FINE, TOO_FAST, BOOM_OUT, ROPE_OUT = range(4)
+"""How a pass ended."""
+BRAKE_WAITS, BRAKE_TAKES = 0.3, 0.2
+"""Time at rest before the hoist's brake falls in, and time in which it stops the drum. [s]"""
+
+
+class Inverse(NamedTuple):
+    """An `InverseMap` as the loop takes it."""
+
+    minus_speed: Array
+    minus_voltage: Array
+    plus_speed: Array
+    plus_voltage: Array
+    creep: float
+    low: float
+    high: float
+    acceleration: float
+    """The smaller one of both ways. [rad/s²]"""
+
+
+class Machine(NamedTuple):
+    """A compiled model's numbers: what its step takes, and where its state is kept."""
+
+    whole: NDArray[np.int64]
+    fraction: Array
+    params: Array
+    given: Array
+    constants: Array
+    lines: Array
+    states: Array
+    values: Array
+    out: Array
+
+
+class Fixed(NamedTuple):
+    """What stays as it is during a run."""
+
+    geometry: Geometry
+    home: Home
+    air: Air
+    settings: Settings
+    actuation: int
+    brake: bool
+    slowest: tuple[float, float]
+    """Voltages of the hoist's dead zone, negative and positive. [V]"""
+    boom: tuple[float, float]
+    """Sines of the boom's limits."""
+    ropes: tuple[float, float]
+    """Limits of the rope. [m]"""
+
+
+class Plant(NamedTuple):
+    """What the loop drives, and what is remembered of it in arrays."""
+
+    inverses: tuple[Inverse, Inverse, Inverse]
+    drives: tuple[Machine, Machine, Machine]
+    law: Machine
+    picks: NDArray[np.int64]
+    """Which of `SEEN` the law takes."""
+    memory: Array
+    """Delayed signals, a row each: three commands, wanted tip x and y, swing x and y."""
+    margins: Array
+    """Worst margins of the domains of the drives and the law."""
+
+
+class State(NamedTuple):
+    """What one sample passes to the next, delayed signals and the drives' states apart."""
+
+    sample: int
+    shafts: Shafts
+    speeds: Shafts
+    operator: Shafts
+    """Where the stick's commands alone would have the shafts."""
+    wish: Shafts
+    """Speeds that it wants. [rad/s]"""
+    aim: Shafts
+    """Where control wants the shafts."""
+    boom: Boom
+    rope: float
+    in_ship: Vector
+    """Tip in the ship's frame."""
+    tip: Vector
+    load: Vector
+    before: Vector
+    still: float
+    """Time for which the hoist's command has been within the dead zone. [s]"""
+    brake: float
+    """How far the brake has fallen in, 0 to 1."""
+
+
+# --- pieces of a sample ---------------------------------------------------------------------------
+
+
+@inlined
+def delayed(memory: Array, row: int, sample: int, delay: float) -> float:
+    """A remembered signal so many samples ago, straight between samples."""
+    whole = int(delay)
+    part = delay - whole
+    last = memory.shape[1] - 1  # lengths are powers of two
+    newer: float = memory[row, (sample - whole) & last]
+    older: float = memory[row, (sample - whole - 1) & last]
+    return newer + part * (older - newer)
+
+
+@inlined
+def shaped(
+    memory: Array, row: int, sample: int, half: float, impulses: tuple[float, float, float]
+) -> float:
+    """A remembered signal through a shaper whose impulses are `half` samples apart."""
+    made: float = impulses[0] * memory[row, sample & (memory.shape[1] - 1)]
+    if impulses[1] > 0.0:
+        made += impulses[1] * delayed(memory, row, sample, half)
+    if impulses[2] > 0.0:
+        made += impulses[2] * delayed(memory, row, sample, 2.0 * half)
+    return made
+
+
+@inlined
+def on_branch(wanted: float, speed: Array, voltage: Array) -> float:
+    """Voltage for a speed on one branch of an inverse map, held at its ends."""
+    low, high = 0, speed.size - 1
+    inside = min(max(wanted, speed[low]), speed[high])
+    while high - low > 1:
+        middle = (low + high) // 2
+        if speed[middle] <= inside:
+            low = middle
+        else:
+            high = middle
+    share = (inside - speed[low]) / (speed[high] - speed[low])
+    made: float = voltage[low] + share * (voltage[high] - voltage[low])
+    return made
+
+
+@inlined
+def inverse_voltage(wanted: float, inverse: Inverse) -> float:
+    """Voltage by `InverseMap.voltage` with its rule in the gap, clipped. [V]"""
+    lower: float = inverse.minus_speed[inverse.minus_speed.size - 1]
+    upper: float = inverse.plus_speed[0]
+    if wanted < lower:
+        return on_branch(wanted, inverse.minus_speed, inverse.minus_voltage)
+    if wanted > upper:
+        return on_branch(wanted, inverse.plus_speed, inverse.plus_voltage)
+    at_rest = abs(wanted - inverse.creep)
+    if at_rest <= wanted - lower and at_rest <= upper - wanted:
+        return 0.0
+    way = lower if wanted - lower <= upper - wanted else upper
+    minus, plus = inverse.minus_voltage[inverse.minus_voltage.size - 1], inverse.plus_voltage[0]
+    edge: float = minus if way == lower else plus
+    return edge
+
+
+@inlined
+def voltage_for(wanted: float, inverse: Inverse, actuation: int) -> float:
+    """Command of a drive for a wanted speed of its shaft. [V]"""
+    if actuation == VOLTS:
+        full = inverse.high if wanted > 0.0 else -inverse.low
+        return min(max(FULL_VOLTAGE * wanted / full, -FULL_VOLTAGE), FULL_VOLTAGE)
+    return inverse_voltage(wanted, inverse)
+
+
+@equation
+def half_clip(size: float, speed: float, acceleration: float, share: float, omega: float) -> float:
+    """Largest offset that control may add along one axis. [m]
+
+    A size that is given [m], or `share` of the largest sine at ω [rad/s] that a speed [m/s] and an
+    acceleration [m/s²] allow, min(v/ω, a/ω²).
+    """
+    return size if size > 0.0 else share * min(speed / omega, acceleration / (omega * omega))
+
+
+@inlined
+def clipped_offset(
+    offset: tuple[float, float],
+    path: tuple[float, float],
+    boom: Boom,
+    rope: float,
+    fixed: Fixed,
+    inverses: tuple[Inverse, Inverse, Inverse],
+) -> tuple[float, float]:
+    """Offset of the tip held, along the boom and across it, within what the drives can follow."""
+    omega = sqrt(GRAVITY / rope)
+    g, settings = fixed.geometry, fixed.settings
+    _, slew, luff = inverses
+    x, y = offset
+    e_x, e_y = path[0] - g.axis.x, path[1] - g.axis.y
+    reach = sqrt(e_x * e_x + e_y * e_y)
+    e_x, e_y = e_x / reach, e_y / reach
+    rate = reach_rate(boom, g)
+    along = half_clip(
+        settings.clip,
+        rate * min(luff.high, -luff.low),
+        rate * luff.acceleration,
+        settings.share,
+        omega,
+    )
+    across = half_clip(
+        0.0,
+        reach * min(slew.high, -slew.low),
+        reach * slew.acceleration,
+        settings.share,
+        omega,
+    )
+    out = min(max(x * e_x + y * e_y, -along), along)
+    turn = min(max(y * e_x - x * e_y, -across), across)
+    return out * e_x - turn * e_y, out * e_y + turn * e_x
+
+
+@inlined
+def advanced(shafts: Shafts, old: Shafts, new: Shafts, h: float) -> Shafts:
+    """Angles one step later, by the trapezoidal rule."""
+    return Shafts(
+        shafts.hoist + 0.5 * h * (old.hoist + new.hoist),
+        shafts.slew + 0.5 * h * (old.slew + new.slew),
+        shafts.luff + 0.5 * h * (old.luff + new.luff),
+    )
+
+
+@inlined
+def limited(u: float, inverse: Inverse) -> float:
+    """Wanted speed for a stick's fraction of the full speed that way. [rad/s]"""
+    return u * inverse.high if u > 0.0 else -u * inverse.low
+
+
+@inlined
+def within(speed: float, inverse: Inverse) -> float:
+    """A speed within the drive's limits. [rad/s]"""
+    return min(max(speed, inverse.low), inverse.high)
+
+
+# --- the loop -------------------------------------------------------------------------------------
+
+
+def _no_law(*_: Any) -> float:
+    return inf
+
+
+@generating
+def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[State, int]]:
+    """The compiled loop over given steps of three drives and of a law, None for no law."""
+    own = law is not None
+    advance_law = law if own else inlined(_no_law)
+
+    @kernel
+    def loop(
+        h: float, fixed: Fixed, state: State, plant: Plant, stick: Array, ship: Array, out: Array
+    ) -> tuple[State, int]:
+        """Take the stick's samples; the state behind the last, and how the pass ended."""
+        inverses, laws, picks = plant.inverses, plant.law, plant.picks
+        memory, margins = plant.memory, plant.margins
+        g, home, settings, actuation = fixed.geometry, fixed.home, fixed.settings, fixed.actuation
+        moving = ship.shape[1] > 1
+        size = memory.shape[1] - 1
+        seen = np.zeros(13)
+        sample, shafts, speeds = state.sample, state.shafts, state.speeds
+        operator, wish, aim = state.operator, state.wish, state.aim
+        boom, rope, in_ship = state.boom, state.rope, state.in_ship
+        tip, load, before = state.tip, state.load, state.before
+        still, brake = state.still, state.brake
+        volts, omega = np.zeros(3), np.zeros(3)
+        r = Rotation(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+        shift = Vector(0.0, 0.0, 0.0)
+        ended = FINE
+        for m in range(len(stick)):
+            half = pi * sqrt(rope / GRAVITY) / h
+            if moving:
+                shift = Vector(ship[m, 0], ship[m, 1], ship[m, 2])
+                r = rotation(ship[m, 3], ship[m, 4], ship[m, 5])
+            # the stick's commands
+            u = stick[m, 0], stick[m, 1], stick[m, 2]
+            for i in range(3):
+                memory[i, sample & size] = u[i]
+            if settings.joint[1] > 0.0:
+                u = (
+                    shaped(memory, 0, sample, half, settings.joint),
+                    shaped(memory, 1, sample, half, settings.joint),
+                    shaped(memory, 2, sample, half, settings.joint),
+                )
+            new = Shafts(
+                limited(u[0], inverses[0]), limited(u[1], inverses[1]), limited(u[2], inverses[2])
+            )
+            wanted = new
+            path_x, path_y = in_ship.x, in_ship.y
+            if settings.path:
+                if sample > 0:
+                    operator = advanced(operator, wish, new, h)
+                wish = new
+                lead = tip_of(home.slew + operator.slew, boom_at(operator.luff, g, home), g)
+                memory[3, sample & size] = lead.x
+                memory[4, sample & size] = lead.y
+                path_x = shaped(memory, 3, sample, half, settings.tip)
+                path_y = shaped(memory, 4, sample, half, settings.tip)
+                swing_x, swing_y = load.x - tip.x, load.y - tip.y
+                memory[5, sample & size] = swing_x
+                memory[6, sample & size] = swing_y
+                x, y = 0.0, 0.0
+                if settings.feedback > 0.0:
+                    back = 2.0 * half * settings.delay
+                    x = settings.feedback * delayed(memory, 5, sample, back)
+                    y = settings.feedback * delayed(memory, 6, sample, back)
+                    if moving:
+                        turned = to_ship(r, Vector(x, y, 0.0))
+                        x, y = turned.x, turned.y
+                if settings.ship and moving:
+                    # over its place on the sea, at the tip's own height
+                    over = Vector(path_x - shift.x, path_y - shift.y, tip.z - shift.z)
+                    place = to_ship(r, over)
+                    x += place.x - path_x
+                    y += place.y - path_y
+                if own:
+                    seen[0], seen[1], seen[2] = swing_x, swing_y, rope
+                    seen[3], seen[4] = home.slew + shafts.slew, elevation(boom)
+                    seen[5], seen[6] = path_x, path_y
+                    if moving:
+                        for i in range(6):
+                            seen[7 + i] = ship[m, i]
+                    for i in range(picks.size):
+                        laws.values[i] = seen[picks[i]]
+                    margins[3] = min(
+                        margins[3],
+                        advance_law(
+                            laws.values, laws.lines, laws.whole, laws.fraction, laws.params,
+                            laws.given, h, laws.constants, laws.states, laws.out,
+                        ),
+                    )  # fmt: skip
+                    x += laws.out[0]
+                    y += laws.out[1]
+                if settings.clip > 0.0 or settings.share > 0.0:
+                    x, y = clipped_offset((x, y), (path_x, path_y), boom, rope, fixed, inverses)
+                path_x += x
+                path_y += y
+                target = shafts_for(path_x, path_y, aim, g, home)
+                if sample == 0:
+                    aim = target
+                gain = settings.gain
+                wanted = Shafts(
+                    new.hoist,
+                    (target.slew - aim.slew) / h + gain * (target.slew - shafts.slew),
+                    (target.luff - aim.luff) / h + gain * (target.luff - shafts.luff),
+                )
+                aim = target
+            # actuation
+            if actuation == IDEAL:
+                omega[0] = within(wanted.hoist, inverses[0])
+                omega[1] = within(wanted.slew, inverses[1])
+                omega[2] = within(wanted.luff, inverses[2])
+            elif actuation == DIRECT:
+                volts[0], volts[1], volts[2] = stick[m, 0], stick[m, 1], stick[m, 2]
+            else:
+                volts[0] = voltage_for(wanted.hoist, inverses[0], actuation)
+                volts[1] = voltage_for(wanted.slew, inverses[1], actuation)
+                volts[2] = voltage_for(wanted.luff, inverses[2], actuation)
+            if actuation != IDEAL:
+                a, b, c = plant.drives
+                a.values[0], b.values[0], c.values[0] = volts[0], volts[1], volts[2]
+                margins[0] = min(margins[0], hoist(
+                    a.values, a.lines, a.whole, a.fraction, a.params, a.given, h, a.constants,
+                    a.states, a.out,
+                ))  # fmt: skip
+                margins[1] = min(margins[1], slew(
+                    b.values, b.lines, b.whole, b.fraction, b.params, b.given, h, b.constants,
+                    b.states, b.out,
+                ))  # fmt: skip
+                margins[2] = min(margins[2], luff(
+                    c.values, c.lines, c.whole, c.fraction, c.params, c.given, h, c.constants,
+                    c.states, c.out,
+                ))  # fmt: skip
+                omega[0], omega[1], omega[2] = a.out[0], b.out[0], c.out[0]
+                if fixed.brake:
+                    within_zone = fixed.slowest[0] < volts[0] < fixed.slowest[1]
+                    still = still + h if within_zone else 0.0
+                    falls = h / BRAKE_TAKES if still >= BRAKE_WAITS else -h / BRAKE_TAKES
+                    brake = min(max(brake + falls, 0.0), 1.0)
+                    omega[0] = omega[0] * (1.0 - brake)
+            # kinematics and rope
+            turning = Shafts(omega[0], omega[1], omega[2])
+            if sample > 0:
+                shafts = advanced(shafts, speeds, turning, h)
+            speeds = turning
+            boom = boom_at(shafts.luff, g, home)
+            rope = rope_length(shafts, g, home)
+            in_ship = tip_of(home.slew + shafts.slew, boom, g)
+            following = to_inertial(r, in_ship, shift) if moving else in_ship
+            if not (fixed.ropes[0] <= rope <= fixed.ropes[1]):
+                ended = ROPE_OUT
+                break
+            if not (fixed.boom[0] <= boom.sin <= fixed.boom[1] and boom.cos > 0.0):
+                ended = BOOM_OUT
+                break
+            pull = GRAVITY
+            if sample == 0:
+                load = Vector(following.x, following.y, following.z - rope)
+                before = load
+            else:
+                if sample == 1:
+                    moved = Vector(following.x - tip.x, following.y - tip.y, following.z - tip.z)
+                    v = Vector(moved.x / h, moved.y / h, moved.z / h)
+                    made = first_step(load, v, tip, following, rope, fixed.air, h)
+                else:
+                    made = rope_step(load, before, tip, following, rope, fixed.air, h)
+                before, load, pull = load, made.position, made.pull
+                if pull < 0.0:
+                    ended = TOO_FAST
+                    break
+            tip = following
+            for i in range(3):
+                out[m, i], out[m, 3 + i] = volts[i], omega[i]
+            out[m, 6], out[m, 7], out[m, 8] = shafts.hoist, shafts.slew, shafts.luff
+            out[m, 9], out[m, 10], out[m, 11] = tip.x, tip.y, tip.z
+            out[m, 12], out[m, 13], out[m, 14] = load.x, load.y, load.z
+            out[m, 15], out[m, 16] = pull, rope
+            out[m, 17], out[m, 18] = path_x, path_y
+            out[m, 19], out[m, 20] = boom.cos, boom.sin
+            sample += 1
+        end = State(
+            sample, shafts, speeds, operator, wish, aim, boom, rope, in_ship, tip, load, before,
+            still, brake,
+        )  # fmt: skip
+        return end, ended
+
+    return loop
+
+
+# --- models as the loop takes them ----------------------------------------------------------------
+
+
+@generating
+def compiled_step(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], stored: tuple[Stored, ...]
+) -> tuple[Callable[..., int], Any]:
+    """Compiled constants of a model, and its step for other kernels."""
+    text, names = advance_source(model, signals, options, stored)
+    made = module(f"{model.name}_in_loop", text, names)
+    return made["prepare"], made["advance"]
+
+
+def machine_of(
+    instance: Instance, signals: tuple[str, ...], stored: tuple[Stored, ...], h: float
+) -> tuple[Any, Machine]:
+    """A model's compiled step, and its numbers at rest."""
+    prepare, advance = compiled_step(instance.model, signals, instance.options, stored)
+    places = instance.places(signals, h)
+    constants = np.zeros(64)
+    prepare(instance.params, instance.given, h, constants)
+    lines = np.zeros((len(signals), (int(places.whole.max()) if places.whole.size else 0) + 3))
+    states = instance.start(dict.fromkeys(signals, 0.0), h).flat
+    return advance, Machine(
+        places.whole,
+        places.fraction,
+        instance.params,
+        instance.given,
+        constants,
+        lines,
+        states,
+        np.zeros(len(signals)),
+        np.zeros(len(stored)),
+    )
+
+
+def inverse_of(inverse: InverseMap) -> Inverse:
+    """An inverse map as the loop takes it."""
+    branches = (*inverse.minus, *inverse.plus)
+    a, b, c, d = (np.ascontiguousarray(each, dtype=np.float64) for each in branches)
+    low, high = inverse.limits
+    return Inverse(a, b, c, d, inverse.creep, low, high, min(inverse.acceleration))
+
+
+class Loop:
+    """A crane in its loop, from a beginning on: its kernel and all that it remembers.
+
+    Parameters
+    ----------
+    drives : sequence of Drive
+        Hoist, slew, luff.
+    inverses : sequence of InverseMap
+        Of the drives.
+    fixed : Fixed
+        Geometry, controller and the rest.
+    law : Law, optional
+        A law of one's own.
+    rate : float
+        Samples a second. [Hz]
+    """
+
+    def __init__(
+        self,
+        drives: tuple[Drive, ...],
+        inverses: tuple[InverseMap, ...],
+        fixed: Fixed,
+        law: Law | None,
+        rate: float,
+    ) -> None:
+        self.fixed, self.rate, self._law = fixed, rate, law
+        self._h = 1.0 / rate
+        speed = (Stored(1, "signals", "shaft_speed"),)
+        for drive in drives:
+            check_filter_stability(drive.parameters, self._h)
+        self._instances = [instance_of_drive(drive.parameters, True) for drive in drives]
+        steps, machines = zip(
+            *(machine_of(each, ("voltage",), speed, self._h) for each in self._instances),
+            strict=True,
+        )
+        step, own, picks = None, Machine(*machines[0]), np.zeros(0, dtype=np.int64)
+        if law is not None:
+            instance = instance_of(law.model, law.values)
+            signals = law.model.external
+            stored = tuple(
+                Stored(0, "signals" if _is_signal(law.model, each) else "state", each)
+                for each in GIVES
+            )
+            step, own = machine_of(instance, signals, stored, self._h)
+            picks = np.array([SEEN.index(each) for each in signals], dtype=np.int64)
+            self._instances.append(instance)
+        self._loop = loop_of(steps[0], steps[1], steps[2], step)
+        g, home = fixed.geometry, fixed.home
+        zero, boom = Shafts(0.0, 0.0, 0.0), boom_at(0.0, g, home)
+        tip = tip_of(home.slew, boom, g)
+        self.state = State(
+            0, zero, zero, zero, zero, zero, boom, home.rope, tip, tip, tip, tip, 0.0, 0.0
+        )  # fmt: skip
+        longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * rate + 4.0
+        memory = np.zeros((7, 1 << int(longest).bit_length()))
+        memory[3:5] = [[tip.x], [tip.y]]
+        hoist, slew, luff = map(inverse_of, inverses)
+        self._plant = Plant(
+            (hoist, slew, luff),
+            (machines[0], machines[1], machines[2]),
+            own,
+            picks,
+            memory,
+            np.full(4, np.inf),
+        )
+
+    def take(self, stick: Array, ship: Array) -> tuple[Array, int]:
+        """The next samples.
+
+        Parameters
+        ----------
+        stick : (n, 3) array
+            Commands of hoist, slew and luff, -1 to 1; voltages if these are given [V].
+        ship : (n, 6) array
+            Motion of the ship, (n, 1) if it does not move. [m], [rad]
+
+        Returns
+        -------
+        out : (n, 21) array
+            Columns as in `ROWS`.
+        ended : int
+            `FINE`, or why it ended at the state's sample.
+
+        Raises
+        ------
+        DomainError
+            If a drive or a law leaves its domain.
+        """
+        out = np.empty((len(stick), len(ROWS)))
+        plant = self._plant
+        self.state, ended = self._loop(self._h, self.fixed, self.state, plant, stick, ship, out)
+        machines = (*plant.drives, plant.law)
+        for instance, machine, worst in zip(
+            self._instances, machines, plant.margins.tolist(), strict=False
+        ):
+            check_domain(instance, machine.states, worst, "command")
+        return out, ended
+
+
+def _is_signal(model: Model, name: str) -> bool:
+    return model.signals is not None and name in model.signals._fields

@@ -1,0 +1,241 @@
+"""Seaways and the ship's motion in them: spectra, seeded components, exact fast synthesis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import cos, isfinite, log, radians, sin
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.crane.rope import GRAVITY
+from swashplate.crane.transfer_functions import CRANE_SHIP, Hull, TransferFunctions
+from swashplate.equations import kernel
+from swashplate.errors import InputError
+
+Array = NDArray[np.float64]
+
+BAND = (0.25, 2.5)
+"""Frequencies of the components, 25 s to 2.5 s. [rad/s]"""
+COARSE = 8.0
+"""Rate at which motion and two derivatives are summed up before they are joined smoothly. [Hz]"""
+LEAST_ENERGY = 0.5
+"""Part of a spectrum's energy that must lie within the band."""
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """JONSWAP's spectrum of waves; Bretschneider's with a peak factor of 1.
+
+    Attributes
+    ----------
+    height : float
+        Significant wave height, four standard deviations of the surface. [m]
+    period : float
+        Of the peak. [s]
+    peak_factor : float
+        γ, 3.3 for young wind seas.
+
+    Raises
+    ------
+    InputError
+        Unless all are above 0 and most of the energy lies at waves of 2.5 to 25 s.
+    """
+
+    height: float
+    period: float
+    peak_factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("height", "period", "peak_factor"):
+            value = getattr(self, name)
+            if not (isfinite(value) and value > 0.0):
+                raise InputError(f"The {name} of a sea is {value:g}, but must be above 0.")
+        omega = np.linspace(*BAND, 2001)
+        held = float(np.trapezoid(self.density(omega), omega))
+        if held < LEAST_ENERGY * self.height**2 / 16.0:
+            low, high = (2.0 * np.pi / each for each in BAND[::-1])
+            raise InputError(
+                f"A sea with a peak at {self.period:g} s has little energy between waves of "
+                f"{low:.3g} and {high:.3g} s, which are simulated: take a period between."
+            )
+
+    def density(self, omega: ArrayLike) -> Array:
+        """Density of the surface's variance at frequencies [rad/s], one-sided. [m² s]"""
+        w = np.asarray(omega, dtype=np.float64)
+        peak = 2.0 * np.pi / self.period
+        ratio = peak / w
+        base = 5.0 / 16.0 * self.height**2 * ratio**4 / w * np.exp(-1.25 * ratio**4)
+        sigma = np.where(w <= peak, 0.07, 0.09)
+        share = np.exp(-((w / peak - 1.0) ** 2) / (2.0 * sigma**2))
+        scale = 1.0 - 0.287 * log(self.peak_factor)
+        return np.asarray(base * scale * self.peak_factor**share)
+
+
+SEA_STATES: Mapping[str, Spectrum] = {
+    "ss2": Spectrum(0.3, 6.3),
+    "ss3": Spectrum(0.88, 7.5),
+    "ss3-swell": Spectrum(0.88, 11.0),
+    "ss4": Spectrum(1.88, 8.8),
+}
+"""Sea states; heights within the classes of the WMO."""
+
+
+class Components(NamedTuple):
+    """Regular waves that add up to a seaway, each an array."""
+
+    frequency: Array
+    """[rad/s]"""
+    amplitude: Array
+    """[m]"""
+    phase: Array
+    """At the ship's mean place. [rad]"""
+    heading: Array
+    """Where they run, from the bow to port; 0 following, 90° abeam. [rad]"""
+
+
+@dataclass(frozen=True)
+class Seaway:
+    """A seeded seaway and the ship in it.
+
+    Attributes
+    ----------
+    sea : str or Spectrum
+        A name of `SEA_STATES`, or a spectrum.
+    heading_deg : float
+        0 following, 90 abeam to port, 180 head sea.
+    seed : int
+        Of the components.
+    ship : Hull or TransferFunctions
+        What the waves make of; by default a hull of a crane ship's size in closed form.
+    speed : float
+        Of the ship, forward. [m/s]
+    spread : bool
+        Directions spread by cos² around the heading, instead of long crests.
+    components : int
+        Number of regular waves.
+    """
+
+    sea: str | Spectrum = "ss3"
+    heading_deg: float = 90.0
+    seed: int = 0
+    ship: Hull | TransferFunctions = field(default=CRANE_SHIP, repr=False)
+    speed: float = 0.0
+    spread: bool = False
+    components: int = 200
+
+    def __post_init__(self) -> None:
+        if isinstance(self.sea, str) and self.sea not in SEA_STATES:
+            raise InputError(f"There is no sea '{self.sea}'; there are {', '.join(SEA_STATES)}.")
+        if not (isfinite(self.heading_deg) and isfinite(self.speed) and self.components >= 2):
+            raise InputError("A seaway has a finite heading and speed and two or more components.")
+
+    @property
+    def spectrum(self) -> Spectrum:
+        """Its spectrum."""
+        return SEA_STATES[self.sea] if isinstance(self.sea, str) else self.sea
+
+    @cached_property
+    def waves(self) -> Components:
+        """Regular waves: one anywhere in each of equal bands, so that nothing repeats."""
+        rng = np.random.default_rng(self.seed)
+        edges, width = np.linspace(*BAND, self.components, endpoint=False, retstep=True)
+        omega = edges + rng.random(self.components) * width
+        phase = 2.0 * np.pi * rng.random(self.components)
+        heading = np.full(self.components, radians(self.heading_deg))
+        if self.spread:
+            grid = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 1001)
+            below = 0.5 + (grid + 0.5 * np.sin(2.0 * grid)) / np.pi
+            heading += np.interp(rng.random(self.components), below, grid)
+        return Components(
+            omega, np.sqrt(2.0 * self.spectrum.density(omega) * width), phase, heading
+        )
+
+    @cached_property
+    def _phasors(self) -> tuple[Array, NDArray[np.complex128]]:
+        """Frequencies of encounter, and complex amplitudes of six motions, (6, components)."""
+        waves = self.waves
+        number = waves.frequency**2 / GRAVITY
+        met = waves.frequency - number * self.speed * np.cos(waves.heading)
+        made = self.ship.response(waves.frequency, waves.heading, self.speed)
+        return met, made * (waves.amplitude * np.exp(1j * waves.phase))
+
+    def motion(self, count: int, rate: float = 512.0) -> Array:
+        """Motion of the ship.
+
+        Parameters
+        ----------
+        count : int
+            Samples.
+        rate : float
+            Samples a second, a multiple of 8. [Hz]
+
+        Returns
+        -------
+        (count, 6) array
+            Surge, sway, heave [m], roll, pitch, yaw [rad].
+
+        Notes
+        -----
+        Value and two derivatives are summed up at 8 Hz, from phasors that are turned, not computed;
+        quintic polynomials join them.
+        """
+        inner = round(rate / COARSE)
+        if inner < 1 or abs(inner * COARSE - rate) > 1e-9 * rate:
+            raise InputError(f"A ship's motion has a multiple of {COARSE:g} samples a second.")
+        met, amplitude = self._phasors
+        intervals = max(-(-(count - 1) // inner), 1)
+        rise = _basis(inner)
+        made = np.empty((intervals * inner + 1, 6))
+        _synthesised(met, amplitude.real.copy(), amplitude.imag.copy(), rise, made)
+        return made[:count]
+
+
+def _basis(inner: int) -> Array:
+    """Quintic polynomials of an interval: of value, slope and curvature at its start and end."""
+    t = np.arange(inner) / inner
+    h = 1.0 / COARSE
+    rise = t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
+    return np.stack(
+        [
+            1.0 - rise,
+            h * (t - t**3 * (6.0 - 8.0 * t + 3.0 * t * t)),
+            h * h * 0.5 * t * t * (1.0 - t) ** 3,
+            rise,
+            h * t**3 * (-4.0 + 7.0 * t - 3.0 * t * t),
+            h * h * 0.5 * t**3 * (1.0 - t) ** 2,
+        ]
+    )
+
+
+@kernel
+def _synthesised(met: Array, real: Array, imag: Array, basis: Array, out: Array) -> None:
+    """Add up components on the coarse grid, turned from point to point; join the points."""
+    inner, size, motions = basis.shape[1], met.size, real.shape[0]
+    c, s, turn_c, turn_s = np.ones(size), np.zeros(size), np.empty(size), np.empty(size)
+    for j in range(size):
+        turn_c[j], turn_s[j] = cos(met[j] / COARSE), sin(met[j] / COARSE)
+    points = np.zeros((6, motions))
+    for n in range((out.shape[0] - 1) // inner + 1):
+        points[:3] = points[3:]
+        points[3:] = 0.0
+        for j in range(size):
+            w = met[j]
+            for q in range(motions):
+                along = real[q, j] * c[j] - imag[q, j] * s[j]
+                across = real[q, j] * s[j] + imag[q, j] * c[j]
+                points[3, q] += along
+                points[4, q] -= w * across
+                points[5, q] -= w * w * along
+            c[j], s[j] = c[j] * turn_c[j] - s[j] * turn_s[j], c[j] * turn_s[j] + s[j] * turn_c[j]
+        for i in range(inner if n else 0):
+            row = (n - 1) * inner + i
+            for q in range(motions):
+                value = 0.0
+                for k in range(6):
+                    value += basis[k, i] * points[k, q]
+                out[row, q] = value
+    out[out.shape[0] - 1] = points[3]

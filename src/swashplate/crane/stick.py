@@ -1,0 +1,194 @@
+"""Sticks: what the operator asks for over time, as parts of each drive's full speed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import isfinite, radians
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.errors import InputError
+
+if TYPE_CHECKING:
+    from swashplate.crane.crane import Crane, Pose
+
+Array = NDArray[np.float64]
+
+AXES = ("hoist", "slew", "luff")
+TARGETS = {"hoist": "rope_m", "slew": "slew_deg", "luff": "boom_deg"}
+"""Where an axis is led to: rope below the tip, slew, elevation of the boom."""
+
+
+@dataclass(frozen=True)
+class Trapezoid:
+    """One axis from rest to a part of its full speed and back."""
+
+    part: float
+    duration: float | None
+    """From the first to the last moment off zero; None: until the target. [s]"""
+    target: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Stick:
+    """Commands of hoist, slew and luff, each from -1 to 1.
+
+    Positive commands hoist, slew to starboard, lift the boom. Made by `trapezoid` or `record`.
+    """
+
+    length: float
+    """[s]"""
+    start: float = 0.0
+    ramp: float = 0.0
+    shapes: Mapping[str, Trapezoid] = field(default_factory=dict)
+    samples: Array | None = field(default=None, repr=False)
+    """(n, 3) commands at `rate`, in place of shapes."""
+    rate: float = 512.0
+
+    @classmethod
+    def trapezoid(
+        cls,
+        *,
+        hoist: float = 0.0,
+        slew: float = 0.0,
+        luff: float = 0.0,
+        until: Mapping[str, float] | None = None,
+        duration: float | None = None,
+        start: float = 1.0,
+        ramp: float = 0.5,
+        length: float = 60.0,
+    ) -> Stick:
+        """Trapezoids of all axes from one moment on.
+
+        Parameters
+        ----------
+        hoist, slew, luff : float
+            Part of the full speed, -1 to 1, its sign that of the way.
+        until : mapping of str to float, optional
+            Where an ideal drive would end: ``slew_deg`` from forward, ``boom_deg``, ``rope_m``;
+            each needs the command of its axis. What the ship, the other axes and the real drives
+            make of it is another matter.
+        duration : float, optional
+            Of an axis without target. [s]
+        start, ramp, length : float
+            Moment of the first ramp, time of each ramp, length of the record. [s]
+
+        Raises
+        ------
+        InputError
+            For a command beyond ±1, a target or duration too few or too many.
+        """
+        parts = {"hoist": hoist, "slew": slew, "luff": luff}
+        targets = dict(until or {})
+        shapes: dict[str, Trapezoid] = {}
+        for axis, part in parts.items():
+            target = targets.pop(TARGETS[axis], None)
+            if not -1.0 <= part <= 1.0:
+                raise InputError(f"The stick of the {axis} is {part:g}, but reaches from -1 to 1.")
+            if part == 0.0 and target is not None:
+                raise InputError(f"There is a target {TARGETS[axis]}, but no command {axis}.")
+            if part == 0.0:
+                continue
+            if target is None and duration is None:
+                raise InputError(
+                    f"The {axis} needs until={{'{TARGETS[axis]}': ...}} or a duration, so that the "
+                    "stick returns."
+                )
+            shapes[axis] = Trapezoid(part, None if target is not None else duration, target)
+        if targets:
+            raise InputError(
+                f"There is no target '{next(iter(targets))}'; there are "
+                f"{', '.join(TARGETS.values())}."
+            )
+        if not (start >= 0.0 and ramp > 0.0 and isfinite(length) and length > 0.0):
+            raise InputError(
+                f"A stick starts at 0 s or later, with ramps and a length above 0 s, not "
+                f"{start:g}, {ramp:g} and {length:g} s."
+            )
+        return cls(length, start, ramp, MappingProxyType(shapes))
+
+    @classmethod
+    def record(cls, commands: ArrayLike, rate: float = 512.0) -> Stick:
+        """Commands as they were recorded, straight between samples.
+
+        Parameters
+        ----------
+        commands : (n, 3) array_like
+            Of hoist, slew and luff, -1 to 1.
+        rate : float
+            Samples a second. [Hz]
+        """
+        made = np.array(commands, dtype=np.float64)
+        if made.ndim != 2 or made.shape[1] != 3 or len(made) < 2 or not rate > 0.0:
+            raise InputError(
+                "A recorded stick has two or more rows of hoist, slew and luff, at a rate above "
+                "0 Hz."
+            )
+        if not (np.abs(made) <= 1.0).all():
+            n = int(np.argmax(~(np.abs(made) <= 1.0).all(axis=1)))
+            raise InputError(f"Row {n} of the stick is not within -1 to 1 on every axis.")
+        made.flags.writeable = False
+        return cls((len(made) - 1) / rate, samples=made, rate=float(rate))
+
+    @classmethod
+    def rest(cls, length: float = 60.0) -> Stick:
+        """Nothing, for so long. [s]"""
+        return cls.trapezoid(length=length)
+
+    def sample(self, crane: Crane, pose: Pose, rate: float) -> tuple[Array, float]:
+        """Commands at a rate for a crane that starts at a pose, and when the last one ends.
+
+        Returns
+        -------
+        commands : (n, 3) array
+        end : float
+            [s]
+
+        Raises
+        ------
+        InputError
+            If a command does not end within the record, or leads away from its target.
+        """
+        time = np.arange(round(self.length * rate) + 1) / rate
+        if self.samples is not None:
+            grid = np.arange(len(self.samples)) / self.rate
+            made = np.stack([np.interp(time, grid, each) for each in self.samples.T], axis=1)
+            busy = np.flatnonzero(np.any(self.samples != 0.0, axis=1))
+            return made, float(grid[busy[-1]]) if busy.size else 0.0
+        made, end = np.zeros((time.size, 3)), 0.0
+        for axis, shape in self.shapes.items():
+            lasts = shape.duration
+            if lasts is None:
+                assert shape.target is not None
+                lasts = self._lasts(crane, pose, axis, shape.part, shape.target)
+            if lasts < 2.0 * self.ramp:
+                raise InputError(
+                    f"The {axis} moves for {lasts:.3g} s, less than its two ramps of "
+                    f"{self.ramp:g} s: take a smaller command or shorter ramps."
+                )
+            if self.start + lasts > self.length:
+                raise InputError(
+                    f"The stick of the {axis} ends at {self.start + lasts:.4g} s, but the record "
+                    f"at {self.length:g} s: take a longer record."
+                )
+            corners = self.start + np.array([0.0, self.ramp, lasts - self.ramp, lasts])
+            levels = [0.0, shape.part, shape.part, 0.0]
+            made[:, AXES.index(axis)] = np.interp(time, corners, levels)
+            end = max(end, self.start + lasts)
+        return made, end
+
+    def _lasts(self, crane: Crane, pose: Pose, axis: str, part: float, target: float) -> float:
+        """Time from zero to zero that brings an ideal drive from a pose to a target. [s]"""
+        way = crane.shaft_angle(pose, axis, radians(target) if axis != "hoist" else target)
+        low, high = crane.inverse(axis).limits
+        speed = part * high if part > 0.0 else -part * low
+        if way * speed <= 0.0:
+            raise InputError(
+                f"The {axis} leads away from {TARGETS[axis]} = {target:g}, or is there already: "
+                "change the sign of its command or the target."
+            )
+        return way / speed + self.ramp

@@ -1,0 +1,426 @@
+"""One sample of a part of a model as straight code, and where the part starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple, get_type_hints
+
+from llvmlite import ir
+from numba import config, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from swashplate.equations import expressions as ex
+from swashplate.equations.code import (
+    Choice,
+    Code,
+    Flag,
+    Item,
+    Let,
+    Rule,
+    Tuple,
+    Value,
+    fixed,
+    leaves,
+    rebuilt,
+)
+from swashplate.equations.expressions import Node
+from swashplate.equations.fields import floats_of
+from swashplate.equations.model import (
+    Equation,
+    Link,
+    Model,
+    Source,
+    Tap,
+    Window,
+    arguments_of,
+    linear,
+    mean_over_sample,
+    previous,
+)
+from swashplate.equations.reading import read
+from swashplate.equations.syntax import plain
+from swashplate.errors import InputError
+
+HOLDS: dict[str, Equation] = {
+    "linear": linear,
+    "previous": previous,
+    "mean": mean_over_sample,
+}
+
+
+class Stored(NamedTuple):
+    """A number of a part that is kept."""
+
+    part: int
+    kind: str
+    """``signals``, ``state``, ``limits``, ``input``, ``link``, or ``tap`` for a tap's sample."""
+    path: str = ""
+    """Of the number; name of the input or link; input and number of a tap's sample, ``at.0``."""
+
+
+class TapOf(NamedTuple):
+    """A tap of a part, with the number of its place among all taps of the model."""
+
+    part: int
+    input: str
+    number: int
+    tap: Tap
+
+
+@lru_cache(maxsize=256)
+def taps_of(model: Model, signals: tuple[str, ...]) -> tuple[TapOf, ...]:
+    """All taps on signals that are given as records, numbered."""
+    found: list[TapOf] = []
+    for i, part in enumerate(model.parts):
+        for name in part.input_types:
+            tap = part.tap(name)
+            outside = model.link_of(i, name) is None and tap.signal in signals
+            if outside and part.looked_at(name):
+                found.append(TapOf(i, name, len(found), tap))
+    return tuple(found)
+
+
+class PartCode:
+    """One sample of a part as straight code.
+
+    `signals` are the external ones that are given as records; for the others the default parameter
+    counts. `taken` are names that are in use already; `ruled` code is to be differentiated.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        part: int,
+        signals: Sequence[str],
+        options: Any,
+        taken: set[str] | None = None,
+        *,
+        ruled: bool = False,
+    ) -> None:
+        self.model, self.part, self.own = model, part, model.parts[part]
+        self.records, self.options = tuple(signals), options
+        self.prologue = Code(set() if taken is None else taken, ruled=ruled)
+        self.code = Code(self.prologue.taken, ruled=ruled)
+        self.prefix = f"{self.own.name}_" if len(model.parts) > 1 else ""
+        self.code.taken.add("h")
+        self.taps = [each for each in taps_of(model, self.records) if each.part == part]
+        for tap in self.taps:
+            self.code.taken |= {*self.tap_samples(tap), self.fraction(tap), self.whole(tap)}
+        self.p = self._names(self.own.parameters, "p")
+        self.given = self._names(self.own.given, "given") if self.own.given else Tuple(None, ())
+        self.state = self._names(self.own.state, "s")
+        self.known: dict[str, Value] = {"p": self.p, "h": ex.name("h"), "given": self.given}
+        self.known["state"] = self.state
+        if self.own.constants is not None:
+            self.known["k"] = self._call(self.prologue, self.own.constants)
+        self.inputs: dict[str, Value] = {}
+        for name in self.own.input_types:
+            self.inputs[name] = self._input(name)
+        self.known |= self.inputs
+        self.entry = list(self.code.items)  # Items that make the inputs; a start needs them, too.
+        if self.own.inputs is not None:
+            self.known["inputs"] = Tuple(self.own.inputs, tuple(self.inputs.values()))
+        if self.own.sample is not None:
+            self.known["signals"] = self._call(self.code, self.own.sample)
+        self.following = self._call(self.code, self.own.step)
+        self._check_type(self.own.step, self.following, self.own.state)
+
+    def _check_type(self, equation: Equation, made: Value, kind: type[Any]) -> None:
+        """Refuse what an equation returns unless it is of a type, and all of it numbers."""
+        cls = made.cls if isinstance(made, Tuple) else None
+        numbers = tuple(path for path, node in leaves(made) if node.kind in ("float", "int"))
+        if cls is not kind or numbers != floats_of(kind):
+            raise InputError(
+                f"Model {self.own.name}: {plain(equation).__name__} must return a {kind.__name__} "
+                "of numbers on every way."
+            )
+
+    def _names(self, kind: Any, letter: str) -> Value:
+        hints = get_type_hints(kind)
+
+        def made(kind: Any, hints: Mapping[str, Any], path: str) -> Value:
+            items: list[Value] = []
+            for name in kind._fields:
+                inner = hints[name]
+                below = f"{path}{name}"
+                if isinstance(inner, type) and hasattr(inner, "_fields"):
+                    items.append(made(inner, get_type_hints(inner), f"{below}_"))
+                else:
+                    taken = self.code.fresh(f"{letter}_{self.prefix}{below}")
+                    items.append(ex.name(taken))
+            return Tuple(kind, tuple(items))
+
+        return made(kind, hints, "")
+
+    def _call(self, code: Code, equation: Equation, **more: Value) -> Value:
+        return self.call(code, equation, {**self.known, **more})
+
+    def call(self, code: Code, equation: Equation, known: Mapping[str, Value]) -> Value:
+        """Append a call of one of the part's equations, of what is known by argument."""
+        given = {name: known[name] for name in arguments_of(equation) if name in known}
+        if "options" in arguments_of(equation):
+            given["options"] = fixed(self.options) or Flag("unknown", "options")
+        made, name = read(code, equation, given), plain(equation).__name__
+        before = {*code.taken}
+        made = code.named(made, name if isinstance(made, Node) else "")
+        code.origins |= dict.fromkeys(code.taken - before, name)
+        return made
+
+    def _input(self, name: str) -> Value:
+        """An input as a name, a window of names, or what a hold makes of one."""
+        link = self.model.link_of(self.part, name)
+        if link is not None:
+            return self.linked(link)
+        tap = self.own.tap(name)
+        found = next((each for each in self.taps if each.input == name), None)
+        if found is None:
+            if tap.signal in self.records:
+                return ex.name(f"x_{tap.signal}")
+            if name not in self.own.defaults:
+                # refused where the model is given its numbers; a constant keeps the code whole
+                return ex.ZERO
+            return dict(leaves(self.p))[self.own.defaults[name]]
+        samples = [ex.name(each) for each in self.tap_samples(found)]
+        fraction = ex.name(self.fraction(found))
+        window = Tuple(Window, (Tuple(None, tuple(samples)), fraction))
+        if tap.width:
+            return window
+        return self._call(self.code, HOLDS[tap.hold], window=window)
+
+    def linked(self, link: Link) -> Node:
+        """A signal between parts, from the names of its sources."""
+        sources = {each.signal: ex.name(self.source(each)) for each in link.sources}
+        if link.equation is None:
+            return next(iter(sources.values()))
+        made = self.code.named(read(self.code, link.equation, sources), link.name)
+        assert isinstance(made, Node)
+        return made
+
+    def source(self, source: Source) -> str:
+        """Name of a signal that another part needs."""
+        return f"x_{self.model.parts[source.part].name}_{source.signal.replace('.', '_')}"
+
+    def tap_samples(self, tap: TapOf) -> list[str]:
+        """Names of a tap's samples, newest first."""
+        return [f"{self.prefix}{tap.input}_{j}" for j in range(tap.tap.samples)]
+
+    def fraction(self, tap: TapOf) -> str:
+        """Name of the rest of a tap's place."""
+        return f"{self.prefix}{tap.input}_f"
+
+    def whole(self, tap: TapOf) -> str:
+        """Name of the whole samples of a tap's place."""
+        return f"{self.prefix}{tap.input}_whole"
+
+    @cached_property
+    def margin(self) -> Node | None:
+        """Margin of the domain."""
+        if self.own.domain is None:
+            return None
+        made = self._call(self.code, self.own.domain)
+        if not isinstance(made, Node):
+            raise InputError(
+                f"Model {self.own.name}: {plain(self.own.domain).__name__} must return one number, "
+                "the margin."
+            )
+        return made
+
+    @cached_property
+    def limits(self) -> list[Node]:
+        """The limits, in their order."""
+        if self.own.limits is None:
+            return []
+        return [node for _, node in leaves(self._call(self.code, self.own.limits))]
+
+    def signal(self, path: str) -> Node:
+        """A signal, or a number of the state, by its path."""
+        signals = self.known.get("signals", Tuple(None, ()))
+        return {**dict(leaves(self.state)), **dict(leaves(signals))}[path]
+
+    def node(self, stored: Stored) -> Node:
+        """A number that is kept."""
+        if stored.kind == "tap":
+            name, number = stored.path.split(".")
+            tap = next(each for each in self.taps if each.input == name)
+            return ex.name(self.tap_samples(tap)[int(number)])
+        if stored.kind == "input":
+            made = self.inputs[stored.path]
+            assert isinstance(made, Node)
+            return made
+        if stored.kind == "state":
+            return dict(leaves(self.state))[stored.path]
+        return self.signal(stored.path)
+
+    @cached_property
+    def parameters(self) -> dict[str, str]:
+        """Path of each parameter by the name that stands for it."""
+        return {node.value: path for path, node in leaves(self.p)}
+
+
+class Start(NamedTuple):
+    """A part's state at the start as straight code."""
+
+    code: Code
+    value: Value
+
+
+def rest_of(part: PartCode) -> Start:
+    """State at rest: every signal is zero, or what its default parameter is."""
+    code = Code(part.code.taken, ruled=part.code.ruled)
+    own = part.own
+    if own.rest is None:
+        defaults = own.state._field_defaults
+        nodes = [
+            ex.number(float(defaults.get(path.split(".")[0], 0.0)))
+            for path, _ in leaves(part.state)
+        ]
+        return Start(code, rebuilt(part.state, iter(nodes)))
+    inputs: dict[str, Value] = {}
+    for name in own.input_types:
+        if name in own.defaults:
+            inputs[name] = dict(leaves(part.p))[own.defaults[name]]
+        elif own.tap(name).width:
+            zeros = (ex.ZERO,) * own.tap(name).width
+            inputs[name] = Tuple(Window, (Tuple(None, zeros), ex.ZERO))
+        else:
+            inputs[name] = ex.ZERO
+    known = {**part.known, **inputs}
+    if own.inputs is not None:
+        known["inputs"] = Tuple(own.inputs, tuple(inputs.values()))
+    return Start(code, part.call(code, own.rest, known))
+
+
+def settled_of(part: PartCode) -> Start | None:
+    """Steady state under the inputs as they come, None where the part has no equation for it."""
+    if part.own.settled is None:
+        return None
+    code = Code(part.code.taken, ruled=part.code.ruled)
+    code.items = list(part.entry)
+    return Start(code, part.call(code, part.own.settled, part.known))
+
+
+# --- one set alone --------------------------------------------------------------------------------
+
+
+def _rarely(typing: Any, test: Any) -> Any:
+    bit = ir.IntType(1)
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        kind = ir.FunctionType(bit, [bit, bit])
+        inserted: Any = cgutils.get_or_insert_function
+        expect = inserted(builder.module, kind, "llvm.expect.i1")
+        return builder.call(expect, [values[0], ir.Constant(bit, 0)])
+
+    return types.boolean(types.boolean), generate
+
+
+GUESSED: dict[str, Any] = {"rarely": bool if config.DISABLE_JIT else intrinsic(_rarely)}  # type: ignore[attr-defined]
+"""What the text calls. ``rarely(test)`` is the test, for which there is a branch."""
+
+
+def reads_of(items: Iterable[Item]) -> Iterator[tuple[tuple[str, ...], frozenset[str]]]:
+    """Names that items make, in their order, and what each of them is made of."""
+    for item in items:
+        if isinstance(item, Let):
+            yield (item.name,), item.node.reads
+        elif isinstance(item, Choice):
+            yield from reads_of((*item.then, *item.other))
+            for name, one, two in item.merged:
+                yield (name,), one.reads | two.reads | item.test.reads
+        else:
+            assert not isinstance(item, Rule)
+            yield item.results, frozenset[str]().union(*(node.reads for node in item.arguments))
+
+
+class Guessed:
+    """A sample of one set, with a branch for each limit that the next sample waits for.
+
+    Each sample waits for the one before it, and a choice for what it chooses between. A limit,
+    whose value is known ahead of the march, is therefore a branch: the processor guesses that it
+    acts as it did at the last sample, and goes on. The operations and their order stay as they are,
+    and so does the last bit.
+
+    Of the sample in `code` are `wanted` some nodes, those of the states `following` it among them;
+    `states` and `still` are names of the states and of numbers that do not change over the march.
+    The attribute `code` is the same sample, `ahead` what of it is computed ahead of the march.
+    """
+
+    def __init__(
+        self,
+        code: Code,
+        wanted: Iterable[Node],
+        states: Iterable[str],
+        following: Iterable[Node],
+        still: Iterable[str],
+    ) -> None:
+        items = code.kept(wanted)
+        made = [*reads_of(items)]
+        self.still, self.moved = {"h", *still}, {*states}
+        for names, reads in made:
+            if reads & self.moved:
+                self.moved.update(names)
+        self.waits = set[str]().union(*(node.reads for node in following))
+        for names, reads in reversed(made):
+            if not self.waits.isdisjoint(names):
+                self.waits |= reads
+        self.choices: dict[str, Node] = {}
+        self.code, self.ahead = Code(code.taken), Code(code.taken)
+        self.code.names = self.ahead.names = code.names
+        self.code.items = self._items(items)
+
+    def _items(self, items: Iterable[Item]) -> list[Item]:
+        found: list[Item] = []
+        for item in items:
+            if isinstance(item, Let) and item.name in self.moved & self.waits:
+                found.append(Let(item.name, self._node(self._chosen(item.node))))
+                if item.node.op == "if" and all(map(self._still, item.node.args[1:])):
+                    self.choices[item.name] = item.node
+            elif isinstance(item, Choice):
+                then, other = self._items(item.then), self._items(item.other)
+                found.append(replace(item, then=then, other=other))
+            else:
+                found.append(item)
+        return found
+
+    def _still(self, node: Node) -> bool:
+        return node.reads <= self.still
+
+    def _chosen(self, node: Node) -> Node:
+        """A choice between two numbers that are known ahead, in place of what follows from one."""
+        moving = [*(node.reads - self.still)]
+        if len(moving) != 1 or moving[0] not in self.choices:
+            return node
+        test, *sides = self.choices[moving[0]].args
+        found = []
+        for side in sides:
+            ahead = Let(self.code.fresh("still"), ex.substitute(node, {moving[0]: side}))
+            self.ahead.items.append(ahead)
+            self.still.add(ahead.name)
+            found.append(ex.name(ahead.name))
+        return ex.choose(test, *found)
+
+    def _node(self, node: Node) -> Node:
+        """An expression with its limits as branches."""
+        if not node.reads & self.moved:
+            return node
+        args = [self._node(each) for each in node.args]
+        if node.op in ("min", "max") and len(args) == 2:
+            # the second counts where it is the smaller, or the larger, and else the first
+            one, two = args
+            test = ex.make("<" if node.op == "min" else ">", two, one)
+            if self._still(one) or self._still(two):
+                return self._branch(test, two, one, self._still(two))
+        if node.op == "if" and node.kind == "float":
+            test, one, two = args
+            if self._still(one) != self._still(two):
+                return self._branch(test, one, two, self._still(one))
+        return ex.make(node.op, *args, value=node.value) if args else node
+
+    def _branch(self, test: Node, one: Node, two: Node, rare: bool) -> Node:
+        """A choice whose first side is rare, or else its second."""
+        if not rare:
+            test, one, two = ex.make("not", test), two, one
+        return ex.choose(ex.make("rarely", test, kind="bool"), one, two)

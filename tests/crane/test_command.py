@@ -1,0 +1,113 @@
+"""``swashplate crane``, the crane's file and figure."""
+
+import polars as pl
+import pytest
+from typer.testing import CliRunner
+
+from swashplate.cli import app
+from swashplate.crane import Crane, Stick, control
+from swashplate.errors import FileError, InputError, ParameterError
+from swashplate.report.figures import plot_crane
+
+
+def said(*words):
+    return CliRunner().invoke(app, ["crane", *words], env={"COLUMNS": "120"})
+
+
+def test_show_marks_what_is_assumed_and_its_file_is_a_crane(tmp_path):
+    shown = said("show", "tg3637")
+    assert shown.exit_code == 0
+    rows = [line.split() for line in shown.stdout.splitlines()]
+    assert ["foot", "offset", "2.5", "m", "assumed"] in rows
+    assert sum("assumed" in row for row in rows[3:]) == 12
+    mine = tmp_path / "mine.toml"
+    mine.write_text(said("show", "tg3637", "--toml").stdout, "utf-8")
+    assert Crane.from_toml(mine).geometry == Crane.preset("tg3637").geometry
+
+
+def test_run_compares_variants_and_writes_signals_and_a_figure(tmp_path):
+    words = ["--slew", "1", "--until", "slew_deg=45", "--length", "50"]
+    both = said(
+        "run", "tg3637", *words, "--variant", "ideal:zv-tip", "--variant", "volts",
+        "--plot", str(tmp_path / "run.png"),
+    )  # fmt: skip
+    assert both.exit_code == 0, both.output
+    rows = {line.split()[0]: line.split()[1:] for line in both.stdout.splitlines() if line.strip()}
+    assert rows["ideal:zv-tip"][:1] == ["0.03"]
+    assert (tmp_path / "run.png").stat().st_size > 10_000
+    out = tmp_path / "run.parquet"
+    one = said("run", "tg3637", *words, "--sea", "ss2,90,1", "--out", str(out))
+    assert one.exit_code == 0, one.output
+    table = pl.read_parquet(out)
+    assert table.height == 50 * 512 + 1
+    assert {"time", "stick_slew", "load_x", "pull", "voltage_luff", "swing"} <= set(table.columns)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ("run tg --slew 1", "There is no packaged crane 'tg'; there is tg3637."),
+        ("run tg3637 --variant fast", "actuation is 'fast'; it is ideal, volts, inverse."),
+        ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-joint"),
+        ("run tg3637 --variant ideal:clip=much", "'much' is no number."),
+        ("run tg3637 --sea ss3,90,1,2", "--sea ss3,90,1,2 has too many parts"),
+        ("run tg3637 --ship hull.re1", "--ship hull.re1 needs a --sea to move in."),
+        ("run tg3637 --at rope=3", "--at has no rope; it has slew_deg, boom_deg, rope_m."),
+        ("run tg3637 --drive boom=hoist", "the axes are hoist, slew and luff."),
+        ("run tg3637 --slew 1 --until 45", "has no equals sign"),
+        ("run tg3637 --variant volts --variant ideal --out a.csv", "--out writes one run's"),
+    ],
+)
+def test_wrong_words_end_in_one_sentence(words, sentence):
+    made = said(*words.split())
+    assert made.exit_code == 2
+    assert sentence in " ".join(made.stderr.split())
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"boom_length": 0.0}, "boom_length is 0, but must be above 0"),
+        ({"tower_sheave_angle": 1.0}, "tower_sheave_angle is 57.2958 deg, but the luff rope only"),
+        ({"boom_limits": (0.9, 0.5)}, "boom_limits are 51.5662 and 28.6479 deg, but must rise"),
+        ({"rope_limits": (0.0, 50.0)}, "rope_limits are 0 and 50 m, but must rise from above 0"),
+        ({"slew_axis": 3.0}, "slew_axis has 1 numbers, but needs 3"),
+        ({"jib": 3.0}, "A crane has no jib; it has boom_length"),
+    ],
+)
+def test_impossible_geometry_is_refused(change, sentence):
+    with pytest.raises(ParameterError, match=sentence):
+        Crane.preset("tg3637").with_geometry(**change)
+
+
+def test_files_are_refused_by_their_entry(tmp_path):
+    text = said("show", "tg3637", "--toml").stdout
+    path = tmp_path / "mine.toml"
+    path.write_text(text.replace("boom_length", "boom_lenght"), "utf-8")
+    with pytest.raises(ParameterError, match=r"mine.toml: .*needs an entry 'boom_length'"):
+        Crane.from_toml(path)
+    path.write_text(text.replace('value = 36.0, unit = "m"', 'value = 36.0, unit = "kg"'), "utf-8")
+    with pytest.raises(InputError, match="boom_length is given in 'kg', which does not measure"):
+        Crane.from_toml(path)
+    with pytest.raises(FileError, match="There is no file"):
+        Crane.from_toml(tmp_path / "none.toml")
+
+
+def test_figure_shows_runs_by_name_and_what_is_assumed():
+    crane = Crane.preset("tg3637")
+    stick = Stick.trapezoid(slew=0.5, luff=0.5, duration=9.0, length=12.0)
+    runs = {
+        name: crane.simulate(stick, control=law)
+        for name, law in (("none", None), ("tip", control.TipShaper("ei")))
+    }
+    figure = plot_crane(runs)
+    assert [ax.get_ylabel() for ax in figure.axes] == [
+        *("swing (deg)", "slew (deg)", "boom (deg)", "limits")
+    ]
+    texts = [each.get_text() for ax in figure.axes for each in ax.texts]
+    assert any("12 of 13 quantities of the crane are assumed" in each for each in texts)
+    names = [each.get_text() for each in figure.axes[0].get_legend().get_texts()]
+    assert names == ["none", "tip"]
+    assert len(runs["none"].plot().axes) == 4
+    with pytest.raises(InputError, match="shows 1 to 6 runs of a crane, not 0"):
+        plot_crane({})

@@ -1,0 +1,244 @@
+"""The load on its rope, against closed forms and an independent integration (DOP853)."""
+
+from math import cos, hypot, pi, radians, sin, sqrt
+
+import numpy as np
+import pytest
+
+from swashplate.crane import Crane, load_motion
+from swashplate.crane.crane import Pose
+from swashplate.crane.kinematics import (
+    Boom,
+    Shafts,
+    Vector,
+    boom_of,
+    luff_rope,
+    rotation,
+    shafts_for,
+    tip_of,
+    to_inertial,
+)
+from swashplate.errors import InputError
+
+G = 9.80665
+RATE = 512.0
+
+
+def still(seconds, rate=RATE):
+    """A tip at rest."""
+    return np.zeros((round(seconds * rate) + 1, 3))
+
+
+def swung(degrees_, length=20.0):
+    """Place of a load swung forward."""
+    angle = radians(degrees_)
+    return [length * sin(angle), 0.0, -length * cos(angle)]
+
+
+def rising(x, rate):
+    """Times at which a signal rises through zero, straight between samples."""
+    i = np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0))
+    return (i - x[i] / (x[i + 1] - x[i])) / rate
+
+
+def angle_of(made, tip):
+    d = made.position - tip
+    return np.degrees(np.arctan2(np.hypot(d[:, 0], d[:, 1]), -d[:, 2]))
+
+
+@pytest.mark.parametrize(("rate", "error"), [(512.0, -1.80e-7), (64.0, -1.15e-5)])
+def test_large_swing_has_the_period_of_the_elliptic_integral(rate, error):
+    tip = still(60.0, rate)
+    made = load_motion(tip, 20.0, rate, start=swung(60.0), velocity=[0.0, 0.0, 0.0])
+    period = np.diff(rising(made.position[:, 0], rate)).mean()
+    assert period / 9.629592541 - 1.0 == pytest.approx(error, rel=0.02)
+    assert made.pull.max() == pytest.approx(2.0 * G, rel=3e-5)
+    assert np.abs(np.linalg.norm(made.position, axis=1) - 20.0).max() < 2e-14
+    middle = (made.position[2:] - made.position[:-2]) * rate / 2.0
+    energy = 0.5 * (middle**2).sum(axis=1) + G * made.position[1:-1, 2]
+    assert np.ptp(energy) < 8e-7 * G * 20.0 * (512.0 / rate) ** 2
+
+
+def test_conical_pendulum_turns_at_its_rate():
+    radius, omega = 20.0 * sin(radians(30.0)), 0.752454119
+    start = swung(30.0)
+    made = load_motion(still(60.0), 20.0, start=start, velocity=[0.0, radius * omega, 0.0])
+    turn = np.unwrap(np.arctan2(made.position[:, 1], made.position[:, 0]))
+    assert turn[-1] / 60.0 == pytest.approx(omega, abs=2e-7)
+    assert made.pull.mean() == pytest.approx(1.154700538 * G, rel=1e-6)
+
+
+def test_ellipse_precesses():
+    b = 20.0 * radians(3.0)
+    start = swung(10.0)
+    made = load_motion(still(600.0), 20.0, start=start, velocity=[0.0, b * sqrt(G / 20.0), 0.0])
+    x, y = made.position[:, 0], made.position[:, 1]
+    r = np.hypot(x, y)
+    peaks = 1 + np.flatnonzero((r[1:-1] > r[:-2]) & (r[1:-1] >= r[2:]))
+    turned = np.unwrap(2.0 * np.arctan2(y[peaks], x[peaks])) / 2.0
+    rate = np.polyfit(peaks / RATE, turned, 1)[0]
+    # to leading order 3/8 ab/L² √(g/L); the next one is of the amplitude's square, 0.03
+    assert rate == pytest.approx(0.0023997, rel=5e-3)
+
+
+def test_slowly_hoisted_load_swings_further():
+    time = np.arange(round(200.0 * RATE) + 1) / RATE
+    length = 30.0 - 0.1 * time
+    made = load_motion(still(200.0), length, start=swung(1.0, 30.0), velocity=[0.0, 0.0, 0.0])
+    angle = angle_of(made, 0.0)
+    peaks = 1 + np.flatnonzero((angle[1:-1] > angle[:-2]) & (angle[1:-1] >= angle[2:]))
+    last = peaks[-1]
+    # adiabatic invariant: amplitude ∝ L^(-3/4), 2.27153 degrees at 10.047 m
+    assert angle[last] * (length[last] / 10.047) ** 0.75 == pytest.approx(2.27153, rel=2e-4)
+
+
+STRESS = np.array([40.756697, -1.019942, 36.518782])
+
+
+def stressed(rate, mirrored=False):
+    """A crane on a ship in six degrees of freedom: path of the tip, rope, first velocity."""
+    crane = Crane.preset("tg3637")
+    g, side = crane.geometry, -1.0 if mirrored else 1.0
+    g = g._replace(axis=g.axis._replace(y=side * g.axis.y))
+    rope = 0.0
+
+    def tip_at(t):
+        psi, beta = side * (0.8 * sin(0.35 * t) - 0.8), radians(45.0 + 8.0 * sin(0.27 * t))
+        shift = Vector(
+            0.3 * sin(0.5 * t), side * 0.4 * sin(0.62 * t + 0.3), 0.5 * sin(0.7 * t + 1.0)
+        )
+        r = rotation(
+            side * radians(2.0) * sin(0.6 * t),
+            radians(1.0) * sin(0.75 * t + 0.5),
+            side * radians(0.5) * sin(0.4 * t),
+        )
+        return np.array(to_inertial(r, tip_of(psi, Boom(cos(beta), sin(beta)), g), shift))
+
+    time = np.arange(round(30.0 * rate) + 1) / rate
+    tip = np.array([tip_at(t) for t in time])
+    u = np.array([sin(0.1), 0.0, -cos(0.1)])
+    velocity = (tip_at(1e-5) - tip_at(-1e-5)) / 2e-5 - 0.8 * u
+    rope = 20.0 - 4.0 * np.sin(0.2 * time)
+    return load_motion(tip, rope, rate, start=tip[0] + 20.0 * u, velocity=velocity)
+
+
+def test_crane_on_a_moving_ship_agrees_with_dop853_by_order_two():
+    error = {rate: stressed(rate).position[-1] - STRESS for rate in (64.0, 128.0, 512.0)}
+    size = {rate: np.abs(each).max() for rate, each in error.items()}
+    assert size[512.0] < 1.1e-4
+    assert size[64.0] < 7.2e-3
+    order = np.log2(np.linalg.norm(error[64.0]) / np.linalg.norm(error[128.0]))
+    assert order == pytest.approx(2.0, abs=0.1)
+
+
+def test_mirrored_crane_has_the_mirrored_load():
+    one, two = stressed(128.0), stressed(128.0, mirrored=True)
+    np.testing.assert_allclose(two.position, one.position * [1.0, -1.0, 1.0], atol=1e-11)
+
+
+def test_slack_rope_is_caught_where_the_load_falls_behind():
+    time = np.arange(round(2.0 * RATE) + 1) / RATE
+    z = np.where(time < 0.5, -7.5 * time**2, -1.875 - 7.5 * (time - 0.5))
+    tip = np.zeros((time.size, 3))
+    tip[:, 2] = z
+    made = load_motion(tip, 10.0, velocity=[0.0, 0.0, 0.0])
+    slack = made.pull == 0.0
+    first = int(np.argmax(~slack & (time > 0.1)))
+    assert time[first] == pytest.approx(1.21479, abs=1.0 / RATE)
+    assert slack[1:first].all()
+    speed = np.diff(made.position[:, 2]) * RATE
+    assert speed[first + 1] == pytest.approx(-7.5, abs=1e-9)
+
+
+def test_steady_slewing_holds_the_load_outwards():
+    rho = 2.5 + 36.0 * cos(radians(45.0))
+    omega, outward = radians(4.24205156), radians(0.9053717)
+    time = np.arange(round(60.0 * RATE) + 1) / RATE
+    tip = np.stack([rho * np.cos(omega * time), rho * np.sin(omega * time), 0.0 * time], axis=1)
+    radius = rho + 20.0 * sin(outward)
+    made = load_motion(
+        tip, 20.0, start=[radius, 0.0, -20.0 * cos(outward)], velocity=[0.0, omega * radius, 0.0]
+    )
+    assert angle_of(made, tip) == pytest.approx(0.9053717, abs=2e-7)
+
+
+def test_forced_sway_has_the_linear_amplitude():
+    time = np.arange(round(120.0 * RATE) + 1) / RATE
+    tip = still(120.0)
+    tip[:, 1] = 0.05 * np.sin(0.4 * time)
+    forced = 0.05 / (1.0 - 0.16 * 20.0 / G)
+    made = load_motion(tip, 20.0, velocity=[0.0, 0.4 * forced, 0.0])
+    assert angle_of(made, tip).max() == pytest.approx(0.0693795, abs=2e-6)
+
+
+def steps(times, part):
+    """A tip that gets its speed of 0.1 m/s in steps."""
+    time = np.arange(round(60.0 * RATE) + 1) / RATE
+    tip = still(60.0)
+    tip[:, 0] = sum(
+        0.1 * each * np.maximum(time - t, 0.0) for t, each in zip(times, part, strict=True)
+    )
+    return tip
+
+
+def test_step_of_speed_swings_the_load():
+    tip = steps([0.0], [1.0])
+    made = load_motion(tip, 20.0, velocity=[0.0, 0.0, 0.0])
+    assert angle_of(made, tip).max() == pytest.approx(0.409117, abs=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "left"), [(0.5, 0.444016), (0.7, 0.253768), (1.3, 0.218412), (1.5, 0.345741)]
+)
+def test_shaper_for_another_rope_leaves_its_share(ratio, left):
+    half = pi * sqrt(20.0 * ratio / G)
+    tip = steps([0.0, half], [0.5, 0.5])
+    made = load_motion(tip, 20.0, velocity=[0.0, 0.0, 0.0])
+    after = round((half + 1.0) * RATE)
+    assert angle_of(made, tip)[after:].max() / 0.409117 == pytest.approx(left, abs=4e-6)
+
+
+def test_drag_leads_to_a_terminal_lean():
+    made = load_motion(still(600.0), 10.0, velocity=[0.0] * 3, drag=0.01, wind=[8.0, 0.0, 0.0])
+    lean = np.arctan(0.01 * 64.0 / G)
+    tail = made.position[-round(60.0 * RATE) :, 0]
+    assert tail.mean() == pytest.approx(10.0 * sin(lean), rel=1e-3)
+    assert np.ptp(tail) < 0.5 * 2.0 * 10.0 * sin(lean)
+
+
+def test_rope_too_short_for_the_step_is_refused():
+    tip = still(1.0)
+    tip[100:, 0] = 5.0
+    with pytest.raises(InputError, match=r"At 0.195312 s the boom's tip moves .* rope of 2 m"):
+        load_motion(tip, 2.0)
+    with pytest.raises(InputError, match="rope longer than 0 m"):
+        load_motion(tip, 0.0)
+    with pytest.raises(InputError, match="two or more rows of x, y and z"):
+        load_motion(tip[:, :2], 2.0)
+
+
+# --- kinematics -----------------------------------------------------------------------------------
+
+
+def test_luff_rope_has_the_lengths_that_were_worked_out_by_hand():
+    g = Crane.preset("tg3637").geometry
+    found = [
+        luff_rope(Boom(cos(radians(b)), sin(radians(b))), g) for b in (20.0, 38.0, 45.0, 53.5, 70.0)
+    ]
+    np.testing.assert_allclose(found, [35.902, 32.712, 31.505, 30.112, 27.794], atol=5e-4)
+
+
+@pytest.mark.parametrize("boom_deg", [16.0, 45.0, 79.0])
+@pytest.mark.parametrize("slew_deg", [-200.0, -30.0, 0.0, 179.0, 181.0])
+def test_inverse_kinematics_return_to_the_same_shafts(boom_deg, slew_deg):
+    crane = Crane.preset("tg3637")
+    g, home = crane.geometry, crane.home(Pose(0.1, radians(45.0), 20.0))
+    boom = Boom(cos(radians(boom_deg)), sin(radians(boom_deg)))
+    rope = luff_rope(boom, g)
+    assert boom_of(rope, g) == pytest.approx(boom, abs=1e-14)
+    tip = tip_of(radians(slew_deg), boom, g)
+    near = Shafts(0.0, radians(slew_deg + 25.0) - 0.1, 0.0)
+    found = shafts_for(tip.x, tip.y, near, g, home)
+    assert found.slew + 0.1 == pytest.approx(radians(slew_deg), abs=1e-12)
+    assert found.luff == pytest.approx((home.luff_rope - rope) / g.luff, abs=1e-10)
+    assert hypot(tip.x - g.axis.x, tip.y - g.axis.y) == pytest.approx(2.5 + 36.0 * boom.cos)

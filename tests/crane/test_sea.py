@@ -1,0 +1,222 @@
+"""Seaways and ships: against closed forms, published hulls and plain sums."""
+
+from math import cos, pi, radians, sin
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate.crane import (
+    SEA_STATES,
+    Hull,
+    Seaway,
+    Spectrum,
+    read_csv,
+    read_veres,
+)
+from swashplate.errors import FileError, InputError
+
+G = 9.80665
+S175 = Path(__file__).parents[3] / "shared" / "data" / "s175" / "input.re1"
+
+
+@pytest.fixture(scope="module")
+def s175():
+    if not S175.exists():
+        pytest.skip(f"the S175's transfer functions are not at {S175}")
+    return read_veres(S175)
+
+
+@pytest.mark.parametrize(
+    ("factor", "height", "crossing"), [(1.0, 0.87979, 5.3932), (3.3, 0.88093, 5.8867)]
+)
+def test_spectrum_has_the_moments_that_were_worked_out_apart(factor, height, crossing):
+    omega = np.linspace(0.05, 6.0, 200_001)
+    density = Spectrum(0.88, 7.5, factor).density(omega)
+    m0, m2 = (np.trapezoid(density * omega**n, omega) for n in (0, 2))
+    assert 4.0 * np.sqrt(m0) == pytest.approx(height, abs=2e-5)
+    assert 2.0 * pi * np.sqrt(m0 / m2) == pytest.approx(crossing, abs=2e-4)
+
+
+def test_components_hold_the_seas_energy_and_come_again_by_their_seed():
+    sea = Seaway("ss3", seed=5)
+    waves = sea.waves
+    assert 4.0 * np.sqrt(0.5 * (waves.amplitude**2).sum()) == pytest.approx(0.88, rel=0.03)
+    np.testing.assert_array_equal(waves.phase, Seaway("ss3", seed=5).waves.phase)
+    assert not np.array_equal(waves.phase, Seaway("ss3", seed=6).waves.phase)
+    width = (2.5 - 0.25) / 200
+    np.testing.assert_array_equal(np.floor((waves.frequency - 0.25) / width), np.arange(200))
+
+
+@pytest.mark.parametrize("speed", [0.0, 6.0])
+def test_fast_synthesis_is_the_plain_sum(speed):
+    sea = Seaway("ss4", heading_deg=130.0, seed=2, speed=speed)
+    waves = sea.waves
+    time = np.arange(60 * 512 + 1) / 512.0
+    met = waves.frequency - waves.frequency**2 / G * speed * np.cos(waves.heading)
+    response = sea.ship.response(waves.frequency, waves.heading, speed)
+    some = np.r_[0, 1, 63, 64, 65, 1000, 12345, 30719, 30720]
+    turned = np.exp(1j * (np.outer(time[some], met) + waves.phase))
+    plain = (turned @ (response * waves.amplitude).T).real
+    np.testing.assert_allclose(sea.motion(time.size)[some], plain, atol=2e-8)
+
+
+def test_spread_seas_come_from_around_their_heading():
+    waves = Seaway("ss3", heading_deg=90.0, seed=1, spread=True, components=2000).waves
+    off = waves.heading - radians(90.0)
+    assert np.abs(off).max() <= pi / 2.0
+    # cos² has the variance π²/12 - 1/2
+    assert off.var() == pytest.approx(pi**2 / 12.0 - 0.5, rel=0.1)
+
+
+# --- ships ----------------------------------------------------------------------------------------
+
+# heave [m/m] and pitch [deg/m] worked out apart, with g = 9.81 m/s²
+CLOSED_FORM = [
+    (Hull(82.8, 19.2, 6.0), 5.0, 75.0, 10.0, 1.10965, 0.67057),
+    (Hull(203.8, 23.2, 9.75), 0.0, 135.0, 8.0, 0.17526, 0.01095),
+    (Hull(203.8, 23.2, 9.75), 0.0, 135.0, 12.0, 0.51690, 0.84655),
+]
+
+
+@pytest.mark.parametrize(("hull", "speed", "heading", "period", "heave", "pitch"), CLOSED_FORM)
+def test_closed_form_is_the_published_one(hull, speed, heading, period, heave, pitch):
+    omega = np.array([2.0 * pi / period])
+    k, c = omega**2 / 9.81, np.array([cos(radians(heading))])
+    found = hull.heave_and_pitch(omega, omega - k * speed * c, k, c)
+    # published are magnitudes: waves shorter than the hull lift it where its middle is in a trough
+    assert abs(found[0][0]) == pytest.approx(heave, abs=1e-5)
+    assert abs(np.degrees(found[1][0])) == pytest.approx(pitch, abs=1e-5)
+
+
+def long_wave(ship, heading_deg, omega):
+    """Motions in a long wave: with the water, and along its slope."""
+    k, heading = omega**2 / G, radians(heading_deg)
+    found = ship.response(np.array([omega]), np.array([heading]))[:, 0]
+    c, s = cos(heading), sin(heading)
+    return found, [-1j * c, -1j * s, 1.0, -1j * k * s, 1j * k * c], k
+
+
+@pytest.mark.parametrize("heading", [0.0, 90.0, 180.0, 270.0, 40.0])
+def test_hull_in_a_long_wave_goes_with_the_water(heading):
+    found, wanted, k = long_wave(Hull(203.8, 23.2, 9.75), heading, 0.06)
+    np.testing.assert_allclose(found[:3], wanted[:3], atol=0.02)
+    np.testing.assert_allclose(found[3:5] / k, np.array(wanted[3:]) / k, atol=0.05)
+
+
+@pytest.mark.parametrize("heading", [0.0, 90.0, 180.0, 270.0])
+def test_s175_in_a_long_wave_goes_with_the_water(s175, heading):
+    found, wanted, k = long_wave(s175, heading, 0.1047198)
+    np.testing.assert_allclose(found[:3], wanted[:3], atol=0.02)
+    # roll in its longest wave is up by its resonance at 0.31 rad/s
+    np.testing.assert_allclose(found[3:5] / k, np.array(wanted[3:]) / k, atol=0.4)
+
+
+def test_s175_abeam_has_the_published_motions(s175):
+    found = s175.response(np.array([0.8377581, 0.5711987]), np.full(2, pi / 2.0))
+    assert found[1] == pytest.approx([0.0655 - 0.5601j, 0.0184 - 0.7834j], abs=2e-4)
+    assert found[2] == pytest.approx([1.0850 - 0.8516j, 1.0877 - 0.0280j], abs=2e-4)
+    assert found[3] == pytest.approx([-0.00269 + 0.00156j, -0.00212 + 0.00776j], abs=2e-5)
+    assert (s175.speeds.size, s175.headings.size, s175.frequencies.size) == (5, 19, 36)
+
+
+def test_s175_in_sea_state_3_moves_as_the_files_own_points_say(s175):
+    # significant single amplitudes abeam: 0.205 m, 0.40 m, 0.079 degrees
+    abeam = s175.values[0, 9]
+    density = SEA_STATES["ss3"].density(s175.frequencies)
+    energy = np.trapezoid(np.abs(abeam) ** 2 * density[:, None], s175.frequencies, axis=0)
+    motion = Seaway("ss3", seed=1, ship=s175).motion(1800 * 512)
+    np.testing.assert_allclose(motion[:, 1:4].std(axis=0), np.sqrt(energy[1:4]), rtol=0.03)
+
+
+MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+HEADER = ",".join(["heading_deg,omega", *(f"{each}_re,{each}_im" for each in MOTIONS)])
+
+
+def write_table(path, ship, headings=(0.0, 90.0, 180.0), frequencies=(0.1, 0.5, 1.0)):
+    rows = [HEADER]
+    for heading in headings:
+        for omega in frequencies:
+            found = ship.response(np.array([omega]), np.array([radians(heading)]))[:, 0]
+            rows.append(
+                ",".join(
+                    map(
+                        repr,
+                        [
+                            heading,
+                            omega,
+                            *(x for z in found for x in (float(z.real), float(z.imag))),
+                        ],
+                    )
+                )
+            )
+    path.write_text("\n".join(rows), "utf-8")
+
+
+def test_table_gives_what_it_was_made_of(tmp_path):
+    hull = Hull(203.8, 23.2, 9.75)
+    write_table(tmp_path / "ship.csv", hull)
+    table = read_csv(tmp_path / "ship.csv")
+    at = np.array([0.5, 1.0]), np.array([radians(90.0), radians(-90.0)])
+    np.testing.assert_allclose(table.response(*at), hull.response(*at), atol=1e-12)
+    between = table.response(np.array([0.75]), np.array([pi / 2.0]))[2]
+    ends = hull.response(np.array([0.5, 1.0]), np.full(2, pi / 2.0))[2]
+    assert between == pytest.approx(ends.mean())
+
+
+# --- refusals -------------------------------------------------------------------------------------
+
+
+def test_cut_and_strange_files_are_refused_by_their_line(tmp_path, s175):
+    lines = S175.read_text("utf-8").splitlines()
+    cut = tmp_path / "cut.re1"
+    cut.write_text("\n".join(lines[:500]), "utf-8")
+    with pytest.raises(FileError, match=r"cut.re1, line 501: .* is missing, .*the file is cut"):
+        read_veres(cut)
+    cut.write_text("\n".join(["something else", *lines[1:]]), "utf-8")
+    with pytest.raises(FileError, match="is no VERES file"):
+        read_veres(cut)
+
+
+def test_tables_that_lack_something_or_mean_something_else_are_refused(tmp_path):
+    path = tmp_path / "ship.csv"
+    write_table(path, Hull(203.8, 23.2, 9.75))
+    whole = path.read_text("utf-8")
+    path.write_text("\n".join(whole.splitlines()[:-1]), "utf-8")
+    with pytest.raises(FileError, match="no row for 180 deg and 1 rad/s"):
+        read_csv(path)
+    path.write_text(whole.replace("heave_im", "heave"), "utf-8")
+    with pytest.raises(FileError, match="line 2: heave_im is None"):
+        read_csv(path)
+    write_table(path, Hull(203.8, 23.2, 9.75), headings=(0.0, 90.0))
+    with pytest.raises(FileError, match="must reach from 0 to 180 deg"):
+        read_csv(path)
+    rows = whole.splitlines()
+    flipped = [rows[0]]
+    for row in rows[1:]:
+        cells = row.split(",")
+        cells[6] = repr(-float(cells[6]))  # z down
+        flipped.append(",".join(cells))
+    path.write_text("\n".join(flipped), "utf-8")
+    with pytest.raises(InputError, match=r"in the longest wave heave is -1.00.* near 1 \+ 0i"):
+        read_csv(path)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Spectrum(0.0, 7.5), "height of a sea is 0, but must be above 0"),
+        (lambda: Spectrum(1.0, 60.0), "has little energy between waves of 2.51 and 25.1 s"),
+        (lambda: Seaway("ss9"), "There is no sea 'ss9'; there are ss2, ss3"),
+        (lambda: Hull(0.0, 20.0, 9.0), "The hull's length is 0"),
+        (lambda: Seaway("ss3").motion(100, 500.0), "multiple of 8 samples a second"),
+    ],
+)
+def test_seas_that_make_no_sense_are_refused(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_speed_beyond_the_table_is_refused(s175):
+    with pytest.raises(InputError, match=r"has speeds from 0 to .* m/s, but 99 m/s"):
+        Seaway("ss3", ship=s175, speed=99.0).motion(10)

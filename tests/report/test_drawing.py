@@ -1,0 +1,187 @@
+"""What all figures share: lines that lose no extreme, labels that fit, files written whole."""
+
+import subprocess
+import sys
+import warnings
+from itertools import pairwise
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.figure import Figure
+
+from swashplate import FileError, Simulation
+from swashplate.report.figures import plot_simulation, save_figure
+from swashplate.report.lines import draw, gap_rows, merged, thinned
+from swashplate.report.style import BLUE, dress, handle, in_lines, sheet, spread
+
+GAP = 0.1
+
+
+@given(
+    st.lists(st.integers(-5, 5), min_size=25, max_size=150),
+    st.lists(st.sampled_from([1.0, 1.3, 20.0]), min_size=150, max_size=150),
+    st.integers(3, 12),
+)
+def test_no_extreme_is_lost_on_either_side_of_a_gap(
+    values: list[int], steps: list[float], columns: int
+) -> None:
+    heights = np.array(values, dtype=float)
+    time = np.cumsum(steps)[: heights.size]
+    gaps = gap_rows(time)
+    rows = thinned(time, heights, gaps, columns)
+    assert (np.diff(rows) > 0).all()
+    # the reference: every piece between gaps, cut by hand into columns of time
+    width = (time[-1] - time[0]) / columns
+    column = np.floor((time - time[0]) / width)
+    piece = np.zeros(time.size)
+    for gap in gaps:
+        piece[gap + 1 :] += 1.0
+    kept = np.isin(np.arange(time.size), rows)
+    if heights.size <= 2 * columns:
+        assert kept.all()
+        return
+    for key in {*zip(piece, column, strict=True)}:
+        # columns whose edge a stamp meets are left out: rounding decides whose it is
+        inside = (piece == key[0]) & (column == key[1])
+        edges = (time[piece == key[0]] - time[0]) / width
+        met = np.round(edges[np.abs(edges - np.round(edges)) < 1e-9])
+        if np.isin(met, [key[1], key[1] + 1]).any():
+            continue
+        assert heights[inside & kept].min() == heights[inside].min()
+        assert heights[inside & kept].max() == heights[inside].max()
+    assert kept[[0, -1, *gaps, *(gaps + 1)]].all()
+    # of each column and each piece: two extremes, two ends
+    assert rows.size <= 2 * (columns + 1) + 4 * (gaps.size + 1)
+
+
+def test_a_line_is_broken_where_samples_are_missing_and_a_lonely_one_is_a_dot() -> None:
+    ax = Figure().subplots()
+    time = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 9.1, 10.1, 15.0])  # one step of more than 5 s
+    shown = np.array([1, 1, 0, 1, 0, 1, 1, 1], dtype=bool)
+    draw(ax, time, 2.0 * time, "k", shown=shown, held=True)
+    draw(ax, time, time, "k", shown=np.zeros(8, dtype=bool))
+    line, dots = ax.lines
+    stamps, heights = line.get_data()
+    np.testing.assert_array_equal(stamps, [0.0, 1.0, 1.0, 3.0, 3.0, 9.1, 10.1, 15.0])
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(heights)), [2, 4])
+    assert line.get_drawstyle() == "steps-post"
+    assert [each.tolist() for each in dots.get_data()] == [[3.0], [6.0]]
+
+
+def test_a_long_line_keeps_a_single_spike_either_way() -> None:
+    ax, time, values = Figure().subplots(), np.arange(1_000_000) / 512.0, np.zeros(1_000_000)
+    values[123_456], values[765_432] = 7.0, -3.0
+    draw(ax, time, values, "k", columns=1000)
+    stamps, heights = ax.lines[0].get_data()
+    assert stamps.size < 3000
+    assert heights[stamps == time[123_456]] == 7.0
+    assert heights[stamps == time[765_432]] == -3.0
+    assert (stamps[0], stamps[-1]) == (time[0], time[-1])
+
+
+def test_spans_are_merged_only_when_there_are_too_many() -> None:
+    spans = np.array([[0.0, 1.0], [1.1, 2.0], [4.0, 5.0], [5.05, 6.0]])
+    np.testing.assert_array_equal(merged(spans, most=4), spans)
+    np.testing.assert_array_equal(merged(spans, most=3), [[0.0, 2.0], [4.0, 6.0]])
+
+
+@given(st.lists(st.floats(0.0, 1.0), max_size=8))
+def test_spread_labels_keep_their_order_and_their_distance(places: list[float]) -> None:
+    wanted = sorted(places)
+    found = spread(wanted, GAP)
+    assert len(found) == len(wanted)
+    assert all(b - a >= GAP - 1e-9 for a, b in pairwise(found))
+    assert sum(found) == pytest.approx(sum(wanted), abs=1e-9)
+    if all(b - a > GAP for a, b in pairwise(wanted)):
+        assert found == wanted
+
+
+@pytest.mark.parametrize(
+    ("label", "letters", "lines"),
+    [
+        ("speed (deg/s)", 20, ["speed (deg/s)"]),
+        ("speed from counts (deg/s)", 12, ["speed from", "counts", "(deg/s)"]),
+        ("current_of_the_winch (A)", 12, ["current_of_", "the_winch", "(A)"]),
+    ],
+)
+def test_a_label_is_broken_where_it_may_be(label: str, letters: int, lines: list[str]) -> None:
+    assert in_lines(label, letters).split("\n") == lines
+
+
+@given(st.text("ab_ ", max_size=60), st.integers(1, 30))
+def test_a_label_never_takes_more_than_three_lines(words: str, letters: int) -> None:
+    lines = in_lines(f"{words} (A)", letters).split("\n")
+    assert len(lines) <= 3
+    assert max(map(len, lines)) <= max(letters, 8)
+    assert lines[-1].endswith("(A)")
+
+
+SIGNATURES = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF", ".PNG": b"\x89PNG"}
+
+
+@pytest.mark.parametrize("suffix", SIGNATURES)
+def test_a_figure_is_written_whole_and_the_same_each_time(
+    step: Simulation, tmp_path: Path, suffix: str
+) -> None:
+    first, second = tmp_path / f"first{suffix}", tmp_path / f"second{suffix}"
+    save_figure(plot_simulation(step), first)
+    save_figure(plot_simulation(step), str(second))
+    content = first.read_bytes()
+    assert content.startswith(SIGNATURES[suffix])
+    assert content == second.read_bytes()
+    assert not any(word in content for word in (b"<dc:date>", b"/CreationDate", b"tEXtCreation"))
+    assert sorted(tmp_path.iterdir()) == [first, second]
+
+
+def test_a_file_that_cannot_be_written_is_said_and_the_older_one_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figure, path = Figure(), tmp_path / "figure.png"
+    for name in ("figure.jpg", "figure", "figure.svgz"):
+        with pytest.raises(FileError, match=r"a figure is written as \.png, \.svg or \.pdf"):
+            save_figure(figure, tmp_path / name)
+    with pytest.raises(FileError, match="cannot be written"):
+        save_figure(figure, tmp_path / "none" / "figure.png")
+    path.write_bytes(b"older")
+
+    def full(target: Path, **_: object) -> None:
+        target.write_bytes(b"half a pic")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(figure, "savefig", full)
+    with pytest.raises(FileError, match="No space left"):
+        save_figure(figure, path)
+    assert path.read_bytes() == b"older"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_plotting_touches_no_global_state() -> None:
+    code = """
+import sys
+import matplotlib
+from swashplate import Drive
+from swashplate.report import figures
+
+settings = [name for name in matplotlib.rcParams if name != "backend"]  # asking for it loads one
+before = {name: matplotlib.rcParams[name] for name in settings}
+figures.plot_simulation(Drive.preset("hoist").simulate([0.0, 1.0]))
+assert "matplotlib.pyplot" not in sys.modules
+assert {name: matplotlib.rcParams[name] for name in settings} == before
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("format", ["svg", "png", "pdf"])
+def test_names_are_drawn_as_they_are(tmp_path: Path, format: str) -> None:
+    """A dollar in a name is no formula, and a control character no part of an SVG."""
+    figure, (ax,) = sheet([1.0], "$\\frac{1}{$ <b>\x1b]0;x\x07 ${1}", legend=[handle("a$b$", BLUE)])
+    dress(ax, "speed $\\x$ (V)", "$t")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        save_figure(figure, tmp_path / f"a.{format}")
+    if format == "svg":
+        ElementTree.parse(tmp_path / "a.svg")
