@@ -266,8 +266,8 @@ def campaign(_, item):
     ratio = max(misfit.ratios.values(), default="")
     cause = misfit.causes[0].name if misfit.causes and ratio > 1.2 else ""
     code = 0 if judged.usable else 1
-    judged = verdict((), predicted)
-    validated = "predicts" if judged.usable else judged.grade
+    alone = verdict((), predicted)
+    validated = "predicts" if alone.usable else alone.grade
     row = (
         name, axis, seed, f"{found} findings" if found else "-", judged.grade, code, ratio, cause,
         error, worst, kind, validated,

@@ -68,7 +68,7 @@ for share in shares.shares[:3]:
 
 # %%
 sines = largest_sine(drive, [0.05, 0.1, 0.2, 0.5])
-for frequency, ahead, in_time in zip(*np.array(sines.to_polars()).T, strict=True):
+for frequency, ahead, in_time in zip(sines.frequencies, sines.shifted, sines.in_time, strict=True):
     print(
         f"{frequency:.2f} Hz: {np.degrees(in_time):5.1f} deg/s, "
         f"{np.degrees(ahead):5.1f} deg/s where the lag does no harm"

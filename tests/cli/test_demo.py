@@ -28,7 +28,7 @@ def test_the_main_job(done, tmp_path):
 def check_readme(printed: str) -> None:
     """The README shows lines of this output, with all but the last digits of its numbers."""
     readme = (Path(__file__).parents[2] / "README.md").read_text("utf-8")
-    (shown,) = re.findall(r"```text\n(unknown .*?)```", readme, re.DOTALL)
+    (shown,) = re.findall(r"```text\n(parameter .*?)```", readme, re.DOTALL)
     lines = [line.split() for line in printed.splitlines()]
     for words in (line.split() for line in shown.splitlines()):
         if words != ["..."] and "─" not in words[0]:

@@ -38,8 +38,12 @@ IMPLICIT = {
     "unloaded_leakage": {"Z12"},
     "flow_speed": {"k.Z12"},
     "pump_sample": {"k.Z12"},
+    "settled_sample": {"k.Z12"},
 }
 """Declared as that at zero leakage, of an equation that leaves leakage out."""
+VANISHING = {"settled_sample": {"spool_free", "orifice_opening", "swash_rate"}}
+"""Zero at rest but for rounding, whose differences say nothing; `pump_sample` and `pump_settled`,
+of which the equation consists, are compared by themselves."""
 
 
 # --- equations ------------------------------------------------------------------------------------
@@ -207,7 +211,7 @@ class Draw:
         p = known["p"]
         if kind is float:
             return self.number(name)
-        if kind == pump.Flag:
+        if kind == control.Flag:
             return self.random.choice([None, True])
         if kind is Window:
             return self.window()
@@ -402,7 +406,9 @@ PATTERN = Pattern()
 # --- comparison -----------------------------------------------------------------------------------
 
 
-def compared(function: Any, arguments: dict[str, Any], implicit: set[str]) -> bool:
+def compared(
+    function: Any, arguments: dict[str, Any], implicit: set[str], vanishing: set[str]
+) -> bool:
     """Compare all partial derivatives at one point, unless it has to be drawn again."""
     run = interpreted(function)
     options, lengths, floats = {}, {}, {}
@@ -446,6 +452,8 @@ def compared(function: Any, arguments: dict[str, Any], implicit: set[str]) -> bo
         h = 1e-3 * size
         at = {k: values(path, number + k * h) for k in (-1.0, -0.5, -0.25, 0.25, 0.5, 1.0)}
         for o, value in enumerate(base):
+            if derived.outputs[o] in vanishing:
+                continue
             slope_of = {k: (at[k][o] - at[-k][o]) / (2.0 * k * h) for k in (1.0, 0.5, 0.25)}
             whole, half, quarter = slope_of.values()
             coarse, fine = (4.0 * half - whole) / 3.0, (4.0 * quarter - half) / 3.0
@@ -488,7 +496,10 @@ def test_partials_are_those_of_differences(name: str) -> None:
         if floats == 0:
             return  # nothing to differentiate by
         wanted = FEWER if floats > SLOW else POINTS
-        accepted += compared(function, arguments, IMPLICIT.get(name.split(".")[1], set()))
+        called = name.split(".")[1]
+        accepted += compared(
+            function, arguments, IMPLICIT.get(called, set()), VANISHING.get(called, set())
+        )
     assert accepted >= wanted, f"{accepted} of {tries} points could be compared"
 
 

@@ -188,7 +188,7 @@ def test_a_fold_that_loses_an_unknown_says_so(found: CrossValidation) -> None:
     assert fold.held[0].endswith("-4_V")
     spreads = {each.name: each for each in found.spreads}
     assert spreads["J_minus"].folds == 3
-    assert any("loses J_minus: only the runs held out tell of it" in s for s in found.sentences())
+    assert any("loses J_minus: only the held-out runs determine it" in s for s in found.sentences())
 
 
 def test_the_result_does_not_depend_on_where_it_is_computed(

@@ -67,7 +67,7 @@ def test_estimate_and_interval_are_those_of_bayes(memory: float, scale: float) -
         # unweighed the data would have swept the prior aside
         assert abs(first[0] - mean) > abs(best[0] - mean) + 0.3 * deviation
     (said,) = prior_sentences(found.unknowns, best, told.quoted)
-    assert "makes up 5" in said or "makes up 4" in said  # half of what is known
+    assert "contributes 5" in said or "contributes 4" in said  # half of what is known
     assert "below its mean" in said
 
 

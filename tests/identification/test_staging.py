@@ -124,7 +124,7 @@ def test_a_recursion_of_another_rate_gives_way_to_its_equation() -> None:
         assert found.parameters.numbers[name] == pytest.approx(truth.parameters.numbers[name])
     (said,) = found.doubts
     assert said.startswith(
-        "slow is marched at 600 Hz, but the card's filter of hoist is a recursion"
+        "slow is simulated at 600 Hz, but the card's filter of hoist is a recursion"
     )
     own = Drive.preset("neutral").parameters
     assert at_rate_of([run], own) == (own, ())

@@ -120,7 +120,7 @@ def test_the_chain_from_command_to_speed(made: dict[str, Figure], step: Simulati
         "voltage (V)",
         "current (A)",
         "spool (mm)",
-        "stroker pressure (bar)",
+        "stroking pressure (bar)",
         "swash angle (deg)",
         "shaft speed (deg/s)",
     ]
@@ -141,7 +141,7 @@ def test_the_chain_from_command_to_speed(made: dict[str, Figure], step: Simulati
 def test_units_of_choice_hold_for_figures(step: Simulation) -> None:
     with shown_in(["rpm", "kPa"]):
         figure = figures.plot_simulation(step)
-    assert labels(figure)[3::2] == ["stroker pressure (kPa)", "shaft speed (rpm)"]
+    assert labels(figure)[3::2] == ["stroking pressure (kPa)", "shaft speed (rpm)"]
     np.testing.assert_allclose(lines(figure, 5)[0], 30.0 / np.pi * step.shaft_speed, rtol=1e-12)
     assert labels(figures.plot_simulation(step))[5] == "shaft speed (deg/s)"
 
@@ -205,7 +205,7 @@ def test_both_models_and_what_lies_between(made: dict[str, Figure]) -> None:
         "difference (% of top)",
         "spool (mm)",
         "swash angle (deg)",
-        "stroker pressure (bar)",
+        "stroking pressure (bar)",
         "motor pressure drop (bar)",
     ]
 

@@ -126,6 +126,7 @@ def _quality(
     values: Array,
     clipped: float,
     findings: Iterable[str],
+    *,
     stuck: float | None = None,
     lost: int | None = None,
 ) -> Quality:
@@ -184,7 +185,9 @@ def _of_channel(experiment: Experiment, channel: Channel, *, signed: bool) -> Qu
             findings.append(f"{lie} before or after the input's record")
     shown = values if values.size else channel.values
     return _quality(
-        experiment, channel.name, channel, stamps, shown, clipped, findings, stuck, lost
+        *(experiment, channel.name, channel, stamps, shown, clipped, findings),
+        stuck=stuck,
+        lost=lost,
     )
 
 

@@ -63,8 +63,9 @@ def excitation(
     """Show before a fit which parameters the runs determine, and what to fix.
 
     Simulates the runs with the drive as it is: which thresholds and limits they
-    reach, how much each parameter changes what was measured, and which
-    can change together without effect. Proposes a fit configuration in which all are determined.
+    reach, how much each parameter changes what was measured, and which can
+    change together without effect. Proposes a fit configuration in which all
+    are determined.
     """
     from swashplate.identification.data_checks import check_sound, refuse_unsound
     from swashplate.identification.excitation import outlook, propose, proposed_setup

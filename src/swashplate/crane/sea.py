@@ -15,6 +15,7 @@ from swashplate.crane.rope import GRAVITY
 from swashplate.crane.transfer_functions import CRANE_SHIP, Hull, TransferFunctions
 from swashplate.equations import kernel
 from swashplate.errors import InputError
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
@@ -96,9 +97,12 @@ class Components(NamedTuple):
     heading: Array
     """Where they run, from the bow to port; 0 following, 90° abeam. [rad]"""
 
+    def __repr__(self) -> str:
+        return f"Components({self.frequency.size} waves)"
+
 
 @dataclass(frozen=True)
-class Seaway:
+class Seaway(Result):
     """A seeded seaway and the ship in it.
 
     Attributes

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.errors import InputError
+from swashplate.results import Result
 
 if TYPE_CHECKING:
     from swashplate.crane.crane import Crane, Pose
@@ -34,7 +35,7 @@ class Trapezoid:
 
 
 @dataclass(frozen=True, eq=False)
-class Stick:
+class Stick(Result):
     """Commands of hoist, slew and luff, each from -1 to 1.
 
     Positive commands hoist, slew to starboard, lift the boom. Made by `trapezoid` or `record`.

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from swashplate.crane.rope import GRAVITY
 from swashplate.documents import read_text
 from swashplate.errors import FileError, InputError
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -115,7 +116,7 @@ CRANE_SHIP = Hull(203.8, 23.2, 9.75)
 
 
 @dataclass(frozen=True, eq=False)
-class TransferFunctions:
+class TransferFunctions(Result):
     """Motion transfer functions on a grid, straight between its points.
 
     Raises

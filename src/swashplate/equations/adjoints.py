@@ -65,9 +65,7 @@ def derived_function(
     """
     found = Derivatives(code, [n for _, n in results], [n for _, n in by], chained=chained)
     values = [node for _, node in results]
-    text, functions = function_text(
-        name, says, formals, code, [*values, *found.partials], found.hints, found.items
-    )
+    text, functions = function_text(name, says, formals, code, [*values, *found.partials], found)
     for each in formals:
         if each in ex.CALLED and f"{each}(" in text:
             raise EquationError(

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import blake2b
+from typing import TYPE_CHECKING
 
 from swashplate.equations import expressions as ex
 from swashplate.equations.code import (
@@ -24,6 +25,9 @@ from swashplate.equations.code import (
     live,
 )
 from swashplate.equations.expressions import Node
+
+if TYPE_CHECKING:
+    from swashplate.equations.adjoints import Derivatives
 
 WIDTH = 96
 """Characters of a line."""
@@ -286,14 +290,19 @@ def function_text(
     formals: Sequence[str],
     code: Code,
     results: Sequence[Node],
-    hints: Mapping[Node, str] | None = None,
-    items: Sequence[Item] | None = None,
+    swept: Derivatives | None = None,
 ) -> tuple[str, dict[str, Function]]:
-    """Text of a function of straight code, and the generated functions that it calls."""
-    given = code.items if items is None else items
-    writer = Writer({*code.taken, *FUNCTIONS, name}, given, results, hints)
+    """Text of a function of straight code, and the generated functions that it calls.
+
+    With `swept` it is that code with its derivatives, whose names are taken as well.
+    """
+    taken = {*code.taken, *FUNCTIONS, name}
+    if swept is None:
+        writer = Writer(taken, code.items, results)
+    else:
+        writer = Writer(taken | swept.taken, swept.items, results, swept.hints)
     inner = [f"    {line}" for line in writer.lines]
-    end = "," if len(results) == 1 and items is not None else ""
+    end = "," if len(results) == 1 and swept is not None else ""
     back = f"    return {', '.join(writer.texts) or '()'}{end}"
     if len(back) > WIDTH:
         back = "\n".join(listed("return (", writer.texts, ")", "    "))

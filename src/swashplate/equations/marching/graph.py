@@ -546,7 +546,8 @@ class _Builder:
                 graph.entries[key] = Entry(rows[key])
         if not rows and not values:
             return -1
-        taken, wanted = {*part.code.taken}, [*(partials[key] for key in rows), *values.values()]
+        wanted = [*(partials[key] for key in rows), *values.values()]
+        taken = {*part.code.taken, *derivatives.taken}
         writer = Writer(taken, derivatives.items, wanted, derivatives.hints)
         ahead, loads = self._arguments(part, writer.needed)
         # what only one side of a choice makes would carry its value from one sample to the next, as
