@@ -99,6 +99,10 @@ values = st.floats(-2.0, 2.0).filter(lambda x: abs(x) > 1e-3)
 
 
 @given(bodies(), st.tuples(values, values, values, values))
+@example(  # a second value of an adjoint was once named as the adjoint of a second value
+    "    x = sqrt(0.5 + helper(x, x) * helper(x, x))\n    return (x + x), (x / (1.0 + y * y))",
+    (1.0, 1.0, 1.0, 1.0),
+)
 @settings(max_examples=200)
 def test_random_equations(
     derivative: Callable[..., float], body: str, at: tuple[float, ...]
