@@ -7,7 +7,7 @@ from math import isfinite
 from typing import Any, NamedTuple
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from swashplate.equations import derive, equation
