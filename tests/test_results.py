@@ -16,7 +16,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import swashplate
-from swashplate import Campaign, Drive, FullOrderDrive, InputError, SquaredError, maneuvers
+from swashplate import Campaign, Drive, FullOrderDrive, InputError, Limit, SquaredError, maneuvers
 from swashplate.analysis import (
     Requirements,
     envelope,
@@ -206,6 +206,10 @@ def test_a_run_is_read_by_its_signals_names() -> None:
     assert all(run[name].shape == run.time.shape for name in run.names)
     with pytest.raises(InputError, match=r"no signal 'shaft_sped': did you mean shaft_speed\?"):
         run["shaft_sped"]
+    assert np.array_equal(run.active("orifice"), run.active(Limit.ORIFICE))
+    assert run.active("orifice").any()
+    with pytest.raises(InputError, match="There is no limit 'orifise'; there are dead_zone"):
+        run.active("orifise")
     current = hoist.simulate_current(run.current)
     assert "voltage" not in current.names
     full = FullOrderDrive.preset("hoist").simulate(TESTS[0].sample())

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,14 +127,18 @@ class Campaign(Result):
     def __repr__(self) -> str:
         return f"Campaign({self.title!r}, {len(self)} experiments on {', '.join(self.axes)})"
 
-    def __getitem__(self, name: str) -> Experiment:
-        """An experiment by its name.
+    def __getitem__(self, name: str | int) -> Experiment:
+        """An experiment by its name, or by its number from 0.
 
         Raises
         ------
         InputError
             If there is none of that name.
+        IndexError
+            If there are not so many.
         """
+        if isinstance(name, int):
+            return self.experiments[name]
         for each in self.experiments:
             if each.name == name:
                 return each
@@ -155,10 +159,14 @@ class Campaign(Result):
         Raises
         ------
         InputError
-            If there is no such axis.
+            If there is no such axis or role.
         """
         if axis is not None and axis not in self.axes:
             raise InputError(f"{self.path} has no axis '{axis}'; it has {', '.join(self.axes)}.")
+        if role is not None and role not in get_args(schema.Role):
+            raise InputError(
+                f"There is no role '{role}': runs have {', '.join(get_args(schema.Role))}."
+            )
         return tuple(
             each
             for each in self.experiments

@@ -286,8 +286,19 @@ class Simulation(Signals):
             bits = bits | (self.flags[0] << 1)
         return self.sampled(bits.astype(np.uint8))
 
-    def active(self, limit: Limit) -> NDArray[np.bool_]:
-        """Samples at which a limit, or any of several, acts."""
+    def active(self, limit: Limit | str) -> NDArray[np.bool_]:
+        """Samples at which a limit, or any of several, acts; also by name, ``"orifice"``.
+
+        Raises
+        ------
+        InputError
+            If there is no such limit.
+        """
+        if isinstance(limit, str):
+            names = {str(each.name).lower(): each for each in Limit}
+            if limit.lower() not in names:
+                raise InputError(f"There is no limit '{limit}'; there are {', '.join(names)}.")
+            limit = names[limit.lower()]
         return np.asarray((self.limits & int(limit)) != 0)
 
     def rate_limited(self) -> NDArray[np.bool_]:
