@@ -81,7 +81,7 @@ class Result:
         """Keep the inherited repr, in whose place a dataclass would write one of its own."""
         super().__init_subclass__(**options)
         if "__repr__" not in cls.__dict__:
-            cls.__repr__ = cls.__repr__  # type: ignore[method-assign]
+            setattr(cls, "__repr__", cls.__repr__)  # noqa: B010  mypy takes it for a mistake
 
     def __repr__(self) -> str:
         return short(self)

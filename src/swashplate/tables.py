@@ -386,7 +386,7 @@ def write_whole(path: str | Path, write: Callable[[Path], None]) -> None:
                 raise
     except OSError as error:
         raise FileError(f"{target} cannot be written: {error.strerror or error}.") from None
-    except Exception as error:
+    except Exception as error:  # libraries raise what they like; what is not the disk's goes on
         reason = _of_the_disk(error)
         if reason is None:
             raise

@@ -26,7 +26,7 @@ from numba import config, njit
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.misc.appdirs import AppDirs
 
-from swashplate.equations.equation import closure_hash, hash_of, is_function, known
+from swashplate.equations.equation import JIT_OFF, closure_hash, hash_of, is_function, known
 from swashplate.equations.syntax import plain
 
 P = ParamSpec("P")
@@ -151,7 +151,7 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     known[plain(function)] = None
     without: Any = {"no_cfunc_wrapper": True}
     compiled: Any = njit(nogil=True, error_model="numpy", **without)(function)
-    if not config.DISABLE_JIT:  # type: ignore[attr-defined]
+    if not JIT_OFF:
         on_disk(compiled, function)
     return compiled  # type: ignore[no-any-return]
 
@@ -161,7 +161,7 @@ def subroutine(function: Callable[P, R]) -> Callable[P, R]:
     known[plain(function)] = None
     without: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
     compiled: Any = njit(nogil=True, error_model="numpy", **without)(function)
-    if not config.DISABLE_JIT:  # type: ignore[attr-defined]
+    if not JIT_OFF:
         on_disk(compiled, function)
     return compiled  # type: ignore[no-any-return]
 

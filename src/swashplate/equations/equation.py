@@ -13,13 +13,16 @@ from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar
 
-from numba import njit
+from numba import config, njit
 
 from swashplate.equations.syntax import is_named_tuple, parsed, plain, resolved
 from swashplate.errors import EquationError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+# numba makes its settings from the environment, so that a type checker sees none of them
+JIT_OFF = bool(config.DISABLE_JIT)  # type: ignore[attr-defined]
+"""Whether nothing is compiled: ``NUMBA_DISABLE_JIT=1``."""
 known: dict[Any, None] = {}
 """Plain functions that were given to `inlined`, for when nothing is compiled."""
 

@@ -8,8 +8,6 @@ from types import FunctionType, ModuleType
 from typing import Any
 from weakref import WeakKeyDictionary
 
-from numba import config
-
 from swashplate.equations import expressions as ex
 from swashplate.equations.code import (
     Choice,
@@ -25,6 +23,7 @@ from swashplate.equations.code import (
     leaves,
     rebuilt,
 )
+from swashplate.equations.equation import JIT_OFF
 from swashplate.equations.expressions import Node, make
 from swashplate.equations.loops import interpolate, interpolated, repeated, repetition, root, solved
 from swashplate.equations.syntax import (
@@ -583,5 +582,5 @@ def _meanings(items: Sequence[Item]) -> dict[str, Node]:
 
 def _is_equation(found: Any) -> bool:
     """Whether something may be an equation: a function that is compiled, if any is."""
-    interpreted = bool(config.DISABLE_JIT)  # type: ignore[attr-defined]
+    interpreted = JIT_OFF
     return isinstance(plain(found), FunctionType) and (plain(found) is not found or interpreted)

@@ -378,8 +378,7 @@ class LinearisedFit(Result):
 
 def triangular_factor(matrix: Array) -> Array:
     """(min(m, K), K) factor R of a matrix (m, K), RᵀR = matrixᵀ matrix."""
-    factor: Array = np.linalg.qr(matrix, mode="r")  # type: ignore[assignment]
-    return factor
+    return np.asarray(np.linalg.qr(matrix, mode="r"))
 
 
 def whitening(

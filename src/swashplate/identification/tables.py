@@ -327,9 +327,9 @@ def runs_tables(
         unit = alike[0].experiment[name].unit
         for each in alike:
             run, test = each.experiment, each.test
-            tested = (None,) * 4
+            tested: tuple[float | None, ...] = (None,) * 4
             if test is not None:
-                tested = (test.duration, test.peak[1], test.cross_band, test.peak[0])  # type: ignore[assignment]
+                tested = (test.duration, test.peak[1], test.cross_band, test.peak[0])
             table.add(
                 *(run.name, run.maneuver, run.role, name, start_words(run)),
                 Cell(

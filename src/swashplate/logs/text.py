@@ -7,6 +7,7 @@ import csv
 import io
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import repeat
 from pathlib import Path
@@ -303,10 +304,9 @@ class Table:
             texts = [pl.Series([row[position] for row in cells]) for position in positions]
         else:
             if not clocks and (self.layout.decimal == "." or "." not in text):
-                try:
+                # cell by cell below: spaces behind a number, a text for a missing one, or no number
+                with suppress(pl.exceptions.PolarsError):
                     return [each.to_numpy() for each in self._parsed(text, positions, pl.Float64())]
-                except pl.exceptions.PolarsError:
-                    pass  # spaces behind a number, a text for a missing one, or no number at all
             texts = self._parsed(text, positions, pl.String())
         arrays = []
         for position, each in zip(positions, texts, strict=True):

@@ -10,11 +10,11 @@ from math import isfinite, isinf, isnan
 from typing import Any
 
 import numpy as np
-from numba import config
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel
+from swashplate.equations.equation import JIT_OFF
 from swashplate.errors import ParameterError
 from swashplate.models.card import Channel, channel_level
 from swashplate.models.displacement_control import (
@@ -49,7 +49,7 @@ def _plain_tuple(values: Array, length: int) -> tuple[float, ...]:
 
 
 # compiled code needs to know the length; Numba's function for it does not run uncompiled
-tuple_of: Any = _plain_tuple if config.DISABLE_JIT else to_fixed_tuple  # type: ignore[attr-defined]
+tuple_of: Any = _plain_tuple if JIT_OFF else to_fixed_tuple
 
 
 def check_rules(owner: str, numbers: Mapping[str, float]) -> None:

@@ -22,12 +22,13 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import config, types
+from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from swashplate.equations import expressions as ex
 from swashplate.equations.code import Call, Choice, Code, Item, Let, Rule, generating, leaves
+from swashplate.equations.equation import JIT_OFF
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.marching.march import Sampler, lower, output_of
 from swashplate.equations.marching.part import rest_of
@@ -61,7 +62,7 @@ def _selected(typing: Any, test: Any, one: Any, two: Any) -> Any:
 CALLED: dict[str, Any] = {"choose": intrinsic(_selected)}
 """What the text calls. ``choose(test, a, b)`` is one of two numbers that both have been computed:
 from ``a if test else b`` the compiler makes a choice between two addresses, and gathers."""
-if config.DISABLE_JIT:  # type: ignore[attr-defined]
+if JIT_OFF:
     # a root that nobody asks for may be one of a number below zero, which compiled code allows
     CALLED = {"choose": _choose, "sqrt": np.sqrt}
 

@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
 from llvmlite import ir
-from numba import config, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
@@ -26,6 +26,7 @@ from swashplate.equations.code import (
     leaves,
     rebuilt,
 )
+from swashplate.equations.equation import JIT_OFF
 from swashplate.equations.expressions import Node
 from swashplate.equations.fields import floats_of
 from swashplate.equations.model import (
@@ -317,7 +318,7 @@ def _rarely(typing: Any, test: Any) -> Any:
     return types.boolean(types.boolean), generate
 
 
-GUESSED: dict[str, Any] = {"rarely": bool if config.DISABLE_JIT else intrinsic(_rarely)}  # type: ignore[attr-defined]
+GUESSED: dict[str, Any] = {"rarely": bool if JIT_OFF else intrinsic(_rarely)}
 """What the text calls. ``rarely(test)`` is the test, for which there is a branch."""
 
 

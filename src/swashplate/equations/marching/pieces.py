@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import config, types
+from numba import types
 from numba.core.ccallback import CFunc
 from numba.core.typing.templates import signature
 from numba.extending import intrinsic
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel, on_disk
 from swashplate.equations.code import GENERATING
-from swashplate.equations.equation import known
+from swashplate.equations.equation import JIT_OFF, known
 from swashplate.equations.syntax import plain
 
 PIECE = "count, first, h, records, before, whole, fraction, params, given, states, met, flat"
@@ -69,7 +69,7 @@ class Planned:
 def piece(function: Callable[..., None]) -> Piece:
     """Compile a function with the arguments of `PIECE`: strict arithmetic, cached on disk."""
     known[plain(function)] = None
-    if config.DISABLE_JIT:  # type: ignore[attr-defined]
+    if JIT_OFF:
         return function
     options = {"nopython": True, "nogil": True, "error_model": "numpy"}
     made = CFunc(function, (_TYPES, types.void), {}, options)
@@ -81,19 +81,19 @@ def piece(function: Callable[..., None]) -> Piece:
 def addresses(pieces: Sequence[Planned], needed: Container[int]) -> Any:
     """What `call` is given of each piece; the pieces themselves must be kept as well."""
     made = [each.made if k in needed else None for k, each in enumerate(pieces)]
-    if config.DISABLE_JIT:  # type: ignore[attr-defined]
+    if JIT_OFF:
         return made
     return np.array([0 if each is None else each.address for each in made], dtype=np.int64)
 
 
 def pointers(records: tuple[NDArray[np.float64], ...]) -> Any:
     """What `call` is given of the records, which must be kept as well."""
-    if config.DISABLE_JIT:  # type: ignore[attr-defined]
+    if JIT_OFF:
         return records
     return np.array([each.ctypes.data for each in records], dtype=np.int64)
 
 
-if config.DISABLE_JIT:  # type: ignore[attr-defined]
+if JIT_OFF:
 
     def call(piece: Piece, count: int, first: int, h: float, arrays: tuple[Any, ...]) -> None:
         """Call a piece."""
