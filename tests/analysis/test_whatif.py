@@ -1,7 +1,5 @@
 """Levers, outcomes of a command, before and after, and sensitivities."""
 
-import sys
-
 import numpy as np
 import pytest
 
@@ -22,7 +20,6 @@ from swashplate.analysis import (
     pulled,
     pulled_columns,
     ranges_of,
-    sobol,
     speed_per_volt,
     trial,
     what_if,
@@ -212,46 +209,6 @@ def test_the_speed_limit_goes_with_the_pump_alone(hoist, task):
     assert result.sentences[0].startswith("Z4 x 0.01 cannot be simulated: hoist: ")
 
 
-def test_sobol_of_a_product_in_closed_form(hoist, task):
-    """Creep goes with pump times plussing, nearly: of a product of two uniform factors of 1 ± s
-    each causes s²/3 of the variance (1 + s²/3)² - 1 by itself."""
-    s = 0.5
-    ranges = ranges_of(["pump", "plussing", "relief"], s)
-    result = sobol(hoist, ranges, task, outcomes=["creep", "overshoot"], samples=256, seed=1)
-    part = s**2 / 3.0
-    by_itself = part / ((1.0 + part) ** 2 - 1.0)
-    assert result.runs == 256 * 5
-    # 256 base samples are good to a few hundredths
-    np.testing.assert_allclose(result.first[:2, 0], by_itself, atol=0.06)
-    np.testing.assert_allclose(result.total[:2, 0], 1.0 - by_itself, atol=0.06)
-    np.testing.assert_allclose([result.first[2, 0], result.total[2, 0]], 0.0, atol=1e-6)
-    assert result.mean[0] == pytest.approx(np.radians(3.09), rel=0.02)
-    assert np.isnan(result.total[:, 1]).all()
-    assert result.sentences == ("None of the levers moves overshoot.",)
-
-
-def test_the_seed_decides_and_threads_do_not(hoist, task):
-    def indices(seed: int, threads: int):
-        ranges = ranges_of(["orifice", "pump"])
-        names = {"outcomes": ["rise_time"], "samples": 16}
-        return sobol(hoist, ranges, task, **names, seed=seed, threads=threads)
-
-    first, again, other = indices(0, 1), indices(0, 2), indices(2, 1)
-    np.testing.assert_array_equal(first.total, again.total)
-    np.testing.assert_array_equal(first.total_error, again.total_error)
-    assert (first.total != other.total).any()
-
-
-def test_undefined_outcomes_have_no_indices(hoist):
-    at_once = trial(hoist, maneuvers.step(9.0, start=0.1, stop=1.0, length=2.0).sample())
-    result = sobol(hoist, ranges_of(["pump"]), at_once, outcomes=["creep"], samples=16)
-    assert np.isnan(result.first).all()
-    assert "48 of 48 variants have no creep" in result.sentences[0]
-
-
-CREEP = {"outcomes": ["creep"], "samples": 16}
-
-
 @pytest.mark.parametrize(
     ("call", "said"),
     [
@@ -275,14 +232,6 @@ CREEP = {"outcomes": ["creep"], "samples": 16}
             lambda d, t: one_at_a_time(d, {"pump": (2.0, 1.0)}, t, outcomes=["creep"]),
             "must rise from 0 or more, not 2 to 1",
         ),
-        (
-            lambda d, t: sobol(d, ranges_of(["pump"]), t, outcomes=["creep"], samples=100),
-            "100, but must be a power of 2 from 16",
-        ),
-        (
-            lambda d, t: sobol(d, {"Z4": (0.01, 1.1)}, t, **CREEP),
-            "of 48 variants cannot be simulated, the first because",
-        ),
     ],
 )
 def test_refusals(hoist, task, call, said):
@@ -290,9 +239,6 @@ def test_refusals(hoist, task, call, said):
         call(hoist, task)
 
 
-def test_what_breaks_a_rule_and_what_is_not_installed(hoist, task, monkeypatch):
+def test_what_breaks_a_rule(hoist, task):
     with pytest.raises(ParameterError, match="Z10"):
         what_if(hoist, {"pump": 0.0}, task)
-    monkeypatch.setitem(sys.modules, "SALib.sample.sobol", None)
-    with pytest.raises(InputError, match=r"pip install 'swashplate\[sensitivity\]'"):
-        sobol(hoist, ranges_of(["pump"]), task, **CREEP)

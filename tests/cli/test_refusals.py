@@ -48,7 +48,6 @@ REFUSED = {
     "sensitivity hoist --lever pump=2/1": "must rise from 0 or more, not 2 to 1",
     "sensitivity hoist --lever pump --lever pump=1/2": "--lever gives pump twice",
     "sensitivity hoist --span 2": "--span is 2, but must lie between 0 and 1",
-    "sensitivity hoist --sobol 100": "must be a power of 2",
     "sensitivity hoist --outcome speed": "There is no outcome 'speed'",
     "size hoist": "Require at least one of a speed",
     "size hoist --speed-deg-s 500": "the hoist reaches a speed of 370 deg/s (required 500)",

@@ -64,7 +64,7 @@ SENSITIVITY_EXAMPLES = """\
 Examples:
   swashplate sensitivity hoist
   swashplate sensitivity hoist --lever orifice --lever pump=0.8/1.5 --plot tornado.png
-  swashplate sensitivity slew --maneuver step:4 --sobol 1024 --plot sobol.png
+  swashplate sensitivity slew --maneuver step:4 --span 0.2 --out all.csv
 """
 COMPENSATE_EXAMPLES = """\
 Examples:
@@ -414,56 +414,30 @@ def sensitivity(
         str,
         option('Command: a maneuver such as step:9 or "step +9 V", or a log.', metavar="NAME|FILE"),
     ] = "step:9",
-    samples: Annotated[
-        int | None,
-        option(
-            "Sobol's indices as well, from N base samples, a power of 2 (1024 is usual): N times "
-            "the number of levers and two simulations.",
-            "--sobol",
-            metavar="N",
-        ),
-    ] = None,
-    seed: Seed = 0,
     plot: FigureFile = None,
     out: TableFile = None,
     *,
     sampling: Sampling,
 ) -> None:
-    """Show which lever moves which outcome.
-
-    Each lever is moved down and up by itself. With --sobol all are moved at once,
-    and the variance of each outcome is shared out among them: by itself, and in
-    total with what a lever does together with others.
-    """
-    from swashplate.analysis import sensitivity as analysis
+    """Show which lever moves which outcome, each moved down and up by itself."""
+    from swashplate.analysis import one_at_a_time, outcome_table
 
     files = Outputs((out, TABLE), (plot, FIGURE))
-    wanted, indices = tuple(outcomes) if outcomes else OUTCOMES, None
     if not 0.0 < span < 1.0:
         raise InputError(f"--span is {span:g}, but must lie between 0 and 1.")
     with working("Simulating"):
         name, trial = trial_of(drive.chosen, maneuver, sampling)
         ranges = ranges_of(levers or PULLED, (1.0 - span, 1.0 + span))
-        single = analysis.one_at_a_time(drive.chosen, ranges, trial, outcomes=wanted)
-        if samples is not None:
-            indices = analysis.sobol(
-                drive.chosen, ranges, trial, outcomes=wanted, samples=samples, seed=seed
-            )
+        found = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
-    files.write(out, "All numbers, in SI", analysis.sensitivity_table(single, indices).write)
-    if indices is None:
-        files.draw(plot, "plot_tornado", single, title=f"{title}: each lever by itself")
-    else:
-        files.draw(plot, "plot_sobol", indices, title=f"{title}: shares of the variance")
+    files.write(out, "All numbers, in SI", found.table().write)
+    files.draw(plot, "plot_tornado", found, title=f"{title}: each lever by itself")
     note(title)
     for line in drive.changes:
         note(line)
-    show(*(analysis.outcome_table(single, indices, k) for k in range(len(single.outcomes))))
-    for sentence in dict.fromkeys((*single.sentences, *(indices.sentences if indices else ()))):
+    show(*(outcome_table(found, k) for k in range(len(found.outcomes))))
+    for sentence in dict.fromkeys(found.sentences):
         say(f"- {sentence}")
-    if indices is not None:
-        error = indices.largest_error
-        say(f"- {indices.runs} simulations; indices are good to {error:.2g} or better.")
     files.say()
 
 
