@@ -188,10 +188,10 @@ def windows(axes: Iterable[schema.Axis], log: Log, span: schema.Window | None) -
     """
     tested = list(axes)
     wanted = [each for axis in tested for each in wanted_columns(axis)]
-    told = len(log.notes)
-    log = in_parts(log, list(Columns.find(log, wanted)))
-    rows = log.rows or 0
-    if rows <= LONG or log.part is None:
+    found = list(Columns.find(log, wanted))
+    log = in_parts(log, found)
+    rows = log.rows_of(found)
+    if rows is None or rows <= LONG:
         return [log]
     moving = np.zeros(-(-rows // GRAIN), dtype=np.bool_)
     period = np.inf
@@ -219,7 +219,7 @@ def windows(axes: Iterable[schema.Axis], log: Log, span: schema.Window | None) -
             f"{log.path} has {rows} rows, in none of which the input moves: leave the run out with "
             'role = "ignore".'
         )
-    return _cut(log, moving, period, log.notes[told:])
+    return _cut(log, rows, moving, period)
 
 
 def _moves(ends: Array) -> NDArray[np.bool_]:
@@ -236,9 +236,8 @@ def _moves(ends: Array) -> NDArray[np.bool_]:
     return moves
 
 
-def _cut(log: Log, moving: NDArray[np.bool_], period: float, notes: tuple[str, ...]) -> list[Log]:
+def _cut(log: Log, rows: int, moving: NDArray[np.bool_], period: float) -> list[Log]:
     """Parts of a log about its motion, so many that all can be held."""
-    rows = log.rows or 0
     changes = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]])))
     first = np.maximum(changes[::2] * GRAIN - round(BEFORE / period), 0)
     last = np.minimum(changes[1::2] * GRAIN + round(AFTER / period), rows)
@@ -254,7 +253,8 @@ def _cut(log: Log, moving: NDArray[np.bool_], period: float, notes: tuple[str, .
     taken = pieces[::every]
     said = f"the log has {len(pieces)} windows with motion"
     said += f", of which 1 in {every} is taken" * (every > 1)
-    said += "".join(f"; {each[0].lower()}{each[1:].rstrip('.')}" for each in notes)
+    if log.table is not None:
+        said += f"; its {rows} rows are read from {log.table.name}, written beside it"
     found = []
     for number, (begin, end, within) in enumerate(taken, 1):
         part = log.between(begin, end)
