@@ -364,8 +364,10 @@ def _within(signal: AnySignal, begin: float, end: float) -> AnySignal:
     kept = (signal.time >= begin) & (signal.time < end)
     if kept.all():
         return signal
-    every: dict[str, Any] = vars(signal)
-    return replace(signal, **{k: v[kept] for k, v in every.items() if isinstance(v, np.ndarray)})
+    arrays: dict[str, Any] = {
+        key: each[kept] for key, each in vars(signal).items() if isinstance(each, np.ndarray)
+    }
+    return replace(signal, **arrays)
 
 
 def _experiment(
