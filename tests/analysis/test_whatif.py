@@ -145,10 +145,24 @@ def test_the_ratio_is_that_of_the_limit_to_the_voltage_that_reaches_it(hoist):
     up, down = 196.0 / 7.87, 185.0 / 7.41
     found = [np.degrees(speed_per_volt(hoist, sign)) for sign in (1.0, -1.0)]
     assert found == pytest.approx([up, down], rel=1e-3)
-    wanted = np.degrees(proportional_speed(hoist, [-9.0, 0.0, 4.0]))
-    np.testing.assert_allclose(wanted, [-9.0 * down, 0.0, 4.0 * up], rtol=1e-3)
+    volts = [-9.0, 0.0, 4.0, 9.0]
+    asked = np.degrees(proportional_speed(hoist, volts, limited=False))
+    np.testing.assert_allclose(asked, [-9.0 * down, 0.0, 4.0 * up, 9.0 * up], rtol=1e-3)
+    wanted = np.degrees(proportional_speed(hoist, volts))
+    np.testing.assert_allclose(wanted, [-185.0, 0.0, 4.0 * up, 196.0], rtol=1e-3)
     wide = hoist.replace(Z13=0.5, Z15=np.inf)  # never saturates
     assert speed_per_volt(wide, 1.0) == pytest.approx(wide.steady_speed(10.0) / 10.0)
+
+
+def test_a_rise_time_belongs_to_a_command_that_goes_one_way(hoist):
+    volts = np.concatenate([np.zeros(512), np.linspace(0.0, 6.0, 512), np.full(1024, 6.0)])
+    noisy = volts + 0.05 * np.random.default_rng(2).normal(size=volts.size)
+    driver = volts - 4.0 * np.exp(-((np.arange(volts.size) - 900.0) ** 2) / 2e4)
+    for command, rises in ((volts, True), (noisy, True), (driver, False)):
+        given = trial(hoist, command)
+        result = what_if(hoist, {"pump": 1.2}, given, outcomes=["rise_time", "response_time"])
+        assert np.isfinite(result.before.values).all() == rises
+    assert "the command turns back on its way there" in result.sentences()[0]
 
 
 # --- before and after -----------------------------------------------------------------------------

@@ -367,7 +367,7 @@ def size(
     pump, from half to twice, unless others are named.
     """
     from swashplate.analysis import sizing
-    from swashplate.analysis.outcomes import trial
+    from swashplate.analysis.outcomes import proportional_speed, trial
 
     files = Outputs((out, None))
     if (tracking_deg_s is None) != (maneuver is None):
@@ -379,7 +379,9 @@ def size(
         follow, ranges = None, ranges_of(levers or SIZED, sizing.WIDEST)
         if maneuver is not None:
             voltage = maneuver_of(maneuver, drive.chosen).sample()
-            follow = trial(drive.chosen, voltage)
+            # a larger drive may well be what it takes to reach it
+            wanted = proportional_speed(drive.chosen, voltage, limited=False)
+            follow = trial(drive.chosen, voltage, wanted=wanted)
         found = sizing.size(drive.chosen, required, ranges, follow=follow)
     files.write(out, "Changed drive", found.drive.to_toml)
     note(drive.title)
