@@ -232,8 +232,8 @@ def plot(
     channel: Annotated[
         str | None,
         option(
-            "An encoder or position: raw against smoothed, and its speed. A rectified current: "
-            "measured against simulated.",
+            "An encoder or position: raw against smoothed, and its speed. Others: measured, and "
+            "what the axis's drive would do.",
             metavar="NAME",
         ),
     ] = None,
@@ -278,21 +278,28 @@ def _close_look(
     begin: float | None,
     end: float | None,
 ) -> None:
-    channel = campaign[run][name]
+    from swashplate.campaign.rig.instruments import SIGNALS
+
+    experiment, channel = campaign[run], campaign[run][name]
     first, last = float(channel.time[0]), float(channel.time[-1])
     window = (first if begin is None else begin, last if end is None else end)
     how = {"window": None if begin is end is None else window, "title": f"{run}, {name}"}
     if channel.is_position:
         files.draw(out, "plot_encoder", channel, **how)
         return
-    if channel.kind != "rectified_current":
-        raise InputError(
-            f"{run} {name} is a {channel.kind}; a close look is for encoders, positions and "
-            "rectified currents."
-        )
-    signal, drive = campaign[run].input, campaign.drive(campaign[run].axis)
-    simulation = drive.simulate(signal.values, time=signal.time, interpolation=signal.interpolation)
-    files.draw(out, "plot_current", channel, simulation, **how)
+    simulation, signal = None, experiment.input
+    if campaign.axes[experiment.axis].drive is not None and signal.kind != "other":
+        drive = campaign.drive(experiment.axis)
+        simulate = drive.simulate if signal.kind == "voltage" else drive.simulate_current
+        held = signal.interpolation
+        simulation = simulate(signal.values, time=signal.time, interpolation=held)
+    if channel.kind == "rectified_current" and simulation is not None:
+        files.draw(out, "plot_current", channel, simulation, **how)
+        return
+    simulated = None
+    if simulation is not None and channel.kind not in ("other", "rectified_current"):
+        simulated = simulation.at(channel.time, SIGNALS.get(channel.kind, channel.kind))
+    files.draw(out, "plot_channel", channel, signal, simulated, **how)
 
 
 def schema() -> None:

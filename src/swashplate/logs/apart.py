@@ -76,7 +76,13 @@ class _Other:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
-            env={**os.environ, "POLARS_MAX_THREADS": str(threads), "RUST_BACKTRACE": "0"},
+            env={
+                **os.environ,
+                "POLARS_MAX_THREADS": str(threads),
+                "RUST_BACKTRACE": "0",
+                # what Polars has read of one block goes back before the next
+                "_RJEM_MALLOC_CONF": "dirty_decay_ms:0,muzzy_decay_ms:0",
+            },
         )
         self._end = finalize(self, _ended, self._process, self._errors)
 

@@ -13,6 +13,7 @@ from .fit import plot_overlay as plot_overlay
 from .fit import plot_waterfall as plot_waterfall
 from .fit import save_fit_figures as save_fit_figures
 from .fit import save_run_figures as save_run_figures
+from .instruments import plot_channel as plot_channel
 from .instruments import plot_current as plot_current
 from .instruments import plot_encoder as plot_encoder
 from .linear import plot_bode as plot_bode

@@ -46,7 +46,7 @@ from swashplate.report.style import (
 from swashplate.units import DisplayUnit, display_unit
 
 if TYPE_CHECKING:
-    from swashplate.campaign import Channel, Method, Speed
+    from swashplate.campaign import Channel, InputSignal, Method, Speed
     from swashplate.simulation.result import Simulation
 
 # --- a rectified current --------------------------------------------------------------------------
@@ -192,6 +192,62 @@ def _handles(run: Compared) -> list[Line2D | Patch]:
         share = 100.0 * float(np.mean(run.ignored))
         handles.append(shade_handle(IGNORED, f"ignored ({share:.2g} %)"))
     return handles
+
+
+# --- any other channel ----------------------------------------------------------------------------
+
+
+def plot_channel(
+    channel: Channel,
+    given: InputSignal,
+    simulated: Array | None = None,
+    *,
+    window: tuple[float, float] | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Figure of a measured channel, and perhaps what a drive would do, over the input.
+
+    Parameters
+    ----------
+    channel : Channel
+        Any.
+    given : InputSignal
+        Input of the same run.
+    simulated : (m,) array, optional
+        What a drive does at the channel's samples. [unit of the channel]
+    window : (float, float), optional
+        First and last instant to show [s].
+    title : str, optional
+        By default the channel's name.
+
+    Raises
+    ------
+    InputError
+        If fewer than two samples lie in the window.
+    """
+    rows = rows_within(channel.time, window, str(channel.source))
+    time, measured = channel.time[rows], channel.values[rows]
+    unit = display_unit(channel.unit, float(np.abs(measured).max()))
+    legend = [handle("measured", BLUE, width=THIN)]
+    if simulated is not None:
+        legend.append(handle("the axis's drive", VERMILION, "dashed", LINE))
+    words = channel.name if title is None else title
+    figure, (upper, lower) = sheet([2.6, 1.2], words, legend=legend)
+    dress(upper, unit.label(channel.kind.replace("_", " ")))
+    draw(upper, time, unit.factor * measured, BLUE, width=THIN)
+    if simulated is not None:
+        draw(upper, time, unit.factor * simulated[rows], VERMILION, dashes="dashed", zorder=2.5)
+    shade(upper, stretches(time, channel.weight[rows] == 0.0), IGNORED)
+    mark_gaps(upper, time)
+    driving = display_unit(given.unit, float(np.abs(given.values).max()))
+    dress(lower, driving.label(f"input, {given.kind}"))
+    held = given.interpolation == "previous"
+    draw(lower, given.time, driving.factor * given.values, INK, held=held)
+    for ax in (upper, lower):
+        zero_line(ax)
+    lower.set_xlim(float(time[0]), float(time[-1]))
+    label_below(lower, "time (s)")
+    return figure
 
 
 # --- an encoder or a position ---------------------------------------------------------------------
