@@ -1,3 +1,4 @@
+import re
 from io import StringIO
 
 import h5py
@@ -356,3 +357,12 @@ def test_a_person_who_waits_sees_a_bar(run, monkeypatch):
 def test_a_folder_that_cannot_be_made(refused, tmp_path):
     (tmp_path / "file").write_text("")
     assert "Error: file cannot be made: " in refused("tour", "--out", "file")
+
+
+def test_a_part_of_a_run_is_drawn(done, refused, tmp_path):
+    done("simulate", "hoist", "step:9", "--plot", "part.svg", "--from", "1", "--to", "2")
+    ticks = re.findall(r"<!-- ([\d.]+) -->", (tmp_path / "part.svg").read_text("utf-8"))
+    instants = ["1.0", "1.2", "1.4", "1.6", "1.8", "2.0"]
+    assert any(ticks[k : k + len(instants)] == instants for k in range(len(ticks)))
+    said = refused("simulate", "hoist", "step:9", "--plot", "none.svg", "--from", "90")
+    assert "The window from 90 s to 10 s holds 0 samples of hoist" in said

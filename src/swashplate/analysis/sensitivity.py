@@ -148,5 +148,6 @@ def outcome_table(single: OneAtATime, number: int) -> Table:
         swing = None if missing or base == 0.0 else swings[k] / abs(base)
         made.add(lever, f"{low:g} {high:g}", *(Cell(e, words(e)) for e in ends), swing)
     if quiet:
-        made.caption = f"not moved by {', '.join(quiet)}"
+        few = len(quiet) < len(single.levers)
+        made.caption = f"not moved by {', '.join(quiet)}" if few else "no lever moves it"
     return made

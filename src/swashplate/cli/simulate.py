@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 SIMULATE_EXAMPLES = """\
 Examples:
   swashplate simulate hoist step:9
-  swashplate simulate hoist "step +9 V" --plot step.png --units rpm
+  swashplate simulate hoist "step +9 V" --plot step.png --from 1 --to 3 --units rpm
   swashplate simulate hoist sine:6.5,0.1 --set Z16_plus=0.12mm --out sine.csv
   swashplate simulate mine.toml log.csv --interpolation previous --out run.csv
 """
@@ -59,6 +59,8 @@ def simulate(
     sampling: Simulating,
     out: TableFile = None,
     plot: FigureFile = None,
+    begin: Annotated[float | None, option("Plot from here on.", "--from", metavar="S")] = None,
+    end: Annotated[float | None, option("Plot up to here.", "--to", metavar="S")] = None,
 ) -> None:
     """Simulate a drive over a maneuver or a measured voltage.
 
@@ -74,7 +76,11 @@ def simulate(
         name, run = simulated(drive.chosen, command, sampling)
         tables, title = run_tables(run), f"{drive.title}, {name}"
     files.write(out, "All signals, in SI", run.write)
-    files.draw(plot, "plot_simulation", run, title=title)
+    window = None
+    if begin is not None or end is not None:
+        first, last = float(run.time[0]), float(run.time[-1])
+        window = (first if begin is None else begin, last if end is None else end)
+    files.draw(plot, "plot_simulation", run, window=window, title=title)
     duration = f"{run.time[-1] - run.time[0]:.6g} s"
     note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
     for line in drive.changes:
