@@ -80,7 +80,8 @@ class _Other:
                 **os.environ,
                 "POLARS_MAX_THREADS": str(threads),
                 "RUST_BACKTRACE": "0",
-                # what Polars has read of one block goes back before the next
+                # a block is read with little ahead of it, and given back before the next
+                "POLARS_ROW_GROUP_PREFETCH_SIZE": "2",
                 "_RJEM_MALLOC_CONF": "dirty_decay_ms:0,muzzy_decay_ms:0",
             },
         )
