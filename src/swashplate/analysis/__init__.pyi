@@ -29,7 +29,6 @@ from .monte_carlo import bands as bands
 from .monte_carlo import draw_deviations as draw_deviations
 from .monte_carlo import drives as drives
 from .monte_carlo import half_widths as half_widths
-from .monte_carlo import independent_drives as independent_drives
 from .monte_carlo import stored_draws as stored_draws
 from .outcomes import OUTCOMES as OUTCOMES
 from .outcomes import BatchOutcomes as BatchOutcomes

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from swashplate.analysis.capability import dead_zone, saturation, starting_acceleration
-from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -198,7 +195,7 @@ class InverseMap(Result):
         )
 
     def to_toml(self, path: str | Path) -> None:
-        """Write the map for a controller; `from_toml` gives an equal one back.
+        """Write the map for a controller.
 
         If the file cannot be written (`FileError`), an older one of that name stays as it was.
         """
@@ -217,24 +214,6 @@ class InverseMap(Result):
             "plus": {name: each.tolist() for name, each in self.plus._asdict().items()},
         }
         write_text(COMMENTS + dumps(content), path)
-
-    @classmethod
-    def from_toml(cls, path: str | Path) -> InverseMap:
-        """A map from a file that `to_toml` wrote.
-
-        Raises
-        ------
-        FileError
-            If the file cannot be read or is not TOML.
-        ParameterError
-            If an entry is wrong; the sentence names it.
-        """
-        read = validated(parse_toml(read_text(path), str(path)), MapFile, str(path))
-        minus, plus = (
-            Branch(np.array(each.speed), np.array(each.voltage)) for each in (read.minus, read.plus)
-        )
-        up, down = read.acceleration
-        return cls(read.drive, minus, plus, read.rest.speed, (up, down), read.lag, read.error)
 
     def write(self, path: str | Path) -> None:
         """Write the map as .toml, or the table of `to_polars` as .csv or .parquet.
@@ -356,74 +335,6 @@ def _lag(drive: Drive, plus: Branch, minus: Branch) -> float:
         phase = float(np.angle(model.response([LAG_FREQUENCY])[0, 0]))
         lags.append(-phase / (2.0 * np.pi * LAG_FREQUENCY))
     return 0.5 * sum(lags)
-
-
-# --- its file -------------------------------------------------------------------------------------
-
-
-def _rising(values: list[float]) -> list[float]:
-    if any(later <= earlier for earlier, later in pairwise(values)):
-        raise ValueError("the numbers must rise from each to the next.")
-    return values
-
-
-Points = Annotated[
-    list[FiniteFloat], Field(min_length=FEWEST, max_length=MOST), AfterValidator(_rising)
-]
-Positive = Annotated[FiniteFloat, Field(ge=0.0)]
-
-
-class BranchFile(BaseModel):
-    """Points of one way, both columns rising."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    speed: Points
-    voltage: Points
-
-    @model_validator(mode="after")
-    def _fits(self) -> BranchFile:
-        if len(self.speed) != len(self.voltage):
-            raise ValueError(
-                f"speed has {len(self.speed)} numbers and voltage {len(self.voltage)}; give as "
-                "many of both."
-            )
-        if max(abs(self.voltage[0]), abs(self.voltage[-1])) > FULL_VOLTAGE:
-            raise ValueError(f"the voltage must stay within ±{FULL_VOLTAGE:g} V.")
-        return self
-
-
-class RestFile(BaseModel):
-    """What happens at 0 V."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    speed: FiniteFloat
-
-
-class MapFile(BaseModel):
-    """An inverse map."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    format: Literal[1] = 1
-    drive: str
-    speed_unit: Literal["rad/s"] = "rad/s"
-    voltage_unit: Literal["V"] = "V"
-    acceleration: Annotated[list[Positive], Field(min_length=2, max_length=2)]
-    lag: Positive
-    error: Positive
-    minus: BranchFile
-    rest: RestFile
-    plus: BranchFile
-
-    @model_validator(mode="after")
-    def _ordered(self) -> MapFile:
-        if not self.minus.speed[-1] <= self.rest.speed <= self.plus.speed[0]:
-            raise ValueError("the speed at rest must lie between those of minus and plus.")
-        if not self.minus.voltage[-1] <= 0.0 <= self.plus.voltage[0]:
-            raise ValueError("minus needs voltages of at most 0 V, plus of at least 0 V.")
-        return self
 
 
 # --- tables ---------------------------------------------------------------------------------------
