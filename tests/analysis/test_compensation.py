@@ -112,21 +112,6 @@ def test_commands_that_cannot_be(speed, rate, lead, said) -> None:
         MAPS["hoist"].command(speed, rate, lead=lead)
 
 
-def test_reachable_speeds_keep_the_limits() -> None:
-    inverse = MAPS["hoist"]
-    wanted = np.concatenate([np.zeros(10), np.full(1024, 9.0), np.full(1024, -9.0)])
-    held = inverse.reachable(wanted, 512.0)
-    rates = np.diff(held) * 512.0
-    up, down = inverse.acceleration
-    assert rates.max() == pytest.approx(up, rel=1e-9)
-    assert rates.min() == pytest.approx(-down, rel=1e-9)
-    assert held.max() == pytest.approx(inverse.limits[1])
-    slow = 0.1 * np.sin(np.arange(1024) / 512.0)
-    np.testing.assert_array_equal(inverse.reachable(slow, 512.0), slow)
-    with pytest.raises(InputError, match="one row of numbers"):
-        inverse.reachable(wanted, 0.0)
-
-
 def test_files(tmp_path) -> None:
     hoist = MAPS["hoist"]
     hoist.write(tmp_path / "map.csv")
