@@ -475,16 +475,3 @@ def side_by_side(drives: Mapping[str, Drive], runs: Mapping[str, Simulation]) ->
     made.add(f"settled speed at {volts:g} V", *settled, unit="rad/s")
     made.add("time to 90 % of it", *times, unit="s", spec=".3f")
     return made
-
-
-def overview_table(runs: Mapping[str, Mapping[str, Simulation]]) -> Table:
-    """Peak speeds of many runs and the limits that they meet, by axis and maneuver."""
-    speed = ("z.2f", "rad/s")
-    words = Column("axis"), Column("maneuver"), Column("samples", "d")
-    limits = Column("limits met", wrap=True)
-    made = Table("Peak speeds", (*words, Column("plus", *speed), Column("minus", *speed), limits))
-    for axis, by_name in runs.items():
-        for number, (name, run) in enumerate(by_name.items()):
-            met = ", ".join(limit for limit, share in _time_shares(run).items() if share)
-            made.add(axis, name, run.time.size, *peaks(run.shaft_speed), met, section=number == 0)
-    return made

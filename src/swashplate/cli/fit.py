@@ -66,32 +66,6 @@ if TYPE_CHECKING:
     from swashplate.identification.validation import RunQuality
     from swashplate.parameters.parameter_set import ParameterSet
 
-FIT_EXAMPLES = """\
-Examples:
-  swashplate rig hoist --out virtual --perturb 0.1
-  swashplate fit virtual/campaign.toml --out fitted
-  swashplate fit harbour/campaign.toml --setup mine.toml --starts 50 --seed 1
-  swashplate fit harbour/campaign.toml --folds 5 --bootstrap 1000 --profile Z16_plus
-  swashplate fit valve/campaign.toml --model valve.py
-  swashplate simulate fitted/drive.toml step:9
-"""
-VALIDATE_EXAMPLES = """\
-Examples:
-  swashplate validate fitted/drive.toml virtual/campaign.toml
-  swashplate validate hoist harbour/campaign.toml --role all --out validation
-"""
-REPORT_EXAMPLES = """\
-Examples:
-  swashplate fit virtual/campaign.toml --out fitted
-  swashplate report fitted virtual/campaign.toml --truth virtual/truth
-  swashplate report fitted virtual/campaign.toml --figures pdf
-  swashplate report fitted virtual/campaign.toml --pdf report.pdf
-"""
-DEMO_EXAMPLES = """\
-Examples:
-  swashplate demo
-  swashplate demo --out results --seed 3
-"""
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as of other programs."""
 FEWEST_DRAWS = 40
@@ -163,6 +137,14 @@ def fit(
     and what 'report' needs to write the report again. Ctrl-C keeps the best so
     far, of several starts those that ended, and the exit code is 130. It is 1 if
     the result is not usable.
+
+    For example:
+      swashplate rig hoist --out virtual --perturb 0.1
+      swashplate fit virtual/campaign.toml --out fitted
+      swashplate fit harbour/campaign.toml --setup mine.toml --starts 50 --seed 1
+      swashplate fit harbour/campaign.toml --folds 5 --bootstrap 1000 --profile Z16_plus
+      swashplate fit valve/campaign.toml --model valve.py
+      swashplate simulate fitted/drive.toml step:9
     """
     if 0 < bootstrap < FEWEST_DRAWS:
         raise InputError(
@@ -436,6 +418,10 @@ def validate(
 
     Prints errors run by run, what is left in the residuals, and a verdict. The
     exit code is 1 if the drive is not usable for these runs.
+
+    For example:
+      swashplate validate fitted/drive.toml virtual/campaign.toml
+      swashplate validate hoist harbour/campaign.toml --role all --out validation
     """
     from swashplate.identification import tables
     from swashplate.identification.acceptance import verdict
@@ -543,6 +529,12 @@ def report(
 
     Nothing is fitted. The campaign must be the one that was fitted: if its
     samples, weights or ignored windows have changed, the report is refused.
+
+    For example:
+      swashplate fit virtual/campaign.toml --out fitted
+      swashplate report fitted virtual/campaign.toml --truth virtual/truth
+      swashplate report fitted virtual/campaign.toml --figures pdf
+      swashplate report fitted virtual/campaign.toml --pdf report.pdf
     """
     from swashplate.campaign import Campaign
     from swashplate.identification.assessment import judge_stored
@@ -608,6 +600,10 @@ def demo(
     Kruse (2001) through a 12-bit command, an ammeter and an encoder, fits card,
     pump and motor to ten of them, predicts the other three and writes a report.
     Takes less than a minute. An earlier demo is replaced.
+
+    For example:
+      swashplate demo
+      swashplate demo --out results --seed 3
     """
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive

@@ -19,15 +19,6 @@ from swashplate.tables import FIGURE, TABLE
 
 Method = Literal["march", "radau"]
 
-EXAMPLES = """\
-Examples:
-  swashplate full-order hoist
-  swashplate full-order hoist step:9 --plot full.png
-  swashplate full-order fitted/drive.toml sine:4,1 --like luff
-  swashplate full-order hoist step:4 --physical load_torque=2kN*m --out run.csv
-  swashplate full-order hoist log.csv --interpolation previous --method radau
-"""
-
 
 def full_order(
     drive: DriveChoice,
@@ -68,6 +59,13 @@ def full_order(
     physical values are completed from the drive's parameters and from assumed
     ones. Prints these, the modes, and by how much the speed of the one-state
     model differs. What is assumed can be replaced by what you know.
+
+    For example:
+      swashplate full-order hoist
+      swashplate full-order hoist step:9 --plot full.png
+      swashplate full-order fitted/drive.toml sine:4,1 --like luff
+      swashplate full-order hoist step:4 --physical load_torque=2kN*m --out run.csv
+      swashplate full-order hoist log.csv --interpolation previous --method radau
     """
     files = Outputs((out, TABLE), (plot, FIGURE))
     if command is None and plot is not None:

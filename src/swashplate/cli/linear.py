@@ -15,19 +15,6 @@ if TYPE_CHECKING:
     from swashplate.drive import Drive
     from swashplate.linear import LinearDrive
 
-LINEARIZE_EXAMPLES = """\
-Examples:
-  swashplate linearize hoist --at 4
-  swashplate linearize hoist --speed-deg-s -50 --loop-gain 0.1
-  swashplate linearize slew --at 2 --sample-time 0.01 --out slew.toml
-  swashplate linearize luff --current 0 --input solenoid_force
-"""
-BODE_EXAMPLES = """\
-Examples:
-  swashplate bode hoist
-  swashplate bode hoist --amplitude 1 --amplitude 9 --plot bode.png
-  swashplate bode slew --bias 3 --amplitude 0.1 --linear-at 3 --out bode.csv
-"""
 MOST_POINTS = 2000
 AMPLITUDES = (1.0, 4.0, 6.5, 9.0)
 
@@ -79,6 +66,12 @@ def linearize(
     Prints the operating point, the gain, the lag of the pump, the poles, the
     bandwidth and what a speed loop closed over the drive can bear. The model is
     exact for small motions; 'swashplate bode' shows what becomes of large ones.
+
+    For example:
+      swashplate linearize hoist --at 4
+      swashplate linearize hoist --speed-deg-s -50 --loop-gain 0.1
+      swashplate linearize slew --at 2 --sample-time 0.01 --out slew.toml
+      swashplate linearize luff --current 0 --input solenoid_force
     """
     from swashplate.linear import LINEAR_MODEL, DeadZoneError, model_tables
 
@@ -157,6 +150,11 @@ def bode(
     those of its first harmonic, the distortion is all the rest of it. Prints the
     gain, the phase and the time by which the speed lags at one frequency: what a
     controller that is to damp a swing of that frequency has to make up for.
+
+    For example:
+      swashplate bode hoist
+      swashplate bode hoist --amplitude 1 --amplitude 9 --plot bode.png
+      swashplate bode slew --bias 3 --amplitude 0.1 --linear-at 3 --out bode.csv
     """
     import numpy as np
 

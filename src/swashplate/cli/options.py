@@ -206,9 +206,12 @@ WRITTEN = {"out", "plot", "write", "pdf", "figures"}
 
 
 def command(
-    app: typer.Typer, name: str, examples: str, panel: str | None = None
+    app: typer.Typer, name: str, examples: str = "", panel: str | None = None
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Register a command with its examples, its groups spread, --force and units added."""
+    """Register a command: its groups spread, --force and units added.
+
+    Examples at the end of its docstring are shown below its options.
+    """
 
     def register(function: Callable[..., None]) -> Callable[..., None]:
         hints = get_type_hints(function, include_extras=True)
@@ -233,11 +236,15 @@ def command(
             with shown_in([each.strip() for each in units.split(",") if each.strip()], drum):
                 function(**words)
 
-        run.__doc__ = function.__doc__
+        text, head, shown = inspect.cleandoc(function.__doc__ or "").partition("\n\nFor example:")
+        run.__doc__ = text
+        run.__wrapped__ = function  # type: ignore[attr-defined]
         # Typer reads the options off the signature, which functions have without declaring it
         run.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
         run.__annotations__ = {each.name: each.annotation for each in flat}
-        app.command(name, epilog=examples, rich_help_panel=panel)(run)
+        app.command(name, epilog=f"Examples:{shown}" if head else examples, rich_help_panel=panel)(
+            run
+        )
         return function
 
     return register

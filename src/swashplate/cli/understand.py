@@ -39,39 +39,6 @@ if TYPE_CHECKING:
     from swashplate.analysis.limits import LimitShares
     from swashplate.analysis.monte_carlo import Bands
 
-LIMITS_EXAMPLES = """\
-Examples:
-  swashplate limits hoist
-  swashplate limits hoist --plot envelope.png --error 0.05 --frequency 0.3
-  swashplate limits luff sine:9,0.1 --plot timeline.png
-  swashplate limits mine.toml log.csv --interpolation previous --out shares.csv
-"""
-WHATIF_EXAMPLES = """\
-Examples:
-  swashplate whatif hoist --scale orifice=1.5 --scale pump=1.5
-  swashplate whatif slew --scale orifice_diameter=1.2 --maneuver step:6 --plot w.png
-  swashplate whatif fitted --scale dead_zone=0 --uncertainty fitted
-  swashplate whatif mine.toml --scale pump=1.2 --maneuver log.csv --interpolation previous
-  swashplate whatif --levers
-"""
-SIZE_EXAMPLES = """\
-Examples:
-  swashplate size hoist --speed-deg-s 250 --lever pump
-  swashplate size hoist --acceleration-deg-s2 200 --lever orifice=1/2 --lever pump=1/1.5
-  swashplate size hoist --tracking-deg-s 19 --maneuver sine:9,0.1 --out larger.toml
-"""
-SENSITIVITY_EXAMPLES = """\
-Examples:
-  swashplate sensitivity hoist
-  swashplate sensitivity hoist --lever orifice --lever pump=0.8/1.5 --plot tornado.png
-  swashplate sensitivity slew --maneuver step:4 --sobol 1024 --plot sobol.png
-"""
-COMPENSATE_EXAMPLES = """\
-Examples:
-  swashplate compensate hoist --out hoist-inverse.toml
-  swashplate compensate hoist --speed-deg-s 5 --speed-deg-s -120
-  swashplate compensate luff sine:4,0.1 --plot inverse.png
-"""
 ERROR = 0.1
 FREQUENCIES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
 LEVEL = 0.95
@@ -129,6 +96,12 @@ def limits(
     often each limit acts, by how much the error falls without it, and so which
     component to change first. The error is the rms of the speed less that of a
     drive without limits. The shares need not add up to 100 %.
+
+    For example:
+      swashplate limits hoist
+      swashplate limits hoist --plot envelope.png --error 0.05 --frequency 0.3
+      swashplate limits luff sine:9,0.1 --plot timeline.png
+      swashplate limits mine.toml log.csv --interpolation previous --out shares.csv
     """
     files = Outputs((out, TABLE), (plot, FIGURE))
     if command is not None and (error is not None or frequencies):
@@ -281,6 +254,13 @@ def whatif(
     The speed that is wanted is in proportion to the voltage, at the ratio of
     the drive as it is. With --uncertainty outcomes get intervals and the figure
     bands: drives are drawn from the errors of a fit's estimates.
+
+    For example:
+      swashplate whatif hoist --scale orifice=1.5 --scale pump=1.5
+      swashplate whatif slew --scale orifice_diameter=1.2 --maneuver step:6 --plot w.png
+      swashplate whatif fitted --scale dead_zone=0 --uncertainty fitted
+      swashplate whatif mine.toml --scale pump=1.2 --maneuver log.csv --interpolation previous
+      swashplate whatif --levers
     """
     from swashplate.analysis.whatif import AS_IS, CHANGED, before_and_after, what_if
 
@@ -365,6 +345,11 @@ def size(
     Smallest is the least sum of squares of the changes, each in per cent. What
     cannot be met is refused, with what can be reached. Levers are orifice and
     pump, from half to twice, unless others are named.
+
+    For example:
+      swashplate size hoist --speed-deg-s 250 --lever pump
+      swashplate size hoist --acceleration-deg-s2 200 --lever orifice=1/2 --lever pump=1/1.5
+      swashplate size hoist --tracking-deg-s 19 --maneuver sine:9,0.1 --out larger.toml
     """
     from swashplate.analysis import sizing
     from swashplate.analysis.outcomes import trial
@@ -434,6 +419,11 @@ def sensitivity(
     Each lever is moved down and up by itself. With --sobol all are moved at once,
     and the variance of each outcome is shared out among them: by itself, and in
     total with what a lever does together with others.
+
+    For example:
+      swashplate sensitivity hoist
+      swashplate sensitivity hoist --lever orifice --lever pump=0.8/1.5 --plot tornado.png
+      swashplate sensitivity slew --maneuver step:4 --sobol 1024 --plot sobol.png
     """
     from swashplate.analysis import sensitivity as analysis
 
@@ -505,6 +495,11 @@ def compensate(
     is straight between its points, so that any controller can follow it. With
     what a stick does, compares three controllers in simulation: a straight
     line, the map, and the map with the drive's lag made up for.
+
+    For example:
+      swashplate compensate hoist --out hoist-inverse.toml
+      swashplate compensate hoist --speed-deg-s 5 --speed-deg-s -120
+      swashplate compensate luff sine:4,0.1 --plot inverse.png
     """
     from swashplate.analysis import compensation, tracking
 

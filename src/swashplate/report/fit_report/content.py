@@ -261,7 +261,7 @@ def _agreement_section(runs: Sequence[ShownRun], findings: dict[str, list[int]])
     columns = (Column(""), Column("run"), Column("role"), Column("maneuver"), Column("judged by"))
     overview = Table("", (*columns, error, Column("why"), Column("findings")))
     for number, (run, (look, why)) in enumerate(zip(runs, run_lights(runs, findings), strict=True)):
-        part = run_error(run)
+        part = run_error(run, runs)
         to_curves = Markup('<a href="#run-{}">{}</a>').format(number, run.name)
         links = Markup(" ").join(
             Markup('<a href="#finding-{0}">{0}</a>').format(each)
@@ -283,7 +283,7 @@ def _agreement_section(runs: Sequence[ShownRun], findings: dict[str, list[int]])
         "RMSE is the root of the mean squared difference of the samples that count; NRMSE is RMSE "
         "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE); R² is "
         "1 − NRMSE². Error / range is RMSE over the largest less the smallest value measured in "
-        "the run; the verdict takes the range of all runs."
+        "all runs of that role, as in the verdict."
     )
     measures = Block("table", joined(made), "agreement")
     blocks = [

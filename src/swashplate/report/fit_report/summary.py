@@ -20,8 +20,8 @@ from swashplate.identification.acceptance import (
     Grade,
     Verdict,
     following,
-    part_of_range,
     percent,
+    range_of,
     weak_unknowns,
 )
 from swashplate.identification.assessment import Assessment
@@ -138,11 +138,15 @@ def light(look: Light, words: str) -> Markup:
     return made.format(look, words, words, sign)
 
 
-def run_error(run: ShownRun) -> float:
-    """RMSE of a run's judged channel over its range in that run; infinite where nothing moves."""
-    shown = run.judged.quality
-    part = part_of_range([shown], shown.channel)
-    return np.inf if part is None else part
+def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
+    """RMSE of a run's judged channel over its range in all runs of its role, as the verdict has it.
+
+    Infinite where nothing moves.
+    """
+    own = run.judged.quality
+    judged = [each.judged.quality for each in runs if each.role == run.role]
+    reach = range_of([each for each in judged if each.channel == own.channel])
+    return own.measures.rmse / reach if reach > 0.0 else np.inf
 
 
 def run_lights(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> list[tuple[Light, str]]:
@@ -223,12 +227,12 @@ def summary_section(
 def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[Block]:
     """The runs that are predicted best and worst, of those held out if there are any."""
     held = [k for k, run in enumerate(runs) if run.validates]
-    chosen = sorted(held or range(len(runs)), key=lambda k: run_error(runs[k]))
+    chosen = sorted(held or range(len(runs)), key=lambda k: run_error(runs[k], runs))
     ends = {"Best": chosen[0], "Worst": chosen[-1]} if len(chosen) > 1 else {"The": chosen[0]}
     for which, k in ends.items():
         kind = "held-out run" if held else "run" if runs[k].validates else "fitted run"
-        part = run_error(runs[k])
-        error = "never moves" if part == np.inf else f"error {percent(part)} of its range"
+        part = run_error(runs[k], runs)
+        error = "never moves" if part == np.inf else f"error {percent(part)} of the range"
         content = {
             "number": k,
             "run": runs[k],
