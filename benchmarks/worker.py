@@ -13,19 +13,8 @@ from cases import CARD_SPREAD, PUMP_SPREAD, RATE, changes
 from timing import alone, seconds
 
 from swashplate import Drive, SquaredError, maneuvers
+from swashplate.cli.understand import OUTCOMES, PULLED
 from swashplate.logs import read_series
-
-LEVERS = (
-    "orifice",
-    "pump",
-    "supply_pressure",
-    "rate_limits",
-    "dead_zone",
-    "spool_stroke",
-    "relief",
-    "plussing",
-)
-OUTCOMES = ("final_speed", "rise_time", "largest_acceleration", "tracking_error", "creep")
 
 
 def peak() -> float:
@@ -76,7 +65,7 @@ def sobol() -> dict[str, float]:
 
     hoist = Drive.preset("hoist")
     command = trial(hoist, maneuvers.step(9.0).sample())
-    ranges = ranges_of(LEVERS, 0.2)
+    ranges = ranges_of(PULLED, 0.2)
     found: dict[str, float] = {}
     for name, samples in (("first", 16), ("quarter", 256), ("all", 1024)):
         forget_peak()

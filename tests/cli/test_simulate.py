@@ -1,17 +1,13 @@
-from io import StringIO
-
 import h5py
 import numpy as np
 import polars as pl
 import pytest
 import scipy.io
-from rich.console import Console
 
 from swashplate import Drive, Limit, maneuvers
 from swashplate.analysis import outcomes
-from swashplate.maneuvers import source_tests
 from swashplate.parameters.definitions import CATALOGUE
-from swashplate.parameters.files import AXES, preset_names
+from swashplate.parameters.files import preset_names
 
 # --- simulate -------------------------------------------------------------------------------------
 
@@ -22,6 +18,8 @@ def test_a_step_prints_the_known_speeds(done, number):
     assert number(text, "peak speed, positive") == 196.00
     assert number(text, "peak speed, negative") == 0.0
     assert number(text, "speed at the end") == 3.09  # the hoist creeps at 0 V
+    assert max(map(len, text.splitlines())) <= 80
+    assert "\x1b" not in text
 
 
 def test_the_table_says_what_the_simulation_says(done, number):
@@ -118,6 +116,22 @@ def test_an_own_set(done, number, tmp_path):
     assert number(text, "peak speed, positive") == pytest.approx(391.99, abs=0.01)
 
 
+def test_a_rod_is_shown_in_millimetres(done, number, tmp_path):
+    """A fit to positions in m writes motion = "rod"; angles inside the machine stay angles."""
+    text = done("show", "hoist", "--toml").replace("[model]", '[model]\nmotion = "rod"', 1)
+    (tmp_path / "boom.toml").write_text(text, "utf-8")
+    assert 'motion = "rod"' in done("show", "boom.toml", "--toml")
+    (z13,) = [line for line in done("show", "boom.toml").splitlines() if line.startswith("Z13 ")]
+    assert z13.split()[-2] == "rad"
+    text = done("simulate", "boom.toml", "step:9")
+    fastest = 12.396 * 0.27596
+    assert number(text, "peak speed, positive") == pytest.approx(1e3 * fastest, abs=0.1)
+    assert "mm/s" in text
+    assert "turns" not in text
+    text = done("simulate", "boom.toml", "step:9", "--units", "m/s")
+    assert number(text, "peak speed, positive") == pytest.approx(fastest, abs=0.01)
+
+
 def test_a_start_of_own_axis_keeps_the_tests_of_the_source(done, tmp_path):
     (tmp_path / "mine.toml").write_text(done("show", "hoist", "--toml"), "utf-8")
     assert "mine.toml (hoist), step +9 V" in done("simulate", "mine.toml", "step +9 V")
@@ -136,13 +150,6 @@ def test_clip(done, number):
     assert "hoist, step 14 V" in clipped
     full = done("simulate", "hoist", "step:10")
     assert clipped.splitlines()[1:] == full.splitlines()[1:]
-
-
-@pytest.mark.parametrize("words", [("step:9",), ("sine:6.5,0.1", "--plot", "a.png")])
-def test_nothing_is_wider_than_80_columns_or_coloured(done, words):
-    text = done("simulate", "hoist", *words)
-    assert max(map(len, text.splitlines())) <= 80
-    assert "\x1b" not in text
 
 
 def test_the_first_lag_of_a_straight_line_is_read_off_the_speed():
@@ -279,12 +286,10 @@ def test_a_file_that_is_none(refused, tmp_path, name, said):
 # --- parameters -----------------------------------------------------------------------------------
 
 
-def test_axes_lists_speeds(done, number):
+def test_axes_lists_drives_and_cards(done):
     text = done("axes")
     for name in preset_names():
         assert f"\n{name} " in text
-    hoist = next(line for line in text.splitlines() if line.startswith("hoist "))
-    assert [float(word) for word in hoist.split()[-3:]] == [-185.00, 3.09, 196.00]
     assert "rexroth_mdsd_1k_2x_4" in text
     assert max(map(len, text.splitlines())) <= 80
 
@@ -312,47 +317,3 @@ def test_toml_starts_an_own_set(done, tmp_path):
     mine, hoist = Drive.from_toml(tmp_path / "mine.toml"), Drive.preset("hoist")
     assert mine == hoist
     assert done("show", "mine.toml") == done("show", "hoist")
-
-
-# --- tour -----------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def printed(done):
-    return done("tour", "--out", "sub/tour")
-
-
-def test_every_run_is_written_and_listed(printed, tmp_path):
-    folder = tmp_path / "sub/tour"
-    names = {
-        f"{axis}/{name.replace('/', ' per ')}.csv" for axis in AXES for name in source_tests(axis)
-    }
-    figures = {"overview.png", "steady.png"}
-    written = {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
-    assert written == names | figures
-    assert len(names) == 25
-    assert pl.read_csv(folder / "hoist/step +9 V.csv").height == 5121
-    assert {"hoist/ramp -1 V per s.csv", "slew/sine 6 V 0.05 Hz.csv"} <= names
-    (row,) = [line for line in printed.splitlines() if line.startswith("hoist  step +9 V ")]
-    assert row.split()[4:7] == ["5121", "196.00", "0.00"]
-    assert "swash stop" in printed
-    for figure in figures:
-        assert (folder / figure).read_bytes().startswith(b"\x89PNG")
-        assert f"sub/tour/{figure}" in printed
-    assert max(map(len, printed.splitlines())) <= 80
-
-
-@pytest.mark.slow
-def test_a_person_who_waits_sees_a_bar(run, monkeypatch):
-    terminal = Console(file=StringIO(), force_terminal=True, width=80, markup=False)
-    monkeypatch.setattr("swashplate.cli.terminal.side", terminal)
-    assert run("tour").exit_code == 0
-    seen = terminal.file.getvalue()
-    assert "0/27" in seen
-    assert "hoist, ramp +1 V/s" in seen
-    assert seen.endswith("\x1b[?25h\r\x1b[1A\x1b[2K")  # the bar is wiped out, the cursor is back
-
-
-def test_a_folder_that_cannot_be_made(refused, tmp_path):
-    (tmp_path / "file").write_text("")
-    assert "Error: file cannot be made: " in refused("tour", "--out", "file")

@@ -451,7 +451,8 @@ def run_tables(run: Simulation) -> tuple[Table, Table]:
         did.add(f"peak speed, {way}", speed, unit="rad/s")
     did.add("speed at the end", float(run.shaft_speed[-1]), unit="rad/s")
     did.add("position at the end", position, unit="rad", spec="z.1f")
-    did.add("", position / (2.0 * np.pi), unit="turns", spec="z.3f")
+    if display_unit("rad").name == "deg":
+        did.add("", position / (2.0 * np.pi), unit="turns", spec="z.3f")
     for way, current in zip(ways, peaks(run.current), strict=True):
         section = way == "positive"
         did.add(f"peak current, {way}", current, unit="A", spec="z.4f", section=section)

@@ -18,7 +18,14 @@ from swashplate.cli.options import (
     option,
 )
 from swashplate.cli.terminal import Outputs, note, say, show, working
-from swashplate.cli.words import campaign_of, file_kind, maneuver_of, parameters_of, runs_to_fit
+from swashplate.cli.words import (
+    campaign_of,
+    configuration_of,
+    file_kind,
+    maneuver_of,
+    parameters_of,
+    runs_to_fit,
+)
 from swashplate.errors import InputError
 from swashplate.tables import TABLE, write_text
 
@@ -234,7 +241,7 @@ def _bench(
         if axis is not None:
             raise InputError("--axis belongs to a campaign; a drive is one axis.")
         parameters = parameters_of(drive or word)
-        plan = load_setup(setup or parameters.name)
+        plan = load_setup(configuration_of(word, setup, parameters.name))
         return bench(smooth(parameters), plan, free=free, sensors=_noises(noise, fresh=parameters))
     campaign, chosen = campaign_of(Path(word), axis)
     plan = setup_of(campaign, chosen, setup)

@@ -57,9 +57,7 @@ def simulate(
     files.write(out, "All signals, in SI", run.write)
     files.draw(plot, "plot_simulation", run, title=title)
     duration = f"{run.time[-1] - run.time[0]:.6g} s"
-    note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
-    for line in drive.changes:
-        note(line)
+    drive.note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
     show(*tables)
     files.say()
 
@@ -159,7 +157,8 @@ def show_parameters(
       swashplate show hoist
       swashplate show hoist --toml > mine.toml    (a start for your own drive)
     """
-    parameters = drive.chosen.parameters
+    # in SI: a rod's drive has angles inside, which chosen units of its motion would change
+    parameters = drive_of(drive.drive, drive.values or (), drive.factors or ()).parameters
     if toml:
         from swashplate.parameters.files import dump_set
 

@@ -7,7 +7,6 @@ from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from textwrap import fill
-from time import perf_counter
 from typing import Any, Protocol
 
 import rich.table
@@ -16,9 +15,8 @@ from rich.console import Console
 from rich.status import Status
 
 from swashplate.errors import FileError
-from swashplate.tables import UNIT, Column, Form, Table, check_place, ending
+from swashplate.tables import UNIT, Form, Table, check_place, ending
 
-BEGUN = perf_counter()
 FORCED: ContextVar[bool] = ContextVar("FORCED", default=False)
 """Whether older files may be replaced: --force."""
 LINE, BETWEEN = 80, 2
@@ -153,6 +151,13 @@ def note(text: str) -> None:
     output.print(text, soft_wrap=True)
 
 
+def bullets(*groups: Iterable[str]) -> None:
+    """Print sentences as a list, group after group."""
+    for group in groups:
+        for sentence in group:
+            say(f"- {sentence}")
+
+
 def say_error(error: Exception) -> None:
     """Print what went wrong as one line on standard error."""
     sentence = " ".join(str(error).split()).rstrip(".")
@@ -185,26 +190,6 @@ def progress(steps: int) -> Iterator[Callable[[str], None]]:
             begun += 1
 
         yield begin
-
-
-class Timing:
-    """Wall time of the parts of a command, from the start of the program on."""
-
-    def __init__(self) -> None:
-        self._last = BEGUN
-        self.parts: dict[str, float] = {}
-
-    def ended(self, part: str) -> None:
-        """A part ends now, which began where the one before ended. [s]"""
-        now = perf_counter()
-        self.parts[part], self._last = now - self._last, now
-
-    def table(self) -> Table:
-        """The parts, and all together."""
-        made = Table("Wall time", (Column("part"), Column("s", ".2f")))
-        for part, seconds in {**self.parts, "all": sum(self.parts.values())}.items():
-            made.add(part, seconds)
-        return made
 
 
 class Shown(Protocol):

@@ -16,14 +16,13 @@ from swashplate.cli.options import (
     FigureFile,
     Levers,
     Sampling,
-    Seed,
     SetFile,
     Simulating,
     TableFile,
     argument,
     option,
 )
-from swashplate.cli.terminal import Outputs, note, say, show, working
+from swashplate.cli.terminal import Outputs, bullets, note, say, show, working
 from swashplate.cli.words import (
     changes_between,
     factors_of,
@@ -41,7 +40,8 @@ if TYPE_CHECKING:
 
 ERROR = 0.1
 FREQUENCIES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
-LEVEL = 0.95
+LEVEL, SPAN = 0.95, (0.9, 1.1)
+"""Of bands, and the factors of a lever that names none."""
 CHOSEN = ("final_speed", "rise_time", "largest_acceleration", "tracking_error", "creep", "travel")
 SIZED = ("orifice", "pump")
 PULLED = (
@@ -137,9 +137,7 @@ def _say_envelope(
             refusal = f"No sine can be commanded: {no_inverse}"
     files.write(out, "Envelope, in SI", found.write)
     files.draw(plot, "plot_envelope", found)
-    note(f"{drive.title}: what it can do")
-    for line in drive.changes:
-        note(line)
+    drive.note(f"{drive.title}: what it can do")
     show(*tables)
     if refusal:
         say(refusal)
@@ -169,9 +167,7 @@ def _say_shares(
     files.write(out, "Shares of each limit, in SI", found.write)
     files.draw(plot, "plot_limit_timeline", run, wanted=found.wanted, title=title)
     error = quantity(found.error, "rad/s", spec=".3f")
-    note(f"{title}: {error} rms from a drive without limits")
-    for line in drive.changes:
-        note(line)
+    drive.note(f"{title}: {error} rms from a drive without limits")
     shares = found.acting()
     if shares.rows:
         show(shares)
@@ -238,8 +234,6 @@ def whatif(
         Path | None,
         option("The campaign of that fit, if it is not where it was.", metavar="CAMPAIGN.toml"),
     ] = None,
-    draws: Annotated[int, option("Drives drawn for the bands, 20 or more.")] = 200,
-    seed: Seed = 0,
     plot: FigureFile = None,
     out: SetFile = None,
     levers: Annotated[
@@ -266,8 +260,6 @@ def whatif(
 
     files = Outputs((out, None), (plot, FIGURE))
     moved = factors_of(factors)
-    if uncertainty is not None and draws < 20:
-        raise InputError(f"--draws is {draws}, but bands need 20 or more.")
     choice = DriveChoice(drive)
     with working("Simulating"):
         name, trial = trial_of(choice.chosen, maneuver, sampling)
@@ -277,9 +269,7 @@ def whatif(
         with working("Drawing drives"):
             from swashplate.analysis import monte_carlo
 
-            before = monte_carlo.stored_draws(
-                uncertainty, drive=choice.chosen, campaign=campaign, draws=draws, seed=seed
-            )
+            before = monte_carlo.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
             drawn = {AS_IS: before, CHANGED: before.pulled(moved)}
             widths = {k: monte_carlo.half_widths(result, v, LEVEL) for k, v in drawn.items()}
             bands = {
@@ -296,8 +286,7 @@ def whatif(
     for line in changes_between(result.before.drive.parameters, result.after.drive.parameters):
         note(line)
     show(made)
-    for sentence in (*result.sentences(), *said):
-        say(f"- {sentence}")
+    bullets(result.sentences(), said)
     files.say()
 
 
@@ -367,9 +356,7 @@ def size(
             follow = trial(drive.chosen, voltage)
         found = sizing.size(drive.chosen, required, ranges, follow=follow)
     files.write(out, "Changed drive", found.drive.to_toml)
-    note(drive.title)
-    for line in drive.changes:
-        note(line)
+    drive.note(drive.title)
     show(sizing.levers_table(found), sizing.performance_table(found, required))
     if found.change == 0.0:
         say("The drive meets it as it is; nothing needs to be changed.")
@@ -385,7 +372,6 @@ def size(
 def sensitivity(
     drive: DriveChoice,
     levers: Levers = None,
-    span: Annotated[float, option("Levers without factors go this part down and up.")] = 0.1,
     outcomes: Annotated[
         list[str] | None,
         option(
@@ -408,7 +394,6 @@ def sensitivity(
             metavar="N",
         ),
     ] = None,
-    seed: Seed = 0,
     plot: FigureFile = None,
     out: TableFile = None,
     *,
@@ -429,31 +414,24 @@ def sensitivity(
 
     files = Outputs((out, TABLE), (plot, FIGURE))
     wanted, indices = tuple(outcomes) if outcomes else OUTCOMES, None
-    if not 0.0 < span < 1.0:
-        raise InputError(f"--span is {span:g}, but must lie between 0 and 1.")
     with working("Simulating"):
         name, trial = trial_of(drive.chosen, maneuver, sampling)
-        ranges = ranges_of(levers or PULLED, (1.0 - span, 1.0 + span))
+        ranges = ranges_of(levers or PULLED, SPAN)
         single = analysis.one_at_a_time(drive.chosen, ranges, trial, outcomes=wanted)
         if samples is not None:
-            indices = analysis.sobol(
-                drive.chosen, ranges, trial, outcomes=wanted, samples=samples, seed=seed
-            )
+            indices = analysis.sobol(drive.chosen, ranges, trial, outcomes=wanted, samples=samples)
     title = f"{drive.title}, {name}"
     files.write(out, "All numbers, in SI", analysis.sensitivity_table(single, indices).write)
     if indices is None:
         files.draw(plot, "plot_tornado", single, title=f"{title}: each lever by itself")
     else:
         files.draw(plot, "plot_sobol", indices, title=f"{title}: shares of the variance")
-    note(title)
-    for line in drive.changes:
-        note(line)
+    drive.note(title)
     show(*(analysis.outcome_table(single, indices, k) for k in range(len(single.outcomes))))
-    for sentence in dict.fromkeys((*single.sentences, *(indices.sentences if indices else ()))):
-        say(f"- {sentence}")
+    bullets(dict.fromkeys((*single.sentences, *(indices.sentences if indices else ()))))
     if indices is not None:
         error = indices.largest_error
-        say(f"- {indices.runs} simulations; indices are good to {error:.2g} or better.")
+        bullets([f"{indices.runs} simulations; indices are good to {error:.2g} or better."])
     files.say()
 
 
@@ -519,8 +497,6 @@ def compensate(
             tables.append(tracking.improvement_table(bought, name))
     files.write(out, "Inverse map, in SI", found.write)
     files.draw(plot, "plot_compensation", found, bought)
-    note(f"{drive.title}: voltage for a wanted speed")
-    for line in drive.changes:
-        note(line)
+    drive.note(f"{drive.title}: voltage for a wanted speed")
     show(*tables)
     files.say()

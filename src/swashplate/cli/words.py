@@ -30,6 +30,8 @@ _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*
 _ENDING = re.compile(r"\.[A-Za-z]\w*$")
 DRIVE = "drive.toml"
 """The drive in a folder that a fit wrote."""
+CONFIGURATION = "setup.toml"
+"""The fit configuration in such a folder."""
 NUMBERS = "parameters.toml"
 """What a fit of a model of one's own writes in the place of a drive."""
 UNFELT, FEELING = "load_torque", ("motor_leakage", "motor_constant")
@@ -147,6 +149,12 @@ def parameters_of(word: str) -> ParameterSet:
 
     file = drive_file(word)
     return load_preset(word) if file is None else load_set(file)
+
+
+def configuration_of(word: str, setup: str | None, name: str) -> str:
+    """The fit configuration for a drive: the one asked for, a fit folder's own, or its name's."""
+    own = Path(word) / CONFIGURATION
+    return setup or (str(own) if own.is_file() else name)
 
 
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelParameters:

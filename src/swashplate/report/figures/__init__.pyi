@@ -10,10 +10,6 @@ from .campaign import plot_campaign as plot_campaign
 from .campaign import plot_channel as plot_channel
 from .crane import plot_crane as plot_crane
 from .fit import plot_fit as plot_fit
-from .fit import plot_overlay as plot_overlay
-from .fit import plot_waterfall as plot_waterfall
-from .fit import save_fit_figures as save_fit_figures
-from .fit import save_run_figures as save_run_figures
 from .linear import plot_bode as plot_bode
 from .simulation import plot_comparison as plot_comparison
 from .simulation import plot_full_order as plot_full_order

@@ -1,4 +1,4 @@
-"""Figures of simulations: one with its chain of signals, several compared, many at a glance."""
+"""Figures of simulations: one with its chain of signals, and several compared."""
 
 from __future__ import annotations
 
@@ -98,8 +98,9 @@ def plot_simulation(simulation: Simulation, *, title: str | None = None) -> Figu
         Trace(run.current_positive, BLUE, "positive"),
         Trace(run.current_negative, VERMILION, "negative"),
     )
-    dead_zone = (Mark(pump.Z17, f"dead zone {pump.Z17:.2f} A"),)
-    electric = acting(Limit.DEAD_ZONE, Limit.CURRENT_RATE)
+    # without a dead zone no current is within it, although its flag stands at exactly 0 A
+    dead_zone = (Mark(pump.Z17, f"dead zone {pump.Z17:.2f} A"),) if pump.Z17 else ()
+    electric = acting(*([Limit.DEAD_ZONE] if pump.Z17 else []), Limit.CURRENT_RATE)
     panels = [
         Panel("current", "A", current, electric, dead_zone),
         _spool(run.spool_position, run.orifice_opening, ends)._replace(

@@ -17,7 +17,7 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
 from swashplate.identification.acceptance import Statement, Verdict, starts_of, verdict
-from swashplate.identification.assessment import Assessment, StageProfile, assess
+from swashplate.identification.assessment import Assessment, StageProfile, assess, motion_of
 from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.identifiability import in_the_fits_scales
 from swashplate.identification.own_model import ModelParameters
@@ -37,7 +37,7 @@ from swashplate.report.fit_report.runs import (
 )
 from swashplate.report.fit_report.summary import light, run_error, run_lights, summary_section
 from swashplate.tables import NONE, Column, Table, count, joined, listed, write_text
-from swashplate.units import chosen_unit, shown_in, unit_text
+from swashplate.units import chosen_unit, show_rod, shown_in, unit_text
 
 Role = Literal["fit", "validate"]
 _PARTS = {
@@ -120,6 +120,8 @@ def write_fit_report(
     found = Drive(drive) if isinstance(drive, ParameterSet) else None
     head, shared = _shared(campaign, runs, fit.nominal)
     with _units_of_people():
+        if motion_of(run.experiment for run in runs) == "rod":
+            show_rod()
         sections = [
             summary_section(judged, campaign, found, assessed, runs, head["findings"]),
             *shared[:2],
