@@ -25,8 +25,6 @@ from swashplate.cli.terminal import (
     note,
     say,
     show,
-    show_in,
-    widths_of,
     working,
 )
 from swashplate.cli.words import (
@@ -172,10 +170,8 @@ def check(
     counted = ", ".join(f"{roles.count(role)} to {role}" for role in dict.fromkeys(roles))
     virtual = " (virtual)" if campaign.virtual else ""
     note(f"{campaign.title}{virtual}: {len(campaign)} experiments ({counted})")
-    tables = {each.name: quality_table(each, qualities[each.name]) for each in campaign}
-    widths = widths_of(tables.values()) if tables else []
     for experiment in campaign:
-        show_in(widths, tables[experiment.name])
+        show(quality_table(experiment, qualities[experiment.name]))
         for text in experiment.notes:
             say(f"- {text}.")
         for each in qualities[experiment.name]:

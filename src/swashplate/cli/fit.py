@@ -26,7 +26,6 @@ from swashplate.cli.terminal import (
     check_free,
     long_work,
     note,
-    progress,
     say,
     show,
     side,
@@ -578,7 +577,7 @@ def demo(
     if not (out / "virtual" / "truth").is_dir():  # an earlier demo is replaced, nothing else
         check_free(out)
     setup = load_setup("hoist")
-    with progress(5) as begin:
+    with long_work("", 5) as begin:
         begin("testing the virtual hoist")
         truth = drawn(Drive.preset("hoist"), setup, seed)
         tests = rig.run("hoist", truth=truth, seed=seed)

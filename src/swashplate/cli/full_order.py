@@ -12,7 +12,7 @@ from swashplate.cli.options import (
     argument,
     option,
 )
-from swashplate.cli.terminal import Outputs, note, progress, say, show, working
+from swashplate.cli.terminal import Outputs, long_work, note, say, show, working
 from swashplate.cli.words import physical_values, simulated
 from swashplate.errors import InputError
 from swashplate.tables import FIGURE, TABLE
@@ -81,7 +81,7 @@ def full_order(
         from swashplate.equations.marching.record import least_substeps
 
         least_substeps(sampling.rate)  # one out of range is refused before anything is sampled
-        with progress(len(comparison.TABLE_MANEUVERS)) as begin:
+        with long_work("", len(comparison.TABLE_MANEUVERS)) as begin:
             found = comparison.validity(full, sampling.rate, begin=begin)
         files.write(out, "Table", found.write)
         said = f"{len(found.rows)} maneuvers"
