@@ -61,12 +61,6 @@ def test_roles(done: Words, held_out: Path) -> None:
     )
 
 
-def test_ignored_windows_stand_beside_the_fit(done: Words, held_out: Path) -> None:
-    text = held_out.read_text("utf-8")
-    held_out.write_text(f"{text}ignore = [{{ to = 0.5, why = 'noise' }}]\n", "utf-8")
-    assert "0 to 0.5 s (noise)" in done("validate", "hoist", "virtual/campaign.toml")
-
-
 def test_a_drive_that_is_not_usable_ends_with_1(
     run: Callable[..., Result], held_out: Path, tmp_path: Path
 ) -> None:

@@ -219,15 +219,12 @@ def test_a_wrong_speed_is_said_and_ends_with_code_1(run, monkeypatch: pytest.Mon
 @pytest.mark.parametrize(
     "typed",
     [
-        "limits hoist",
         "limits hoist sine:9,0.1",
         "sensitivity hoist --lever pump --lever orifice --sobol 16",
         "compensate slew sine:2,0.1",
         "size hoist --speed-deg-s 250",
         "linearize hoist --at 4 --loop-gain 0.01",
         "bode hoist --points 3",
-        "full-order hoist step:4",
-        "compare hoist slew",
         "excitation virtual/campaign.toml",
         "campaign check virtual/campaign.toml",
         "validate hoist virtual/campaign.toml --role all",

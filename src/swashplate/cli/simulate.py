@@ -19,7 +19,13 @@ from swashplate.cli.options import (
     option,
 )
 from swashplate.cli.terminal import Outputs, note, say, show, working
-from swashplate.cli.words import drive_of, maneuver_of, simulated
+from swashplate.cli.words import (
+    changes_between,
+    drive_of,
+    maneuver_of,
+    parameters_of,
+    simulated,
+)
 from swashplate.documents import parse_toml
 from swashplate.tables import FIGURE, TABLE, Column, Table
 
@@ -165,7 +171,7 @@ def show_parameters(
         typer.echo(dump_set(parameters), nl=False)
         return
     say(f"{parameters.name}: {parameters.title}")
-    for line in drive.changes:
+    for line in changes_between(parameters_of(drive.drive), parameters):
         note(line)
     show(*parameters.tables())
     rate = "any rate" if parameters.rate is None else f"{parameters.rate:g} Hz"

@@ -71,7 +71,7 @@ def _rich(
             width=widths[place] if widths else None,
             min_width=whole[place] if column.spec else None,
             # a name that is too long goes on in the next line
-            overflow="fold" if widths and not column.spec else "ellipsis",
+            overflow="ellipsis" if column.spec else "fold",
         )
     for row, cells in zip(table.rows, texts[1:], strict=True):
         if row.section:

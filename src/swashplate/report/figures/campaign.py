@@ -435,6 +435,9 @@ def plot_channel(
     unit = display_unit(channel.unit, float(np.abs(values).max()))
     dress(axes[0], unit.label(channel.kind.replace("_", " ").replace("encoder counts", "angle")))
     how: dict[str, Any] = {"held": channel.is_position, "width": THIN, "zorder": 2.5}
+    counted = values[used] if used.any() else values
+    room = 0.12 * float(np.ptp(counted)) or 1.0 / unit.factor
+    axes[0].set_ylim(unit.factor * (counted.min() - room), unit.factor * (counted.max() + room))
     draw(axes[0], time, unit.factor * values, INK if channel.is_position else BLUE, **how)
     if simulated is not None:
         draw(axes[0], time, unit.factor * simulated[rows], VERMILION, zorder=3.0)
