@@ -25,10 +25,10 @@ from swashplate.errors import FileError, InputError, SwashplateError
 HELP = """\
 Hydrostatic drives: from a joystick's voltage to the speed of the shaft.
 
-A drive is a control card, a pump and a motor. Packaged are three measured
-ones, the hoist, slew and luff axes of a crane, and a neutral one to start
-your own from. A command is a file of measured voltages or a maneuver: a
-name and its numbers in V, s and Hz.
+A drive is a proportional amplifier (the control card), a pump and a motor.
+Packaged are three measured ones, the hoist, slew and luff axes of a crane,
+and a neutral one to start your own from. A command is a file of measured
+voltages or a maneuver: a name and its numbers in V, s and Hz.
 
 Maneuvers, and some of the options that may follow their numbers:
   step:9                  9 V from 1 s to 6 s         start, stop, length
@@ -59,7 +59,7 @@ Examples:
 
 Files are written in SI, whole or not at all. What is wrong is said in one
 sentence on standard error, with exit code 2. 'swashplate COMMAND --help'
-tells more about a command.
+says more about a command.
 """
 
 

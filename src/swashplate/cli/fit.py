@@ -128,7 +128,7 @@ def fit(
     """Identify a drive, or a model of your own, from its tests.
 
     Fits the runs with the role 'fit', stage after stage, predicts those with the
-    role 'validate', and says what the data can and cannot tell. Writes the drive
+    role 'validate', and says what the data determine and what not. Writes the drive
     as a parameter file that 'simulate' takes, the estimates with their intervals,
     and what 'report' needs to write the report again. Ctrl-C keeps the best so
     far, of several starts those that ended, and the exit code is 130. It is 1 if

@@ -201,7 +201,8 @@ def summary_section(
 ) -> Section:
     """The first screen: `drive` is None for a model of one's own, which has no such numbers."""
     look = LIGHTS[judged.grade]
-    shown = [Block("verdict", (light(look, judged.grade), judged.headline), look)]
+    headline = judged.headline.replace(" %", "\N{NO-BREAK SPACE}%")
+    shown = [Block("verdict", (light(look, judged.grade), headline), look)]
     shown.append(Block("pair", list(_curves(runs, campaign.virtual))))
     numbers, limits = [], []
     if drive is not None:
@@ -252,13 +253,9 @@ def _limits(drive: Drive) -> list[str]:
     except SwashplateError as error:
         return [str(error)]
     acting = sorted(found.shares, key=lambda each: each.time_share or 0.0, reverse=True)
-    shares = (
-        f"{each.limit[0].upper()}{each.limit[1:]}: acts {percent(each.time_share)} of the time."
-        for each in acting[:3]
-        if each.time_share
-    )
-    head = "Steps from rest to ±10 V and back:"
-    return [f"{head} {' '.join(shares)}", *found.sentences()[:1]]
+    shares = [f"{e.limit} {percent(e.time_share)}" for e in acting[:3] if e.time_share]
+    head = "Share of the time of steps from rest to ±10 V and back"
+    return [f"{head}: {', '.join(shares) or 'nothing acts'}.", *found.sentences()[:1]]
 
 
 def _next(
