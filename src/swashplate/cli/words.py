@@ -190,8 +190,9 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
 
     set_as = "Z16=1.2e-4, Z16=1.2e-4/1.5e-4 (plus/minus) or Z16_plus=0.12mm"
     scaled_as = "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
-    drive = Drive(parameters_of(word)).replace(**_assigned("--set", values, set_as, _value))
-    scaled = _assigned("--scale", factors, scaled_as, _factor)
+    chosen: dict[str, Change] = _assigned("--set", values, set_as, _value)
+    scaled: dict[str, Change] = _assigned("--scale", factors, scaled_as, _factor)
+    drive = Drive(parameters_of(word)).replace(**chosen)
     own = {name: change for name, change in scaled.items() if not _is_lever(name)}
     drive = drive.scale(**own)
     if len(own) < len(scaled):
