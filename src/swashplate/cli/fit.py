@@ -128,11 +128,11 @@ def fit(
     """Identify a drive, or a model of your own, from its tests.
 
     Fits the runs with the role 'fit', stage after stage, predicts those with the
-    role 'validate', and says what the data determine and what not. Writes the drive
-    as a parameter file that 'simulate' takes, the estimates with their intervals,
-    and what 'report' needs to write the report again. Ctrl-C keeps the best so
-    far, of several starts those that ended, and the exit code is 130. It is 1 if
-    the result is not usable.
+    role 'validate', and says what the data determine. Writes the drive as a
+    parameter file that 'simulate' takes, the fit configuration, the estimates
+    with their intervals, and what 'report' needs to write the report again.
+    Ctrl-C keeps the best so far, of several starts those that ended, and the exit
+    code is 130. It is 1 if the result is not usable.
 
     For example:
       swashplate rig hoist --out virtual --perturb 0.1
