@@ -14,18 +14,6 @@ from timing import alone, seconds
 from swashplate import Drive, SquaredError, maneuvers
 from swashplate.logs import read_series
 
-LEVERS = (
-    "orifice",
-    "pump",
-    "supply_pressure",
-    "rate_limits",
-    "dead_zone",
-    "spool_stroke",
-    "relief",
-    "plussing",
-)
-OUTCOMES = ("final_speed", "rise_time", "largest_acceleration", "tracking_error", "creep")
-
 
 def peak() -> float:
     """Largest memory that this process has had (Linux). [B]

@@ -38,7 +38,6 @@ from .outcomes import command_for as command_for
 from .outcomes import find_outcomes as find_outcomes
 from .outcomes import outcome_matrix as outcome_matrix
 from .outcomes import outcome_unit as outcome_unit
-from .outcomes import overview_table as overview_table
 from .outcomes import peaks as peaks
 from .outcomes import performance as performance
 from .outcomes import proportional_speed as proportional_speed

@@ -469,7 +469,8 @@ def run_tables(run: Simulation) -> tuple[Table, Table]:
         did.add(f"peak speed, {way}", speed, unit="rad/s")
     did.add("speed at the end", float(run.shaft_speed[-1]), unit="rad/s")
     did.add("position at the end", position, unit="rad", spec="z.1f")
-    did.add("", position / (2.0 * np.pi), unit="turns", spec="z.3f")
+    if display_unit("rad").name == "deg":
+        did.add("", position / (2.0 * np.pi), unit="turns", spec="z.3f")
     for way, current in zip(ways, peaks(run.current), strict=True):
         section = way == "positive"
         did.add(f"peak current, {way}", current, unit="A", spec="z.4f", section=section)
@@ -492,17 +493,4 @@ def side_by_side(drives: Mapping[str, Drive], runs: Mapping[str, Simulation]) ->
     made.add("peak speed, negative", *negative, unit="rad/s")
     made.add(f"settled speed at {volts:g} V", *settled, unit="rad/s")
     made.add("time to 90 % of it", *times, unit="s", spec=".3f")
-    return made
-
-
-def overview_table(runs: Mapping[str, Mapping[str, Simulation]]) -> Table:
-    """Peak speeds of many runs and the limits that they meet, by axis and maneuver."""
-    speed = ("z.2f", "rad/s")
-    words = Column("axis"), Column("maneuver"), Column("samples", "d")
-    limits = Column("limits met", wrap=True)
-    made = Table("Peak speeds", (*words, Column("plus", *speed), Column("minus", *speed), limits))
-    for axis, by_name in runs.items():
-        for number, (name, run) in enumerate(by_name.items()):
-            met = ", ".join(limit for limit, share in _time_shares(run).items() if share)
-            made.add(axis, name, run.time.size, *peaks(run.shaft_speed), met, section=number == 0)
     return made

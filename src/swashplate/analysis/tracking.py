@@ -147,8 +147,8 @@ class LargestSine(Result):
             f"Largest sine followed within {100.0 * self.error:g} %",
             (
                 Column("frequency", "g", "Hz"),
-                Column("lag forgiven", ".2f", "rad/s"),
-                Column("lag counted", ".2f", "rad/s"),
+                Column("with time shift", ".2f", "rad/s"),
+                Column("without", ".2f", "rad/s"),
             ),
         )
         for frequency, *amplitudes in zip(

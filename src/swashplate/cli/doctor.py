@@ -15,10 +15,6 @@ from swashplate.__about__ import __version__
 from swashplate.cli.terminal import note, say, show, working
 from swashplate.tables import Column, Table
 
-EXAMPLES = """\
-Examples:
-  swashplate doctor
-"""
 LIBRARIES = ("numpy", "scipy", "numba", "polars", "pydantic", "matplotlib", "jinja2", "h5py")
 """Whose versions matter when a result or a figure differs."""
 
@@ -48,6 +44,9 @@ def doctor() -> None:
 
     Paste what it prints into a question or a report of a problem. Exit code 1
     if the simulation does not give the published speed.
+
+    For example:
+      swashplate doctor
     """
     show(_versions(), _machine(), _extras())
     with working("Simulating the hoist"):

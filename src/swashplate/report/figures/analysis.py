@@ -323,36 +323,6 @@ def _speed_limits(ax: Axes, result: WhatIf, looks: Mapping[str, Stroke]) -> None
                 ax.axhline(factor * limit, color=looks[name].color, linewidth=0.6, alpha=0.5)
 
 
-def plot_bands(band: Bands, *, title: str | None = None) -> Figure:
-    """Figure of the median speed with its band, and of the band about the median, enlarged.
-
-    Parameters
-    ----------
-    band : Bands
-        See `analysis.monte_carlo.bands`.
-    title : str, optional
-        By default it says what is shown.
-    """
-    words = "Shaft speed that the tests allow" if title is None else title
-    figure, axes = sheet([2.8, 1.4], words)
-    unit = display_unit("rad/s")
-    for ax, label in zip(axes, ("shaft speed", "about the median"), strict=True):
-        dress(ax, unit.label(label))
-        zero_line(ax)
-    shade_band(axes[0], band, BLUE)
-    draw(axes[0], band.time, unit.factor * band.median, BLUE)
-    shade_band(axes[1], band, BLUE, about=band.median)
-    width, when = band.widest
-    said = (
-        f"{100.0 * band.level:g} % of {band.draws} drives; widest {unit.factor * width:.3g} "
-        f"{unit.name} at {when:.3g} s"
-    )
-    write(axes[1], said, (0.0, 1.0))
-    fit_time(axes[-1], band.time)
-    label_below(axes[-1], "time (s)")
-    return figure
-
-
 def shade_band(ax: Axes, band: Bands, color: ColorType, *, about: Array | float = 0.0) -> None:
     """Shade a band of speeds; a long one by every so many samples."""
     step, factor = max(-(-band.time.size // (2 * COLUMNS)), 1), display_unit("rad/s").factor
