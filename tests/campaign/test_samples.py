@@ -78,20 +78,6 @@ def test_statistics_by_hand() -> None:
     assert found.missing == 4
 
 
-def test_a_real_log_with_a_pause() -> None:
-    folder = SHARED / "data" / "excavator"
-    if not folder.exists():
-        pytest.skip("the excavator's measured data are not beside this checkout")
-    import polars as pl
-
-    path = sorted(folder.glob("steps_*.csv"))[0]
-    time = pl.read_csv(path)["Time"].to_numpy().astype(float)
-    found = stamp_statistics(time)
-    assert found.rate == pytest.approx(52.0, abs=2.0)
-    assert found.longest == pytest.approx(1.0, abs=0.2)
-    assert found.missing > 40
-
-
 # --- counts ---------------------------------------------------------------------------------------
 
 
@@ -163,22 +149,6 @@ def test_interpolation_by_hand(time: list, counts: list, lines: list) -> None:
     np.testing.assert_allclose(interpolate_counts(time, counts), lines, rtol=1e-15)
 
 
-@given(st.floats(0.02, 30.0), st.floats(0.0, 1.0), st.sampled_from([-1.0, 1.0]))
-def test_steady_motion_is_found_to_the_motion_within_one_sample(
-    speed: float, first: float, direction: float
-) -> None:
-    rows = np.arange(2000)
-    position = first + direction * speed * rows
-    counts = np.floor(position)
-    changes = np.flatnonzero(np.diff(counts)) + 1
-    inside = slice(changes[0], changes[-1] + 1)
-    lines = interpolate_counts(rows, counts)
-    # the edge below (forth) or above (back) was passed within the sample before the change
-    behind = direction * (position - lines)[inside] + (1.0 if direction < 0.0 else 0.0)
-    assert behind.min() >= -1e-9
-    assert behind.max() <= min(1.0, speed) + 1e-9
-
-
 def test_lost_counts_are_found_where_they_are() -> None:
     time = np.arange(1000) / 512.0
     counts = np.floor(300.0 * np.sin(2.0 * np.pi * time))  # at most 1885 counts/s
@@ -194,11 +164,6 @@ def test_stamps_count_and_a_record_must_be_long_enough() -> None:
     np.testing.assert_array_equal(find_lost_counts(time, counts), [4])
     with pytest.raises(InputError, match="5 rows is too short to find lost counts"):
         find_lost_counts(time[:5], counts[:5])
-
-
-def test_rest_has_no_lost_counts() -> None:
-    flicker = np.array([0, 0, 0, 1, 0, 0, 0, 0, 1, 1, 1, 0], dtype=float)
-    assert find_lost_counts(np.arange(12.0), flicker).size == 0
 
 
 # --- columns that are counters --------------------------------------------------------------------

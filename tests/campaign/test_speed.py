@@ -4,8 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.signal import lsim
 
 from swashplate.campaign import (
@@ -33,17 +31,6 @@ def recursions(angle: np.ndarray, a: float, b: float, h: float) -> np.ndarray:
         low[n] = (1.0 - a * h) * low[n - 1] + a * h * angle[n - 1]
         speed[n] = (1.0 - b * h) * speed[n - 1] + b * (low[n] - low[n - 1])
     return speed
-
-
-def test_matched_speed_is_its_two_recursions() -> None:
-    """As printed, w ← (1 - ah) w + ah u₋₁ and y ← (1 - bh) y + bh w₋₁ are not aligned."""
-    speed = np.random.default_rng(6).normal(size=400)
-    low, expected = np.zeros(400), np.zeros(400)
-    for n in range(1, 400):
-        low[n] = (1.0 - LOW_PASS * H) * low[n - 1] + LOW_PASS * H * speed[n - 1]
-        expected[n] = (1.0 - DIFFERENTIATOR * H) * expected[n - 1] + DIFFERENTIATOR * H * low[n - 1]
-    found = matched_speed(np.arange(400) * H, speed, aligned=False)
-    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def position(
@@ -93,20 +80,6 @@ def test_exact_path_is_the_continuous_one(rate: float) -> None:
     np.testing.assert_allclose(found, speed, atol=1e-8 * np.abs(speed).max())
 
 
-@given(st.lists(st.tuples(st.floats(1e-4, 0.05), st.floats(-1, 1)), min_size=2, max_size=30))
-def test_exact_path_does_not_see_stamps_put_between(steps: list[tuple[float, float]]) -> None:
-    time = np.cumsum([step for step, _ in steps])
-    angle = np.array([value for _, value in steps])
-    finer = np.sort(np.concatenate([time, 0.7 * time[1:] + 0.3 * time[:-1]]))
-    speed = speed_from_angle(time, angle, form="exact")
-    between = speed_from_angle(finer, np.interp(finer, time, angle), form="exact")
-    # stamps that are even but for 5 % are taken as even: that is the tolerance here
-    scale = np.abs(np.diff(angle) / np.diff(time)).max()
-    np.testing.assert_allclose(between[::2], speed, atol=0.2 * scale + 1e-12)
-    if np.ptp(np.diff(time)) > 0.5 * np.diff(time).max():
-        np.testing.assert_allclose(between[::2], speed, atol=1e-9 * scale + 1e-12)
-
-
 def test_a_gap_leaves_its_mean_speed_and_no_overflow() -> None:
     speed = speed_from_angle([0.0, 0.1, 1000.0, 1000.1], [0.0, 0.2, 1000.0, 1000.1], form="exact")
     assert speed[2] == pytest.approx((1000.0 - 0.2) / (1000.0 - 0.1), rel=1e-12)
@@ -145,20 +118,6 @@ def test_matched_sine_has_the_phase_of_the_measured_one(form: str, frequency: fl
     assert abs(matched / measured) == pytest.approx(x / np.tan(x), rel=1e-6)
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_matched_ramp_comes_when_the_measured_one_does(form: str) -> None:
-    time = np.arange(2000) * H
-    speed, angle = 4.0 * time, 2.0 * time**2
-    measured = speed_from_angle(time, angle, form=form)
-    matched = matched_speed(time, speed, form=form)
-    raw = matched_speed(time, speed, form=form, aligned=False)
-    lags = [(measured - each)[-1] / 4.0 / H for each in (matched, raw)]
-    np.testing.assert_allclose(lags, [0.0, 0.5], atol=1e-6)
-    # but for terms in h² of the exact form
-    late = time[-1] - measured[-1] / 4.0
-    assert late == pytest.approx(path_delay(H, form=form), rel=1e-6 if form == "source" else 1e-5)
-
-
 def test_unstable_and_uneven_are_refused_for_the_explicit_form_only() -> None:
     slow = np.arange(100) / 94.0
     with pytest.raises(InputError, match="unstable at 94 Hz, as at every rate up to 94.25 Hz"):
@@ -170,16 +129,6 @@ def test_unstable_and_uneven_are_refused_for_the_explicit_form_only() -> None:
         matched_speed(uneven, uneven)
     with pytest.raises(InputError, match="form must be 'source' or 'exact', not 'zoh'"):
         matched_speed(slow, slow, form="zoh")
-
-
-def test_wrong_arguments_are_refused() -> None:
-    time = np.arange(10) * H
-    with pytest.raises(InputError, match="angle must be finite, but row 3"):
-        speed_from_angle(time, np.where(np.arange(10) == 3, np.nan, 0.0))
-    with pytest.raises(
-        InputError, match="speed must be one signal with one row for each of the 10"
-    ):
-        matched_speed(time, np.zeros((3, 10)))
 
 
 def test_the_moving_parabola_by_hand() -> None:
