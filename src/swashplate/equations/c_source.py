@@ -37,12 +37,17 @@ from swashplate.errors import EquationError
 
 WIDTH = 100
 """Longest line of C."""
-HELPERS = """\
-/* Python's min and max: of two that do not compare, the first; of two that are equal, too. */
+HELPERS = {
+    "lesser_of": """\
+/* Python's min: of two that are equal or do not compare, the first. */
 static double lesser_of(double a, double b) { return b < a ? b : a; }
+""",
+    "greater_of": """\
+/* Python's max: of two that are equal or do not compare, the first. */
 static double greater_of(double a, double b) { return b > a ? b : a; }
-
-/* A number with whole powers by squaring, as the equations' compiler has them. */
+""",
+    "whole_power": """\
+/* A power with a whole number, by squaring as the equations' compiler does it. */
 static double whole_power(double base, int exponent)
 {
     double power = 1.0;
@@ -54,13 +59,16 @@ static double whole_power(double base, int exponent)
     }
     return exponent < 0 ? 1.0 / power : power;
 }
-
-/* A number without its fraction as a whole number; what has none is the lowest. */
+""",
+    "whole_number": """\
+/* A number without its fraction as a whole number; for what has none the lowest. */
 static long long whole_number(double value)
 {
     return value >= -9.2e18 && value <= 9.2e18 ? (long long)value : -9223372036854775807LL - 1;
 }
-"""
+""",
+}
+"""Functions that stand for what C has not, or has otherwise."""
 WORDS = set(
     """
 auto break case char const continue default do double else enum extern float for goto if inline int
@@ -235,6 +243,11 @@ class Unit:
             lines = [f"struct {tag} {{", *(f"    {each};" for each in inner), "};"]
             self.structs[tag] = (tag, "\n".join(lines))
         return tag
+
+    def helpers(self) -> list[str]:
+        """Functions that the translated ones call."""
+        text = "\n".join(self.texts)
+        return [each for name, each in HELPERS.items() if f"{name}(" in text]
 
     def kind(self, hint: Any, where: str) -> Kind:
         """Kind of what has a type."""
