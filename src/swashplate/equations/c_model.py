@@ -6,7 +6,7 @@ samples every part in the order of the flow, and then takes all states to the ne
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
@@ -23,9 +23,10 @@ from swashplate.equations.c_source import (
     literal,
     wrapped,
 )
+from swashplate.equations.expressions import Node
 from swashplate.equations.fields import Definition, declared_by, floats_of
 from swashplate.equations.marching.march import output_of
-from swashplate.equations.marching.part import HOLDS
+from swashplate.equations.marching.part import HOLDS, PartCode
 from swashplate.equations.model import Equation, Link, Model, Tap, Window, arguments_of
 from swashplate.equations.syntax import is_named_tuple, plain
 from swashplate.errors import InputError
@@ -449,3 +450,59 @@ def path_of(path: str) -> str:
 def indented(lines: Iterable[str]) -> list[str]:
     """Lines of C moved in, long ones on several."""
     return [each for line in lines for each in (wrapped(f"    {line}") if line else [""])]
+
+
+# --- feedthrough ----------------------------------------------------------------------------------
+
+
+def feedthrough(exported: Exported) -> dict[str, frozenset[str]]:
+    """Inputs that each output follows at the same sample, whatever the options.
+
+    Returns
+    -------
+    dict of str to frozenset of str
+        External signals by output; those that are read through a tap count with any delay below
+        the window's lead only, and are left out.
+    """
+    model = exported.model
+    every = [kind.options for kind in model.parts]
+    chosen = [[_on(kind, None) for kind in every], [_on(kind, "") for kind in every]]
+    for i, kind in enumerate(every):
+        for name in kind._fields if kind is not None else ():
+            chosen.append([_on(k, name if j == i else "") for j, k in enumerate(every)])
+    found: dict[str, frozenset[str]] = dict.fromkeys(exported.names, frozenset())
+    for options in chosen:
+        parts = [PartCode(model, i, model.external, each) for i, each in enumerate(options)]
+        for name in exported.names:
+            stored, _ = output_of(model, model.integrals.get(name, name))
+            link = model.links.get(stored.path) if stored.kind == "link" else None
+            nodes = (
+                [(s.part, parts[s.part].signal(s.signal)) for s in link.sources]
+                if link is not None
+                else [(stored.part, parts[stored.part].node(stored))]
+            )
+            found[name] |= _read(parts, nodes)
+    return found
+
+
+def _on(kind: Any, name: str | None) -> Any:
+    """Options all on, all off, or one of them on."""
+    if kind is None:
+        return None
+    return kind(*(True if name is None or each == name else None for each in kind._fields))
+
+
+def _read(parts: Sequence[PartCode], nodes: Iterable[tuple[int, Node]]) -> frozenset[str]:
+    """External signals that some nodes follow at once."""
+    found: set[str] = set()
+    for i, node in nodes:
+        read = parts[i].code.reads([node])
+        for name in parts[i].own.input_types:
+            link = parts[i].model.link_of(i, name)
+            if link is None:
+                signal = parts[i].own.tap(name).signal
+                found |= {signal} if f"x_{signal}" in read else set()
+            elif any(parts[i].source(s) in read for s in link.sources):
+                before = [(s.part, parts[s.part].signal(s.signal)) for s in link.sources]
+                found |= _read(parts, before)
+    return frozenset(found)
