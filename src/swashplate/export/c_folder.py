@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from swashplate.drive import Drive
 from swashplate.equations.c_interface import interface
-from swashplate.equations.c_model import Exported, Writer
+from swashplate.equations.c_model import Exported
+from swashplate.equations.c_model import feedthrough as feedthrough_of
 from swashplate.equations.c_source import literal
 from swashplate.equations.fields import numbers_of
 from swashplate.equations.marching.part import PartCode
@@ -57,6 +58,11 @@ def exported_drive(drive: Drive | None = None) -> Exported:
 def drive_sources(drive: Drive | None = None) -> dict[str, str]:
     """Header and source of the drive, by file name: the same for every set of parameters."""
     return interface(exported_drive(drive))
+
+
+def feedthrough(drive: Drive | None = None) -> dict[str, frozenset[str]]:
+    """Inputs that each output follows at the same sample, by output; a delayed command is none."""
+    return feedthrough_of(exported_drive(drive))
 
 
 def values_of(drive: Drive, step: float = STEP) -> Array:
