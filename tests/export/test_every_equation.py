@@ -19,7 +19,7 @@ import pytest
 
 import swashplate.equations
 import swashplate.models
-from swashplate.equations.c_source import Kind, Unit, hints_of
+from swashplate.equations.c_source import Kind, Unit, fields_of
 from swashplate.equations.equation import is_function
 from swashplate.equations.marching.run import module
 from swashplate.equations.syntax import parsed, plain
@@ -55,7 +55,7 @@ EQUATIONS = equations()
 def scalars(unit: Unit, kind: Kind, path: str) -> Iterator[tuple[str, str]]:
     """Word and path of every scalar of a kind, in order."""
     if kind.word == "struct":
-        for name, hint in hints_of(kind.cls):
+        for name, hint in fields_of(kind.cls):
             yield from scalars(unit, unit.kind(hint, path), f"{path}.{name}")
     elif kind.word == "tuple":
         for i, item in enumerate(kind.items):
@@ -67,7 +67,7 @@ def scalars(unit: Unit, kind: Kind, path: str) -> Iterator[tuple[str, str]]:
 def in_c(unit: Unit, kind: Kind, number: Iterator[int]) -> str:
     """A value in C of numbers in a row."""
     if kind.word == "struct":
-        inner = [in_c(unit, unit.kind(h, ""), number) for _, h in hints_of(kind.cls)]
+        inner = [in_c(unit, unit.kind(h, ""), number) for _, h in fields_of(kind.cls)]
         return f"{{{', '.join(inner) or '0'}}}"
     if kind.word == "tuple":
         return f"{{{{{', '.join(in_c(unit, item, number) for item in kind.items)}}}}}"
@@ -78,7 +78,7 @@ def in_c(unit: Unit, kind: Kind, number: Iterator[int]) -> str:
 def out_c(unit: Unit, kind: Kind, text: str) -> Iterator[str]:
     """The scalars of a value in C."""
     if kind.word == "struct":
-        for name, hint in hints_of(kind.cls):
+        for name, hint in fields_of(kind.cls):
             yield from out_c(unit, unit.kind(hint, ""), f"{text}.{name}")
     elif kind.word == "tuple":
         for i, item in enumerate(kind.items):
@@ -114,7 +114,7 @@ class Twin:
         self.count = 0
         given = [self.value(unit.kind(hints[a.arg], ""), a.arg) for a in source.arguments]
         back = unit.kind(hints["return"], "")
-        lines = [f"    for i in range(rows.shape[0]):", f"        r = f({', '.join(given)})"]
+        lines = ["    for i in range(rows.shape[0]):", f"        r = f({', '.join(given)})"]
         out = list(self.scalar(back, "r"))
         self.width = len(out)
         lines += [f"        out[i, {j}] = {each}" for j, each in enumerate(out)]
@@ -123,7 +123,9 @@ class Twin:
     def value(self, kind: Kind, path: str) -> str:
         if kind.word == "struct":
             self.names[kind.cls.__name__] = kind.cls
-            inner = [self.value(self.unit.kind(h, ""), f"{path}.{n}") for n, h in hints_of(kind.cls)]
+            inner = [
+                self.value(self.unit.kind(h, ""), f"{path}.{n}") for n, h in fields_of(kind.cls)
+            ]
             return f"{kind.cls.__name__}({', '.join(inner)})"
         if kind.word == "tuple":
             inner = [self.value(item, f"{path}.{i}") for i, item in enumerate(kind.items)]
@@ -137,7 +139,7 @@ class Twin:
 
     def scalar(self, kind: Kind, text: str) -> Iterator[str]:
         if kind.word == "struct":
-            for name, hint in hints_of(kind.cls):
+            for name, hint in fields_of(kind.cls):
                 yield from self.scalar(self.unit.kind(hint, ""), f"{text}.{name}")
         elif kind.word == "tuple":
             for i, item in enumerate(kind.items):

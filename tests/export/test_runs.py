@@ -1,19 +1,16 @@
 """Whole runs in C against the march in Python, bit for bit, and how much of the C they reach."""
 
-import ctypes
 import re
-import shutil
-import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
-from swashplate import DomainError, Drive, InputError
-from swashplate.export import drive_sources, values_of
+from swashplate import Drive
 from swashplate.simulation.stepper import Sample
 
 H = 1.0 / 512.0
@@ -31,8 +28,8 @@ class Case(NamedTuple):
     """A run of the battery."""
 
     preset: str = "hoist"
-    changes: dict[str, Any] = {}
-    forms: dict[str, Any] = {}
+    changes: Mapping[str, Any] = MappingProxyType({})
+    forms: Mapping[str, Any] = MappingProxyType({})
     start: str = "rest"
     rate: float = 512.0
     exact: bool = False
@@ -105,9 +102,7 @@ def compared(case: Case, made: Callable[..., Any], library: Path | None = None) 
     """Every output and limit of a run, in C and in Python."""
     drive, command = case.drive(), case.command()
     inputs = case.inputs(command.size)
-    run = drive.simulate(
-        command, case.rate, interpolation="previous", start=case.start, **inputs
-    )  # type: ignore[arg-type]
+    run = drive.simulate(command, case.rate, interpolation="previous", start=case.start, **inputs)  # type: ignore[arg-type]
     model = made(drive, 1.0 / case.rate, library)
     numbers = {name: model.number("_input", name) for name in inputs}
 

@@ -11,12 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive
-from swashplate.equations.c_interface import interface
-from swashplate.equations.c_model import Exported, Writer
-from swashplate.equations.c_model import feedthrough as feedthrough_of
-from swashplate.equations.c_source import c_name, literal
+from swashplate.equations.c_source import Exported, c_name, interface, literal
+from swashplate.equations.c_source import feedthrough as feedthrough_of
+from swashplate.equations.c_source.model import Writer
 from swashplate.equations.fields import numbers_of
-from swashplate.equations.marching.part import PartCode
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Instance, called
 from swashplate.equations.marching.use import instance_of as instance_of_model
@@ -24,7 +22,6 @@ from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError
 from swashplate.models.card import stable_step
 from swashplate.models.displacement_control import steep_stops
-from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import (
     PATHS,

@@ -12,25 +12,14 @@ from functools import cached_property
 from math import inf
 from typing import Any, get_type_hints
 
-from swashplate.equations.c_source import (
-    FLAG,
-
-    Kind,
-    Unit,
-    c_name,
-    comment,
-    hints_of,
-    literal,
-    wrapped,
-)
+from swashplate.equations.c_source.text import c_name, fields_of, indented, literal
+from swashplate.equations.c_source.unit import Unit
 from swashplate.equations.expressions import Node
 from swashplate.equations.fields import Definition, declared_by, floats_of
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.part import HOLDS, PartCode
 from swashplate.equations.model import Equation, Link, Model, Tap, Window, arguments_of
-from swashplate.equations.syntax import is_named_tuple, plain
-from swashplate.errors import InputError
-
+from swashplate.equations.syntax import plain
 
 OWN = """
 number_at put_at is_finite in_range number_of placed seen constant_window before_all good_inputs
@@ -295,7 +284,7 @@ class Writer:
             found[name] = local
         if part.inputs is not None:
             struct = self.unit.struct(part.inputs)
-            kinds = dict(hints_of(part.inputs))
+            kinds = dict(fields_of(part.inputs))
             values = [found[n][1:] if kinds[n] is Window else found[n] for n in part.input_types]
             made = f"(struct {struct}){{{', '.join(values)}}}"
             lines.append(f"const struct {struct} {member}_inputs = {made};")
@@ -451,19 +440,14 @@ class Writer:
         for i, part in enumerate(self.model.parts):
             if part.constants is not None:
                 kind = get_type_hints(plain(part.constants))["return"]
-                for path in floats_of(kind):
-                    found.append((path, f"{self.e.members[i]}_constants.{path_of(path)}"))
+                place = f"{self.e.members[i]}_constants"
+                found += [(path, f"{place}.{path_of(path)}") for path in floats_of(kind)]
         return found
 
 
 def path_of(path: str) -> str:
     """A path of Python's as one of C's."""
     return ".".join(c_name(each) for each in path.split("."))
-
-
-def indented(lines: Iterable[str]) -> list[str]:
-    """Lines of C moved in, long ones on several."""
-    return [each for line in lines for each in (wrapped(f"    {line}") if line else [""])]
 
 
 # --- feedthrough ----------------------------------------------------------------------------------
@@ -483,7 +467,7 @@ def feedthrough(exported: Exported) -> dict[str, frozenset[str]]:
     chosen = [[_on(kind, None) for kind in every], [_on(kind, "") for kind in every]]
     for i, kind in enumerate(every):
         for name in kind._fields if kind is not None else ():
-            chosen.append([_on(k, name if j == i else "") for j, k in enumerate(every)])
+            chosen += [[_on(k, name if j == i else "") for j, k in enumerate(every)]]
     found: dict[str, frozenset[str]] = dict.fromkeys(exported.names, frozenset())
     for options in chosen:
         parts = [PartCode(model, i, model.external, each) for i, each in enumerate(options)]
