@@ -111,6 +111,15 @@ def exported_model(model: Model) -> Exported:
     return Exported(model, c_name(model.name))
 
 
+def model_values(
+    model: Model, step: float, parameters: Any, *, options: Any = None, given: Any = None
+) -> Array:
+    """All numbers that the ``init`` of a model of one's own takes, as `values_of` has them."""
+    if not step > 0.0:
+        raise InputError(f"The step is {step:g} s, but must be above 0.")
+    return _values(instance_of_model(model, parameters, options=options, given=given), step)
+
+
 def c(
     what: Drive | Model,
     folder: str | Path,
@@ -150,10 +159,8 @@ def c(
     if isinstance(what, Drive):
         exported, values, name = exported_drive(what), values_of(what, step), what.name
     else:
-        if not step > 0.0:
-            raise InputError(f"The step is {step:g} s, but must be above 0.")
-        instance = instance_of_model(what, parameters, options=options, given=given)
-        exported, values, name = exported_model(what), _values(instance, step), what.name
+        values = model_values(what, step, parameters, options=options, given=given)
+        exported, name = exported_model(what), what.name
     name = re.sub(r"\W", "_", name, flags=re.ASCII).strip("_").lower() or "model"
     texts = interface(exported)
     words = {

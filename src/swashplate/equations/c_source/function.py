@@ -61,8 +61,7 @@ class Function:
             cells = zip(f.__code__.co_freevars, f.__closure__ or (), strict=False)
             free = {cell: each.cell_contents for cell, each in cells}
             hints = typing.get_type_hints(f, None, free or None)
-            where = f"{source.file}, line {source.node.lineno}: {source.name}"
-            kinds = {n: unit.kind(hint, where) for n, hint in hints.items()}
+            kinds = {n: unit.kind(hint, n) for n, hint in hints.items()}
         self.returns = kinds["return"]
         self.formals = {n: kind for n, kind in kinds.items() if n != "return"}
         if source.node.args.vararg:
@@ -234,7 +233,7 @@ class Function:
             for way in (value.body, value.orelse)
         ):
             ways = zip(value.body.elts, value.orelse.elts, strict=True)  # type: ignore[attr-defined]
-            elements = [ast.IfExp(value.test, one, two) for one, two in ways]
+            elements: list[ast.expr] = [ast.IfExp(value.test, one, two) for one, two in ways]
             value = ast.copy_location(ast.Tuple(elements, ast.Load()), value)
         pad = "    " * (len(path) + 1)
         if isinstance(value, ast.Tuple) and len(value.elts) == len(targets):
@@ -256,13 +255,12 @@ class Function:
         made = self.value(value)
         if not made.kind.whole:
             self.refuse(value, "an unpacking of something else than a tuple")
-        kept = self.held(made)
-        parts = self.parts(kept)
+        parts = self.parts(self.held(made))
         if len(parts) != len(targets):
             self.refuse(value, f"an unpacking of {len(parts)} values into {len(targets)}")
-        names = [t.id if isinstance(t, ast.Name) else "_" for t in targets]
+        targeted = [t.id if isinstance(t, ast.Name) else "_" for t in targets]
         return [self.bound(name, part, path, value)
-                for name, part in zip(names, parts, strict=True) if name != "_"]  # fmt: skip
+                for name, part in zip(targeted, parts, strict=True) if name != "_"]  # fmt: skip
 
     # -- values with parts -------------------------------------------------------------------------
 
@@ -289,7 +287,8 @@ class Function:
 
     def part(self, made: Text, name: str) -> Text:
         """A field."""
-        kind = self.unit.kind(dict(fields_of(made.kind.cls))[name], made.kind.cls.__name__)
+        cls = made.kind.cls
+        kind = self.unit.kind(dict(fields_of(cls))[name], f"{cls.__name__}.{name}")
         dot = "->" if made.pointer else "."
         return Text(f"{_grouped(made, 13)}{dot}{c_name(name)}", 13, kind, place=made.place)
 
@@ -561,7 +560,7 @@ class Function:
         """A named tuple."""
         hints, kind = dict(fields_of(cls)), Kind("struct", cls)
         made = self.bind(node, cls._fields, cls._field_defaults)
-        kinds = [self.unit.kind(hints[name], cls.__name__) for name in cls._fields]
+        kinds = [self.unit.kind(hints[n], f"{cls.__name__}.{n}") for n in cls._fields]
         texts = [self.converted(m, k, node) for m, k in zip(made, kinds, strict=True)]
         if node.keywords:
             pairs = zip(cls._fields, texts, strict=True)
@@ -591,7 +590,7 @@ class Function:
         cells = zip(f.__code__.co_freevars, f.__closure__ or (), strict=False)
         free = {cell: each.cell_contents for cell, each in cells}
         hints = typing.get_type_hints(f, None, free or None)
-        return {name: self.unit.kind(hint, source.name) for name, hint in hints.items()}
+        return {name: self.unit.kind(hint, name) for name, hint in hints.items()}
 
     def specialised(self, node: ast.Call, function: Any) -> Text:
         """A call of `root`, `repeated` or `interpolate`, made for what it is given."""

@@ -112,7 +112,8 @@ class _Interface:
             lines += [f"    double {c_name(name)};", f"    bool {c_name(name)}_given;"]
         lines += ["};", "", f"struct {e.type} {{", "    double step; /* [s] */"]
         for member, part in zip(e.members, self.model.parts, strict=True):
-            lines += [f"    struct {tag} {member}{tail};" for tag, tail in self.of_part(part)]
+            tags = self.writer.members_of(part)
+            lines += [f"    struct {tag} {member}{tail};" for tag, tail in tags]
         lines.append(f"    struct {e.prefix}_inputs inputs;")
         lines.append(f"    struct {e.prefix}_memory now, before; /* before the last sample */")
         if e.taps:
@@ -127,10 +128,6 @@ class _Interface:
         lines.append("    bool stale;   /* what follows from parameters is to be computed */")
         lines.append("    bool settled; /* the start is not at rest */")
         return "\n".join([*lines, "};"])
-
-    def of_part(self, part: object) -> Sequence[tuple[str, str]]:
-        """Tags and endings of the members that belong to a part."""
-        return [(tag, tail) for tag, tail in self.writer.members_of(part)]
 
     # -- source ------------------------------------------------------------------------------------
 

@@ -29,7 +29,7 @@ given_places flag_places constant_places output_names input_names option_names
 PUBLIC = """
 size value_count init reset settle step correct output limits set_input clear_input set get
 set_option get_option set_step get_step update find find_output find_input find_option
-parameter_name output_name sentence
+parameter_name output_name sentence memory inputs parameter
 """
 """Names that the interface takes, of its own and behind the prefix."""
 
@@ -59,13 +59,14 @@ class Exported:
     @property
     def file(self) -> str:
         """Name of header and source."""
-        return self.type if self.prefix == self.model.name else f"swashplate_{self.model.name}"
+        own = self.prefix == c_name(self.model.name)
+        return self.prefix if own else f"swashplate_{self.model.name}"
 
     @property
     def type(self) -> str:
         """Name of the struct."""
-        name = self.model.name
-        return name if self.prefix == name else f"{self.prefix}_{name}"
+        own = self.prefix == c_name(self.model.name)
+        return f"{self.prefix}_{'model' if own else self.model.name}"
 
     # -- names -------------------------------------------------------------------------------------
 
@@ -178,6 +179,7 @@ class Writer:
     def __init__(self, exported: Exported) -> None:
         self.e, self.model = exported, exported.model
         own = {*OWN.split(), *(f"{exported.prefix}_{each}" for each in PUBLIC.split())}
+        own |= {exported.type}
         self.unit = Unit(f"{exported.prefix}_", exported.widest, own)
         self.P = exported.prefix.upper()
         self.taken = {
@@ -377,8 +379,12 @@ class Writer:
         ]
         for number, (i, _, tap) in enumerate(self.e.taps):
             delay = f"m->{self.e.members[i]}.{path_of(tap.delay)}" if tap.delay else "0.0"
-            made = f"placed(m, {number}, {delay}, {literal(float(tap.ahead))}, {tap.samples})"
-            places.append(f"if (!{made}) {{\n    return {self.P}_BAD_DELAY;\n}}")
+            places.append(
+                f"placed(m, {number}, {delay}, {literal(float(tap.ahead))}, {tap.samples})"
+            )
+        if places:
+            test = "\n    || ".join(f"!{each}" for each in places)
+            places = [f"if ({test}) {{\n    return {self.P}_BAD_DELAY;\n}}"]
         lines = [line for each in (*options, *checks, *places) for line in each.split("\n")]
         texts = [
             "/* Options, stability and delays of these parameters and this step. */",

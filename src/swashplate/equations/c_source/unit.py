@@ -31,6 +31,10 @@ from swashplate.equations.syntax import Parsed, is_named_tuple, parsed, plain
 from swashplate.errors import EquationError
 
 
+class UnknownKindError(EquationError):
+    """A type that has no counterpart in C."""
+
+
 @dataclass
 class Unit:
     """Structs, constants and functions, in the order in which C needs them."""
@@ -40,7 +44,7 @@ class Unit:
     longest: int = 3
     """Elements of a tuple whose length the types leave open: samples of a `Window`."""
     reserved: set[str] = field(default_factory=set)
-    """Names that functions may not have."""
+    """Names that functions and structs may not have."""
     structs: dict[Any, tuple[str, str]] = field(default_factory=dict)
     constants: dict[str, tuple[Any, str]] = field(default_factory=dict)
     functions: dict[Any, str] = field(default_factory=dict)
@@ -70,7 +74,11 @@ class Unit:
         stem = "_of_".join([source.name, *(plain(each).__name__ for each in calls.values())])
         name = self.free(c_name(stem), source.function, {*self.functions.values(), *self.reserved})
         self.under_way.append(whole_key)
-        text = Function(self, source, name, kinds, calls).text()
+        try:
+            text = Function(self, source, name, kinds, calls).text()
+        except UnknownKindError as error:
+            where = f"{source.file}, line {source.node.lineno}: {source.name}"
+            raise EquationError(f"{where} cannot be written in C: {error}") from None
         self.under_way.pop()
         self.functions[whole_key] = name
         self.texts.append(text)
@@ -79,16 +87,19 @@ class Unit:
     def free(self, name: str, owner: Any, taken: Iterable[str]) -> str:
         """A name that nothing else has: with its module's, then with a number."""
         used, module = set(taken), owner.__module__.rpartition(".")[2].strip("_") or "own"
-        names = (name, f"{module}_{name}", *(f"{name}_{k}" for k in range(2, 1000)))
+        start = self.prefix if self.prefix and name.startswith(self.prefix) else ""
+        moved = f"{start}{module}_{name.removeprefix(start)}"
+        names = (name, moved, *(f"{name}_{k}" for k in range(2, 1000)))
         return next(each for each in names if each not in used)
 
     def struct(self, cls: Any) -> str:
         """A class of named tuples; its tag."""
         if cls not in self.structs:
             tag = c_name(f"{self.prefix}{snake(cls.__name__)}")
-            tag = self.free(tag, cls, [known for known, _ in self.structs.values()])
+            taken = {known for known, _ in self.structs.values()}
+            tag = self.free(tag, cls, taken | self.reserved)
             fields = [
-                (self.declaration(self.kind(hint, cls.__name__), c_name(name)), note)
+                (self.declaration(self.kind(hint, f"{cls.__name__}.{name}"), c_name(name)), note)
                 for (name, hint), note in zip(fields_of(cls), _notes(cls), strict=True)
             ]
             doc = inspect.getdoc(cls) or ""
@@ -131,10 +142,9 @@ class Unit:
         if origin is tuple:
             args = (args[0],) * self.longest if args[-1] is Ellipsis else args
             return Kind("tuple", None, tuple(self.kind(each, where) for each in args))
-        raise EquationError(
-            f"{where}: the type {getattr(hint, '__name__', hint)} has no counterpart in C; an "
-            "equation that is exported takes float, int, bool, bool | None for an option, tuples "
-            "and named tuples of them."
+        raise UnknownKindError(
+            f"{where} is of type {getattr(hint, '__name__', hint)}; there are float, int, bool, "
+            "bool | None for an option, tuples and named tuples of them."
         )
 
     def declared(self, kind: Kind) -> str:
