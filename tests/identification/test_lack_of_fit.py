@@ -10,12 +10,12 @@ import pytest
 from swashplate import Campaign, Drive
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import Experiment
-from swashplate.identification.acceptance import Verdict, verdict
 from swashplate.identification.assessment import Assessment, assess
 from swashplate.identification.fitting import fit
 from swashplate.identification.lack_of_fit import clipped_channels, lack_of_fit
 from swashplate.identification.setup import load_setup
 from swashplate.identification.validation import predict
+from swashplate.identification.verdict import Verdict, verdict
 from swashplate.maneuvers import ramp, sine, step
 
 TESTS = {

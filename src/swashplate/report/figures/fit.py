@@ -14,11 +14,11 @@ from matplotlib.ticker import NullLocator
 
 from swashplate.campaign import Campaign
 from swashplate.errors import InputError
-from swashplate.identification.acceptance import starts_of
 from swashplate.identification.assessment import Assessment, assess
 from swashplate.identification.fitting import Fit
 from swashplate.identification.solving import StartResult
 from swashplate.identification.validation import RunQuality, ignored_windows
+from swashplate.identification.verdict import starts_of
 from swashplate.report.fit_report.runs import (
     ShownRun,
     off_scale,
