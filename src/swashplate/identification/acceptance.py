@@ -13,7 +13,6 @@ from swashplate.identification.data_checks import contradicting_runs
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.intervals import unbounded_predictions
 from swashplate.identification.lack_of_fit import (
-    EXPLAINS,
     LOSS,
     Fault,
     LackOfFit,
@@ -61,10 +60,6 @@ BANDS = 1.35
 fit into the lags, and the largest of them stays below that."""
 SURE = 0.9
 """A correlation from which no band is asked: in short runs of one slow movement it reaches 1."""
-SIGNIFICANT = 10.0
-"""Standard errors from which a fault's size is taken for one. They are those of one step and of
-independent samples: in 60 sound campaigns sizes reach 13 of them, but no third of what is
-plausible."""
 
 
 class Criterion(NamedTuple):
@@ -307,7 +302,8 @@ def misfit_criteria(misfit: LackOfFit, judged: Sequence[RunQuality]) -> list[Cri
             )
         )
     poor = any(ratio > MISFIT for ratio in misfit.ratios.values())
-    made += [each for fault in misfit.faults for each in _fault_criterion(fault, poor)]
+    wrong = next((each for each in misfit.faults if _is_wrong(each, poor)), None)
+    made += [each for fault in misfit.faults for each in _fault_criterion(fault, poor, wrong)]
     if misfit.clipped:
         made.append(
             Criterion(
@@ -322,11 +318,22 @@ def misfit_criteria(misfit: LackOfFit, judged: Sequence[RunQuality]) -> list[Cri
     return made
 
 
-def _fault_criterion(fault: Fault, poor: bool) -> list[Criterion]:
-    """That a fault has no size that matters; none of a fault that is no criterion."""
+def _is_wrong(fault: Fault, poor: bool) -> bool:
+    """Whether an instrument is off by more than a third of what occurs without notice.
+
+    Where there is lack of fit, only a fault that explains it is told from what else is wrong.
+    """
+    told = isfinite(fault.plausible) and fault.told and fault.significant
+    return told and abs(fault.size) > fault.plausible / 3.0 and (fault.explains or not poor)
+
+
+def _fault_criterion(fault: Fault, poor: bool, wrong: Fault | None) -> list[Criterion]:
+    """That a fault has no size that matters; none of a fault that is no criterion.
+
+    Of several instruments that seem `wrong` the one that explains most is.
+    """
     size = f"{fault.size:+.2g} {fault.unit}"
-    significant = abs(fault.size) > SIGNIFICANT * fault.standard_error
-    explains = significant and fault.share > EXPLAINS
+    explains = fault.significant and fault.explains
     if fault.name.startswith("drift of "):
         part = abs(fault.size) / 100.0
         drifts = part > DRIFTS and explains
@@ -357,16 +364,17 @@ def _fault_criterion(fault: Fault, poor: bool) -> list[Criterion]:
         ]
     if not (isfinite(fault.plausible) and fault.told):
         return []
-    beyond = abs(fault.size) > fault.plausible / 3.0
-    wrong = beyond and significant
+    value = "not seen" if abs(fault.size) > fault.plausible / 3.0 else size
+    if wrong is not None and wrong is not fault and _is_wrong(fault, poor):
+        value = f"see {wrong.name}"
     return [
         Criterion(
             fault.name,
-            size if wrong or not beyond else "not seen",
+            size if fault is wrong else value,
             f"{fault.plausible / 3.0:.2g} {fault.unit}",
             "a larger error would be visible in these logs",
             "values",
-            f"{fault.words} off by {size}" if wrong else "",
+            f"{fault.words} off by {size}" if fault is wrong else "",
         )
     ]
 

@@ -27,6 +27,11 @@ Array = NDArray[np.float64]
 EXPLAINS = 0.2
 """Part of the residuals' squares from which a fault is named as a likely cause."""
 
+SIGNIFICANT = 10.0
+"""Standard errors from which a fault's size is taken for one. They are those of one step and of
+independent samples: in sound campaigns sizes reach 13 of them, but no third of what is plausible.
+"""
+
 SAME_DIRECTION = 1e-6
 """Part of a fault's effect outside the estimates' below which both are the same: derivatives are
 exact to about 1e-9, and a fault of 3 % would then leave 3e-8 of the signal."""
@@ -105,6 +110,16 @@ class Fault:
         return isfinite(self.plausible) and not told
 
     @property
+    def significant(self) -> bool:
+        """Whether its size is told from none."""
+        return abs(self.size) > SIGNIFICANT * self.standard_error
+
+    @property
+    def explains(self) -> bool:
+        """Whether it explains a large part of the residuals."""
+        return self.share > EXPLAINS
+
+    @property
     def words(self) -> str:
         """Its name, and the fixed parameters that might be wrong in its place."""
         either = self.told and self.hidden and self.fixed
@@ -130,10 +145,10 @@ class Fault:
     def assumption(self) -> str:
         """It as an assumption, in words."""
         if self.told:
-            return (
-                f"{self.name}: an error below {2.0 * self.with_fixed:.2g} {self.unit} can be one "
-                f"of the fixed {listed(self.fixed)} instead"
-            )
+            below = ""
+            if isfinite(self.with_fixed):
+                below = f" below {2.0 * self.with_fixed:.2g} {self.unit}"
+            return f"{self.name}: an error{below} can be one of the fixed {listed(self.fixed)}"
         if isfinite(self.standard_error):
             return (
                 f"{self.name}: an error below {2.0 * self.standard_error:.2g} {self.unit} is not "
@@ -183,8 +198,7 @@ class LackOfFit:
     @property
     def causes(self) -> tuple[Fault, ...]:
         """Faults that explain a large part of the residuals, the likeliest first; three at most."""
-        likely = (each for each in self.faults if each.share >= EXPLAINS)
-        return tuple(e for e in likely if e.near)[:3]
+        return tuple(each for each in self.faults if each.explains and each.near)[:3]
 
     @property
     def assumed(self) -> tuple[Fault, ...]:
