@@ -252,7 +252,7 @@ def _close_look(
     begin: float | None,
     end: float | None,
 ) -> None:
-    from swashplate.campaign.rig.instruments import SIGNALS
+    from swashplate.identification.drive_model import SIGNALS
 
     experiment, channel = campaign[run], campaign[run][name]
     first, last = float(channel.time[0]), float(channel.time[-1])
