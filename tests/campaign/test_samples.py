@@ -17,7 +17,6 @@ from swashplate.campaign import (
     stamp_statistics,
     stamps_of,
     unwrap_counts,
-    zero_crossings,
 )
 from swashplate.errors import InputError
 
@@ -204,25 +203,6 @@ def test_columns_that_are_counters(
 TIME = np.arange(11) * 0.1
 
 
-@pytest.mark.parametrize(
-    ("values", "options", "instants", "masked"),
-    [
-        # from +3 at 0.4 s to -1 at 0.5 s: zero at 0.475 s; 0.26 s around: 0.345 to 0.605 s
-        ([3, 3, 3, 3, 3, -1, -1, -1, -1, -1, -1], {"width": 0.26}, [0.475], [4, 5, 6]),
-        # a stay at zero is masked at both ends
-        ([1, 1, 0, 0, 0, 0, 0, 0, -1, -1, -1], {"width": 0.22}, [0.1, 0.8], [0, 1, 2, 7, 8, 9]),
-        # rest and the return to it are no crossings
-        ([0, 0, 1, 2, 0, 0, 1, 0, 0, 0, 0], {"width": 0.2}, [], []),
-        # noise below the level has no sign
-        ([2, 2, 0.01, -0.01, 0.01, -0.01, 2, 2, 2, 2, 2], {"width": 0.1, "level": 0.05}, [], []),
-    ],
-)
-def test_zero_crossings(values: list, options: dict, instants: list, masked: list) -> None:
-    found = zero_crossings(TIME, values, **options)
-    np.testing.assert_allclose(found.instants, instants)
-    np.testing.assert_array_equal(np.flatnonzero(found.masked), masked)
-
-
 def test_sign_of_a_current_on_its_way_to_zero() -> None:
     command = np.array([0.0, -5.0, -5.0, 0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 4.0, 4.0])
     reading = np.array([0.0, 0.1, 0.4, 0.3, 0.1, 0.0, 0.0, 0.2, 0.3, 0.4, 0.4])
@@ -233,7 +213,3 @@ def test_sign_of_a_current_on_its_way_to_zero() -> None:
 def test_wrong_readings_are_refused() -> None:
     with pytest.raises(InputError, match="rectified must not be negative, but row 3"):
         signed_by_command(np.where(np.arange(11) == 3, -0.1, 0.1), TIME)
-    with pytest.raises(InputError, match="width must be positive"):
-        zero_crossings(TIME, TIME, width=0.0)
-    with pytest.raises(InputError, match="level must not be negative"):
-        zero_crossings(TIME, TIME, width=0.1, level=-1.0)
