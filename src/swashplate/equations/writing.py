@@ -81,6 +81,7 @@ class Writer:
     `taken` names stand for something else; `hints` are names for expressions, should they need one.
     The items are `lines`, which call `functions` by name, the results `texts` by names that the
     lines make. `inner` are names that only one side of a choice makes, with a number of their type.
+    `straight` text has few branches, see `expressions.render`.
     """
 
     def __init__(
@@ -89,8 +90,9 @@ class Writer:
         items: Sequence[Item],
         results: Sequence[Node],
         hints: Mapping[Node, str] | None = None,
+        straight: bool = False,
     ) -> None:
-        self.taken, self.hints = taken, hints or {}
+        self.taken, self.hints, self.straight = taken, hints or {}, straight
         self.functions: dict[str, Function] = {}
         self.inner: dict[str, str] = {}
         self.uses: dict[Node, list[_Region]] = {}
@@ -148,7 +150,7 @@ class Writer:
 
     def text(self, node: Node, region: _Region) -> str:
         """Text of an expression, by the names that are known here."""
-        return ex.render(node, lambda each: region.known.get(each.same))
+        return ex.render(node, lambda each: region.known.get(each.same), self.straight)
 
     def define(self, node: Node, region: _Region, pad: str, name: str | None = None) -> list[str]:
         """Lines that give an expression a name."""

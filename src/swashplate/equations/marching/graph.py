@@ -548,7 +548,7 @@ class _Builder:
             return -1
         wanted = [*(partials[key] for key in rows), *values.values()]
         taken = {*part.code.taken, *derivatives.taken}
-        writer = Writer(taken, derivatives.items, wanted, derivatives.hints)
+        writer = Writer(taken, derivatives.items, wanted, derivatives.hints, straight=True)
         ahead, loads = self._arguments(part, writer.needed)
         # what only one side of a choice makes would carry its value from one sample to the next, as
         # far as a compiler can know, and the loop would not become vector instructions

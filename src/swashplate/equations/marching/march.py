@@ -36,7 +36,7 @@ _OWN = """
 n m j c lane first last worst h half value error total count span used progress values lines
 whole fraction params given constants states out flags records before measured weight outputs flat
 table kept tangent columns program plan sink room block met machine volts current speed voltage
-target counts coming cost rate integral shown
+target counts coming cost rate integral shown rarely pick
 """
 RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
 """Names that the kernels use themselves."""

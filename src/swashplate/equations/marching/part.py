@@ -318,8 +318,26 @@ def _rarely(typing: Any, test: Any) -> Any:
     return types.boolean(types.boolean), generate
 
 
-GUESSED: dict[str, Any] = {"rarely": bool if JIT_OFF else intrinsic(_rarely)}
-"""What the text calls. ``rarely(test)`` is the test, for which there is a branch."""
+def _pick(typing: Any, test: Any, one: Any, two: Any) -> Any:
+    kind = typing.unify_types(one, two)
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        sides = (context.cast(builder, values[k], signature.args[k], kind) for k in (1, 2))
+        return builder.select(values[0], *sides)
+
+    return kind(types.boolean, one, two), generate
+
+
+def _picked(test: bool, one: float, two: float) -> float:
+    return one if test else two
+
+
+GUESSED: dict[str, Any] = {
+    "rarely": bool if JIT_OFF else intrinsic(_rarely),
+    "pick": _picked if JIT_OFF else intrinsic(_pick),
+}
+"""What the text calls. ``rarely(test)`` is the test, for which there is a branch; ``pick(test, one,
+two)`` is one or two without a branch."""
 
 
 def reads_of(items: Iterable[Item]) -> Iterator[tuple[tuple[str, ...], frozenset[str]]]:
