@@ -130,10 +130,3 @@ def test_a_drive_of_one_s_own(done, tmp_path):
     assert lines[1].startswith("Z15 (")
     assert lines[3] == "Left out of both models, which do not know refinements: spool_friction."
     assert cells(text, "spool_mass") == ["10", "g", "assumed"]
-
-
-def test_a_solver_agrees_with_the_march(done, number):
-    words = ("full-order", "hoist", "step:4,length=3,stop=2")
-    march, radau = done(*words), done(*words, "--method", "radau")
-    row = "largest difference"
-    assert number(radau, row) == pytest.approx(number(march, row), abs=2e-3)

@@ -71,7 +71,6 @@ REFUSED = {
     "full-order hoist step:9 --rate 1": "must be between 10 and 100000 Hz",
     "full-order slew --like hoist": "slew: spool_mass on spool_arm alone has",
     "full-order hoist --plot run.png": "--plot draws one run; name a maneuver",
-    "full-order hoist --method radau": "--method radau checks one run; name a maneuver",
     "full-order hoist step:9 --out run.doc": "run.doc ends in '.doc'",
     "full-order hoist --physical oil_volume": "--physical cannot read 'oil_volume'; write",
     "full-order hoist --physical oil_volume=nan": "at the stroking piston) is nan m^3, but must be",

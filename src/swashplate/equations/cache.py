@@ -169,7 +169,7 @@ def subroutine(function: Callable[P, R]) -> Callable[P, R]:
 def pasted(function: Callable[P, R]) -> Callable[P, R]:
     """A `subroutine` of one caller, which takes in its code: compiled once, and not twice."""
     known[plain(function)] = None
-    return njit(nogil=True, error_model="numpy", inline="always")(function)  # type: ignore[no-any-return]
+    return njit(nogil=True, error_model="numpy", inline="always")(function)
 
 
 def on_disk(compiled: Any, function: Callable[..., Any]) -> None:

@@ -256,7 +256,7 @@ def positive(a: Node, definition: Callable[[str], Node | None], strict: bool = T
 def render(node: Node, known: Callable[[Node], str | None], straight: bool = False) -> str:
     """An expression as Python writes it, with the names that parts of it have.
 
-    In `straight` text a choice between what is `CHEAP` is ``pick(test, one, two)``, and tests are
+    In `straight` text a choice between what is `CHEAP` is ``choose(test, one, two)``, and tests are
     joined by ``&`` and ``|``: no branch, which a compiler would take a while to remove.
     """
     return _render(node, known, straight)[0]
@@ -288,7 +288,7 @@ def _render(
     if straight and op in ("and", "or") and node.cheap:
         return f" {'&' if op == 'and' else '|'} ".join(part(a, ATOM) for a in args), level
     if straight and op == "if" and args[1].cheap and args[2].cheap:
-        return f"pick({', '.join(part(a, 1) for a in args)})", ATOM
+        return f"choose({', '.join(part(a, 1) for a in args)})", ATOM
     if op == "if":
         return f"{part(args[1], 2)} if {part(args[0], 2)} else {part(args[2], 1)}", level
     if op in ("and", "or"):

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate import maneuvers
 from swashplate.equations.marching.record import SOURCE_RATE, least_substeps
 from swashplate.equations.marching.run import Start
-from swashplate.full_order.drive import FullOrderDrive, FullOrderSimulation, Method
+from swashplate.full_order.drive import FullOrderDrive, FullOrderSimulation
 from swashplate.results import Result, Tabular
 from swashplate.simulation.result import read_only
 from swashplate.tables import Cell, Column, Table
@@ -147,15 +147,13 @@ class Comparison(Tabular):
         return made
 
 
-def compare(
-    full: FullOrderDrive, run: Simulation, *, start: Start = "rest", method: Method = "march"
-) -> Comparison:
+def compare(full: FullOrderDrive, run: Simulation, *, start: Start = "rest") -> Comparison:
     """Simulate both models over the current of a run of ``full.drive``.
 
-    The reduced model has the lumps of the full-order one. `start` and `method` as in
+    The reduced model has the lumps of the full-order one; `start` as in
     `FullOrderDrive.simulate_current`.
     """
-    followed = full.follow(run, method=method, start=start)
+    followed = full.follow(run, start=start)
     reference, record = followed.shaft_speed, followed.record
     reduced, grid_rate = full.reduced, record.rate * record.substeps
 

@@ -217,7 +217,14 @@ def follow(a: Array, columns: Indices, width: int, flat: Array, count: int, tang
 
 @subroutine
 def follow_out(
-    columns: Indices, size: int, flat: Array, tangent: Array, q: Array, sink: Sink, at: int, count: int
+    columns: Indices,
+    size: int,
+    flat: Array,
+    tangent: Array,
+    q: Array,
+    sink: Sink,
+    at: int,
+    count: int,
 ) -> None:
     """Run y[n+1] = a[n] y[n] + g[n] as `follow`, and put q[n] y[n] into the sink from `at` on.
 
@@ -295,7 +302,11 @@ def place(
     on; `at` is the first of the stamps, `to` the first place in the rows of the sink.
     """
     derived, long = sink.to.size, sink.rows.shape[1]
-    cell, fraction, weight = behind(plan.cell, at), behind(plan.fraction, at), behind(plan.weight, at)
+    cell, fraction, weight = (
+        behind(plan.cell, at),
+        behind(plan.fraction, at),
+        behind(plan.weight, at),
+    )
     begin = cell[0] - base
     for c in range(derived):
         column, row = behind(sink.rows, sink.to[c] * long + to), behind(seen, c * STRIDE)
