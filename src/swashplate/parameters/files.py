@@ -54,7 +54,7 @@ class ModelOptions(BaseModel):
     differential equation, for any rate."""
     options: list[str] | None = None
     """Terms of the pump that count; where they are not given, those whose parameters are not 0."""
-    equations: list[dict[Literal["old", "new", "parameters"], str]] = []
+    equations: list[dict[str, str]] = []
     """One's own equations in place of the package's, each as ``module:name``."""
 
 

@@ -387,10 +387,10 @@ def observe_source(
     kept: Sequence[Stored],
     wanted: Sequence[Stored],
 ) -> tuple[str, dict[str, Any]]:
-    """Text of a kernel that computes signals of one part where its states are known.
+    """Text of a `piece` that computes signals of one part where its states are known.
 
-    The kernel ``observe(params, given, h, kept, out)`` takes rows of states, inputs and taps'
-    samples in the order of `kept`, and fills rows in the order of `wanted`.
+    In place of records it takes rows of states, inputs and taps' samples in the order of `kept`,
+    and fills rows in the order of `wanted`.
     """
     sampler = Sampler(model, signals, options, wanted)
     own = sampler.parts[part]
@@ -401,7 +401,7 @@ def observe_source(
         for node in (own.limits if each.kind == "limits" else [own.node(each)])
     ]
     read = sampler.read(own)
-    lines = [*sampler.ahead([own]), "for m in range(out.shape[1]):"]
+    lines = [*sampler.ahead([own]), "for m in range(count):"]
     inner = []
     for row, each in enumerate(kept):
         if each.part == part:
@@ -409,13 +409,12 @@ def observe_source(
         else:
             name = own.source(Source(each.part, each.path))
         if name in read:
-            inner.append(f"{name} = kept[{row}, m]")
+            inner.append(f"{name} = records[{row}][m]")
     inner += lines_of(own.code, sampler.ends[part], straight=True)
-    inner += sampler.stored(own, wanted, lambda row: f"out[{row}, m]")
+    inner += sampler.stored(own, wanted, lambda row: f"flat[{row} * count + m]")
     lines += indented(inner)
-    head = "observe(params, given, h, kept, out)"
     says = f"Signals of {own.own.name} at known states."
-    return function_source(head, says, lines), sampler.names
+    return function_source(f"observe({PIECE})", says, lines, "@piece"), sampler.names
 
 
 def output_of(model: Model, output: str) -> tuple[Stored, bool]:

@@ -446,7 +446,7 @@ def march_observed(
     last.
     """
     size, block, h = grid
-    used, count, flat = int(plan.first[0]), 0, room.flat
+    used, count, flat = plan.first[0], 0, room.flat
     for first in range(0, size, block):
         for k in range(0, room.flat_seen.size, STRIDE):
             # what interpolation looks back at, from the end of the block before
