@@ -12,19 +12,10 @@ from swashplate.cli.options import (
     argument,
     option,
 )
-from swashplate.cli.terminal import Outputs, note, progress, say, show, working
+from swashplate.cli.terminal import Outputs, long_work, note, say, show, working
 from swashplate.cli.words import physical_values, simulated
 from swashplate.errors import InputError
 from swashplate.tables import FIGURE, TABLE
-
-EXAMPLES = """\
-Examples:
-  swashplate full-order hoist
-  swashplate full-order hoist step:9 --plot full.png
-  swashplate full-order fitted/drive.toml sine:4,1 --like luff
-  swashplate full-order hoist step:4 --physical load_torque=2kN*m --out run.csv
-  swashplate full-order hoist log.csv --interpolation previous
-"""
 
 
 def full_order(
@@ -63,6 +54,13 @@ def full_order(
     physical values are completed from the drive's parameters and from assumed
     ones. Prints these, the modes, and by how much the speed of the one-state
     model differs. What is assumed can be replaced by what you know.
+
+    For example:
+      swashplate full-order hoist
+      swashplate full-order hoist step:9 --plot full.png
+      swashplate full-order fitted/drive.toml sine:4,1 --like luff
+      swashplate full-order hoist step:4 --physical load_torque=2kN*m --out run.csv
+      swashplate full-order hoist log.csv --interpolation previous
     """
     files = Outputs((out, TABLE), (plot, FIGURE))
     if command is None and plot is not None:
@@ -83,7 +81,7 @@ def full_order(
         from swashplate.equations.marching.record import least_substeps
 
         least_substeps(sampling.rate)  # one out of range is refused before anything is sampled
-        with progress(len(comparison.TABLE_MANEUVERS)) as begin:
+        with long_work("", len(comparison.TABLE_MANEUVERS)) as begin:
             found = comparison.validity(full, sampling.rate, begin=begin)
         files.write(out, "Table", found.write)
         said = f"{len(found.rows)} maneuvers"

@@ -25,6 +25,7 @@ from swashplate.models.channel import (
     channel_settled,
     channel_step,
     rate_limit_active,
+    step_limit,
 )
 
 
@@ -90,6 +91,14 @@ def card_constants(p: Card, h: float, options: CardOptions) -> CardConstants:
     return CardConstants(
         channel_constants(p.plus, h, options), channel_constants(p.minus, h, options)
     )
+
+
+@equation
+def stable_step(p: Card, h: float, options: CardOptions) -> float:
+    """Share of the step that the filters would still bear, above 0 where they are stable. [1]"""
+    plus = p.plus.omega * h / step_limit(p.plus.zeta, options.exact)
+    minus = p.minus.omega * h / step_limit(p.minus.zeta, options.exact)
+    return 1.0 - max(plus, minus)
 
 
 @equation

@@ -15,6 +15,7 @@ from swashplate.parameters.definitions import Block, Definition, declare, find, 
 from swashplate.parameters.parameter_set import (
     CardSwitch,
     CoulombSign,
+    Motion,
     Pair,
     Parameter,
     ParameterSet,
@@ -56,6 +57,7 @@ class ModelOptions(BaseModel):
     """Terms of the pump that count; where they are not given, those whose parameters are not 0."""
     equations: list[dict[str, str]] = []
     """One's own equations in place of the package's, each as ``module:name``."""
+    motion: Motion = "shaft"
 
 
 class CardFile(BaseModel):
@@ -142,6 +144,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
         model.rate or rate,
         options_of(values) if model.options is None else frozenset(model.options),
         own,
+        motion=model.motion,
     )
 
 
@@ -178,6 +181,8 @@ def dump_set(parameters: ParameterSet) -> str:
         options.add("options", sorted(parameters.options))
     if parameters.equations:
         options.add("equations", [each.places for each in parameters.equations])
+    if parameters.motion != "shaft":
+        options.add("motion", parameters.motion)
     text.add("model", options)
     for block in ("control_card", "pump_motor", "refinements"):
         if all(parameter.definition.block != block for parameter in parameters.values()):
