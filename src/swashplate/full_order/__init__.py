@@ -3,7 +3,6 @@
 from swashplate.full_order.comparison import TABLE_MANEUVERS as TABLE_MANEUVERS
 from swashplate.full_order.comparison import Comparison as Comparison
 from swashplate.full_order.comparison import Difference as Difference
-from swashplate.full_order.comparison import Lag as Lag
 from swashplate.full_order.comparison import compare as compare
 from swashplate.full_order.comparison import convergence as convergence
 from swashplate.full_order.comparison import fine_steps as fine_steps
