@@ -75,8 +75,8 @@ def solved(full: FullOrderDrive, run: Simulation, tolerance: float = 1e-8) -> np
             atol=TOLERANCES * (tolerance / 1e-6),
         )
         assert made.status >= 0, made.message
-        if made.t.size:
-            found[time.size - later.size :][: made.t.size] = made.y.T
+        if len(made.t):
+            found[time.size - later.size :][: len(made.t)] = made.y.T
         if made.status == 0:
             break
         now = max(float(each[0]) for each in made.t_events if each.size)
