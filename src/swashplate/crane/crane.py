@@ -19,6 +19,7 @@ from swashplate.analysis.capability import dead_zone
 from swashplate.analysis.compensation import InverseMap, inverse_map
 from swashplate.crane.control import Control, settings_of
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
+from swashplate.crane.linear import LinearCrane, linearize
 from swashplate.crane.loop import BOOM_OUT, DIRECT, FINE, ROPE_OUT, Fixed, Loop
 from swashplate.crane.result import CraneRun
 from swashplate.crane.rope import AIR, Air, Suspension, too_fast
@@ -358,6 +359,10 @@ class Crane:
         voltages. [V]
         """
         return CraneStepper(self, self._loop(DEFAULTS | setup)[0])
+
+    def linearize(self, boom_deg: float = 45.0, rope_m: float = 20.0) -> LinearCrane:
+        """The linear crane at a boom and rope; see `swashplate.crane.linearize`."""
+        return linearize(self, boom_deg, rope_m)
 
     def _loop(self, how: Setup) -> tuple[Loop, Pose, int]:
         """The loop of a complete setup, where it begins, and half periods of its shaper."""
