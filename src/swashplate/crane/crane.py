@@ -497,7 +497,11 @@ class CraneStepper:
         motion = np.zeros((1, 1)) if ship is None else np.array([ship], dtype=np.float64)
         if motion.shape not in ((1, 1), (1, 6)) or not np.isfinite(motion).all():
             raise InputError("The ship's motion is six finite numbers.")
-        return dict(zip(self._loop.rows, self.take(commands, motion)[0].tolist(), strict=True))
+        return self.named(self.take(commands, motion)[0])
+
+    def named(self, row: Array) -> dict[str, float]:
+        """Signals of a row that `take` returns, by name."""
+        return dict(zip(self._loop.rows, row.tolist(), strict=True))
 
     def take(self, commands: Array, ship: Array) -> Array:
         """Advance by many samples at once.
