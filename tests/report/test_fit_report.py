@@ -19,13 +19,11 @@ from swashplate.campaign import Source, rig
 from swashplate.identification.acceptance import verdict
 from swashplate.identification.assessment import StageProfile, assess
 from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.identifiability import in_the_fits_scales
 from swashplate.identification.profile import Point, Profile
 from swashplate.identification.resampling import CrossValidation, Fold, FoldEstimate, HeldRun
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import StartResult
 from swashplate.identification.staging import stage_problem
-from swashplate.identification.tables import ignored_words
 from swashplate.identification.validation import Measures, predict, run_qualities
 from swashplate.report.figures import plot_fit
 from swashplate.report.fit_report import print_report, write_fit_report, write_validation_report
@@ -396,24 +394,6 @@ def test_truth_stands_beside_the_estimates(write, assessments, read: Page) -> No
     assert number(fixed["Z4"]["truth"]) == pytest.approx(truth.numbers["Z4"], rel=1e-4)
 
 
-def test_truth_is_moved_to_the_scales_that_the_fit_held(campaign: Campaign) -> None:
-    free = {name: {"relative": (0.5, 2.0), "log": True} for name in ("Z1", "Z8", "Z10")}
-    stages = [{"name": "pump", "part": "pump", "free": free}]
-    nominal = Drive.preset("hoist")
-    begun = fit(
-        nominal.parameters,
-        campaign.select(role="fit"),
-        Setup.model_validate({"stages": stages}),
-        max_evaluations=1,
-    )
-    # another scale of pressure, and 3 % more speed
-    truth = nominal.scale(Z9=1.2, Z15=1.2, Z1=1.0 / 1.2, Z8=1.2**0.5, Z10=1.03)
-    moved = in_the_fits_scales(truth.parameters, begun).numbers
-    for name in ("Z9", "Z15", "Z1", "Z8"):
-        assert moved[name] == pytest.approx(nominal.parameters.numbers[name], rel=1e-9)
-    assert moved["Z10"] == pytest.approx(1.03 * nominal.parameters.numbers["Z10"])
-
-
 def test_the_first_screen_is_for_the_owner(read: Page, fitted: Fit, validated: Path) -> None:
     rows = {row["quantity"]: row for row in read.rows("numbers")}
     drive = fitted.drive
@@ -617,10 +597,3 @@ def test_without_a_browser_it_says_so(page: Path, tmp_path: Path, monkeypatch) -
     with pytest.raises(FileError, match=r"No browser was found .* install Chromium"):
         print_report(page, tmp_path / "fit.pdf")
     assert not list(tmp_path.glob("*.pdf"))
-
-
-def test_ignored_windows_in_words(fitted: Fit) -> None:
-    experiment = fitted.stages[0].problem.experiments[0]
-    words = ignored_words(experiment, experiment["current"])
-    assert re.fullmatch(r"0 to 0\.\d+ s \(the dither starts\)", words)
-    assert ignored_words(experiment, experiment["counts"]) == "nothing"
