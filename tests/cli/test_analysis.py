@@ -264,19 +264,13 @@ def test_one_at_a_time(done, tmp_path):
     assert table["at upper factor"][0] == pytest.approx(1.1 * table["as it is"][0], rel=1e-6)
 
 
-def test_sobol(done, tmp_path):
-    words = ("--outcome", "final_speed", "--outcome", "overshoot", "--sobol", "32")
-    text = done("sensitivity", "hoist", *FEW, *words, "--plot", "s.png", "--out", "s.parquet")
-    assert "by itself  in total" in text
-    assert "- 128 simulations; indices are good to" in text
-    assert "- None of the levers moves overshoot." in text
-    assert (tmp_path / "s.png").exists()
-    table = pl.read_parquet(tmp_path / "s.parquet")
-    assert table.height == 4
-    speed = table.filter(pl.col("outcome") == "final_speed")
-    assert speed["total"][0] == pytest.approx(1.0, abs=0.3)
-    assert speed["total"][1] == pytest.approx(0.0, abs=1e-3)
-    assert table.filter(pl.col("outcome") == "overshoot")["total"].null_count() == 2
+def test_a_log_is_a_command(done, tmp_path):
+    done("simulate", "hoist", "step:9,stop=4,length=5", "--out", "log.csv")
+    words = ("--lever", "pump", "--outcome", "final_speed", "--maneuver", "log.csv")
+    text = done("sensitivity", "hoist", *words, "--interpolation", "linear")
+    assert "hoist, log.csv" in text
+    (line,) = [line for line in text.splitlines() if line.startswith("pump ")]
+    assert line.split() == ["pump", "0.9", "1.1", "176.40", "215.60", "20.0", "%"]
 
 
 # --- size -----------------------------------------------------------------------------------------

@@ -84,6 +84,41 @@ def test_a_close_look(done: Done, refused: Callable[..., str], logs: list[str]) 
     assert "no channel 'speed'" in refused(*look, "speed")
 
 
+TACHO = """
+[axes.hoist]
+drive = "hoist"
+time = { column = "time" }
+input = { column = "u", unit = "V" }
+channels.tacho = { column = "n", kind = "shaft_speed", unit = "deg/s" }
+[[runs]]
+file = "log.csv"
+"""
+
+
+def test_a_close_look_at_a_tacho_beside_the_drive_before_any_fit(
+    done: Done, tmp_path: Path
+) -> None:
+    rows = [f"{k / 100},{4 if k > 20 else 0},{98 if k > 40 else 0}" for k in range(300)]
+    (tmp_path / "log.csv").write_text("\n".join(["time,u,n", *rows]) + "\n", "utf-8")
+    look = ("campaign", "plot", "--run", "log", "--channel", "tacho", "--to", "2")
+    for name, text in (("with", TACHO), ("without", TACHO.replace('drive = "hoist"', ""))):
+        (tmp_path / "campaign.toml").write_text(text, "utf-8")
+        done(*look, "--out", f"{name}.svg")
+    shown, alone = ((tmp_path / f"{name}.svg").read_text("utf-8") for name in ("with", "without"))
+    assert "measured less simulated" in shown
+    assert "measured less simulated" not in alone
+
+
+def test_volts_that_were_declared_as_millivolts(
+    refused: Callable[..., str], tmp_path: Path
+) -> None:
+    rows = [f"{k / 100},{4 if k > 20 else 0},{98 if k > 40 else 0}" for k in range(300)]
+    (tmp_path / "log.csv").write_text("\n".join(["time,u,n", *rows]) + "\n", "utf-8")
+    (tmp_path / "campaign.toml").write_text(TACHO.replace('"V"', '"mV"'), "utf-8")
+    said = " ".join(refused("fit", "campaign.toml", "--setup", "hoist", "--out", "fit").split())
+    assert 'if the log is in V, write unit = "V": it then reaches 4 V' in said
+
+
 def test_a_run_that_there_is_not(done: Done, refused: Callable[..., str], logs: list[str]) -> None:
     done("campaign", "init", *logs, *COUNTS)
     said = refused("campaign", "plot", "--run", "lfit")

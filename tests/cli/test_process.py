@@ -220,7 +220,7 @@ def test_a_wrong_speed_is_said_and_ends_with_code_1(run, monkeypatch: pytest.Mon
     "typed",
     [
         "limits hoist sine:9,0.1",
-        "sensitivity hoist --lever pump --lever orifice --sobol 16",
+        "sensitivity hoist --lever pump --lever orifice --span 0.2",
         "compensate slew sine:2,0.1",
         "size hoist --speed-deg-s 250",
         "linearize hoist --at 4 --loop-gain 0.01",

@@ -1,3 +1,5 @@
+import re
+
 import h5py
 import numpy as np
 import polars as pl
@@ -280,3 +282,12 @@ def test_toml_starts_an_own_set(done, tmp_path):
     mine, hoist = Drive.from_toml(tmp_path / "mine.toml"), Drive.preset("hoist")
     assert mine == hoist
     assert done("show", "mine.toml") == done("show", "hoist")
+
+
+def test_a_part_of_a_run_is_drawn(done, refused, tmp_path):
+    done("simulate", "hoist", "step:9", "--plot", "part.svg", "--from", "1", "--to", "2")
+    ticks = re.findall(r"<!-- ([\d.]+) -->", (tmp_path / "part.svg").read_text("utf-8"))
+    instants = ["1.0", "1.2", "1.4", "1.6", "1.8", "2.0"]
+    assert any(ticks[k : k + len(instants)] == instants for k in range(len(ticks)))
+    said = refused("simulate", "hoist", "step:9", "--plot", "none.svg", "--from", "90")
+    assert "The window from 90 s to 10 s holds 0 samples of hoist" in said

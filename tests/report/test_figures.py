@@ -16,7 +16,6 @@ from swashplate.analysis import (
     inverse_map,
     one_at_a_time,
     ranges_of,
-    sobol,
     trial,
     what_if,
 )
@@ -43,7 +42,6 @@ def made(hoist: Drive, step: Simulation, all_limits: Simulation, task: Trial) ->
     changed = what_if(hoist, {"orifice": 1.5, "pump": 1.5}, task)
     outcomes = ("final_speed", "rise_time", "overshoot")
     one = one_at_a_time(hoist, ranges_of(LEVERS), task, outcomes=outcomes)
-    shares = sobol(hoist, ranges_of(LEVERS), task, outcomes=("final_speed",), samples=32)
     inverse = inverse_map(luff)
     wanted = 0.5 * np.sin(task.time)
     current = hoist.simulate_current(0.5 * np.sin(np.arange(2000) / 300.0))
@@ -61,7 +59,6 @@ def made(hoist: Drive, step: Simulation, all_limits: Simulation, task: Trial) ->
         "timeline": figures.plot_limit_timeline(all_limits),
         "whatif": figures.plot_whatif(changed, bands={"as it is": band}),
         "tornado": figures.plot_tornado(one),
-        "sobol": figures.plot_sobol(shares),
         "map": figures.plot_compensation(inverse),
         "improvement": figures.plot_compensation(inverse, improvement(luff, wanted)),
         "bode": figures.plot_bode(response, linear=hoist.linearize(4.0)),
@@ -70,7 +67,7 @@ def made(hoist: Drive, step: Simulation, all_limits: Simulation, task: Trial) ->
 
 NAMES = (
     *("simulation", "all limits", "by current", "neutral", "full order", "comparison"),
-    *("envelope", "timeline", "whatif", "tornado", "sobol", "map", "improvement", "bode"),
+    *("envelope", "timeline", "whatif", "tornado", "map", "improvement", "bode"),
 )
 
 
@@ -255,8 +252,6 @@ def test_the_strongest_lever_is_at_the_top(made: dict[str, Figure]) -> None:
     assert (ends[0], ends[-1]) == pytest.approx((176.4, 215.6), abs=0.05)
     assert speed.get_xlabel() == "final speed (deg/s)"
     assert "no lever moves it" in [text.get_text() for text in still.texts]
-    bars = [bar.get_width() for bar in made["sobol"].axes[0].patches]
-    assert max(bars) == pytest.approx(1.0, abs=0.3)
 
 
 def test_the_inverse_map_and_its_gap(made: dict[str, Figure]) -> None:

@@ -252,15 +252,18 @@ def _close_look(
     begin: float | None,
     end: float | None,
 ) -> None:
-    channel = campaign[run][name]
+    from swashplate.identification.drive_model import SIGNALS
+
+    experiment, channel = campaign[run], campaign[run][name]
     first, last = float(channel.time[0]), float(channel.time[-1])
     window = (first if begin is None else begin, last if end is None else end)
     how = {"window": None if begin is end is None else window, "title": f"{run}, {name}"}
     simulated = None
-    if not channel.is_position:
+    known = channel.kind in SIGNALS and campaign.axes[experiment.axis].drive is not None
+    if known and not channel.is_position:
         from swashplate.identification import predict
 
-        found = predict(campaign.drive(campaign[run].axis), [campaign[run]])
+        found = predict(campaign.drive(experiment.axis), [experiment])
         simulated = next((each.simulated for each in found if each.channel == name), None)
     files.draw(out, "plot_channel", channel, simulated, **how)
 

@@ -31,7 +31,6 @@ EXTRAS = (
     Extra("control", "control", "linear models as python-control's StateSpace"),
     Extra("dask", "distributed", "fit --dask: many starts on a cluster"),
     Extra("mdf", "asammdf", "logs in ASAM MDF 4 (.mf4)"),
-    Extra("sensitivity", "SALib", "swashplate sensitivity, Sobol indices"),
     Extra("tdms", "npTDMS", "logs in National Instruments' TDMS"),
 )
 FULL_SPEED_DEG_S = 196.0

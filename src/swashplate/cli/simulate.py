@@ -40,6 +40,8 @@ def simulate(
     sampling: Simulating,
     out: TableFile = None,
     plot: FigureFile = None,
+    begin: Annotated[float | None, option("Plot from here on.", "--from", metavar="S")] = None,
+    end: Annotated[float | None, option("Plot up to here.", "--to", metavar="S")] = None,
 ) -> None:
     """Simulate a drive over a maneuver or a measured voltage.
 
@@ -61,7 +63,11 @@ def simulate(
         name, run = simulated(drive.chosen, command, sampling)
         tables, title = run_tables(run), f"{drive.title}, {name}"
     files.write(out, "All signals, in SI", run.write)
-    files.draw(plot, "plot_simulation", run, title=title)
+    window = None
+    if begin is not None or end is not None:
+        first, last = float(run.time[0]), float(run.time[-1])
+        window = (first if begin is None else begin, last if end is None else end)
+    files.draw(plot, "plot_simulation", run, window=window, title=title)
     duration = f"{run.time[-1] - run.time[0]:.6g} s"
     drive.note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
     show(*tables)

@@ -341,7 +341,7 @@ def size(
       swashplate size hoist --tracking-deg-s 19 --maneuver sine:9,0.1 --out larger.toml
     """
     from swashplate.analysis import sizing
-    from swashplate.analysis.outcomes import trial
+    from swashplate.analysis.outcomes import proportional_speed, trial
 
     files = Outputs((out, None))
     if (tracking_deg_s is None) != (maneuver is None):
@@ -353,7 +353,9 @@ def size(
         follow, ranges = None, ranges_of(levers or SIZED, sizing.WIDEST)
         if maneuver is not None:
             voltage = maneuver_of(maneuver, drive.chosen).sample()
-            follow = trial(drive.chosen, voltage)
+            # a larger drive may well be what it takes to reach it
+            wanted = proportional_speed(drive.chosen, voltage, limited=False)
+            follow = trial(drive.chosen, voltage, wanted=wanted)
         found = sizing.size(drive.chosen, required, ranges, follow=follow)
     files.write(out, "Changed drive", found.drive.to_toml)
     drive.note(drive.title)
@@ -385,53 +387,31 @@ def sensitivity(
         str,
         option('Command: a maneuver such as step:9 or "step +9 V", or a log.', metavar="NAME|FILE"),
     ] = "step:9",
-    samples: Annotated[
-        int | None,
-        option(
-            "Sobol's indices as well, from N base samples, a power of 2 (1024 is usual): N times "
-            "the number of levers and two simulations.",
-            "--sobol",
-            metavar="N",
-        ),
-    ] = None,
     plot: FigureFile = None,
     out: TableFile = None,
     *,
     sampling: Sampling,
 ) -> None:
-    """Show which lever moves which outcome.
-
-    Each lever is moved down and up by itself. With --sobol all are moved at once,
-    and the variance of each outcome is shared out among them: by itself, and in
-    total with what a lever does together with others.
+    """Show which lever moves which outcome, each moved down and up by itself.
 
     For example:
       swashplate sensitivity hoist
       swashplate sensitivity hoist --lever orifice --lever pump=0.8/1.5 --plot tornado.png
-      swashplate sensitivity slew --maneuver step:4 --sobol 1024 --plot sobol.png
+      swashplate sensitivity slew --maneuver step:4 --out all.csv
     """
-    from swashplate.analysis import sensitivity as analysis
+    from swashplate.analysis import one_at_a_time, outcome_table
 
     files = Outputs((out, TABLE), (plot, FIGURE))
-    wanted, indices = tuple(outcomes) if outcomes else OUTCOMES, None
     with working("Simulating"):
         name, trial = trial_of(drive.chosen, maneuver, sampling)
         ranges = ranges_of(levers or PULLED, SPAN)
-        single = analysis.one_at_a_time(drive.chosen, ranges, trial, outcomes=wanted)
-        if samples is not None:
-            indices = analysis.sobol(drive.chosen, ranges, trial, outcomes=wanted, samples=samples)
+        found = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
-    files.write(out, "All numbers, in SI", analysis.sensitivity_table(single, indices).write)
-    if indices is None:
-        files.draw(plot, "plot_tornado", single, title=f"{title}: each lever by itself")
-    else:
-        files.draw(plot, "plot_sobol", indices, title=f"{title}: shares of the variance")
+    files.write(out, "All numbers, in SI", found.table().write)
+    files.draw(plot, "plot_tornado", found, title=f"{title}: each lever by itself")
     drive.note(title)
-    show(*(analysis.outcome_table(single, indices, k) for k in range(len(single.outcomes))))
-    bullets(dict.fromkeys((*single.sentences, *(indices.sentences if indices else ()))))
-    if indices is not None:
-        error = indices.largest_error
-        bullets([f"{indices.runs} simulations; indices are good to {error:.2g} or better."])
+    show(*(outcome_table(found, k) for k in range(len(found.outcomes))))
+    bullets(dict.fromkeys(found.sentences))
     files.say()
 
 

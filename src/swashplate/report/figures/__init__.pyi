@@ -3,7 +3,6 @@ import swashplate.report.style
 from .analysis import plot_compensation as plot_compensation
 from .analysis import plot_envelope as plot_envelope
 from .analysis import plot_limit_timeline as plot_limit_timeline
-from .analysis import plot_sobol as plot_sobol
 from .analysis import plot_tornado as plot_tornado
 from .analysis import plot_whatif as plot_whatif
 from .campaign import plot_campaign as plot_campaign

@@ -24,6 +24,7 @@ from swashplate.report.lines import (
     draw,
     fill_panel,
     fit_time,
+    rows_within,
     shade,
     shade_handle,
     stretches,
@@ -78,15 +79,27 @@ class Panel(NamedTuple):
     """Range that is shown at least, SI, so that rounding looks like nothing."""
 
 
-def plot_simulation(simulation: Simulation, *, title: str | None = None) -> Figure:
+def plot_simulation(
+    simulation: Simulation,
+    *,
+    window: tuple[float, float] | None = None,
+    title: str | None = None,
+) -> Figure:
     """Figure of the chain's signals over time, with the active limits shaded.
 
     Parameters
     ----------
     simulation : Simulation
         What to show. Voltage has a panel only if the simulation was driven by one.
+    window : (float, float), optional
+        First and last instant to show [s].
     title : str, optional
         By default the name of the parameter set.
+
+    Raises
+    ------
+    InputError
+        If the window holds fewer than two samples.
     """
     pump, run = simulation.pump, simulation
 
@@ -116,7 +129,8 @@ def plot_simulation(simulation: Simulation, *, title: str | None = None) -> Figu
     ]
     if run.voltage is not None:
         panels.insert(0, Panel("voltage", "V", (Trace(run.voltage, INK),)))
-    return _chain(panels, run.time, run.name if title is None else title)
+    rows = rows_within(run.time, window, run.name)
+    return _chain(panels, run.time, run.name if title is None else title, rows)
 
 
 def plot_signals(
@@ -229,7 +243,7 @@ def _swash(angle: Array, stops: Stops) -> Panel:
     return Panel("swash angle", "swash", (Trace(angle, BLUE),), marks=tuple(marks))
 
 
-def _chain(panels: Sequence[Panel], time: Array, title: str) -> Figure:
+def _chain(panels: Sequence[Panel], time: Array, title: str, rows: slice = slice(None)) -> Figure:
     """The panels one under another, with a legend of the limits that act anywhere."""
     acting = {limit for panel in panels for limit, spans in panel.limits if spans.size}
     legend = [shade_handle(SHADES[limit]) for limit in Limit if limit in acting]
@@ -237,20 +251,20 @@ def _chain(panels: Sequence[Panel], time: Array, title: str) -> Figure:
     for ax, panel in zip(axes, panels, strict=True):
         for limit, spans in panel.limits:
             shade(ax, spans, SHADES[limit])
-        largest = max(float(np.abs(trace.values).max()) for trace in panel.traces)
+        largest = max(float(np.abs(trace.values[rows]).max()) for trace in panel.traces)
         # an angle within the machine stays in degrees, whatever the shaft's is shown in
         unit = display_unit(panel.si, max(largest, panel.least) or inf)
         name, factor = ("deg", float(np.degrees(1.0))) if panel.si == "swash" else unit
         fill_panel(
             ax,
             f"{panel.words}\n({name})",
-            time,
-            [each._replace(values=factor * each.values) for each in panel.traces],
+            time[rows],
+            [each._replace(values=factor * each.values[rows]) for each in panel.traces],
             [each._replace(level=factor * each.level) for each in panel.marks],
             height=panel.height,
             least=factor * panel.least,
         )
-    fit_time(axes[-1], time)
+    fit_time(axes[-1], time[rows])
     label_below(axes[-1], "time (s)")
     return figure
 
