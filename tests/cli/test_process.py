@@ -187,7 +187,7 @@ def test_it_prints_versions_extras_cache_and_a_simulated_speed(run) -> None:
 
 def test_its_extras_are_those_of_the_package() -> None:
     extras = PROJECT["project"]["optional-dependencies"]
-    named = {each.name: each.library.lower() for each in doctor.EXTRAS}
+    named = {name: library.lower() for name, (library, _) in doctor.EXTRAS.items()}
     assert set(named) == set(extras) - {"dev"}
     for name, library in named.items():
         assert [each.split(">")[0].lower() for each in extras[name]] == [library]
