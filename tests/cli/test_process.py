@@ -216,29 +216,6 @@ def test_a_wrong_speed_is_said_and_ends_with_code_1(run, monkeypatch: pytest.Mon
 # --- 80 columns -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "typed",
-    [
-        "limits hoist sine:9,0.1",
-        "sensitivity hoist --lever pump --lever orifice --span 0.2",
-        "compensate slew sine:2,0.1",
-        "size hoist --speed-deg-s 250",
-        "linearize hoist --at 4 --loop-gain 0.01",
-        "bode hoist --points 3",
-        "excitation virtual/campaign.toml",
-        "campaign check virtual/campaign.toml",
-        "validate hoist virtual/campaign.toml --role all",
-        "advise hoist --top 2 --maneuver step:9 --maneuver step:-9",
-    ],
-)
-@pytest.mark.usefixtures("virtual")
-def test_no_table_is_cut_or_wider_than_a_terminal(done, typed):
-    text = done(*typed.split())
-    assert "…" not in text
-    rules = [len(line) for line in text.splitlines() if set(line) == {"─"}]
-    assert max(rules) <= 80
-
-
 def test_every_end_of_an_interval_is_whole(monkeypatch, capsys) -> None:
     """A table of more numbers than a line holds goes on below, each block with the names."""
     monkeypatch.setenv("COLUMNS", "80")
