@@ -22,7 +22,6 @@ EXTRAS = {
     "control": ("control", "linear models as python-control's StateSpace"),
     "dask": ("distributed", "fit --dask: many starts on a cluster"),
     "mdf": ("asammdf", "logs in ASAM MDF 4 (.mf4)"),
-    "sensitivity": ("SALib", "swashplate sensitivity, Sobol indices"),
     "tdms": ("npTDMS", "logs in National Instruments' TDMS"),
 }
 """Library of each optional extra, and what it enables."""
