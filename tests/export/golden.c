@@ -48,7 +48,7 @@ struct swp_pump {
     double Z16_plus; /* opening at which the orifice limits the flow [m] */
     double Z16_minus;
     double Z17; /* dead zone of the solenoids [A] */
-    double Z18; /* plussing: spool displacement at rest [m] */
+    double Z18; /* neutral offset of the spool [m] */
     double Z19_plus; /* solenoid force, linear [N/A] */
     double Z19_minus;
     double Z20_plus; /* solenoid force, quadratic [N/A^2] */
