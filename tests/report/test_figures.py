@@ -181,8 +181,8 @@ def test_what_has_no_dead_zone_shows_none(made: dict[str, Figure]) -> None:
     assert legend(made["neutral"]) == []
 
 
-def test_an_hour_is_drawn_by_few_points_and_few_spans(hoist: Drive) -> None:
-    time = np.arange(3600 * 512) / 512.0
+def test_a_long_run_is_drawn_by_few_points_and_few_spans(hoist: Drive) -> None:
+    time = np.arange(900 * 512) / 512.0
     run = hoist.simulate(8.0 * np.sin(0.2 * time) + 1.5 * np.sin(20.0 * time))
     figure = figures.plot_simulation(run)
     for panel, ax in enumerate(figure.axes):

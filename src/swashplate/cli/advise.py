@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from swashplate.cli.options import (
 )
 from swashplate.cli.terminal import Outputs, note, say, show, working
 from swashplate.cli.words import (
+    assigned,
     campaign_of,
     configuration_of,
     file_kind,
@@ -228,21 +228,13 @@ def _noises(words: Sequence[str], fresh: ParameterSet | None = None) -> list[Sen
     from swashplate.identification.experiment_design import Sensor, default_sensors
     from swashplate.units import to_si
 
-    made: dict[str, Sensor] = {}
-    for word in words:
-        name, equals, given = (part.strip() for part in word.partition("="))
-        match = re.fullmatch(r"([+]?[\d.]+(?:[eE][+-]?\d+)?)\s*(.*)", given)
-        if not equals or match is None or not match[1].strip("+.0eE-"):
-            raise InputError(
-                f"--noise cannot read '{word}'; write it as swash_angle=0.1deg, above 0."
-            )
+    def read(name: str, numbers: list[float], unit: str) -> Sensor | None:
         kind = _kind(name)
         si = KINDS[kind].units[0]
-        try:
-            value = to_si(float(match[1]), match[2] or si, si, f"--noise {name}")
-        except ValueError as error:
-            raise InputError(str(error)) from None
-        made[kind] = Sensor(kind, value)
+        value = to_si(numbers[0], unit or si, si, f"--noise {name}")
+        return Sensor(kind, value) if len(numbers) == 1 and value > 0.0 else None
+
+    made = assigned("--noise", words, "swash_angle=0.1deg, above 0", read)
     if fresh is None:
         return list(made.values())
     return [made.get(each.kind, each) for each in default_sensors(Drive(fresh))]
