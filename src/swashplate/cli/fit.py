@@ -182,7 +182,7 @@ def fit(
         from swashplate.identification.assessment import Wanted, judge_fit
         from swashplate.identification.fitting import fit as fitted
         from swashplate.identification.fitting import refined
-        from swashplate.identification.own_model import ModelSetup
+        from swashplate.identification.setup import ModelSetup
         from swashplate.identification.solving import longest_left
         from swashplate.identification.staging import setup_of
     clock.ended("start")
@@ -311,7 +311,7 @@ def _written(found: Judged, out: Path) -> list[str]:
     from tomlkit import dumps
 
     from swashplate.drive import Drive
-    from swashplate.identification.own_model import ModelParameters
+    from swashplate.identification.setup import ModelParameters
     from swashplate.identification.tables import estimates_table
 
     made_folder(out)
@@ -581,7 +581,7 @@ def report(
 def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -> Judged:
     """The stored fit; of a drive that is named, the one beside it that found it."""
     from swashplate.identification.assessment import load_fit
-    from swashplate.identification.own_model import ModelSetup
+    from swashplate.identification.setup import ModelSetup
 
     own = None if model is None else ModelSetup.from_file(model)
     stored = load_fit(place, campaign, model=own)
