@@ -82,14 +82,19 @@ class Criterion(NamedTuple):
         return not self.failure
 
 
+def range_of(qualities: Sequence[RunQuality]) -> float:
+    """Largest less smallest value that was measured of a channel in some runs."""
+    counted = [x.values[x.used] for x in (each.experiment[each.channel] for each in qualities)]
+    return max(float(x.max()) for x in counted) - min(float(x.min()) for x in counted)
+
+
 def part_of_range(qualities: Sequence[RunQuality], channel: str) -> float | None:
     """RMSE of a channel over the range that was measured of it, all runs together.
 
     None where nothing moved.
     """
     alike = [each for each in qualities if each.channel == channel]
-    counted = [each.experiment[channel].values[each.experiment[channel].used] for each in alike]
-    reach = max(float(x.max()) for x in counted) - min(float(x.min()) for x in counted)
+    reach = range_of(alike)
     return pooled(alike)[channel].rmse / reach if reach > 0.0 else None
 
 

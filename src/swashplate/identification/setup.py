@@ -269,6 +269,18 @@ def load_setup(name: str | Path) -> Setup:
     return validated(parse_toml(text, f"{name}.toml"), Setup, f"{name}.toml")
 
 
+def setup_text(setup: Setup) -> str:
+    """A fit configuration as TOML that `load_setup` reads as an equal one."""
+    from tomlkit import dumps, inline_table
+
+    content = setup.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+    for stage in content["stages"]:
+        for name, entry in stage["free"].items():
+            stage["free"][name] = inline_table()
+            stage["free"][name].update(entry)
+    return dumps(content)
+
+
 # --- models of one's own --------------------------------------------------------------------------
 
 

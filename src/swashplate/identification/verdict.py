@@ -30,6 +30,7 @@ from swashplate.identification.acceptance import (
     no_worse_than_mean,
     part_of_range,
     percent,
+    range_of,
     required_accuracy,
 )
 from swashplate.identification.drive_model import DriveModel
@@ -277,12 +278,14 @@ def _headline(
 
 
 def _accuracy(qualities: Sequence[RunQuality]) -> str:
-    """``speed from counts to 1.2 % of its range and current to 2.0 %``."""
+    """``speed to 1.2 % of its range (worst run 1.6 %) and current to 2.0 % (worst run 2.2 %)``."""
     parts = list[str]()
     for name in dict.fromkeys(each.channel for each in qualities):
-        part = part_of_range(qualities, name)
+        part, alike = part_of_range(qualities, name), [q for q in qualities if q.channel == name]
         if part is not None:
-            parts.append(f"{name} to {percent(part)}{'' if parts else ' of its range'}")
+            largest = max(each.measures.rmse for each in alike) / range_of(alike)
+            worst = f" (worst run {percent(largest)})" if len(alike) > 1 else ""
+            parts.append(f"{name} to {percent(part)}{'' if parts else ' of its range'}{worst}")
     return listed(parts) or "channels that never move"
 
 
