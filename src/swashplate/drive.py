@@ -133,8 +133,8 @@ class Drive(Result):
         Parameters
         ----------
         old : equation
-            Of `swashplate.models.card`, `swashplate.models.displacement_control`,
-            `swashplate.models.pump` or `swashplate.models.refinements`.
+            Of `swashplate.models.channel`, `swashplate.models.card`, `swashplate.models.pump`,
+            `swashplate.models.displacement_control` or `swashplate.models.refinements`.
         new : equation
             The same arguments, and behind them, by name, any of `parameters`.
         parameters : class of named tuples, optional
@@ -359,7 +359,8 @@ class Drive(Result):
         Parameters
         ----------
         outputs : sequence of str
-            Signals of the step, by their names in `Simulation`.
+            Signals of the step, by their names in `Simulation`; ``"limits"`` are the pump's, a bit
+            each: dead zone, orifice, spool, swash stop, relief.
         inputs : sequence of str
             ``"voltage"``, and of ``"load_torque"``, ``"pump_speed"`` and ``"supply_pressure"`` what
             the loop gives; for the others the parameters count.
