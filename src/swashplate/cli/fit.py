@@ -160,7 +160,7 @@ def fit(
         from swashplate.identification.assessment import Wanted, judge_fit
         from swashplate.identification.fitting import fit as fitted
         from swashplate.identification.fitting import refined
-        from swashplate.identification.own_model import ModelSetup
+        from swashplate.identification.setup import ModelSetup
         from swashplate.identification.solving import longest_left
         from swashplate.identification.staging import setup_of
     with working(f"Reading {path}"):
@@ -285,8 +285,7 @@ def _written(found: Judged, out: Path) -> list[str]:
     from tomlkit import dumps
 
     from swashplate.drive import Drive
-    from swashplate.identification.own_model import ModelParameters
-    from swashplate.identification.setup import setup_text
+    from swashplate.identification.setup import ModelParameters, setup_text
     from swashplate.identification.tables import estimates_table
 
     made_folder(out)
@@ -539,7 +538,7 @@ def report(
 def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -> Judged:
     """The stored fit; of a drive that is named, the one beside it that found it."""
     from swashplate.identification.assessment import load_fit
-    from swashplate.identification.own_model import ModelSetup
+    from swashplate.identification.setup import ModelSetup
 
     own = None if model is None else ModelSetup.from_file(model)
     stored = load_fit(place, campaign, model=own)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from swashplate.campaign import Campaign, Experiment
     from swashplate.cli.options import Sampling
     from swashplate.drive import Drive
-    from swashplate.identification.own_model import ModelParameters
+    from swashplate.identification.setup import ModelParameters
     from swashplate.maneuvers import Maneuver
     from swashplate.parameters.parameter_set import Change, ParameterSet
     from swashplate.simulation.result import Simulation
@@ -167,7 +167,7 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
     """
     from dataclasses import replace
 
-    from swashplate.identification.own_model import ModelSetup
+    from swashplate.identification.setup import ModelSetup
 
     setup = ModelSetup.from_file(file)
     place = Path(folder) / NUMBERS if Path(folder).is_dir() else Path(folder)

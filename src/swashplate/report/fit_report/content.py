@@ -19,8 +19,8 @@ from swashplate.identification import tables
 from swashplate.identification.acceptance import percent
 from swashplate.identification.assessment import Assessment, StageProfile, assess, motion_of
 from swashplate.identification.fitting import Fit, StageFit
-from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.resampling import CrossValidation
+from swashplate.identification.setup import ModelParameters
 from swashplate.identification.solving import StartResult
 from swashplate.identification.staging import Parameters
 from swashplate.identification.validation import RunQuality, pooled
