@@ -131,7 +131,7 @@ static double number_at(const @type@ *m, size_t place)
     return value;
 }
 
-static void put(@type@ *m, size_t place, double value)
+static void put_at(@type@ *m, size_t place, double value)
 {
     memcpy((char *)m + place, &value, sizeof value);
 }
@@ -144,7 +144,7 @@ static bool in_range(const struct @p@_parameter *p, double value)
     return low && (p->closed ? value <= p->upper : value < p->upper);
 }
 
-static int found(const char *const *names, int count, const char *name)
+static int number_of(const char *const *names, int count, const char *name)
 {
     for (int i = 0; i < count; i++) {
         if (strcmp(names[i], name) == 0) {
@@ -179,8 +179,9 @@ static struct @window@ seen(const @type@ *m, int tap, int line, int samples)
     }
     return window;
 }
-
-static struct @window@ constant(double value)
+"""
+CONSTANT = """\
+static struct @window@ constant_window(double value)
 {
     struct @window@ window = {{{0.0}}, 0.0};
     for (int j = 0; j < @samples@; j++) {
@@ -213,7 +214,7 @@ static int taken(@type@ *m)
         rested_start(m);
     }
     m->before = m->now;
-    return sample(m);
+    return one_sample(m);
 }
 """
 INTERFACE = """\
@@ -232,10 +233,10 @@ int @p@_init(@type@ *m, const double *values, size_t count)
     const double *next = values;
     m->step = *next++;
     for (int i = 0; i < @P@_PARAMETERS; i++, next++) {
-        if (!in_range(&parameters[i], *next)) {
+        if (!in_range(&parameter_table[i], *next)) {
             return @P@_BAD_VALUE;
         }
-        put(m, parameters[i].place, *next);
+        put_at(m, parameter_table[i].place, *next);
     }
 @rest@    m->stale = false;
     const int status = checked(m);
@@ -311,7 +312,7 @@ int @p@_set_input(@type@ *m, int input, double value)
     if (!is_finite(value)) {
         return @P@_BAD_VALUE;
     }
-    switch (input) {
+@no_inputs@    switch (input) {
 @set_inputs@    default:
         return @P@_BAD_VALUE;
     }
@@ -319,7 +320,7 @@ int @p@_set_input(@type@ *m, int input, double value)
 
 int @p@_clear_input(@type@ *m, int input)
 {
-    switch (input) {
+@no_inputs@    switch (input) {
 @clear_inputs@    default:
         return @P@_BAD_VALUE;
     }
@@ -327,11 +328,11 @@ int @p@_clear_input(@type@ *m, int input)
 
 int @p@_set(@type@ *m, int parameter, double value)
 {
-    if (parameter < 0 || parameter >= @P@_PARAMETERS || !in_range(&parameters[parameter], value)) {
+    if (parameter < 0 || parameter >= @P@_PARAMETERS || !in_range(&parameter_table[parameter], value)) {
         return @P@_BAD_VALUE;
     }
-    if (value != number_at(m, parameters[parameter].place)) {
-        put(m, parameters[parameter].place, value);
+    if (value != number_at(m, parameter_table[parameter].place)) {
+        put_at(m, parameter_table[parameter].place, value);
         switched(m, parameter);
         m->stale = true;
     }
@@ -343,12 +344,12 @@ double @p@_get(const @type@ *m, int parameter)
     if (parameter < 0 || parameter >= @P@_PARAMETERS) {
         return NAN;
     }
-    return number_at(m, parameters[parameter].place);
+    return number_at(m, parameter_table[parameter].place);
 }
 
 int @p@_set_option(@type@ *m, int option, bool on)
 {
-    switch (option) {
+@no_options@@no_on@    switch (option) {
 @set_options@    default:
         return @P@_BAD_VALUE;
     }
@@ -356,7 +357,7 @@ int @p@_set_option(@type@ *m, int option, bool on)
 
 bool @p@_get_option(const @type@ *m, int option)
 {
-    switch (option) {
+@no_options@    switch (option) {
 @get_options@    default:
         return false;
     }
@@ -379,27 +380,27 @@ double @p@_get_step(const @type@ *m) { return m->step; }
 int @p@_find(const char *parameter)
 {
     for (int i = 0; i < @P@_PARAMETERS; i++) {
-        if (strcmp(parameters[i].name, parameter) == 0) {
+        if (strcmp(parameter_table[i].name, parameter) == 0) {
             return i;
         }
     }
     return -1;
 }
 
-int @p@_find_output(const char *output) { return found(outputs, @P@_OUTPUTS, output); }
+int @p@_find_output(const char *output) { return number_of(output_names, @P@_OUTPUTS, output); }
 
-int @p@_find_input(const char *input) { return found(inputs, @P@_INPUTS, input); }
+int @p@_find_input(const char *input) { return number_of(input_names, @P@_INPUTS, input); }
 
-int @p@_find_option(const char *option) { return found(options, @P@_OPTIONS, option); }
+int @p@_find_option(const char *option) { return number_of(option_names, @P@_OPTIONS, option); }
 
 const char *@p@_parameter_name(int parameter)
 {
-    return parameter < 0 || parameter >= @P@_PARAMETERS ? NULL : parameters[parameter].name;
+    return parameter < 0 || parameter >= @P@_PARAMETERS ? NULL : parameter_table[parameter].name;
 }
 
 const char *@p@_output_name(int output)
 {
-    return output < 0 || output >= @P@_OUTPUTS ? NULL : outputs[output];
+    return output < 0 || output >= @P@_OUTPUTS ? NULL : output_names[output];
 }
 
 const char *@p@_sentence(int status)
@@ -484,6 +485,9 @@ class _Interface:
             zeros=", 0.0" * len(self.arguments),
             count=str(len(self.values) + 1),
             longest=literal(e.longest),
+            no_inputs="" if e.measured else "    (void)m;\n",
+            no_options="" if e.settable else "    (void)m;\n",
+            no_on="" if e.settable else "    (void)on;\n",
             **more,
         )
 
@@ -566,6 +570,7 @@ class _Interface:
             "\n".join(self.helpers()),
             self.filled(NUMBERS),
             *([self.filled(LINES, window=window)] if e.taps else []),
+            *([self.filled(CONSTANT, window=window)] if "constant_window(" in core else []),
             "/* --- equations " + "-" * 80 + " */\n",
             *(["\n\n".join(private) + "\n"] if private else []),
             *(["\n".join(constants) + "\n"] if constants else []),
@@ -634,7 +639,7 @@ class _Interface:
     def tables(self) -> str:
         """Parameters, names and places."""
         e, lines = self.e, list[str]()
-        lines.append(f"static const struct {e.prefix}_parameter parameters[] = {{")
+        lines.append(f"static const struct {e.prefix}_parameter parameter_table[] = {{")
         for name, place, d in self.rows:
             above = d.above is not None or d.lower == -float("inf")
             closed = d.can_be_off and d.upper == float("inf")
@@ -646,18 +651,18 @@ class _Interface:
         flags = [f"{e.members[i]}_options.{c_name(name)}" for i, name in e.options]
         constants = self.values[count + len(given) + len(flags) :]
         for word, places in (
-            ("givens", [place for _, place in given]),
-            ("flags", flags),
-            ("constants", [place for _, place in constants]),
+            ("given_places", [place for _, place in given]),
+            ("flag_places", flags),
+            ("constant_places", [place for _, place in constants]),
         ):
             if places:
                 lines.append(f"static const size_t {word}[] = {{")
                 lines += [f"    offsetof({e.type}, {place})," for place in places]
                 lines += ["};", ""]
         for word, names in (
-            ("outputs", e.names),
-            ("inputs", e.measured),
-            ("options", [name for _, name in e.settable]),
+            ("output_names", e.names),
+            ("input_names", e.measured),
+            ("option_names", [name for _, name in e.settable]),
         ):
             listed = ", ".join(f'"{name}"' for name in names) or "NULL"
             lines += [*wrapped(f"static const char *const {word}[] = {{{listed}}};"), ""]
@@ -669,24 +674,24 @@ class _Interface:
         P = self.P
         sized = "(int)(sizeof {0} / sizeof {0}[0])"
         for word, present in (
-            ("givens", bool(e.named("given"))),
-            ("flags", bool(e.options)),
-            ("constants", any(p.constants is not None for p in self.model.parts)),
+            ("given_places", bool(e.named("given"))),
+            ("flag_places", bool(e.options)),
+            ("constant_places", any(p.constants is not None for p in self.model.parts)),
         ):
             if not present:
                 continue
-            bad = "*next != 0.0 && *next != 1.0" if word == "flags" else "*next != *next"
+            bad = "*next != 0.0 && *next != 1.0" if word == "flag_places" else "*next != *next"
             lines += [
                 f"for (int i = 0; i < {sized.format(word)}; i++, next++) {{",
                 f"    if ({bad}) {{",
                 f"        return {P}_BAD_VALUE;",
                 "    }",
             ]
-            if word == "flags":
+            if word == "flag_places":
                 lines.append("    const bool on = *next != 0.0;")
-                lines.append("    memcpy((char *)m + flags[i], &on, sizeof on);")
+                lines.append("    memcpy((char *)m + flag_places[i], &on, sizeof on);")
             else:
-                lines.append(f"    put(m, {word}[i], *next);")
+                lines.append(f"    put_at(m, {word}[i], *next);")
             lines.append("}")
         return _body(lines)
 
@@ -740,7 +745,7 @@ class _Interface:
                 f"    m->inputs.{own}_given = true;",
                 f"    return {self.P}_OK;",
             ]
-        return _body(lines or ["(void)m;"] if lines else [])
+        return _body(lines)
 
     def clear_inputs(self) -> str:
         lines = []

@@ -32,6 +32,19 @@ from swashplate.equations.syntax import is_named_tuple, plain
 from swashplate.errors import InputError
 
 
+OWN = """
+number_at put_at is_finite in_range number_of placed seen constant_window before_all good_inputs
+put_inputs taken one_sample rested_start settled_start checked computed switched parameter_table
+given_places flag_places constant_places output_names input_names option_names
+"""
+PUBLIC = """
+size value_count init reset settle step correct output limits set_input clear_input set get
+set_option get_option set_step get_step update find find_output find_input find_option
+parameter_name output_name sentence
+"""
+"""Names that the interface takes, of its own and behind the prefix."""
+
+
 @dataclass(frozen=True)
 class Exported:
     """A model as C: what its names are, and what goes beyond its equations."""
@@ -175,7 +188,8 @@ class Writer:
 
     def __init__(self, exported: Exported) -> None:
         self.e, self.model = exported, exported.model
-        self.unit = Unit(f"{exported.prefix}_", exported.widest)
+        own = {*OWN.split(), *(f"{exported.prefix}_{each}" for each in PUBLIC.split())}
+        self.unit = Unit(f"{exported.prefix}_", exported.widest, own)
         self.P = exported.prefix.upper()
         self.taken = {
             "type": exported.type,
@@ -261,7 +275,7 @@ class Writer:
                 line, struct = self.e.lines.index(tap.signal), self.unit.struct(Window)
                 made = f"seen(m, {number}, {line}, {tap.samples})"
                 if window == "before":
-                    made = f"constant(m->before_record[{line}])"
+                    made = f"constant_window(m->before_record[{line}])"
                 lines.append(f"const struct {struct} {local} = {made};")
                 if not tap.width:
                     value = f"{self.unit.add(HOLDS[tap.hold])}(&{local})"
@@ -322,7 +336,7 @@ class Writer:
             body.append(f"next.{own}_rate = {own}_rate;")
         head = [
             "/* One sample: everything at this instant, then all states to the next. */",
-            f"static int sample({self.e.type} *m)",
+            f"static int one_sample({self.e.type} *m)",
             "{",
             "    bool good = true;",
         ]

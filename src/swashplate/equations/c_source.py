@@ -172,6 +172,8 @@ class Unit:
     """What stands before the tags of structs."""
     longest: int = 3
     """Elements of a tuple whose length the types leave open: samples of a `Window`."""
+    reserved: set[str] = field(default_factory=set)
+    """Names that functions may not have."""
     structs: dict[Any, tuple[str, str]] = field(default_factory=dict)
     constants: dict[str, tuple[Any, str]] = field(default_factory=dict)
     functions: dict[Any, str] = field(default_factory=dict)
@@ -199,7 +201,7 @@ class Unit:
         if whole_key in self.under_way:
             source.refuse(None, "a call of itself", "write a loop over a literal range")
         stem = "_of_".join([source.name, *(plain(each).__name__ for each in calls.values())])
-        name = self.free(c_name(stem), source.function, self.functions.values())
+        name = self.free(c_name(stem), source.function, {*self.functions.values(), *self.reserved})
         self.under_way.append(whole_key)
         text = Function(self, source, name, kinds, calls).text()
         self.under_way.pop()
