@@ -3,3 +3,10 @@ from .c_folder import drive_sources as drive_sources
 from .c_folder import exported_drive as exported_drive
 from .c_folder import feedthrough as feedthrough
 from .c_folder import values_of as values_of
+from .fmi import Comparison as Comparison
+from .fmi import compare as compare
+from .fmi import fmu as fmu
+from .libraries import PLATFORMS as PLATFORMS
+from .variables import LONGEST_STEP as LONGEST_STEP
+from .variables import Variable as Variable
+from .variables import variables as variables
