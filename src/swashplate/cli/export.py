@@ -19,7 +19,7 @@ EXAMPLES = """\
 Examples:
   swashplate export hoist --fmu hoist.fmu
   swashplate export fitted/ --fmu winch.fmu --fmi 3.0 --platforms linux64,win64
-  swashplate export mine.toml --c folder --compile
+  swashplate export mine.toml --c folder
   swashplate export hoist --set tau=10ms --step 0.001 --fmu hoist.fmu
   swashplate export hoist --wasm hoist.wasm
 """
@@ -89,7 +89,11 @@ def export(
                     ),
                 )
             if c is not None:
-                for made in exporting.c(chosen, c, step=own, compile=compile):
+                written = exporting.c(chosen, c, own)
+                if compile:
+                    (header,) = (each.name for each in written if each.name.endswith("drive.h"))
+                    written.append(exporting.compiled_c(c, header))
+                for made in written:
                     note(f"C: {made}")
             if wasm is not None:
                 files.write(
