@@ -22,9 +22,9 @@ from swashplate.equations.model import Equation, Link, Model, Tap, Window, argum
 from swashplate.equations.syntax import plain
 
 OWN = """
-number_at put_at is_finite in_range number_of placed seen constant_window before_all good_inputs
-put_inputs taken one_sample rested_start settled_start checked computed switched parameter_table
-given_places flag_places constant_places output_names input_names option_names
+number_at put_at is_finite all_finite in_range number_of placed seen constant_window before_all
+good_inputs put_inputs taken one_sample rested_start settled_start checked computed switched
+parameter_table given_places flag_places constant_places output_names input_names option_names
 """
 PUBLIC = """
 size value_count init reset settle step correct output limits set_input clear_input set get
@@ -53,6 +53,8 @@ class Exported:
     """By part: margin above 0 where its equations bear the step, of ``p, h, options``."""
     follows: Mapping[tuple[int, str], Equation] = field(default_factory=dict)
     """By part and option: whether it is on, of ``p``; it cannot be set."""
+    internal: frozenset[str] = frozenset()
+    """Options that belong to the equations, and are not for users."""
     longest: float = inf
     """Longest step. [s]"""
 
@@ -107,7 +109,8 @@ class Exported:
     @cached_property
     def settable(self) -> list[tuple[int, str]]:
         """Options that do not follow from parameters."""
-        return [o for o in self.options if o not in self.switches and o not in self.follows]
+        follows = {*self.switches, *self.follows}
+        return [o for o in self.options if o not in follows and o[1] not in self.internal]
 
     @cached_property
     def signals(self) -> tuple[str, ...]:
@@ -210,7 +213,7 @@ class Writer:
 
     def functions(self) -> list[str]:
         """The functions around one sample."""
-        made = [self.updates(), self.starts(False)]
+        made = [self.updates(), self.finite(), self.starts(False)]
         made += [self.starts(True)] if self.e.settles else []
         return [*made, self.sample()]
 
@@ -332,10 +335,8 @@ class Writer:
             "    bool good = true;",
         ]
         body += ["next.begun = true;", "m->now = next;"]
-        checks = [f"good = is_finite(next.{self.e.members[i]}.{path_of(path)}) && good;"
-                  for i, path in self.model.places("state")]  # fmt: skip
-        end = [f"return good ? {self.P}_OK : {self.P}_DOMAIN;"]
-        return "\n".join([*head, *indented([*body, *checks, *end]), "}"])
+        end = [f"return good && all_finite(&next) ? {self.P}_OK : {self.P}_DOMAIN;"]
+        return "\n".join([*head, *indented([*body, *end]), "}"])
 
     def starts(self, settled: bool) -> str:
         """States at the first sample, at rest or settled."""
@@ -400,6 +401,22 @@ class Writer:
             "}",
         ]
         return "\n".join(texts)
+
+    def finite(self) -> str:
+        """Whether all states are finite: without a branch for each."""
+        lines = ["double none = 0.0;"]
+        for i, path in self.model.places("state"):
+            place = f"s->{self.e.members[i]}.{path_of(path)}"
+            lines.append(f"none += {place} - {place};")
+        lines += ["return none == 0.0;"] if len(lines) > 1 else ["(void)s;", "return none == 0.0;"]
+        text = [
+            "/* Whether all states are finite: what is not leaves no zero behind. */",
+            f"static bool all_finite(const struct {self.e.prefix}_memory *s)",
+            "{",
+            *indented(lines),
+            "}",
+        ]
+        return "\n".join(text)
 
     # -- numbers -----------------------------------------------------------------------------------
 
