@@ -18,21 +18,6 @@ import typer
 from typer.core import TyperGroup
 
 from swashplate.__about__ import __version__
-<<<<<<< HEAD
-from swashplate.cli import (
-    advise,
-    campaign,
-    crane,
-    doctor,
-    export,
-    fit,
-    full_order,
-    linear,
-    simulate,
-    understand,
-)
-=======
->>>>>>> main
 from swashplate.cli.options import command
 from swashplate.cli.terminal import say_error
 from swashplate.errors import FileError, InputError, SwashplateError
@@ -107,6 +92,7 @@ COMMANDS = {
         "full-order": "full_order.full_order",
         "crane": "crane.app",
     },
+    "Export": {"export": "export.export"},
     "This installation": {"doctor": "doctor.doctor"},
 }
 """Where each command stands, by the panel of the help that lists it."""
@@ -191,42 +177,6 @@ def options(
     """Options before the command."""
 
 
-<<<<<<< HEAD
-for name, panel, function, examples in (
-    ("demo", "Demonstrations", fit.demo, fit.DEMO_EXAMPLES),
-    ("tour", "Demonstrations", simulate.tour, simulate.TOUR_EXAMPLES),
-    ("simulate", "Simulate", simulate.simulate, simulate.SIMULATE_EXAMPLES),
-    ("compare", "Simulate", simulate.compare, simulate.COMPARE_EXAMPLES),
-    ("axes", "Simulate", simulate.axes, simulate.AXES_EXAMPLES),
-    ("show", "Simulate", simulate.show_parameters, simulate.SHOW_EXAMPLES),
-    ("rig", "Test", campaign.rig, campaign.RIG_EXAMPLES),
-    ("campaign", "Test", campaign.app, ""),
-    ("guess", "Identify", campaign.guess, campaign.GUESS_EXAMPLES),
-    ("excitation", "Identify", advise.excitation, advise.EXCITATION_EXAMPLES),
-    ("fit", "Identify", fit.fit, fit.FIT_EXAMPLES),
-    ("validate", "Identify", fit.validate, fit.VALIDATE_EXAMPLES),
-    ("advise", "Identify", advise.advise, advise.ADVISE_EXAMPLES),
-    ("report", "Identify", fit.report, fit.REPORT_EXAMPLES),
-    ("limits", "Analyse", understand.limits, understand.LIMITS_EXAMPLES),
-    ("whatif", "Analyse", understand.whatif, understand.WHATIF_EXAMPLES),
-    ("size", "Analyse", understand.size, understand.SIZE_EXAMPLES),
-    ("sensitivity", "Analyse", understand.sensitivity, understand.SENSITIVITY_EXAMPLES),
-    ("compensate", "Analyse", understand.compensate, understand.COMPENSATE_EXAMPLES),
-    ("linearize", "Analyse", linear.linearize, linear.LINEARIZE_EXAMPLES),
-    ("bode", "Analyse", linear.bode, linear.BODE_EXAMPLES),
-    ("full-order", "Analyse", full_order.full_order, full_order.EXAMPLES),
-    ("crane", "Analyse", crane.app, ""),
-    ("export", "Export", export.export, export.EXAMPLES),
-    ("doctor", "This installation", doctor.doctor, doctor.EXAMPLES),
-):
-    if isinstance(function, typer.Typer):
-        app.add_typer(function, name=name, rich_help_panel=panel)
-    else:
-        command(app, name, examples, panel)(function)
-
-
-=======
->>>>>>> main
 def _check_surroundings() -> None:
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
     if not epoch.isdecimal():
