@@ -217,13 +217,13 @@ class Writer:
         made += [self.starts(True)] if self.e.settles else []
         return [*made, self.sample()]
 
-    def argument(self, i: int, name: str, inputs: Mapping[str, str]) -> str:
+    def argument(self, i: int, name: str, inputs: Mapping[str, str], state: str) -> str:
         """What an equation of a part takes under a name."""
         member, part = self.e.members[i], self.model.parts[i]
         if name in inputs:
             return inputs[name]
         return {
-            "state": f"&m->now.{member}",
+            "state": f"&m->{state}.{member}",
             "signals": f"&m->{member}_signals",
             "inputs": f"&{member}_inputs",
             "p": f"&m->{member}",
@@ -233,10 +233,12 @@ class Writer:
             "given": f"&m->{member}_given" if part.given else "",
         }[name]
 
-    def call(self, i: int, equation: Equation, inputs: Mapping[str, str]) -> str:
+    def call(
+        self, i: int, equation: Equation, inputs: Mapping[str, str], state: str = "now"
+    ) -> str:
         """A call of one of a part's equations."""
         name = self.unit.add(equation)
-        given = (self.argument(i, each, inputs) for each in arguments_of(equation))
+        given = (self.argument(i, each, inputs, state) for each in arguments_of(equation))
         return f"{name}({', '.join(given)})"
 
     def link(self, link: Link, state: str) -> str:
@@ -257,13 +259,14 @@ class Writer:
         `window` is how a tap is read: at its place, or all of one value before the record.
         """
         part, member = self.model.parts[i], self.e.members[i]
+        state = "now" if window == "before" else "before"
         lines, found = [], dict[str, str]()
         for name in part.input_types:
             link, tap = self.model.link_of(i, name), part.tap(name)
             local = f"{member}_{c_name(name)}"
             default = part.defaults.get(name)
             if link is not None:
-                lines.append(f"const double {local} = {self.link(link, 'now')};")
+                lines.append(f"const double {local} = {self.link(link, state)};")
             elif part.looked_at(name):
                 number = self.e.taps.index((i, name, tap))
                 line, struct = self.e.lines.index(tap.signal), self.unit.struct(Window)
@@ -312,30 +315,30 @@ class Writer:
             member = self.e.members[i]
             lines, inputs = self.inputs(i, "line")
             tail = []
-            if part.sample is not None:
-                tail.append(f"m->{member}_signals = {self.call(i, part.sample, inputs)};")
-            if part.limits is not None:
-                tail.append(f"m->{member}_limits = {self.call(i, part.limits, inputs)};")
+            for word, equation in (("signals", part.sample), ("limits", part.limits)):
+                if equation is not None:
+                    made = self.call(i, equation, inputs, "before")
+                    tail.append(f"m->{member}_{word} = {made};")
             if part.domain is not None:
-                tail.append(f"good = {self.call(i, part.domain, inputs)} > 0.0 && good;")
-            step = f"next.{member} = {self.call(i, part.step, inputs)};"
+                margin = self.call(i, part.domain, inputs, "before")
+                tail.append(f"good = {margin} > 0.0 && good;")
+            step = f"m->now.{member} = {self.call(i, part.step, inputs, 'before')};"
             body += [*self.used(lines, [*tail, step]), *tail]
             late.append(step)
-        body += [f"struct {self.e.prefix}_memory next = m->now;", *late]
+        body += late
         for name, signal in self.model.integrals.items():
-            value, own = self.output(signal, "now"), c_name(name)
-            body.append(f"const double {own}_rate = {value};")
-            grown = f"m->now.{own} + 0.5 * m->step * (m->now.{own}_rate + {own}_rate)"
-            body.append(f"next.{own} = m->now.begun ? {grown} : 0.0;")
-            body.append(f"next.{own}_rate = {own}_rate;")
+            value, own = self.output(signal), c_name(name)
+            body.append(f"m->now.{own}_rate = {value};")
+            grown = f"m->before.{own} + 0.5 * m->step * (m->before.{own}_rate + m->now.{own}_rate)"
+            body.append(f"m->now.{own} = m->before.begun ? {grown} : 0.0;")
         head = [
             "/* One sample: everything at this instant, then all states to the next. */",
             f"static int one_sample({self.e.type} *m)",
             "{",
             "    bool good = true;",
         ]
-        body += ["next.begun = true;", "m->now = next;"]
-        end = [f"return good && all_finite(&next) ? {self.P}_OK : {self.P}_DOMAIN;"]
+        body.append("m->now.begun = true;")
+        end = [f"return good && all_finite(&m->now) ? {self.P}_OK : {self.P}_DOMAIN;"]
         return "\n".join([*head, *indented([*body, *end]), "}"])
 
     def starts(self, settled: bool) -> str:
@@ -391,7 +394,7 @@ class Writer:
             "/* Options, stability and delays of these parameters and this step. */",
             f"static int checked({self.e.type} *m)",
             "{",
-            *indented([*lines, f"return {self.P}_OK;"]),
+            *indented([*(lines or ["(void)m;"]), f"return {self.P}_OK;"]),
             "}",
             "",
             "/* Constants of these parameters and this step. */",
