@@ -19,12 +19,15 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import tomlkit
 
-from swashplate import Drive
-from swashplate.export import feedthrough, fmi, libraries
+from swashplate import Drive, export
+from swashplate.export import fmi, libraries
 
 ROOT = Path(__file__).parents[1]
 BINARIES = ROOT / "src" / "swashplate" / "export" / "binaries"
 SAMPLES, STEP = 15360, 1.0 / 512.0
+AXES = ("hoist", "slew", "luff", "neutral")
+WATCHED = ("current", "shaft_speed", "shaft_position")
+"""Signals that are compared; their value references stand in play.c."""
 MOST_COMPRESSED = 150_000
 """Bytes that all of them together may add to the wheel."""
 LOADERS = ("/usr/aarch64-linux-gnu", "/usr/lib/aarch64-linux-gnu")
@@ -54,7 +57,7 @@ def main() -> None:
         entry["equal_bits"] = verdict(name, content)
         print(f"{name}: {len(content)} bytes; {entry['equal_bits']}")
         entries[name] = entry
-    made["feedthrough"] = {name: sorted(read) for name, read in feedthrough().items()}
+    made["feedthrough"] = {name: sorted(read) for name, read in export.feedthrough().items()}
     made["libraries"] = entries
     for name, content in contents.items():
         (BINARIES / name).write_bytes(content)
@@ -71,19 +74,60 @@ def main() -> None:
 def verdict(name: str, content: bytes) -> str:
     """Whether a library gives the numbers of `Drive.stepper`, or why it was not run."""
     if name == libraries.WASM:
-        return "run by the tests"
+        return wasm_verdict(content)
     platform = next(each for each in libraries.PLATFORMS.values() if each.library == name)
     runner = runner_of(platform)
     if isinstance(runner, str):
         return f"not run: {runner}"
     said = []
-    for axis in ("hoist", "slew", "luff", "neutral"):
+    for axis in AXES:
         for standard in ("2.0", "3.0"):
             worst = largest_difference(Drive.preset(axis), platform, content, standard, runner)
             if worst != 0.0:
                 return f"{axis}, FMI {standard}: differs by {worst:g}"
         said.append(axis)
     return f"FMI 2.0 and 3.0, {', '.join(said)}, {SAMPLES} samples: equal"
+
+
+def wasm_verdict(content: bytes) -> str:
+    """As `verdict`, of the WebAssembly, in wasmtime."""
+    import wasmtime
+
+    store = wasmtime.Store()
+    module = wasmtime.Module(store.engine, content)
+    for axis in AXES:
+        drive = Drive.preset(axis)
+        exports = wasmtime.Instance(store, module, []).exports(store)
+        memory = exports["memory"]
+        exports["_initialize"](store)
+
+        def called(function: str, *words: float, exports=exports) -> int:
+            return exports[f"swp_page_{function}"](store, *words)
+
+        values, voltage = export.values_of(drive, STEP), command()
+        memory.write(store, values.astype("<f8").tobytes(), called("values", values.size))
+        assert called("init", values.size) == 0
+        assert called("begin", SAMPLES, STEP, len(WATCHED)) == 0
+        names = export.exported_drive().names
+        for place, signal in enumerate(WATCHED):
+            called("select", place, names.index(signal))
+        memory.write(store, voltage.astype("<f8").tobytes(), called("input"))
+        assert called("run", 0) == 0
+        found = np.empty((SAMPLES, len(WATCHED)))
+        for place in range(len(WATCHED)):
+            at = called("row", place)
+            found[:, place] = np.frombuffer(memory.read(store, at, at + 8 * SAMPLES), "<f8")
+        worst = float(np.abs(found - stepped(drive)).max())
+        if worst != 0.0:
+            return f"{axis}: differs by {worst:g}"
+    return f"wasmtime, {', '.join(AXES)}, {SAMPLES} samples: equal"
+
+
+def stepped(drive: Drive) -> np.ndarray:
+    """Samples of the stepper under the command."""
+    stepper = drive.stepper(STEP)
+    samples = [stepper.step(each) for each in command()]
+    return np.array([[getattr(each, name) for name in WATCHED] for each in samples])
 
 
 def runner_of(platform: libraries.Platform) -> list[str] | str:
@@ -137,10 +181,7 @@ def largest_difference(
             print(done.stderr[-2000:], file=sys.stderr)
             return float("inf")
         found = np.frombuffer((folder / "result").read_bytes(), "<f8").reshape(-1, 3)
-    stepper = drive.stepper(STEP)
-    expected = [stepper.step(each) for each in voltage]
-    wanted = np.array([(each.current, each.shaft_speed, each.shaft_position) for each in expected])
-    return float(np.abs(found - wanted).max())
+    return float(np.abs(found - stepped(drive)).max())
 
 
 def drive_texts() -> dict[str, str]:

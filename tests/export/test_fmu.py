@@ -480,7 +480,7 @@ def test_supply_pressure_is_z9_until_it_is_set(made, hoist):
 
 @pytest.mark.parametrize("options", [{"literal_coulomb_sign": True}, {"split_card_switch": True}])
 def test_forms_of_the_card_can_be_chosen(made, hoist, options):
-    drive, voltage = hoist.replace(lim1=40.0, I_t1=0.1), command(500)
+    drive, voltage = hoist.replace(lim1=40.0, I_t1=0.2), command(500)
     found = made(drive).begin(voltage=voltage[0], **options).played(voltage)
     words = {"literal_coulomb_sign": ("coulomb_sign", "literal")}
     name, value = words.get(next(iter(options)), ("card_switch", "split"))

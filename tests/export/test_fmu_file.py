@@ -256,7 +256,7 @@ def exported_by(header: str) -> list[str]:
     return sorted(set(re.findall(r"#define (fmi\d\w+) +fmi\dFullName", text)))
 
 
-@pytest.mark.parametrize(("header", "count"), [("fmi2Functions.h", 43), ("fmi3Functions.h", 76)])
+@pytest.mark.parametrize(("header", "count"), [("fmi2Functions.h", 44), ("fmi3Functions.h", 75)])
 def test_library_has_every_function_of_the_standard(header, count, tmp_path):
     """Importers look all of them up, those of model exchange and clocks too."""
     names = exported_by(header)

@@ -137,7 +137,7 @@ def exportable(drive: Drive, step: float) -> Drive:
             f"{drive.name}: tau is {delay:g} s, but the library's line holds {LONGEST_LINE} steps, "
             f"{LONGEST_LINE * step:g} s; choose a step of {delay / LONGEST_LINE:.3g} s or more."
         )
-    if delay < LATE * step:
+    if is_late(delay, step):
         shorter = f"choose a step of {delay / LATE:.3g} s or less" if delay > 0.0 else ""
         advice = shorter or "a master that sets inputs before it reads outputs gets them exactly"
         warnings.warn(
@@ -146,6 +146,11 @@ def exportable(drive: Drive, step: float) -> Drive:
             stacklevel=3,
         )
     return drive
+
+
+def is_late(delay: float, step: float) -> bool:
+    """Whether outputs depend on the voltage of their own instant."""
+    return delay < LATE * step * (1.0 - 1e-12)
 
 
 def packed(drive: Drive, fmi: Version, step: float, platforms: Iterable[Platform]) -> bytes:
@@ -186,7 +191,7 @@ def table_of(drive: Drive, step: float) -> tuple[Variable, ...]:
 
 def direct(drive: Drive, step: float) -> dict[str, set[str]]:
     """By output, the inputs that it depends on at the same instant."""
-    at_once = {"voltage"} if drive.parameters.numbers["tau"] < LATE * step else set[str]()
+    at_once = {"voltage"} if is_late(drive.parameters.numbers["tau"], step) else set[str]()
     own = bool(drive.parameters.equations)
     read = feedthrough(drive) if own else manifest()["feedthrough"]
     return {name: {*inputs, *at_once} for name, inputs in read.items()}

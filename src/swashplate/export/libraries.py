@@ -18,21 +18,22 @@ from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from swashplate.documents import parse_toml
+from swashplate.drive import Drive
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import STEP, drive_sources, exported_drive, values_of
 from swashplate.export.variables import c_header
 from swashplate.tables import write_whole
 
-if TYPE_CHECKING:
-    from swashplate.drive import Drive
-
 NAME = "swashplate_drive"
 """Stem of every library: FMI's model identifier."""
 MANIFEST = "manifest.toml"
 WASM = "drive.wasm"
+
+
+SMALL = ("-Os", "-mllvm", "-inline-threshold=5")
 
 
 class Platform(NamedTuple):
@@ -46,7 +47,7 @@ class Platform(NamedTuple):
     fmi3: tuple[str, ...]
     targets: tuple[str, ...]
     """Zig's; a library for several has them side by side."""
-    optimize: str = "-O2"
+    optimize: tuple[str, ...] = ("-O2",)
     """Two that are large, with a C library or two parts inside, are compiled for size."""
 
 
@@ -67,7 +68,7 @@ PLATFORMS: dict[str, Platform] = {
         ("win64",),
         ("x86_64-windows",),
         ("x86_64-windows-gnu",),
-        "-Os",
+        SMALL,
     ),
     "darwin64": Platform(
         "darwin.dylib",
@@ -75,7 +76,7 @@ PLATFORMS: dict[str, Platform] = {
         ("darwin64", "aarch64-darwin"),
         ("x86_64-darwin", "aarch64-darwin"),
         ("x86_64-macos.11.0", "aarch64-macos.11.0"),
-        "-Os",
+        SMALL,
     ),
 }
 """By the names that users give."""
@@ -90,7 +91,7 @@ FLAGS = (
     "-fno-stack-protector",
     "-DNDEBUG",
 )
-WASM_FLAGS = ("-std=c11", "-Os", "-g0", "-ffp-contract=off", "-fno-ident", "-DNDEBUG")
+WASM_FLAGS = ("-std=c11", *SMALL, "-g0", "-ffp-contract=off", "-fno-ident", "-DNDEBUG")
 FMI_HEADERS = (
     "fmi2FunctionTypes.h",
     "fmi2Functions.h",
@@ -144,10 +145,17 @@ def library_sources(drive: Drive | None = None) -> dict[str, str]:
     drive : Drive, optional
         One with equations of its own; by default the packaged equations.
     """
-    texts = dict(drive_sources(drive))
+    if drive is None:
+        return dict(_packaged_sources())
+    texts = drive_sources(drive)
     header = c_header(exported_drive(drive), layout_of(texts))
     own = {name: _source(name) for name in FMI_SOURCES}
     return {**texts, "fmi_variables.h": header, **own}
+
+
+@cache
+def _packaged_sources() -> dict[str, str]:
+    return library_sources(Drive.preset("neutral"))
 
 
 def all_sources(drive: Drive | None = None) -> dict[str, str]:
@@ -326,7 +334,7 @@ def _options(platform: Platform) -> list[str]:
     # no C++ unwinds through them; on Windows the C library needs its tables
     bare = ["-fno-asynchronous-unwind-tables", "-fno-unwind-tables"]
     shared = ["-shared"] if platform.ending == ".dll" else ["-shared", "-fPIC", *bare]
-    return [*FLAGS, platform.optimize, f"-DSWP_API={api}", *shared]
+    return [*FLAGS, *platform.optimize, f"-DSWP_API={api}", *shared]
 
 
 def _zig(target: str) -> list[str]:
