@@ -35,7 +35,7 @@ from swashplate.export.libraries import (
 from swashplate.export.variables import LONGEST_STEP, NONE, TIME, Variable, variables
 from swashplate.results import Result
 from swashplate.simulation.instance import check_filter_stability
-from swashplate.tables import UNIT, Column, Table, write_whole
+from swashplate.tables import UNIT, Column, Table, write_bytes
 from swashplate.units import si_exponents, to_si
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def fmu(
     chosen = chosen_platforms(platforms)
     exported = exportable(drive, step)
     content = packed(exported, fmi, step, chosen)
-    write_whole(path, lambda beside: beside.write_bytes(content) and None)
+    write_bytes(content, path)
     return Path(path)
 
 
@@ -230,6 +230,13 @@ def _zipped(members: Mapping[str, bytes]) -> bytes:
     return target.getvalue()
 
 
+def _xml(root: ET.Element) -> bytes:
+    """A document's bytes."""
+    ET.indent(root)
+    text = ET.tostring(root, "unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
+
+
 # --- modelDescription.xml -------------------------------------------------------------------------
 
 
@@ -282,8 +289,7 @@ def description(
         clock = {"name": "time", "valueReference": str(TIME), "causality": "independent"}
         ET.SubElement(listed, "Float64", {**clock, "variability": "continuous", "unit": "s"})
         _structure3(structure, table)
-    ET.indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, "utf-8") + b"\n"
+    return _xml(root)
 
 
 def _head(
@@ -402,8 +408,7 @@ def _build_description(units: Sequence[str]) -> bytes:
     )
     for name in units:
         ET.SubElement(sources, "SourceFile", {"name": name})
-    ET.indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, "utf-8") + b"\n"
+    return _xml(root)
 
 
 def _add_units(root: ET.Element, table: Sequence[Variable]) -> None:

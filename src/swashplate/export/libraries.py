@@ -25,7 +25,7 @@ from swashplate.drive import Drive
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import STEP, drive_sources, exported_drive, values_of
 from swashplate.export.variables import c_header
-from swashplate.tables import write_whole
+from swashplate.tables import write_bytes
 
 NAME = "swashplate_drive"
 """Stem of every library: FMI's model identifier."""
@@ -234,7 +234,7 @@ def wasm(drive: Drive, path: str | Path, *, step: float = STEP) -> Path:
     name = VALUES_SECTION.encode()
     content = bytes([len(name)]) + name + numbers
     made = code + b"\0" + _leb128(len(content)) + content
-    write_whole(path, lambda beside: beside.write_bytes(made) and None)
+    write_bytes(made, path)
     return Path(path)
 
 
