@@ -490,8 +490,12 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> Comparison:
         warnings.simplefilter("ignore")  # said when it was exported
         chosen = exportable(drive, step)
     run = chosen.simulate(command, 1.0 / step, interpolation="previous")
-    signals = np.empty(command.size, [("time", np.float64), ("voltage", np.float64)])
-    signals["time"], signals["voltage"] = np.arange(command.size) * step, command
+    table = table_of(chosen, step)
+    inputs = {each.name: each.start for each in table if each.causality == "input"}
+    columns = {"time": np.arange(command.size) * step, **inputs, "voltage": command}
+    signals = np.empty(command.size, [(name, np.float64) for name in columns])
+    for name, values in columns.items():
+        signals[name] = values
     names = [name for name in run.names if name not in ("time", "voltage")]
     try:
         found = fmpy.simulate_fmu(
@@ -507,7 +511,7 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> Comparison:
     if len(found) != command.size:
         raise InputError(f"{path} gave {len(found)} samples for a command of {command.size}.")
     differences = {name: float(np.abs(found[name] - run[name]).max()) for name in names}
-    units = {each.name: each.unit for each in table_of(chosen, step)}
+    units = {each.name: each.unit for each in table}
     return Comparison(chosen.name, command.size, differences, units)
 
 
