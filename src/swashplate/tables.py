@@ -408,6 +408,15 @@ def _of_the_disk(error: BaseException) -> str | None:
     return None if before is None else _of_the_disk(before)
 
 
+def write_bytes(content: bytes, path: str | Path) -> None:
+    """Write bytes, whole or not at all."""
+
+    def write(beside: Path) -> None:
+        beside.write_bytes(content)
+
+    write_whole(path, write)
+
+
 def write_text(text: str, path: str | Path) -> None:
     """Write UTF-8 text, whole or not at all."""
 

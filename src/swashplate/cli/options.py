@@ -205,7 +205,7 @@ class ShownUnits:
     ] = None
 
 
-WRITTEN = {"out", "plot", "write", "pdf"}
+WRITTEN = {"out", "plot", "write", "pdf", "fmu", "c", "wasm"}
 """Parameters of commands that write files, and so replace older ones with --force alone."""
 
 UNITLESS = {"axes", "doctor", "init", "schema"}
