@@ -2,6 +2,13 @@ from . import control as control
 from .crane import Crane as Crane
 from .crane import CraneStepper as CraneStepper
 from .crane import Pose as Pose
+from .following import Demand as Demand
+from .following import Followable as Followable
+from .following import follow as follow
+from .judgment import Estimate as Estimate
+from .judgment import Judgment as Judgment
+from .judgment import Remedy as Remedy
+from .judgment import judge as judge
 from .result import CraneRun as CraneRun
 from .result import limit_table as limit_table
 from .result import run_table as run_table
@@ -11,6 +18,12 @@ from .sea import SEA_STATES as SEA_STATES
 from .sea import Seaway as Seaway
 from .sea import Spectrum as Spectrum
 from .stick import Stick as Stick
+from .study import Residuals as Residuals
+from .study import Sweep as Sweep
+from .study import operability as operability
+from .study import orifices as orifices
+from .study import residuals as residuals
+from .study import sectors as sectors
 from .transfer_functions import Hull as Hull
 from .transfer_functions import TransferFunctions as TransferFunctions
 from .transfer_functions import read_csv as read_csv

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from importlib.resources import files
 from math import cos, degrees, isfinite, radians, sin
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,8 +31,26 @@ from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.tables import Column, Table
 from swashplate.units import to_si
 
+if TYPE_CHECKING:
+    from swashplate.analysis.monte_carlo import Draws
+    from swashplate.crane.following import Followable
+    from swashplate.crane.judgment import Judgment
+    from swashplate.crane.study import Sweep
+
 Array = NDArray[np.float64]
 Actuation = Literal["ideal", "volts", "inverse"]
+
+
+class Fitted(Protocol):
+    """What a fit returns, as far as a crane takes it."""
+
+    @property
+    def drive(self) -> Drive:
+        """The drive that was found."""
+        ...
+
+
+DriveLike = Drive | Fitted | str | Path
 
 RATE = 512.0
 """Samples a second of the loop: the packaged drives' own. [Hz]"""
@@ -142,13 +160,69 @@ class Crane:
         assumed = sum(each.status == "assumed" for each in self.quantities.values())
         return f"Crane({self.name!r}, {drives}; {assumed} of {len(UNITS)} quantities assumed)"
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Names and numbers, by which another process makes the same crane."""
+        drives = {axis: getattr(self, axis) for axis in AXES}
+        return _crane_of, (self.name, self.title, dict(self.quantities), drives)
+
     def with_drive(
-        self, *, hoist: Drive | None = None, slew: Drive | None = None, luff: Drive | None = None
+        self,
+        *,
+        hoist: DriveLike | None = None,
+        slew: DriveLike | None = None,
+        luff: DriveLike | None = None,
     ) -> Crane:
-        """The crane with other drives: ``crane.with_drive(luff=crane.luff.scale(Z16=1.5))``."""
-        return replace(
-            self, hoist=hoist or self.hoist, slew=slew or self.slew, luff=luff or self.luff
+        """The crane with other drives.
+
+        Parameters
+        ----------
+        hoist, slew, luff : Drive, Fit, str or path, optional
+            A drive, ``crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a packaged
+            name, a parameter file, or the folder that a fit wrote.
+
+        Raises
+        ------
+        FileError, ParameterError
+            If there is no such file, or it is no drive's.
+        """
+        given = {"hoist": hoist, "slew": slew, "luff": luff}
+        made: dict[str, Any] = {
+            axis: _drive_of(each) for axis, each in given.items() if each is not None
+        }
+        return replace(self, **made)
+
+    def drawn(
+        self,
+        *,
+        hoist: Draws | None = None,
+        slew: Draws | None = None,
+        luff: Draws | None = None,
+    ) -> tuple[Crane, ...]:
+        """Cranes whose drives are drawn from the errors of fits.
+
+        Parameters
+        ----------
+        hoist, slew, luff : Draws, optional
+            Of `analysis.monte_carlo.drives`; axes without keep their drive.
+
+        Returns
+        -------
+        tuple of Crane
+            As many as the shortest of the draws; of several axes the first with the first.
+
+        Raises
+        ------
+        InputError
+            If no draws are given.
+        """
+        given = {"hoist": hoist, "slew": slew, "luff": luff}
+        found = {axis: each.drives for axis, each in given.items() if each is not None}
+        if not found:
+            raise InputError("Cranes are drawn from the draws of at least one axis.")
+        sets: Iterator[dict[str, Any]] = (
+            dict(zip(found, each, strict=True)) for each in zip(*found.values(), strict=False)
         )
+        return tuple(replace(self, **each) for each in sets)
 
     def with_geometry(self, **changes: float | tuple[float, ...]) -> Crane:
         """The crane with other quantities, in SI and by name: ``boom_length=38.0``.
@@ -336,6 +410,30 @@ class Crane:
         )  # fmt: skip
         return CraneStepper(self, loop)
 
+    def judge(self, control: Control | Mapping[str, Control], **how: Any) -> Judgment:
+        """Judgment of control over many seaways; see `swashplate.crane.judge`."""
+        from swashplate.crane.judgment import judge
+
+        return judge(self, control, **how)
+
+    def follow(self, periods: ArrayLike = tuple(range(4, 17)), **how: Any) -> Followable:
+        """Largest sines of the tip that each axis can follow; see `swashplate.crane.follow`."""
+        from swashplate.crane.following import follow
+
+        return follow(self, periods, **how)
+
+    def sectors(self, control: Control | Mapping[str, Control], **how: Any) -> Sweep:
+        """Swing over the bearing of the boom; see `swashplate.crane.sectors`."""
+        from swashplate.crane.study import sectors
+
+        return sectors(self, control, **how)
+
+    def operability(self, control: Control | Mapping[str, Control], **how: Any) -> Sweep:
+        """Swing over the height of the waves; see `swashplate.crane.operability`."""
+        from swashplate.crane.study import operability
+
+        return operability(self, control, **how)
+
     def _mass(self, load: float | None) -> float:
         mass = self.safe_load if load is None else load
         if not (isfinite(mass) and mass > 0.0):
@@ -361,7 +459,7 @@ class Crane:
         mode = {"ideal": 0, "volts": 1, "inverse": 2, "direct": DIRECT}[actuation]
         if mode == DIRECT and control is not None:
             raise InputError("With direct actuation the voltages are given: leave control out.")
-        edges = [dead_zone(self.hoist, way).outside for way in (-1.0, 1.0)]
+        edges = _edges(self.hoist)
         low, high = self.boom_limits
         fixed = Fixed(
             self.geometry,
@@ -452,15 +550,61 @@ class CraneStepper:
         motion = np.zeros((1, 1)) if ship is None else np.array([ship], dtype=np.float64)
         if motion.shape not in ((1, 1), (1, 6)) or not np.isfinite(motion).all():
             raise InputError("The ship's motion is six finite numbers.")
-        out, ended = self._loop.take(commands, motion)
+        return dict(zip(ROWS, self.take(commands, motion)[0].tolist(), strict=True))
+
+    def take(self, commands: Array, ship: Array) -> Array:
+        """Advance by many samples at once.
+
+        Parameters
+        ----------
+        commands : (n, 3) array
+            As of `step`.
+        ship : (n, 6) array
+            Motion of the ship [m], [rad]; (n, 1) if it does not move.
+
+        Returns
+        -------
+        (n, 24) array
+            Signals, a column for each that `step` returns.
+
+        Raises
+        ------
+        InputError, DomainError
+            As `Crane.simulate`.
+        """
+        out, ended = self._loop.take(commands, ship)
         if ended != FINE:
             raise self._crane._stopped(self._loop, ended)
-        return dict(zip(ROWS, out[0].tolist(), strict=True))
+        return out
+
+
+def _crane_of(
+    name: str, title: str, quantities: dict[str, Quantity], drives: dict[str, Drive]
+) -> Crane:
+    return Crane(name, title, MappingProxyType(quantities), **drives)
+
+
+def _drive_of(given: DriveLike) -> Drive:
+    """A drive as it may be given to a crane."""
+    if isinstance(given, Drive):
+        return given
+    if not isinstance(given, str | Path):
+        return given.drive
+    place = Path(given)
+    if place.is_dir():
+        return Drive.from_toml(place / "drive.toml")
+    return Drive.from_toml(place) if place.suffix == ".toml" else Drive.preset(str(given))
+
+
+@lru_cache(maxsize=512)
+def _inverse(drive: Drive) -> InverseMap:
+    return inverse_map(drive)
 
 
 @lru_cache(maxsize=64)
-def _inverse(drive: Drive) -> InverseMap:
-    return inverse_map(drive)
+def _edges(drive: Drive) -> tuple[float | None, float | None]:
+    """Voltages of a drive's dead zone, negative and positive. [V]"""
+    return dead_zone(drive, -1.0).outside, dead_zone(drive, 1.0).outside
 
 
 def preset_text(name: str) -> str:

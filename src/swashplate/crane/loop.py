@@ -61,6 +61,7 @@ ROWS = (
     *("shaft_hoist", "shaft_slew", "shaft_luff"),
     *("tip_x", "tip_y", "tip_z", "load_x", "load_y", "load_z"),
     *("pull", "rope", "wanted_x", "wanted_y", "boom_cos", "boom_sin"),
+    *("limits_hoist", "limits_slew", "limits_luff"),
 )
 """What the loop leaves of each sample."""
 FINE, TOO_FAST, BOOM_OUT, ROPE_OUT = range(4)
@@ -321,7 +322,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
         boom, rope, in_ship = state.boom, state.rope, state.in_ship
         tip, load, before = state.tip, state.load, state.before
         still, brake = state.still, state.brake
-        volts, omega = np.zeros(3), np.zeros(3)
+        volts, omega, bits = np.zeros(3), np.zeros(3), np.zeros(3)
         r = Rotation(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
         shift = Vector(0.0, 0.0, 0.0)
         ended = FINE
@@ -430,6 +431,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                     c.states, c.out,
                 ))  # fmt: skip
                 omega[0], omega[1], omega[2] = a.out[0], b.out[0], c.out[0]
+                bits[0], bits[1], bits[2] = a.out[1], b.out[1], c.out[1]
                 if fixed.brake:
                     within_zone = fixed.slowest[0] < volts[0] < fixed.slowest[1]
                     still = still + h if within_zone else 0.0
@@ -475,6 +477,8 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
             out[m, 15], out[m, 16] = pull, rope
             out[m, 17], out[m, 18] = path_x, path_y
             out[m, 19], out[m, 20] = boom.cos, boom.sin
+            for i in range(3):
+                out[m, 21 + i] = bits[i]
             sample += 1
         end = State(
             sample, shafts, speeds, operator, wish, aim, boom, rope, in_ship, tip, load, before,
@@ -556,7 +560,7 @@ class Loop:
     ) -> None:
         self.fixed, self.rate, self._law = fixed, rate, law
         self._h = 1.0 / rate
-        speed = (Stored(1, "signals", "shaft_speed"),)
+        speed = (Stored(1, "signals", "shaft_speed"), Stored(1, "limits"))
         for drive in drives:
             check_filter_stability(drive.parameters, self._h)
         self._instances = [instance_of_drive(drive.parameters, True) for drive in drives]
@@ -607,7 +611,7 @@ class Loop:
 
         Returns
         -------
-        out : (n, 21) array
+        out : (n, 24) array
             Columns as in `ROWS`.
         ended : int
             `FINE`, or why it ended at the state's sample.

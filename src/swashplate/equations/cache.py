@@ -120,14 +120,33 @@ class _KernelCache(FunctionCache):
 
     @cached_property
     def _cache_file(self) -> _Index:  # type: ignore[override]
-        stamp = f"{closure_hash(self._py_func)} {numba_version}"
-        return _Index(self._cache_path, self._impl.filename_base, stamp)  # type: ignore[no-untyped-call]
+        found, name = closure_hash(self._py_func), self._impl.filename_base
+        if self._py_func.__closure__ is not None:  # one place in a file, several functions
+            found = blake2b(f"{found} {_cells(self._py_func)}".encode(), digest_size=16).hexdigest()
+            name = f"{name}.{found[:12]}"
+        return _Index(self._cache_path, name, f"{found} {numba_version}")  # type: ignore[no-untyped-call]
+
+    def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
+        """Key of machine code; what a function closes over is in the stamp.
+
+        Numba's own key has the identities of compiled functions, which no other process has.
+        """
+        if self._py_func.__closure__ is None:
+            return tuple(super()._index_key(sig, codegen))  # type: ignore[no-untyped-call]
+        return sig, codegen.magic_tuple()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # whole, and yet nothing that this Numba can use
             return None
+
+
+def _cells(function: Any) -> list[tuple[str, str]]:
+    """What a function closes over, by name: functions by what they reach, others as they are."""
+    cells = [each.cell_contents for each in function.__closure__]
+    known_by = [closure_hash(each) if is_function(each) else repr(each) for each in cells]
+    return list(zip(function.__code__.co_freevars, known_by, strict=True))
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
