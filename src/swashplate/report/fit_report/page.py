@@ -67,7 +67,7 @@ def page(sections: Sequence[Section], content: Mapping[str, Any]) -> str:
         {**content, "run_data": map(_script_json, content["run_data"])},
         sections=sections,
         css=Markup(resource("page.css")),
-        js=Markup(resource("page.js")),
+        js=scripts("curves.js", "page.js"),
     )
     # control characters of a name, and what turns the direction of writing, are no part of HTML
     return re.sub("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]", "\ufffd", made)
@@ -76,6 +76,12 @@ def page(sections: Sequence[Section], content: Mapping[str, Any]) -> str:
 def resource(name: str) -> str:
     """A file of this folder."""
     return files("swashplate.report.fit_report").joinpath(name).read_text("utf-8")
+
+
+def scripts(*names: str) -> Markup:
+    """Scripts of this folder in one scope of their own."""
+    whole = "\n".join(resource(name) for name in names)
+    return Markup('"use strict";\n(() => {\n' + whole + "})();")
 
 
 def html_table(table: Table, look: str = "") -> Markup:
