@@ -159,7 +159,8 @@ def test_boom_along_the_ship_is_calm_where_the_slew_does_the_work(crane):
 def test_swing_without_control_is_proportional_to_small_waves(crane):
     found = operability(crane, MEANT, heights=[0.05, 0.1], seeds=[0, 1], **SHORT)
     swing = found.values[:, :, 0, 0]
-    np.testing.assert_allclose(swing[:, 1] / swing[:, 0], 2.0, rtol=1e-3)
+    # what is left is of second order in the height: half a per cent here
+    np.testing.assert_allclose(swing[:, 1] / swing[:, 0], 2.0, rtol=1e-2)
     assert found.below(90.0).min() == 1.0
 
 
@@ -186,7 +187,7 @@ def test_residuals_over_the_stick_are_those_of_runs(crane):
 def fitted(tmp_path_factory):
     """The folder of a small fit of a virtual luff drive."""
     place = tmp_path_factory.mktemp("fit")
-    names = ("step +4 V", "step -4 V", "step +9 V")
+    names = ("step +4 V", "step +9 V", "sine 4 V 0.1 Hz")
     virtual = rig.run("luff", {name: source_tests("luff")[name] for name in names}, seed=3)
     path = rig.write(virtual, place / "virtual")
     campaign = Campaign.from_toml(path)
@@ -199,11 +200,13 @@ def fitted(tmp_path_factory):
     return place, result
 
 
+@pytest.mark.slow
 def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
     place, result = fitted
     own = crane.with_drive(luff=place)
     assert own.luff.parameters.numbers == pytest.approx(result.drive.parameters.numbers, rel=1e-9)
-    assert crane.with_drive(luff=result).luff is result.drive
+    given = crane.with_drive(luff=result)
+    assert given.luff.parameters.numbers == result.drive.parameters.numbers
     assert crane.with_drive(luff="hoist").luff.name == "hoist"
     drawn = own.drawn(luff=stored_draws(place, draws=3, seed=1))
     assert len(drawn) == 3
@@ -242,7 +245,5 @@ def test_what_makes_no_study_is_said(crane):
     refuse("boom of tg3637 stands at 85 deg", boom_deg=85.0)
     with pytest.raises(InputError, match="Periods to follow must be above 0 s"):
         follow(crane, [0.0])
-    with pytest.raises(
-        InputError, match="Heights of waves must be one or more finite numbers above"
-    ):
+    with pytest.raises(InputError, match="Heights of waves must be one or more finite"):
         operability(crane, MEANT, heights=[-1.0])

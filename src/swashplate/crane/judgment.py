@@ -272,11 +272,8 @@ class Judgment(Tabular):
 
     def _limits(self) -> Table:
         heads = [str(each.name).lower().replace("_", " ") for each in PUMPS]
-        columns = (
-            Column("variant"),
-            Column("axis"),
-            *(Column(each, ".1%", none="–") for each in heads),
-        )
+        shares = (Column(each, ".1%", none="–") for each in heads)
+        columns = (Column("variant"), Column("axis"), *shares)
         made = Table("Share of time for which limits act", columns)
         for name in self.names[1:]:
             for axis in AXES if self.cases[name].actuation != IDEAL else ():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -208,9 +208,8 @@ def plot_sectors(result: Sweep, *, title: str = "") -> Figure:
     ax.tick_params(labelsize=SMALL, labelcolor=INK)
     ax.tick_params(axis="x", pad=8.0)
     for angle, text in zip(angles, ax.get_xticklabels(), strict=True):
-        text.set_horizontalalignment(
-            {0: "center", 180: "center"}.get(int(angle), "left" if angle < 180 else "right")
-        )
+        side: Literal["center", "left", "right"] = "left" if angle < 180 else "right"
+        text.set_horizontalalignment("center" if angle % 180 == 0 else side)
     ax.grid(True, color=GRID, linewidth=0.6)
     ax.spines["polar"].set_color(FAINT)
     side = figure.add_axes((0.012, top + 0.01, 0.9, 0.001))
