@@ -285,7 +285,7 @@ def stored_draws(
         raise InputError(
             f"{path} was fitted to {tests}, which is not there: say where the campaign is."
         )
-    fit = load_fit(path, Campaign.from_toml(tests)).fit
+    fit = load_fit(path, Campaign.from_toml(tests)).result
     if drive is not None:
         given, found = drive.parameters.numbers, fit.drive.parameters.numbers
         other = [name for name, value in found.items() if given[name] != value]
@@ -312,8 +312,6 @@ MOST_SAMPLES = 150_000_000  # Samples of speed that a band may take: 1.2 GB.
 @dataclass(frozen=True, eq=False)
 class Bands(Result):
     """Where the speed lies at each instant."""
-
-    figure = "plot_bands"
 
     time: Array  # (n,) [s]
     lower: Array  # (n,) [rad/s]

@@ -1,0 +1,372 @@
+"""The C interface of an exported model: header and source around its equations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from importlib.resources import files
+
+from swashplate.equations.c_source.model import Exported, Writer, path_of
+from swashplate.equations.c_source.text import HELPERS, c_name, indented, literal, wrapped
+from swashplate.equations.model import Window
+
+_SECTION = re.compile(r"^/\*== (\w+) ==\*/\n", re.MULTILINE)
+_PARTS = _SECTION.split((files(__package__) / "interface.c.in").read_text("utf-8"))[1:]
+TEXTS = dict(zip(_PARTS[::2], _PARTS[1::2], strict=True))
+"""Sections of the text around the equations, by name."""
+
+
+def interface(exported: Exported) -> dict[str, str]:
+    """Header and source of a model.
+
+    Returns
+    -------
+    dict of str to str
+        Text by file name.
+
+    Raises
+    ------
+    EquationError
+        If something in an equation has no counterpart in C; the sentence has file, line and name.
+    """
+    made = _Interface(exported)
+    return {f"{exported.file}.h": made.header(), f"{exported.file}.c": made.source()}
+
+
+class _Interface:
+    """Fills the texts above."""
+
+    def __init__(self, exported: Exported) -> None:
+        self.e, self.writer = exported, Writer(exported)
+        self.model, self.P = exported.model, self.writer.P
+        self.arguments = [c_name(name) for name in exported.signals]
+        self.rows = list(self.writer.ranges())
+        self.values = self.writer.values()
+        # first, so that the equations behind links are among the functions
+        self.read = [self.writer.output(name) for name in exported.names]
+
+    def filled(self, text: str, **more: str) -> str:
+        e = self.e
+        signals = "".join(f", double {name}" for name in self.arguments)
+        return self.writer.filled(
+            text,
+            title=e.title or f"The model {self.model.name}, one sample at a time.",
+            file=e.file,
+            GUARD=f"{e.file.upper()}_H",
+            signals=signals,
+            formals=signals[2:] or "void",
+            passed="".join(f", {name}" for name in self.arguments),
+            given=", ".join(self.arguments),
+            zeros=", 0.0" * len(self.arguments),
+            count=str(len(self.values) + 1),
+            longest=literal(e.longest),
+            no_inputs="" if e.measured else "    (void)m;\n",
+            no_options="" if e.settable else "    (void)m;\n",
+            no_on="" if e.settable else "    (void)on;\n",
+            **more,
+        )
+
+    # -- header ------------------------------------------------------------------------------------
+
+    def header(self) -> str:
+        e, writer, P = self.e, self.writer, self.P
+        enums = [
+            _enum("Outputs", f"{P}_", e.names, f"{P}_OUTPUTS"),
+            _enum("Parameters", f"{P}_PARAMETER_", [n for n, _, _ in self.rows], f"{P}_PARAMETERS"),
+            _enum(
+                "Inputs beside those of a step, for which parameters stand",
+                f"{P}_INPUT_", e.measured, f"{P}_INPUTS",
+            ),
+            _enum(
+                "Options; terms that belong to a parameter come on with it",
+                f"{P}_OPTION_", [n for _, n in e.settable], f"{P}_OPTIONS",
+            ),
+            _enum("Limits, as bits", f"{P}_LIMIT_", [n for _, n in e.limits], "", bits=True),
+        ]  # fmt: skip
+        structs = [text for _, text in list(writer.unit.structs.values())]
+        structs = [*structs[: self.first_private()], self.struct()]
+        settle = self.filled(TEXTS["settle"]) if e.settles else ""
+        return self.filled(
+            TEXTS["header"],
+            enums="\n\n".join(each for each in enums if each),
+            structs="\n\n".join(structs),
+            settle=settle,
+        )
+
+    def first_private(self) -> int:
+        """Number of structs that the header needs."""
+        return self.writer.public
+
+    def struct(self) -> str:
+        """The struct that holds all of a model."""
+        e, unit = self.e, self.writer.unit
+        lines = [f"struct {e.prefix}_memory {{ /* what changes from sample to sample */"]
+        for member, part in zip(e.members, self.model.parts, strict=True):
+            lines.append(f"    struct {unit.struct(part.state)} {member};")
+        for name in self.model.integrals:
+            lines += [f"    double {c_name(name)};", f"    double {c_name(name)}_rate;"]
+        lines += ["    bool begun; /* a sample was taken */", "};", ""]
+        lines.append(f"struct {e.prefix}_inputs {{")
+        lines += [f"    double {name};" for name in self.arguments]
+        for name in e.measured:
+            lines += [f"    double {c_name(name)};", f"    bool {c_name(name)}_given;"]
+        lines += ["};", "", f"struct {e.type} {{", "    double step; /* [s] */"]
+        for member, part in zip(e.members, self.model.parts, strict=True):
+            tags = self.writer.members_of(part)
+            lines += [f"    struct {tag} {member}{tail};" for tag, tail in tags]
+        lines.append(f"    struct {e.prefix}_inputs inputs;")
+        lines.append(f"    struct {e.prefix}_memory now, before; /* before the last sample */")
+        if e.taps:
+            count, rows = len(e.taps), len(e.lines)
+            lines += [
+                f"    int whole[{count}];       /* samples by which taps look back */",
+                f"    double fraction[{count}]; /* and the rest of one */",
+                f"    double line[{rows}][{self.P}_LINE];",
+                f"    double before_record[{rows}];",
+                "    int newest; /* place of the newest sample */",
+            ]
+        lines.append("    bool stale;   /* what follows from parameters is to be computed */")
+        lines.append("    bool settled; /* the start is not at rest */")
+        return "\n".join([*lines, "};"])
+
+    # -- source ------------------------------------------------------------------------------------
+
+    def source(self) -> str:
+        e, writer, unit = self.e, self.writer, self.writer.unit
+        window = unit.struct(Window) if e.taps else ""
+        private = [text for _, text in list(unit.structs.values())[self.first_private() :]]
+        constants = [text for _, text in unit.constants.values()]
+        core = "\n\n".join(writer.core)
+        sections = [
+            self.filled(TEXTS["top"]),
+            "\n".join(self.helpers()),
+            self.filled(TEXTS["numbers"]),
+            *([self.filled(TEXTS["lines"], window=window)] if e.taps else []),
+            *(
+                [self.filled(TEXTS["constant"], window=window)]
+                if "constant_window(" in core
+                else []
+            ),
+            "/* --- equations " + "-" * 80 + " */\n",
+            *(["\n\n".join(private) + "\n"] if private else []),
+            *(["\n".join(constants) + "\n"] if constants else []),
+            "\n\n".join(unit.texts) + "\n",
+            "/* --- the model " + "-" * 80 + " */\n",
+            core + "\n",
+            self.filled(TEXTS["fill"], before=self.before_all()),
+            self.filled(TEXTS["push"], bounds=self.bounds(), push=self.pushed()),
+            self.tables(),
+            self.switched(),
+            self.filled(
+                TEXTS["interface"],
+                rest=self.rest(),
+                settle=self.filled(TEXTS["settled"], finite=self.finite()) if e.settles else "",
+                move=self.moved(),
+                outputs=self.outputs(),
+                limits=self.limits(),
+                set_inputs=self.set_inputs(),
+                clear_inputs=self.clear_inputs(),
+                set_options=self.set_options(),
+                get_options=self.get_options(),
+            ),
+        ]
+        return "\n".join(sections)
+
+    def helpers(self) -> list[str]:
+        """What the equations call, and the lines."""
+        found = self.writer.unit.helpers()
+        own = HELPERS["greater_of"]
+        return [*found, own] if self.e.taps and own not in found else found
+
+    def before_all(self) -> str:
+        lines = [f"m->inputs.{name} = {name};" for name in self.arguments]
+        for k, signal in enumerate(self.e.lines):
+            value = c_name(signal) if signal in self.e.signals else "0.0"
+            lines += [
+                f"m->before_record[{k}] = {value};",
+                f"for (int i = 0; i < {self.P}_LINE; i++) {{",
+                f"    m->line[{k}][i] = {value};",
+                "}",
+            ]
+        return _body([*lines, *(["m->newest = 0;"] if self.e.lines else [])] or ["(void)m;"])
+
+    def bounds(self) -> str:
+        found = []
+        for name, own in zip(self.e.signals, self.arguments, strict=True):
+            bound = self.e.bounds.get(name)
+            found.append(
+                f"is_finite({own})" if bound is None
+                else f"{own} >= -{literal(bound)} && {own} <= {literal(bound)}"
+            )  # fmt: skip
+        return " && ".join(found) or "true"
+
+    def pushed(self) -> str:
+        lines = [f"m->inputs.{name} = {name};" for name in self.arguments]
+        for k, signal in enumerate(self.e.lines):
+            value = f"m->inputs.{c_name(signal)}"
+            lines.append(f"m->line[{k}][m->newest] = {value};")
+        return _body(lines or ["(void)m;"])
+
+    def moved(self) -> str:
+        if not self.e.lines:
+            return ""
+        return f"    m->newest = m->newest > 0 ? m->newest - 1 : {self.P}_LINE - 1;\n"
+
+    def tables(self) -> str:
+        """Parameters, names and places."""
+        e, lines = self.e, list[str]()
+        lines.append(f"static const struct {e.prefix}_parameter parameter_table[] = {{")
+        for name, place, d in self.rows:
+            above = d.above is not None or d.lower == -float("inf")
+            closed = d.can_be_off and d.upper == float("inf")
+            row = f'"{name}", offsetof({e.type}, {place}), {literal(d.lower)}, {literal(d.upper)}'
+            lines.append(f"    {{{row}, {literal(above)}, {literal(closed)}}},")
+        lines += ["};", ""]
+        count = len(self.rows)
+        given = self.values[count : count + len(e.named("given"))]
+        flags = [f"{e.members[i]}_options.{c_name(name)}" for i, name in e.options]
+        constants = self.values[count + len(given) + len(flags) :]
+        for word, places in (
+            ("given_places", [place for _, place in given]),
+            ("flag_places", flags),
+            ("constant_places", [place for _, place in constants]),
+        ):
+            if places:
+                lines.append(f"static const size_t {word}[] = {{")
+                lines += [f"    offsetof({e.type}, {place})," for place in places]
+                lines += ["};", ""]
+        for word, names in (
+            ("output_names", e.names),
+            ("input_names", e.measured),
+            ("option_names", [name for _, name in e.settable]),
+        ):
+            listed = ", ".join(f'"{name}"' for name in names) or "NULL"
+            lines += [*wrapped(f"static const char *const {word}[] = {{{listed}}};"), ""]
+        return "\n".join(lines)
+
+    def rest(self) -> str:
+        """Lines of an initialisation behind the parameters."""
+        e, lines = self.e, list[str]()
+        P = self.P
+        sized = "(int)(sizeof {0} / sizeof {0}[0])"
+        for word, present in (
+            ("given_places", bool(e.named("given"))),
+            ("flag_places", bool(e.options)),
+            ("constant_places", any(p.constants is not None for p in self.model.parts)),
+        ):
+            if not present:
+                continue
+            bad = "*next != 0.0 && *next != 1.0" if word == "flag_places" else "*next != *next"
+            lines += [
+                f"for (int i = 0; i < {sized.format(word)}; i++, next++) {{",
+                f"    if ({bad}) {{",
+                f"        return {P}_BAD_VALUE;",
+                "    }",
+            ]
+            if word == "flag_places":
+                lines.append("    const bool on = *next != 0.0;")
+                lines.append("    memcpy((char *)m + flag_places[i], &on, sizeof on);")
+            else:
+                lines.append(f"    put_at(m, {word}[i], *next);")
+            lines.append("}")
+        return _body(lines)
+
+    def switched(self) -> str:
+        """Terms that come on and go off with their parameters."""
+        cases: dict[str, list[str]] = {}
+        places = {place: i for i, (_, place, _) in enumerate(self.rows)}
+        for (part, option), paths in self.e.switches.items():
+            member = self.e.members[part]
+            own = [f"{member}.{path_of(path)}" for path in paths]
+            test = " || ".join(f"m->{place} != 0.0" for place in own)
+            line = f"m->{member}_options.{c_name(option)} = {test};"
+            cases.setdefault(line, []).extend(str(places[place]) for place in own)
+        lines = ["/* Terms of the equations that are on where their parameters are not 0. */",
+                 f"static void switched({self.e.type} *m, int parameter)", "{"]  # fmt: skip
+        if not cases:
+            return "\n".join([*lines, "    (void)m;", "    (void)parameter;", "}", ""])
+        lines.append("    switch (parameter) {")
+        for line, numbers in cases.items():
+            lines += [f"    case {number}:" for number in numbers]
+            lines += [*indented([f"    {line}"]), "        break;"]
+        return "\n".join([*lines, "    default:", "        break;", "    }", "}", ""])
+
+    def finite(self) -> str:
+        tests = [f"is_finite(m->now.{self.e.members[i]}.{path_of(path)})"
+                 for i, path in self.model.places("state")]  # fmt: skip
+        return "\n        && ".join(tests) or "true"
+
+    def outputs(self) -> str:
+        lines = []
+        for name, read in zip(self.e.names, self.read, strict=True):
+            lines += [f"    case {self.P}_{path_name(name)}:", f"        return {read};"]
+        return "".join(f"{line}\n" for line in lines)
+
+    def limits(self) -> str:
+        if not self.e.limits:
+            return _body(["(void)m;", "return 0u;"])
+        lines = ["unsigned bits = 0u;"]
+        for i, name in self.e.limits:
+            place = f"m->{self.e.members[i]}_limits.{c_name(name)}"
+            lines.append(f"bits |= {place} ? (unsigned){self.P}_LIMIT_{c_name(name)} : 0u;")
+        return _body([*lines, "return bits;"])
+
+    def set_inputs(self) -> str:
+        lines = []
+        for name in self.e.measured:
+            own = c_name(name)
+            lines += [
+                f"case {self.P}_INPUT_{own}:",
+                f"    m->inputs.{own} = value;",
+                f"    m->inputs.{own}_given = true;",
+                f"    return {self.P}_OK;",
+            ]
+        return _body(lines)
+
+    def clear_inputs(self) -> str:
+        lines = []
+        for name in self.e.measured:
+            own = c_name(name)
+            lines += [f"case {self.P}_INPUT_{own}:", f"    m->inputs.{own}_given = false;",
+                      f"    return {self.P}_OK;"]  # fmt: skip
+        return _body(lines)
+
+    def set_options(self) -> str:
+        lines = []
+        for i, name in self.e.settable:
+            place = f"m->{self.e.members[i]}_options.{c_name(name)}"
+            lines += [
+                f"case {self.P}_OPTION_{c_name(name)}:",
+                f"    m->stale = m->stale || {place} != on;",
+                f"    {place} = on;",
+                f"    return {self.P}_OK;",
+            ]
+        return _body(lines)
+
+    def get_options(self) -> str:
+        lines = []
+        for i, name in self.e.settable:
+            lines += [f"case {self.P}_OPTION_{c_name(name)}:",
+                      f"    return m->{self.e.members[i]}_options.{c_name(name)};"]  # fmt: skip
+        return _body(lines)
+
+
+def path_name(name: str) -> str:
+    """A signal's name as part of one in an enum."""
+    return c_name(name.replace(".", "_"))
+
+
+def _body(lines: Sequence[str]) -> str:
+    return "".join(f"{line}\n" for line in indented(lines))
+
+
+def _enum(says: str, prefix: str, names: Sequence[str], count: str, *, bits: bool = False) -> str:
+    if not names and not count:
+        return ""
+    lines = [f"/* {says}. */", "enum {"]
+    for i, name in enumerate(names):
+        value = 1 << i if bits else i
+        comma = "," if count or i + 1 < len(names) else ""
+        lines.append(f"    {prefix}{path_name(name)} = {value}{comma}")
+    lines += [f"    {count} = {len(names)}"] if count else []
+    return "\n".join([*lines, "};"])

@@ -1,0 +1,87 @@
+"""Every equation in C against its compiled twin, bit for bit, on numbers of all kinds.
+
+Equations are found by looking, so that a new one is compared or fails by its name; those of the
+constructs' test show every construct that an equation may use.
+"""
+
+import ctypes
+import importlib
+import inspect
+import pkgutil
+from functools import cache
+from typing import Any
+
+import pytest
+from tests.equations import test_constructs
+from tests.export.twins import InC, flagged
+
+import swashplate.equations
+import swashplate.models
+from swashplate.equations.c_source import Unit
+from swashplate.equations.equation import is_function
+from swashplate.equations.syntax import plain
+from swashplate.errors import EquationError
+
+
+def equations_of(space: dict[str, Any]) -> dict[str, Any]:
+    """Equations that a module defines."""
+    return {
+        name: thing
+        for name, thing in space.items()
+        if is_function(thing)
+        and plain(thing).__module__ == space["__name__"]
+        and inspect.getsource(plain(thing)).startswith("@equation\n")
+    }
+
+
+def packaged() -> dict[str, Any]:
+    """All equations of the models and of the engine's library, by module and name."""
+    found = {}
+    for package in (swashplate.models, swashplate.equations):
+        for each in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+            space = vars(importlib.import_module(each.name))
+            stem = each.name.rpartition(".")[2]
+            found |= {f"{stem}.{name}": thing for name, thing in equations_of(space).items()}
+    return found
+
+
+REFUSED = ("rubbing", "rubbed")
+"""Constructs of which there are none in C: an option that is a tuple of numbers, or None."""
+CONSTRUCTS = equations_of(vars(test_constructs))
+SETS = {
+    "packaged": packaged(),
+    "constructs": {name: each for name, each in CONSTRUCTS.items() if name not in REFUSED},
+}
+CASES = [
+    pytest.param(word, key, on, id=f"{key}-{'on' if on else 'off'}")
+    for word, equations in SETS.items()
+    for key, each in equations.items()
+    for on in ((False, True) if flagged(each) else (False,))
+]
+
+
+@cache
+def translated(word: str) -> InC:
+    """One of the sets as C."""
+    return InC(SETS[word])
+
+
+@pytest.fixture(scope="session")
+def libraries(compiled: Any) -> dict[str, ctypes.CDLL]:
+    """A library of each set."""
+    return {word: ctypes.CDLL(str(compiled({"all.c": translated(word).text}))) for word in SETS}
+
+
+@pytest.mark.parametrize(("word", "key", "on"), CASES)
+def test_an_equation_in_c_has_the_bits_of_the_compiled_one(
+    word: str, key: str, on: bool, libraries: dict[str, ctypes.CDLL]
+) -> None:
+    translated(word).compare(libraries[word], key, on)
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_has_no_counterpart_in_c_is_refused_by_name(name: str) -> None:
+    with pytest.raises(
+        EquationError, match=r"constructs.py, line \d+: rubbing .*Rubbing\.friction.*None"
+    ):
+        Unit().add(CONSTRUCTS[name])
