@@ -24,7 +24,7 @@ from swashplate.crane.judgment import mean_of, share_of
 from swashplate.crane.study import PUMPS
 from swashplate.errors import InputError
 from swashplate.executors import Processes, Serial, Threads
-from swashplate.identification.assessment import save_fit
+from swashplate.identification.assessment import Judged
 from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Free, Setup, load_setup
 from swashplate.maneuvers import source_tests
@@ -195,7 +195,7 @@ def fitted(tmp_path_factory):
     free = {"Z16": Free(relative=(0.5, 2.0))}
     setup = Setup(stages=(stage.model_copy(update={"free": free, "forces": None}),))
     result = fit(Drive.preset("luff").parameters, campaign.experiments, setup)
-    save_fit(result, campaign.experiments, place / "fit.json", campaign=path)
+    Judged(campaign, result, campaign.experiments).store(place / "fit.json")
     result.drive.to_toml(place / "drive.toml")
     return place, result
 
@@ -240,7 +240,7 @@ def test_what_makes_no_study_is_said(crane):
     refuse("no drives 'fast'; there are ideal, identified", drives=("fast",))
     refuse("one controller and one set of drives", drives=())
     refuse("empty list of cranes", drives={"drawn": []})
-    refuse("counts from 60 s on, but a run is 50 s long", length=50.0)
+    refuse("counts from 40 s on, but a run is 30 s long", length=30.0)
     refuse("allowed is 2, but is a share", allowed=2.0)
     refuse("boom of tg3637 stands at 85 deg", boom_deg=85.0)
     with pytest.raises(InputError, match="Periods to follow must be above 0 s"):

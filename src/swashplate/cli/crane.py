@@ -255,9 +255,9 @@ def judge(
         say(sentence)
     files.say()
     if not found.passed:
-        side.print(found.verdict())
+        side.print(f"Fails: {found.verdict()}")
         raise typer.Exit(1)
-    say(found.verdict())
+    say(f"Works: {found.verdict()}")
 
 
 def follow(

@@ -208,8 +208,8 @@ def plot_sectors(result: Sweep, *, title: str = "") -> Figure:
     ax.tick_params(labelsize=SMALL, labelcolor=INK)
     ax.tick_params(axis="x", pad=8.0)
     for angle, text in zip(angles, ax.get_xticklabels(), strict=True):
-        side: Literal["center", "left", "right"] = "left" if angle < 180 else "right"
-        text.set_horizontalalignment("center" if angle % 180 == 0 else side)
+        where: Literal["center", "left", "right"] = "left" if angle < 180 else "right"
+        text.set_horizontalalignment("center" if angle % 180 == 0 else where)
     ax.grid(True, color=GRID, linewidth=0.6)
     ax.spines["polar"].set_color(FAINT)
     side = figure.add_axes((0.012, top + 0.01, 0.9, 0.001))

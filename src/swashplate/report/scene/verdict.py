@@ -18,7 +18,7 @@ from swashplate.report.figures.crane import plot_crane
 from swashplate.report.figures.crane_studies import plot_follow, plot_judgment, seaway_words
 from swashplate.report.fit_report.page import Block, Section, listed_block, page, text
 from swashplate.report.fit_report.summary import Light, light
-from swashplate.tables import Table, count, write_text
+from swashplate.tables import Table, count, listed, write_text
 
 IN_WORDS = (
     "No control: the crane as it is, under the operator's stick alone. Every variant goes through "
@@ -99,7 +99,7 @@ def _summary(judgment: Judgment, remedies: list[Table]) -> Section:
         *_tables(*remedies),
     ]
     if judgment.tried:
-        shown.append(text(f"Tried, and not enough: {', '.join(judgment.tried)}.", "remark"))
+        shown.append(text(f"Tried, and not enough: {listed(judgment.tried)}.", "remark"))
     return Section("summary", "Summary", [*shown, *listed_block(rests)])
 
 
