@@ -42,10 +42,19 @@ UNUSED = 60.0 * DAY
 """Time after which a generated module that nobody used is removed. [s]"""
 LARGEST = 1_000_000_000
 """Size that all generated modules may have with their machine code. [bytes]"""
+MOST_CLOSURES = 48
+"""Functions made by one function of which machine code is kept."""
 DOCSTRING = re.compile(r'^ *""".*?"""\n', re.MULTILINE | re.DOTALL)
 
 
 # --- kernels --------------------------------------------------------------------------------------
+
+
+def _modified(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except FileNotFoundError:  # another worker was quicker
+        return 0.0
 
 
 class _KernelCacheImpl(CompileResultCacheImpl):
@@ -71,7 +80,11 @@ class _Index(IndexDataCacheFile):
         """Remove what was kept of the same function when it stood on another line of its file."""
         function, _, rest = self._index_name.rpartition("-")
         line, _, version = rest.partition(".")
-        if "locals" in function:  # such a name may stand for several functions
+        if "locals" in function:  # such a name stands for several functions: the latest stay
+            old = sorted(Path(self._cache_path).glob(f"{escape(function)}-*.nbi"), key=_modified)
+            for path in old[:-MOST_CLOSURES]:
+                for each in path.parent.glob(f"{escape(path.stem)}.*"):
+                    each.unlink(missing_ok=True)
             return
         for path in Path(self._cache_path).glob(
             f"{escape(function)}-*.{version.partition('.')[0]}.*"
@@ -120,19 +133,17 @@ class _KernelCache(FunctionCache):
 
     @cached_property
     def _cache_file(self) -> _Index:  # type: ignore[override]
-        found, name = closure_hash(self._py_func), self._impl.filename_base
-        if self._py_func.__closure__ is not None:  # one place in a file, several functions
-            found = blake2b(f"{found} {_cells(self._py_func)}".encode(), digest_size=16).hexdigest()
-            name = f"{name}.{found[:12]}"
-        return _Index(self._cache_path, name, f"{found} {numba_version}")  # type: ignore[no-untyped-call]
+        stamp = f"{closure_hash(self._py_func)} {numba_version}"
+        base = self._impl.filename_base
+        if self._py_func.__closure__ is not None:
+            stamp += f" {_cells(self._py_func)}"
+        if "locals" in base:  # one of several functions of this name, which do not displace another
+            base = f"{base}.{hash_of({'': stamp})[:12]}"
+        return _Index(self._cache_path, base, stamp)  # type: ignore[no-untyped-call]
 
-    def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
-        """Key of machine code; what a function closes over is in the stamp.
-
-        Numba's own key has the identities of compiled functions, which no other process has.
-        """
-        if self._py_func.__closure__ is None:
-            return tuple(super()._index_key(sig, codegen))  # type: ignore[no-untyped-call]
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        # the stamp says what a closure holds; Numba's own key has a compiled function's number of
+        # this session
         return sig, codegen.magic_tuple()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -143,7 +154,10 @@ class _KernelCache(FunctionCache):
 
 
 def _cells(function: Any) -> list[tuple[str, str]]:
-    """What a function closes over, by name: functions by what they reach, others as they are."""
+    """What a function closes over, by name: functions by what they reach, others as they are.
+
+    The hash of a closure knows each function once, but not which of several names it has.
+    """
     cells = [each.cell_contents for each in function.__closure__]
     known_by = [closure_hash(each) if is_function(each) else repr(each) for each in cells]
     return list(zip(function.__code__.co_freevars, known_by, strict=True))
