@@ -23,6 +23,7 @@ from swashplate.cli import (
     fit,
     full_order,
     linear,
+    live,
     simulate,
     understand,
 )
@@ -128,6 +129,7 @@ for name, panel, function, examples in (
     ("validate", "Identify", fit.validate, fit.VALIDATE_EXAMPLES),
     ("advise", "Identify", advise.advise, advise.ADVISE_EXAMPLES),
     ("report", "Identify", fit.report, fit.REPORT_EXAMPLES),
+    ("live", "Analyse", live.live, live.EXAMPLES),
     ("limits", "Analyse", understand.limits, understand.LIMITS_EXAMPLES),
     ("whatif", "Analyse", understand.whatif, understand.WHATIF_EXAMPLES),
     ("size", "Analyse", understand.size, understand.SIZE_EXAMPLES),

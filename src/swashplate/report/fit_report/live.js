@@ -332,7 +332,7 @@ class Page {
       ...[...new Set(symbols)].map((symbol) => {
         const own = data.parameters.filter((each) => each.symbol === symbol);
         const numbers = own.map((each) => values.get(each.number));
-        return `${symbol} = { value = ${own.length > 1 ? `[${numbers.join(", ")}]` : numbers[0]}, unit = "${own[0].si}", status = "assumed" }`;
+        return `${symbol} = { value = ${own.length > 1 ? `[${numbers.join(", ")}]` : numbers[0]}, unit = "${own[0].si}", status = "user" }`;
       }),
       "",
     ]);

@@ -18,10 +18,11 @@ from swashplate.analysis.whatif import LEVERS
 from swashplate.campaign import Campaign, Channel, Experiment
 from swashplate.campaign.speed import DIFFERENTIATOR, LOW_PASS, speed_of
 from swashplate.drive import Drive, HasParameters, set_of
-from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.record import Record, record_of
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import SIGNALS, at_rate_of, voltage_record
 from swashplate.identification.validation import ignored_windows
+from swashplate.maneuvers import Maneuver
 from swashplate.parameters.parameter_set import Parameter, ParameterSet
 from swashplate.report.fit_report.page import rendered, resource, script_json
 from swashplate.report.fit_report.runs import packed
@@ -48,7 +49,9 @@ def write_live_page(
     path: str | Path,
     *,
     campaign: Campaign | None = None,
-    command: Record | None = None,
+    axis: str | None = None,
+    command: Maneuver | None = None,
+    rate: float = 512.0,
     name: str = "drive.toml",
 ) -> tuple[str, ...]:
     """Write the live page of a drive: one HTML file, whole or not at all, that needs no network.
@@ -64,8 +67,12 @@ def write_live_page(
         The file, which replaces an older one.
     campaign : Campaign, optional
         Its runs with a voltage as their input are shown beside what the drive makes of them.
-    command : Record, optional
-        A voltage on the march's grid, shown where there is no campaign. [V]
+    axis : str, optional
+        The axis, where the campaign has several.
+    command : Maneuver, optional
+        A voltage that the drive is simulated under where there is no campaign.
+    rate : float
+        At which the command is sampled. [Hz]
     name : str
         File that the changed values belong to, for the page's words.
 
@@ -85,23 +92,20 @@ def write_live_page(
     parameters, said = set_of(drive), tuple[str, ...]()
     runs: list[dict[str, Any]] = []
     if campaign is not None:
-        axes = {each.axis for each in campaign}
-        driven = [each for each in campaign if each.input.kind == "voltage"]
+        tests = campaign.select(axis=axis)
+        driven = [each for each in tests if each.input.kind == "voltage"]
         if not driven:
             raise InputError(
                 f"{campaign.path.name} has no run that a voltage drives; a live page needs one."
             )
-        if len(axes) > 1:
-            raise InputError(
-                f"{campaign.path.name} has runs of {', '.join(sorted(axes))}; select one axis."
-            )
         parameters, said = at_rate_of(driven, parameters)
         runs = [_run(each) for each in driven]
-        left = [each.name for each in campaign if each.input.kind != "voltage"]
+        left = [each.name for each in tests if each.input.kind != "voltage"]
         if left:
             said += (f"Left out, driven by something else than a voltage: {', '.join(left)}.",)
     elif command is not None:
-        runs = [{**_record(command), "name": "command", "role": "", "channels": []}]
+        record = record_of(command.sample(rate), rate, what="voltage")
+        runs = [{**_record(record), "name": command.name, "role": "", "channels": []}]
     else:
         raise InputError("A live page needs the runs of a campaign, or a command to simulate.")
     limits = [(int(each), each.name.lower().replace("_", "-"), look) for each, look in _limits()]

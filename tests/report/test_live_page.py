@@ -1,0 +1,82 @@
+"""The live page: a drive in a browser, equal to the drive in Python."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swashplate import Drive
+from swashplate.campaign import Campaign
+from swashplate.errors import InputError
+from swashplate.maneuvers import parse
+from swashplate.report.fit_report import write_live_page
+
+ACTS = """<script>
+const act = (words, value) => {
+  const range = document.querySelector(`input[type=range][aria-label="${words}"]`);
+  range.value = value;
+  range.dispatchEvent(new Event("input"));
+};
+const wait = setInterval(() => {
+  if (document.body.dataset.ready !== "yes") return;
+  clearInterval(wait);
+  const made = { first: [...live.latest.signals.shaft_speed], limits: [...live.latest.limits] };
+  act("Orifice", 0.75);
+  made.factor = live.factors.get("orifice");
+  made.moved = [...live.latest.signals.shaft_speed];
+  made.errors = live.latest.errors;
+  made.toml = document.getElementById("toml").textContent;
+  dispatchEvent(new KeyboardEvent("keydown", { key: "r" }));
+  made.reset = [...live.latest.signals.shaft_speed];
+  made.milliseconds = document.body.dataset.milliseconds;
+  document.body.append(Object.assign(document.createElement("pre"), { id: "made", textContent: JSON.stringify(made) }));
+}, 5);
+</script></body>"""
+
+
+def acted(page: Path, tmp_path: Path) -> dict:
+    """What a browser makes of a page whose orifice slider is moved, and then reset."""
+    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    if browser is None:
+        pytest.skip("there is no Chromium here; `make browser` installs it where it can")
+    tried = tmp_path / "tried.html"
+    tried.write_text(page.read_text("utf-8").replace("</body>", ACTS), "utf-8")
+    options = ("--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr")
+    more = ("--virtual-time-budget=20000", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom")
+    words = [browser, *options, *more, "--window-size=1280,1000", tried.as_uri()]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    said = [line for line in done.stderr.splitlines() if ":CONSOLE" in line]
+    assert [line for line in said if "setting log level" not in line] == []
+    found = re.search(r'<pre id="made">(.*?)</pre>', done.stdout, re.DOTALL)
+    assert found is not None, done.stdout[-2000:]
+    return json.loads(found[1].replace("&gt;", ">").replace("&lt;", "<").replace("&amp;", "&"))
+
+
+def test_a_slider_gives_what_python_gives(tmp_path: Path) -> None:
+    drive, command = Drive.preset("hoist"), parse("step:9")
+    page = tmp_path / "live.html"
+    write_live_page(drive, page, command=command)
+    made = acted(page, tmp_path)
+    # the page's voltages have four bytes each
+    voltage = command.sample(512.0).astype(np.float32).astype(float)
+    run = drive.simulate(voltage, 512.0)
+    largest = np.abs(run.shaft_speed).max()
+    np.testing.assert_allclose(made["first"], run.shaft_speed, rtol=0.0, atol=1e-12 * largest)
+    assert made["limits"] == [int(each) for each in run.limits]
+    moved = drive.scale(Z16=made["factor"]).simulate(voltage, 512.0).shaft_speed
+    assert np.abs(moved - run.shaft_speed).max() > 0.01 * largest
+    np.testing.assert_allclose(made["moved"], moved, rtol=0.0, atol=1e-12 * largest)
+    assert made["reset"] == made["first"]
+    changed = drive.scale(Z16=made["factor"]).parameters["Z16"].values
+    line = re.fullmatch(
+        r'\[pump_motor\]\nZ16 = \{ value = \[(\S+), (\S+)\], unit = "m", status = "user" \}',
+        made["toml"],
+    )
+    assert line is not None, made["toml"]
+    np.testing.assert_allclose([float(line[1]), float(line[2])], changed, rtol=1e-15)
