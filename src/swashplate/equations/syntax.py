@@ -201,24 +201,36 @@ def parsed(function: Any, typed: bool = True) -> Parsed:
         If there is no source, or something in it that an equation may not use.
     """
     f = plain(function)
-    if not isinstance(f, FunctionType):
-        raise EquationError(f"{function!r} is not a function that can be an equation.")
-    known = _parsed.get(f)
+    known = _parsed.get(f) if isinstance(f, FunctionType) else None
     if known is None:
-        file = f.__code__.co_filename
-        try:
-            node = _functions(file, f.__globals__).get(f.__code__.co_firstlineno)
-        except SyntaxError:
-            node = None
-        if node is None or node.name != f.__code__.co_name:
-            raise EquationError(
-                f"The source of {f.__name__} cannot be read from {file}: write the equation in a "
-                "file or in a notebook's cell, not at a bare prompt."
-            )
-        known = Parsed(f, node, _short(file))
+        known = unchecked(f)
         _Check(known).all(typed)
         _parsed[f] = known
     return known
+
+
+def unchecked(function: Any) -> Parsed:
+    """Source of any function, as it stands: for those that equations are built on.
+
+    Raises
+    ------
+    EquationError
+        If there is no source.
+    """
+    f = plain(function)
+    if not isinstance(f, FunctionType):
+        raise EquationError(f"{function!r} is not a function that can be an equation.")
+    file = f.__code__.co_filename
+    try:
+        node = _functions(file, f.__globals__).get(f.__code__.co_firstlineno)
+    except SyntaxError:
+        node = None
+    if node is None or node.name != f.__code__.co_name:
+        raise EquationError(
+            f"The source of {f.__name__} cannot be read from {file}: write the equation in a "
+            "file or in a notebook's cell, not at a bare prompt."
+        )
+    return Parsed(f, node, _short(file))
 
 
 def _short(file: str) -> str:

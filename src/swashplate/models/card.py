@@ -14,7 +14,7 @@ it, I*'' + 2ζω I*' + C sign(I*') + ω² I* = ω² I_ss, is solved over each st
 and C mean the same at every rate.
 """
 
-from math import cos, exp, sin, sqrt
+from math import cos, exp, inf, pi, sin, sqrt
 from typing import Annotated, NamedTuple
 
 from swashplate.equations.derivatives import declared
@@ -273,6 +273,32 @@ def filtered_current(
         + w * w * steady
     )
     return faded(following)
+
+
+@equation
+def step_limit(zeta: float, exact: Flag) -> float:
+    """Largest ωh, itself excluded, that a channel's filter bears.
+
+    Recursion: Jury's criterion for z² - 2(1 - ζωh) z + 1 - 2ζωh + ω²h² is ωh < 2ζ and
+    ζωh < 1 + ω²h²/4. The first condition is the stricter one where damping is small: an explicit
+    step adds to a swing what the damping has to take away. From ζ = 1 on the second gives
+    ωh < 2(ζ - √(ζ² - 1)), here written without cancellation. Differential equation (`exact`): half
+    a swing, ωh √(1 - ζ²) < π, within which its Coulomb term may count as constant.
+    """
+    if exact is None:
+        over = max(zeta, 1.0)
+        slow = 2.0 / (over + sqrt(over - 1.0) * sqrt(over + 1.0))
+        return min(2.0 * zeta, slow)
+    share = sqrt(max(1.0 - zeta * zeta, 0.0))
+    return pi / share if share > 0.0 else inf
+
+
+@equation
+def stable_step(p: Card, h: float, options: CardOptions) -> float:
+    """Share of the step that the filters would still bear, above 0 where they are stable. [1]"""
+    plus = p.plus.omega * h / step_limit(p.plus.zeta, options.exact)
+    minus = p.minus.omega * h / step_limit(p.minus.zeta, options.exact)
+    return 1.0 - max(plus, minus)
 
 
 @equation

@@ -19,7 +19,7 @@ from typing import Annotated, NamedTuple
 from swashplate.equations.derivatives import declared
 from swashplate.equations.equation import equation
 from swashplate.equations.fields import MINUS, OFF, Definition, Flag
-from swashplate.equations.library import arctangent, small_arctangent
+from swashplate.equations.library import TAN_22_5, arctangent, small_arctangent
 
 WELL_CONDITIONED = 0.25
 """cos(φ+α) cos(φ-α) / cos²φ above which the form without a root in its denominator is used."""
@@ -426,6 +426,12 @@ def swash_angle(tangent: float, p: Pump, steep: Flag) -> float:
     """
     angle = small_arctangent(tangent) if steep is None else arctangent(tangent)
     return min(max(angle, -p.Z13_minus), p.Z13_plus)
+
+
+@equation
+def steep_stops(p: Pump) -> bool:
+    """Whether a stop of the swash plate lies beyond 22.5°."""
+    return tan(max(p.Z13_plus, p.Z13_minus)) >= TAN_22_5
 
 
 @equation

@@ -5,21 +5,22 @@ from __future__ import annotations
 from cmath import log, sqrt
 from dataclasses import replace
 from functools import lru_cache
-from math import floor, tan
+from math import floor
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.equations.equation import interpreted
 from swashplate.equations.fields import floats_of
-from swashplate.equations.library import TAN_22_5
 from swashplate.equations.marching.run import Instance, Part
 from swashplate.equations.model import Model
 from swashplate.equations.replacement import Replacement, again, uses
 from swashplate.equations.syntax import plain
 from swashplate.errors import InputError
 from swashplate.models.card import Card, CardOptions, Channel
-from swashplate.models.displacement_control import Pump, PumpOptions
+from swashplate.models.card import step_limit as filter_limit
+from swashplate.models.displacement_control import Pump, PumpOptions, steep_stops
 from swashplate.models.drive import Source as CurrentSource
 from swashplate.models.drive import (
     drive,
@@ -132,7 +133,7 @@ def card_options(parameters: ParameterSet) -> CardOptions:
 def pump_options(parameters: ParameterSet) -> PumpOptions:
     """Forms of the pump."""
     numbers, on = parameters.numbers, set(parameters.options)
-    if tan(max(numbers["Z13_plus"], numbers["Z13_minus"])) >= TAN_22_5:
+    if interpreted(steep_stops)(pump_of(parameters)):
         on.add("steep")
     if parameters.pressure_root == "symmetric":
         on.add("symmetric")
@@ -160,22 +161,11 @@ def without_ripple(instance: Instance) -> Instance:
 
 
 def step_limit(zeta: ArrayLike, exact: bool) -> NDArray[np.float64]:
-    """Largest ωh, itself excluded, that the card's filter bears, for each ζ.
-
-    Recursion: Jury's criterion for z² - 2(1 - ζωh) z + 1 - 2ζωh + ω²h² is ωh < 2ζ and
-    ζωh < 1 + ω²h²/4. The first condition is the stricter one where damping is small: an explicit
-    step adds to a swing what the damping has to take away. From ζ = 1 on the second gives
-    ωh < 2(ζ - √(ζ² - 1)), here written without cancellation. Differential equation (`exact`): half
-    a swing, ωh √(1 - ζ²) < π, within which its Coulomb term may count as constant.
-    """
+    """Largest ωh that the card's filter bears, for each ζ; see the equation of that name."""
     damping = np.asarray(zeta, dtype=np.float64)
-    if exact:
-        share = np.sqrt(np.maximum(1.0 - damping * damping, 0.0))
-        return np.divide(np.pi, share, out=np.full_like(damping, np.inf), where=share > 0.0)
-    over = np.maximum(damping, 1.0)
-    slow = 2.0 / (over + np.sqrt(over - 1.0) * np.sqrt(over + 1.0))
-    limit: NDArray[np.float64] = np.minimum(2.0 * damping, slow)
-    return limit
+    limit = interpreted(filter_limit)
+    found = [limit(each, True if exact else None) for each in damping.reshape(-1).tolist()]
+    return np.array(found).reshape(damping.shape)
 
 
 @lru_cache(maxsize=256)

@@ -1,0 +1,522 @@
+"""C99 of a whole model: its equations, a struct for its numbers, and functions around one sample.
+
+The C does at every sample what a stepper does: it puts the newest inputs into their delay lines,
+samples every part in the order of the flow, and then takes all states to the next sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import inf
+from typing import Any, get_type_hints
+
+from swashplate.equations.c_source import (
+    FLAG,
+
+    Kind,
+    Unit,
+    c_name,
+    comment,
+    hints_of,
+    literal,
+    wrapped,
+)
+from swashplate.equations.expressions import Node
+from swashplate.equations.fields import Definition, declared_by, floats_of
+from swashplate.equations.marching.march import output_of
+from swashplate.equations.marching.part import HOLDS, PartCode
+from swashplate.equations.model import Equation, Link, Model, Tap, Window, arguments_of
+from swashplate.equations.syntax import is_named_tuple, plain
+from swashplate.errors import InputError
+
+
+OWN = """
+number_at put_at is_finite in_range number_of placed seen constant_window before_all good_inputs
+put_inputs taken one_sample rested_start settled_start checked computed switched parameter_table
+given_places flag_places constant_places output_names input_names option_names
+"""
+PUBLIC = """
+size value_count init reset settle step correct output limits set_input clear_input set get
+set_option get_option set_step get_step update find find_output find_input find_option
+parameter_name output_name sentence
+"""
+"""Names that the interface takes, of its own and behind the prefix."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A model as C: what its names are, and what goes beyond its equations."""
+
+    model: Model
+    prefix: str
+    """What all public names begin with: ``swp`` for ``swp_step``."""
+    title: str = ""
+    """First sentence of the header."""
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    """Names of parameters by path; by default the paths, with ``_`` for dots."""
+    outputs: tuple[str, ...] = ()
+    """Signals that can be read; by default all."""
+    bounds: Mapping[str, float] = field(default_factory=dict)
+    """Largest magnitude of an input."""
+    stable: Mapping[int, Equation] = field(default_factory=dict)
+    """By part: margin above 0 where its equations bear the step, of ``p, h, options``."""
+    follows: Mapping[tuple[int, str], Equation] = field(default_factory=dict)
+    """By part and option: whether it is on, of ``p``; it cannot be set."""
+    longest: float = inf
+    """Longest step. [s]"""
+
+    @property
+    def file(self) -> str:
+        """Name of header and source."""
+        return self.type if self.prefix == self.model.name else f"swashplate_{self.model.name}"
+
+    @property
+    def type(self) -> str:
+        """Name of the struct."""
+        name = self.model.name
+        return name if self.prefix == name else f"{self.prefix}_{name}"
+
+    # -- names -------------------------------------------------------------------------------------
+
+    @cached_property
+    def members(self) -> list[str]:
+        """Name of each part within the structs."""
+        return [c_name(part.name) for part in self.model.parts]
+
+    def named(self, kind: str) -> list[tuple[int, str, str]]:
+        """Part, path and name of every number of its parameters or givens."""
+        found = []
+        for part, path in self.model.places(kind):
+            full = f"{self.model.prefix(part)}{path}"
+            name = self.parameters.get(full) or full.replace(".", "_")
+            found.append((part, path, c_name(name)))
+        return found
+
+    @cached_property
+    def options(self) -> list[tuple[int, str]]:
+        """Part and name of every option."""
+        return [
+            (i, name)
+            for i, part in enumerate(self.model.parts)
+            if part.options is not None
+            for name in part.options._fields
+        ]
+
+    @cached_property
+    def switches(self) -> dict[tuple[int, str], list[str]]:
+        """By part and option: paths of the parameters that switch it on."""
+        found: dict[tuple[int, str], list[str]] = {}
+        for i, part in enumerate(self.model.parts):
+            for each in declared_by(part.parameters):
+                if each.definition.switch:
+                    found.setdefault((i, each.definition.switch), []).extend(each.fields)
+        return {key: paths for key, paths in found.items() if key in self.options}
+
+    @cached_property
+    def settable(self) -> list[tuple[int, str]]:
+        """Options that do not follow from parameters."""
+        return [o for o in self.options if o not in self.switches and o not in self.follows]
+
+    @cached_property
+    def signals(self) -> tuple[str, ...]:
+        """External signals that must be given."""
+        return tuple(name for name in self.model.external if name not in self.measured)
+
+    @cached_property
+    def measured(self) -> tuple[str, ...]:
+        """External signals for which a parameter stands where they are not given."""
+        found: dict[str, None] = {}
+        for i, part in enumerate(self.model.parts):
+            for name in part.input_types:
+                if self.model.link_of(i, name) is None and name in part.defaults:
+                    found[part.tap(name).signal] = None
+        return tuple(found)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """All outputs."""
+        every: dict[str, None] = dict.fromkeys(self.outputs)
+        if not every:
+            for part in self.model.parts:
+                every |= dict.fromkeys(part.signal_names)
+            every |= dict.fromkeys([*self.model.links, *self.model.integrals])
+        return tuple(every)
+
+    @cached_property
+    def limits(self) -> list[tuple[int, str]]:
+        """Part and name of every limit."""
+        found = []
+        for i, part in enumerate(self.model.parts):
+            if part.limits is not None:
+                kind = get_type_hints(plain(part.limits))["return"]
+                found += [(i, name) for name in kind._fields]
+        return found
+
+    @cached_property
+    def taps(self) -> list[tuple[int, str, Tap]]:
+        """Part, input and tap of what is read through a line."""
+        return [
+            (i, name, part.tap(name))
+            for i, part in enumerate(self.model.parts)
+            for name in part.input_types
+            if part.looked_at(name) and self.model.link_of(i, name) is None
+        ]
+
+    @cached_property
+    def lines(self) -> tuple[str, ...]:
+        """External signals that are kept in delay lines."""
+        return tuple(dict.fromkeys(tap.signal for _, _, tap in self.taps))
+
+    @property
+    def settles(self) -> bool:
+        """Whether every part that remembers something has an equation for its steady state."""
+        return all(p.settled is not None or not floats_of(p.state) for p in self.model.parts)
+
+    @cached_property
+    def widest(self) -> int:
+        """Samples of the widest window."""
+        return max([tap.samples for _, _, tap in self.taps], default=3)
+
+
+# --- source ---------------------------------------------------------------------------------------
+
+
+class Writer:
+    """Header and source of a model."""
+
+    def __init__(self, exported: Exported) -> None:
+        self.e, self.model = exported, exported.model
+        own = {*OWN.split(), *(f"{exported.prefix}_{each}" for each in PUBLIC.split())}
+        self.unit = Unit(f"{exported.prefix}_", exported.widest, own)
+        self.P = exported.prefix.upper()
+        self.taken = {
+            "type": exported.type,
+            "p": exported.prefix,
+            "P": self.P,
+            "samples": exported.widest,
+        }
+        for part in self.model.parts:  # structs of the header come before those of the functions
+            for kind in (part.parameters, part.options, part.given, part.state, part.signals):
+                if kind is not None:
+                    self.unit.struct(kind)
+            for equation in (part.constants, part.limits):
+                if equation is not None:
+                    self.unit.struct(get_type_hints(plain(equation))["return"])
+        if exported.taps:
+            self.unit.struct(Window)
+        self.public = len(self.unit.structs)
+        self.core = self.functions()
+
+    def filled(self, text: str, **more: str) -> str:
+        """A text with names in place of ``@name@``."""
+        for key, value in {**self.taken, **more}.items():
+            text = text.replace(f"@{key}@", str(value))
+        return text
+
+    # -- the sample --------------------------------------------------------------------------------
+
+    def functions(self) -> list[str]:
+        """The functions around one sample."""
+        made = [self.updates(), self.starts(False)]
+        made += [self.starts(True)] if self.e.settles else []
+        return [*made, self.sample()]
+
+    def argument(self, i: int, name: str, inputs: Mapping[str, str]) -> str:
+        """What an equation of a part takes under a name."""
+        member, part = self.e.members[i], self.model.parts[i]
+        if name in inputs:
+            return inputs[name]
+        return {
+            "state": f"&m->now.{member}",
+            "signals": f"&m->{member}_signals",
+            "inputs": f"&{member}_inputs",
+            "p": f"&m->{member}",
+            "k": f"&m->{member}_constants",
+            "h": "m->step",
+            "options": f"&m->{member}_options",
+            "given": f"&m->{member}_given" if part.given else "",
+        }[name]
+
+    def call(self, i: int, equation: Equation, inputs: Mapping[str, str]) -> str:
+        """A call of one of a part's equations."""
+        name = self.unit.add(equation)
+        given = (self.argument(i, each, inputs) for each in arguments_of(equation))
+        return f"{name}({', '.join(given)})"
+
+    def link(self, link: Link, state: str) -> str:
+        """A signal between parts."""
+        found = []
+        for source in link.sources:
+            part, member = self.model.parts[source.part], self.e.members[source.part]
+            inside = part.signals is not None and source.signal in floats_of(part.signals)
+            where = f"m->{member}_signals" if inside else f"m->{state}.{member}"
+            found.append(f"{where}.{path_of(source.signal)}")
+        if link.equation is None:
+            return found[0]
+        return f"{self.unit.add(link.equation)}({', '.join(found)})"
+
+    def inputs(self, i: int, window: str) -> tuple[list[str], dict[str, str]]:
+        """Lines that make a part's inputs, and what stands for each of them.
+
+        `window` is how a tap is read: at its place, or all of one value before the record.
+        """
+        part, member = self.model.parts[i], self.e.members[i]
+        lines, found = [], dict[str, str]()
+        for name in part.input_types:
+            link, tap = self.model.link_of(i, name), part.tap(name)
+            local = f"{member}_{c_name(name)}"
+            default = part.defaults.get(name)
+            if link is not None:
+                lines.append(f"const double {local} = {self.link(link, 'now')};")
+            elif part.looked_at(name):
+                number = self.e.taps.index((i, name, tap))
+                line, struct = self.e.lines.index(tap.signal), self.unit.struct(Window)
+                made = f"seen(m, {number}, {line}, {tap.samples})"
+                if window == "before":
+                    made = f"constant_window(m->before_record[{line}])"
+                lines.append(f"const struct {struct} {local} = {made};")
+                if not tap.width:
+                    value = f"{self.unit.add(HOLDS[tap.hold])}(&{local})"
+                    if default is not None:
+                        flag = f"m->inputs.{c_name(tap.signal)}_given"
+                        value = f"{flag} ? {value} : m->{member}.{path_of(default)}"
+                    lines.append(f"const double {local}_held = {value};")
+                    local = f"{local}_held"
+                else:
+                    found[name] = f"&{local}"
+                    continue
+            else:
+                value = f"m->inputs.{c_name(tap.signal)}"
+                if default is not None:
+                    value = f"{value}_given ? {value} : m->{member}.{path_of(default)}"
+                lines.append(f"const double {local} = {value};")
+            found[name] = local
+        if part.inputs is not None:
+            struct = self.unit.struct(part.inputs)
+            kinds = dict(hints_of(part.inputs))
+            values = [found[n][1:] if kinds[n] is Window else found[n] for n in part.input_types]
+            made = f"(struct {struct}){{{', '.join(values)}}}"
+            lines.append(f"const struct {struct} {member}_inputs = {made};")
+        return lines, found
+
+    def used(self, lines: list[str], tail: list[str]) -> list[str]:
+        """Lines without the locals that nothing reads."""
+        kept: list[str] = []
+        for line in reversed(lines):
+            name = line.partition(" = ")[0].rpartition(" ")[2]
+            if any(name in other for other in (*kept, *tail)):
+                kept.insert(0, line)
+        return kept
+
+    def sample(self) -> str:
+        """One sample of the whole model."""
+        body: list[str] = []
+        late: list[str] = []
+        for i, part in enumerate(self.model.parts):
+            member = self.e.members[i]
+            lines, inputs = self.inputs(i, "line")
+            tail = []
+            if part.sample is not None:
+                tail.append(f"m->{member}_signals = {self.call(i, part.sample, inputs)};")
+            if part.limits is not None:
+                tail.append(f"m->{member}_limits = {self.call(i, part.limits, inputs)};")
+            if part.domain is not None:
+                tail.append(f"good = {self.call(i, part.domain, inputs)} > 0.0 && good;")
+            step = f"next.{member} = {self.call(i, part.step, inputs)};"
+            body += [*self.used(lines, [*tail, step]), *tail]
+            late.append(step)
+        body += [f"struct {self.e.prefix}_memory next = m->now;", *late]
+        for name, signal in self.model.integrals.items():
+            value, own = self.output(signal, "now"), c_name(name)
+            body.append(f"const double {own}_rate = {value};")
+            grown = f"m->now.{own} + 0.5 * m->step * (m->now.{own}_rate + {own}_rate)"
+            body.append(f"next.{own} = m->now.begun ? {grown} : 0.0;")
+            body.append(f"next.{own}_rate = {own}_rate;")
+        head = [
+            "/* One sample: everything at this instant, then all states to the next. */",
+            f"static int one_sample({self.e.type} *m)",
+            "{",
+            "    bool good = true;",
+        ]
+        body += ["next.begun = true;", "m->now = next;"]
+        checks = [f"good = is_finite(next.{self.e.members[i]}.{path_of(path)}) && good;"
+                  for i, path in self.model.places("state")]  # fmt: skip
+        end = [f"return good ? {self.P}_OK : {self.P}_DOMAIN;"]
+        return "\n".join([*head, *indented([*body, *checks, *end]), "}"])
+
+    def starts(self, settled: bool) -> str:
+        """States at the first sample, at rest or settled."""
+        body: list[str] = []
+        for i, part in enumerate(self.model.parts):
+            member = self.e.members[i]
+            lines, inputs = self.inputs(i, "before")
+            equation = part.settled if settled else part.rest
+            if equation is not None:
+                tail = [f"m->now.{member} = {self.call(i, equation, inputs)};"]
+            else:
+                defaults = part.state._field_defaults
+                tail = []
+                for path in floats_of(part.state):
+                    value = defaults.get(path.split(".")[0], 0.0)
+                    for each in path.split(".")[1:]:
+                        value = getattr(value, each, 0.0)
+                    tail.append(f"m->now.{member}.{path_of(path)} = {literal(float(value))};")
+            if part.sample is not None and i + 1 < len(self.model.parts):
+                tail.append(f"m->{member}_signals = {self.call(i, part.sample, inputs)};")
+            body += [*self.used(lines, tail), *tail]
+        what = "settled under what it was given" if settled else "at rest"
+        name = "settled_start" if settled else "rested_start"
+        head = [f"/* States before the first sample, {what}. */",
+                f"static void {name}({self.e.type} *m)", "{"]  # fmt: skip
+        return "\n".join([*head, *indented(body), "}"])
+
+    def updates(self) -> str:
+        """What follows from parameters and step: options, constants, places of the taps."""
+        options, constants, places = [], [], []
+        for (i, name), equation in self.e.follows.items():
+            member = self.e.members[i]
+            options.append(f"m->{member}_options.{c_name(name)} = {self.call(i, equation, {})};")
+        for i, part in enumerate(self.model.parts):
+            if part.constants is not None:
+                made = self.call(i, part.constants, {})
+                constants.append(f"m->{self.e.members[i]}_constants = {made};")
+        checks = [
+            f"if (!({self.call(i, equation, {})} > 0.0)) {{\n    return {self.P}_UNSTABLE;\n}}"
+            for i, equation in self.e.stable.items()
+        ]
+        for number, (i, _, tap) in enumerate(self.e.taps):
+            delay = f"m->{self.e.members[i]}.{path_of(tap.delay)}" if tap.delay else "0.0"
+            made = f"placed(m, {number}, {delay}, {literal(float(tap.ahead))}, {tap.samples})"
+            places.append(f"if (!{made}) {{\n    return {self.P}_BAD_DELAY;\n}}")
+        lines = [line for each in (*options, *checks, *places) for line in each.split("\n")]
+        texts = [
+            "/* Options, stability and delays of these parameters and this step. */",
+            f"static int checked({self.e.type} *m)",
+            "{",
+            *indented([*lines, f"return {self.P}_OK;"]),
+            "}",
+            "",
+            "/* Constants of these parameters and this step. */",
+            f"static void computed({self.e.type} *m)",
+            "{",
+            *indented(constants or ["(void)m;"]),
+            "}",
+        ]
+        return "\n".join(texts)
+
+    # -- numbers -----------------------------------------------------------------------------------
+
+    def members_of(self, part: Model) -> Iterator[tuple[str, str]]:
+        """Tag and ending of each member of the struct that belongs to a part."""
+        yield self.unit.struct(part.parameters), ""
+        kinds = [("options", part.options), ("given", part.given), ("signals", part.signals)]
+        for word in ("constants", "limits"):
+            equation = getattr(part, word)
+            if equation is not None:
+                kinds.append((word, get_type_hints(plain(equation))["return"]))
+        for word, kind in kinds:
+            if kind is not None:
+                yield self.unit.struct(kind), f"_{word}"
+
+    def output(self, name: str, state: str = "before") -> str:
+        """Where an output is read."""
+        if name in self.model.integrals:
+            return f"m->now.{c_name(name)}"
+        stored, _ = output_of(self.model, name)
+        if stored.kind == "link":
+            return self.link(self.model.links[stored.path], state)
+        where = f"m->{state}." if stored.kind == "state" else "m->"
+        tail = "_signals" if stored.kind == "signals" else ""
+        return f"{where}{self.e.members[stored.part]}{tail}.{path_of(stored.path)}"
+
+    def ranges(self) -> Iterator[tuple[str, str, Definition]]:
+        """Name, place and definition of each parameter."""
+        definitions: dict[tuple[int, str], Definition] = {}
+        for i, part in enumerate(self.model.parts):
+            for each in declared_by(part.parameters):
+                definitions |= {(i, path): each.definition for path in each.fields}
+        for i, path, name in self.e.named("parameters"):
+            place = f"{self.e.members[i]}.{path_of(path)}"
+            yield name, place, definitions.get((i, path), Definition(name, ""))
+
+    def values(self) -> list[tuple[str, str]]:
+        """Name and place of every number that an initialisation takes, the step apart."""
+        found = [(name, place) for name, place, _ in self.ranges()]
+        for i, path, name in self.e.named("given"):
+            found.append((name, f"{self.e.members[i]}_given.{path_of(path)}"))
+        for i, name in self.e.options:
+            found.append((name, f"{self.e.members[i]}_options.{c_name(name)}"))
+        for i, part in enumerate(self.model.parts):
+            if part.constants is not None:
+                kind = get_type_hints(plain(part.constants))["return"]
+                for path in floats_of(kind):
+                    found.append((path, f"{self.e.members[i]}_constants.{path_of(path)}"))
+        return found
+
+
+def path_of(path: str) -> str:
+    """A path of Python's as one of C's."""
+    return ".".join(c_name(each) for each in path.split("."))
+
+
+def indented(lines: Iterable[str]) -> list[str]:
+    """Lines of C moved in, long ones on several."""
+    return [each for line in lines for each in (wrapped(f"    {line}") if line else [""])]
+
+
+# --- feedthrough ----------------------------------------------------------------------------------
+
+
+def feedthrough(exported: Exported) -> dict[str, frozenset[str]]:
+    """Inputs that each output follows at the same sample, whatever the options.
+
+    Returns
+    -------
+    dict of str to frozenset of str
+        External signals by output; those that are read through a tap count with any delay below
+        the window's lead only, and are left out.
+    """
+    model = exported.model
+    every = [kind.options for kind in model.parts]
+    chosen = [[_on(kind, None) for kind in every], [_on(kind, "") for kind in every]]
+    for i, kind in enumerate(every):
+        for name in kind._fields if kind is not None else ():
+            chosen.append([_on(k, name if j == i else "") for j, k in enumerate(every)])
+    found: dict[str, frozenset[str]] = dict.fromkeys(exported.names, frozenset())
+    for options in chosen:
+        parts = [PartCode(model, i, model.external, each) for i, each in enumerate(options)]
+        for name in exported.names:
+            stored, _ = output_of(model, model.integrals.get(name, name))
+            link = model.links.get(stored.path) if stored.kind == "link" else None
+            nodes = (
+                [(s.part, parts[s.part].signal(s.signal)) for s in link.sources]
+                if link is not None
+                else [(stored.part, parts[stored.part].node(stored))]
+            )
+            found[name] |= _read(parts, nodes)
+    return found
+
+
+def _on(kind: Any, name: str | None) -> Any:
+    """Options all on, all off, or one of them on."""
+    if kind is None:
+        return None
+    return kind(*(True if name is None or each == name else None for each in kind._fields))
+
+
+def _read(parts: Sequence[PartCode], nodes: Iterable[tuple[int, Node]]) -> frozenset[str]:
+    """External signals that some nodes follow at once."""
+    found: set[str] = set()
+    for i, node in nodes:
+        read = parts[i].code.reads([node])
+        for name in parts[i].own.input_types:
+            link = parts[i].model.link_of(i, name)
+            if link is None:
+                signal = parts[i].own.tap(name).signal
+                found |= {signal} if f"x_{signal}" in read else set()
+            elif any(parts[i].source(s) in read for s in link.sources):
+                before = [(s.part, parts[s.part].signal(s.signal)) for s in link.sources]
+                found |= _read(parts, before)
+    return frozenset(found)

@@ -1,0 +1,989 @@
+"""C99 from equations: each function of Python becomes one of C, with its names and its docstring.
+
+The translator reads the very functions that Numba compiles. Options are run-time flags in C, named
+tuples are structs, and every operation stays where the equation has it, so that a strict compiler
+gives the same bits.
+"""
+
+from __future__ import annotations
+
+import ast
+import copy
+import inspect
+import math
+import re
+import textwrap
+import types
+import typing
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import Any, NamedTuple, NoReturn
+
+from swashplate.equations import loops
+from swashplate.equations.fields import Definition
+from swashplate.equations.syntax import (
+    ARITHMETIC,
+    COMPARISONS,
+    MATH,
+    Parsed,
+    is_named_tuple,
+    parsed,
+    plain,
+    unchecked,
+    whole,
+)
+from swashplate.errors import EquationError
+
+WIDTH = 100
+"""Longest line of C."""
+HELPERS = {
+    "lesser_of": """\
+/* Python's min: of two that are equal or do not compare, the first. */
+static double lesser_of(double a, double b) { return b < a ? b : a; }
+""",
+    "greater_of": """\
+/* Python's max: of two that are equal or do not compare, the first. */
+static double greater_of(double a, double b) { return b > a ? b : a; }
+""",
+    "whole_power": """\
+/* A power with a whole number, by squaring as the equations' compiler does it. */
+static double whole_power(double base, int exponent)
+{
+    double power = 1.0;
+    for (int left = exponent < 0 ? -exponent : exponent; left != 0; left >>= 1) {
+        if (left & 1) {
+            power *= base;
+        }
+        base *= base;
+    }
+    return exponent < 0 ? 1.0 / power : power;
+}
+""",
+    "whole_number": """\
+/* A number without its fraction as a whole number; for what has none the lowest. */
+static long long whole_number(double value)
+{
+    return value >= -9.2e18 && value <= 9.2e18 ? (long long)value : -9223372036854775807LL - 1;
+}
+""",
+}
+"""Functions that stand for what C has not, or has otherwise."""
+WORDS = set(
+    """
+auto break case char const continue default do double else enum extern float for goto if inline int
+long register restrict return short signed sizeof static struct switch typedef union unsigned void
+volatile while bool true false NULL INFINITY NAN size_t offsetof main errno memcpy memset strcmp
+isfinite isnan isinf signbit lesser_of greater_of whole_power whole_number fabs fmod pow ldexp frexp
+modf ceil round trunc rint cosh sinh tanh acosh asinh atanh cbrt log10 log2 log1p exp2 expm1 erf erfc
+gamma lgamma tgamma fmin fmax fdim fma j0 j1 jn y0 y1 yn index time signal div abs linux unix
+""".split()  # noqa: SIM905
+) | set(MATH.values())
+"""Names that C or its library keeps for itself."""
+BREAKS = re.compile(r"[,;] | (?=[?:+/=*-] |&& |\|\| )|\{(?=\.)")
+"""Where a long line of C may end."""
+LEVELS = {"?": 1, "||": 2, "&&": 3, "==": 7, "!=": 7, "<": 8, "<=": 8, ">": 8, ">=": 8}
+LEVELS |= {"+": 10, "-": 10, "*": 11, "/": 11, "unary": 12, "atom": 13}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a value is: double, int, bool, flag (an option), struct or tuple."""
+
+    word: str
+    cls: Any = None
+    items: tuple[Kind, ...] = ()
+
+    @property
+    def whole(self) -> bool:
+        """Whether it has parts, and is passed by its address."""
+        return self.word in ("struct", "tuple")
+
+
+DOUBLE, INT, BOOL, FLAG = Kind("double"), Kind("int"), Kind("bool"), Kind("flag")
+SCALARS = {DOUBLE: "double", INT: "long long", BOOL: "bool", FLAG: "bool"}
+
+
+class Text(NamedTuple):
+    """An expression in C."""
+
+    text: str
+    level: int
+    kind: Kind
+    pointer: bool = False
+    """Whether it is the address of what it stands for."""
+    place: bool = True
+    """Whether it has an address, if it has parts."""
+
+
+def c_name(name: str) -> str:
+    """A name of Python's as one of C's."""
+    plain_name = "".join(c if c.isascii() else f"u{ord(c):04x}" for c in name)
+    return f"{plain_name}_" if plain_name in WORDS else plain_name
+
+
+def snake(name: str) -> str:
+    """Name of a class in lower case: ``CardOptions`` is ``card_options``."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+
+
+def literal(value: float) -> str:
+    """A number as C writes it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if math.isinf(value):
+        return "INFINITY" if value > 0.0 else "-INFINITY"
+    return "NAN" if math.isnan(value) else repr(float(value))
+
+
+def wrapped(line: str) -> list[str]:
+    """A line of C on as many lines as it takes."""
+    indent = " " * (len(line) - len(line.lstrip()))
+    lines, rest = list[str](), line
+    while len(rest) > WIDTH:
+        ends = [m.end() for m in BREAKS.finditer(rest, len(indent) + 8, WIDTH + 1)]
+        if not ends:
+            break
+        at = max([m for m in ends if rest[m - 2] in ",;"] or ends)
+        at = at if at > WIDTH // 2 else max(ends)
+        lines.append(rest[:at].rstrip())
+        rest = f"{indent}    {rest[at:]}"
+    return [*lines, rest]
+
+
+def comment(text: str) -> list[str]:
+    """A docstring as a comment."""
+    lines = inspect.cleandoc(text).replace("*/", "* /").splitlines()
+    if len(lines) == 1 and len(lines[0]) < WIDTH - 6:
+        return [f"/* {lines[0]} */"]
+    return [f"/* {lines[0]}", *(f" * {line}".rstrip() for line in lines[1:]), " */"]
+
+
+# --- all that was translated ----------------------------------------------------------------------
+
+
+@dataclass
+class Unit:
+    """Structs, constants and functions, in the order in which C needs them."""
+
+    prefix: str = ""
+    """What stands before the tags of structs."""
+    longest: int = 3
+    """Elements of a tuple whose length the types leave open: samples of a `Window`."""
+    reserved: set[str] = field(default_factory=set)
+    """Names that functions may not have."""
+    structs: dict[Any, tuple[str, str]] = field(default_factory=dict)
+    constants: dict[str, tuple[Any, str]] = field(default_factory=dict)
+    functions: dict[Any, str] = field(default_factory=dict)
+    """Names in C, by function and what it is made for."""
+    texts: list[str] = field(default_factory=list)
+    under_way: list[Any] = field(default_factory=list)
+
+    def add(self, function: Any) -> str:
+        """Translate an equation and all that it calls; its name in C.
+
+        Raises
+        ------
+        EquationError
+            If something in it has no counterpart in C; the sentence has file, line and function.
+        """
+        return self.made(parsed(function), (), {}, {})
+
+    def made(
+        self, source: Parsed, key: tuple[Any, ...], kinds: dict[str, Kind], calls: dict[str, Any]
+    ) -> str:
+        """A function for certain kinds of arguments, or for other functions among them."""
+        whole_key = (source.function, *key)
+        if whole_key in self.functions:
+            return self.functions[whole_key]
+        if whole_key in self.under_way:
+            source.refuse(None, "a call of itself", "write a loop over a literal range")
+        stem = "_of_".join([source.name, *(plain(each).__name__ for each in calls.values())])
+        name = self.free(c_name(stem), source.function, {*self.functions.values(), *self.reserved})
+        self.under_way.append(whole_key)
+        text = Function(self, source, name, kinds, calls).text()
+        self.under_way.pop()
+        self.functions[whole_key] = name
+        self.texts.append(text)
+        return name
+
+    def free(self, name: str, owner: Any, taken: Iterable[str]) -> str:
+        """A name that nothing else has: with its module's, then with a number."""
+        used, module = set(taken), owner.__module__.rpartition(".")[2].strip("_") or "own"
+        names = (name, f"{module}_{name}", *(f"{name}_{k}" for k in range(2, 1000)))
+        return next(each for each in names if each not in used)
+
+    def struct(self, cls: Any) -> str:
+        """A class of named tuples; its tag."""
+        if cls not in self.structs:
+            tag = c_name(f"{self.prefix}{snake(cls.__name__)}")
+            tag = self.free(tag, cls, [known for known, _ in self.structs.values()])
+            fields = [
+                (self.declaration(self.kind(hint, cls.__name__), c_name(name)), note)
+                for (name, hint), note in zip(hints_of(cls), _notes(cls), strict=True)
+            ]
+            doc = inspect.getdoc(cls) or ""
+            doc = "" if doc.startswith(f"{cls.__name__}(") else doc.splitlines()[0]
+            lines = [*(comment(doc) if doc else []), f"struct {tag} {{"]
+            for text, note in fields:
+                lines.append(f"    {text};" + (f" /* {note} */" if note else ""))
+            lines += [] if fields else ["    char nothing;"]
+            self.structs[cls] = (tag, "\n".join([*lines, "};"]))
+        return self.structs[cls][0]
+
+    def tuple(self, kind: Kind) -> str:
+        """A tuple's struct; its tag."""
+        doubles = all(item in (DOUBLE, INT) for item in kind.items)
+        letters = "".join(item.word[0] for item in kind.items)
+        tag = f"{self.prefix}{'double' if doubles else letters}_{len(kind.items)}"
+        if tag not in self.structs:
+            inner = [f"double v[{len(kind.items)}]"]
+            if not doubles:
+                inner = [self.declaration(item, f"v{i}") for i, item in enumerate(kind.items)]
+            lines = [f"struct {tag} {{", *(f"    {each};" for each in inner), "};"]
+            self.structs[tag] = (tag, "\n".join(lines))
+        return tag
+
+    def helpers(self) -> list[str]:
+        """Functions that the translated ones call."""
+        text = "\n".join(self.texts)
+        return [each for name, each in HELPERS.items() if f"{name}(" in text]
+
+    def kind(self, hint: Any, where: str) -> Kind:
+        """Kind of what has a type."""
+        origin, args = typing.get_origin(hint), typing.get_args(hint)
+        known = {float: DOUBLE, int: INT, bool: BOOL, type(None): FLAG}
+        if hint in known:
+            return known[hint]
+        if origin in (typing.Union, types.UnionType) and set(args) == {bool, type(None)}:
+            return FLAG
+        if is_named_tuple(hint):
+            return Kind("struct", hint)
+        if origin is tuple:
+            args = (args[0],) * self.longest if args[-1] is Ellipsis else args
+            return Kind("tuple", None, tuple(self.kind(each, where) for each in args))
+        raise EquationError(
+            f"{where}: the type {getattr(hint, '__name__', hint)} has no counterpart in C; an "
+            "equation that is exported takes float, int, bool, bool | None for an option, tuples "
+            "and named tuples of them."
+        )
+
+    def declared(self, kind: Kind) -> str:
+        """A kind as C writes it."""
+        if kind in SCALARS:
+            return SCALARS[kind]
+        return f"struct {self.struct(kind.cls) if kind.word == 'struct' else self.tuple(kind)}"
+
+    def declaration(self, kind: Kind, name: str, *, formal: bool = False) -> str:
+        """A name with its kind; what has parts is given to functions by its address."""
+        if formal and kind.whole:
+            return f"const {self.declared(kind)} *{name}"
+        return f"{self.declared(kind)} {name}"
+
+    def constant(self, name: str, value: Any) -> str:
+        """A number from outside an equation; its name in C."""
+        name = {"pi": "PI", "e": "EULER", "tau": "TAU"}.get(name, name)
+        name = c_name(name if name.isupper() and len(name) > 3 or name == "PI" else f"{name}_VALUE")
+        name = name.upper()
+        known = [n for n, (v, _) in self.constants.items() if n.startswith(name) and v == value]
+        if known:
+            return known[0]
+        name = next(n for n in (name, *(f"{name}_{k}" for k in range(2, 1000)))
+                    if n not in self.constants)  # fmt: skip
+        if isinstance(value, tuple):
+            kind = Kind("tuple", None, (DOUBLE,) * len(value))
+            inner = ", ".join(literal(float(each)) for each in value)
+            text = f"static const {self.declared(kind)} {name} = {{{{{inner}}}}};"
+        else:
+            word = "bool" if isinstance(value, bool) else "double"
+            word = "long long" if type(value) is int else word
+            text = f"static const {word} {name} = {literal(value)};"
+        self.constants[name] = (value, "\n".join(wrapped(text)))
+        return name
+
+
+def hints_of(cls: Any) -> list[tuple[str, Any]]:
+    """Fields of a class of named tuples with their types."""
+    hints = typing.get_type_hints(cls)
+    return [(name, hints.get(name, float)) for name in cls._fields]
+
+
+def _notes(cls: Any) -> list[str]:
+    """What is said about each field: its definition, or the comment behind it."""
+    hints = typing.get_type_hints(cls, include_extras=True)
+    try:
+        text = inspect.getsource(cls)
+    except (OSError, TypeError):
+        text = ""
+    said = dict(re.findall(r"^    (\w+):.*?# (?!fmt|noqa|type:)(.*)$", text, re.MULTILINE))
+    notes = []
+    for name in cls._fields:
+        definition = next(iter(getattr(hints.get(name), "__metadata__", ())), None)
+        if isinstance(definition, Definition) and definition.unit:
+            notes.append(f"{definition.name} [{definition.unit}]")
+        else:
+            notes.append(said.get(name, ""))
+    return notes
+
+
+# --- one function ---------------------------------------------------------------------------------
+
+
+class Function:
+    """One function of C: its statements, with the kinds of all names found on the way."""
+
+    def __init__(
+        self, unit: Unit, source: Parsed, name: str, kinds: dict[str, Kind], calls: dict[str, Any]
+    ) -> None:
+        self.unit, self.source, self.name, self.calls = unit, source, name, calls
+        self.star: list[str] = []
+        f = source.function
+        if not kinds:
+            cells = zip(f.__code__.co_freevars, f.__closure__ or (), strict=False)
+            free = {cell: each.cell_contents for cell, each in cells}
+            hints = typing.get_type_hints(f, None, free or None)
+            where = f"{source.file}, line {source.node.lineno}: {source.name}"
+            kinds = {n: unit.kind(hint, where) for n, hint in hints.items()}
+        self.returns = kinds["return"]
+        self.formals = {n: kind for n, kind in kinds.items() if n != "return"}
+        if source.node.args.vararg:
+            own = {each.arg for each in source.arguments}
+            self.star = [n for n in self.formals if n not in own]
+        body = copy.deepcopy(source.node.body)
+        if ast.get_docstring(source.node, clean=False) is not None:
+            body = body[1:]
+        self.body = list(_unrolled(body, body))
+        self.kinds = dict(self.formals)
+        stored = set().union(*(_stored(each) for each in body)) if body else set[str]()
+        self.copied = {n for n, kind in self.formals.items() if kind.whole and n in stored}
+        self.temporaries = 0
+        self.before: list[str] = []  # Lines that a statement needs ahead of it.
+
+    def refuse(self, node: ast.AST | None, what: str) -> NoReturn:
+        """Refuse what has no counterpart in C."""
+        line = getattr(node, "lineno", self.source.node.lineno)
+        raise EquationError(
+            f"{self.source.file}, line {line}: {what} in {self.source.name}, which has no "
+            "counterpart in C: write it with numbers and named tuples."
+        )
+
+    def text(self) -> str:
+        """Comment, head and statements."""
+        self.blocks: dict[str, tuple[Any, ...]] = {}
+        self.counts: dict[str, int] = {}
+        for name, path, stored in _references(self.body, ()):
+            if name in self.formals and not stored:
+                continue
+            self.blocks[name] = _common(self.blocks.get(name, path), path)
+            self.counts[name] = self.counts.get(name, 0) + stored
+        self.blocks = {name: path for name, path in self.blocks.items() if self.counts[name]}
+        while True:
+            known, self.temporaries, self.declared = dict(self.kinds), 0, set(self.formals)
+            lines = self.block(self.body, ())
+            if known == {name: self.kinds[name] for name in known}:
+                break
+        used = {each.id for s in self.source.node.body for each in ast.walk(s)
+                if isinstance(each, ast.Name)}  # fmt: skip
+        used |= set(self.star)
+        idle = [f"    (void){c_name(n)};" for n in self.formals if n not in used]
+        arguments = []
+        for n, kind in self.formals.items():
+            given = f"{n}_given" if n in self.copied else c_name(n)
+            arguments.append(self.unit.declaration(kind, given, formal=True))
+            if n in self.copied:
+                idle.append(f"    {self.unit.declaration(kind, c_name(n))} = *{given};")
+        head = f"static {self.unit.declared(self.returns)} {self.name}({', '.join(arguments)})"
+        doc = ast.get_docstring(self.source.node) or ""
+        said = comment(doc) if doc else []
+        body = (each for line in lines for each in wrapped(line))
+        return "\n".join([*said, *wrapped(head), "{", *idle, *body, "}"])
+
+    # -- statements --------------------------------------------------------------------------------
+
+    def block(self, statements: Sequence[ast.stmt], path: tuple[Any, ...]) -> list[str]:
+        """Lines of statements, moved in by where they stand."""
+        lines: list[str] = []
+        pad = "    " * (len(path) + 1)
+        for each in statements:
+            self.before = []
+            made = self.statement(each, path)
+            lines += [f"{pad}{line}" for line in self.before]
+            lines += made
+        return lines
+
+    def statement(self, each: ast.stmt, path: tuple[Any, ...]) -> list[str]:
+        pad = "    " * (len(path) + 1)
+        if isinstance(each, ast.Return):
+            assert each.value is not None
+            value = self.converted(self.value(each.value, self.returns), self.returns, each)
+            return [f"{pad}return {value};"]
+        if isinstance(each, ast.If | ast.For):
+            test = self.value(each.test) if isinstance(each, ast.If) else None
+            ahead, self.before = self.before, []
+            inside = self.compound(each, test, path)
+            ahead += [
+                f"{self.unit.declared(self.kinds[name])} {c_name(name)};"
+                for name, block in self.blocks.items()
+                if block == path and name not in self.declared and name in _stored(each)
+                and not self.declared.add(name)  # type: ignore[func-returns-value]
+            ]  # fmt: skip
+            self.before = ahead
+            return inside
+        if isinstance(each, ast.Break):
+            return [f"{pad}break;"]
+        if isinstance(each, ast.AugAssign):
+            assert isinstance(each.target, ast.Name)
+            term = ast.BinOp(ast.Name(each.target.id, ast.Load()), each.op, each.value)
+            return self.assigned(each.target, ast.copy_location(term, each), path)
+        if isinstance(each, ast.Assign | ast.AnnAssign) and each.value is not None:
+            targets = each.targets if isinstance(each, ast.Assign) else [each.target]
+            return [line for t in targets for line in self.assigned(t, each.value, path)]
+        if isinstance(each, ast.Pass):
+            return []
+        self.refuse(each, ast.unparse(each).splitlines()[0])
+
+    def compound(
+        self, each: ast.If | ast.For, test: Text | None, path: tuple[Any, ...]
+    ) -> list[str]:
+        """Lines of an `if` or a loop."""
+        pad = "    " * (len(path) + 1)
+        if isinstance(each, ast.For):
+            head, counter = self.head(each)
+            self.kinds[counter] = INT
+            self.declared.add(counter)
+            ahead, self.before = self.before, []
+            inner = self.block(each.body, (*path, (id(each), 0)))
+            return [*(f"{pad}{line}" for line in ahead), f"{pad}{head} {{", *inner, f"{pad}}}"]
+        assert test is not None
+        lines = [f"{pad}if ({test.text}) {{", *self.block(each.body, (*path, (id(each), 0)))]
+        if not each.orelse:
+            return [*lines, f"{pad}}}"]
+        other = self.block(each.orelse, (*path, (id(each), 1)))
+        first = other[0].strip() if other else ""
+        if len(each.orelse) == 1 and isinstance(each.orelse[0], ast.If) and first.startswith("if "):
+            moved = [line[4:] for line in other]
+            return [*lines, f"{pad}}} else {first}", *moved[1:]]
+        return [*lines, f"{pad}}} else {{", *other, f"{pad}}}"]
+
+    def head(self, each: ast.For) -> tuple[str, str]:
+        """Head of a loop, and its counter."""
+        assert isinstance(each.iter, ast.Call)
+        assert isinstance(each.target, ast.Name)
+        args = [self.value(a).text for a in each.iter.args]
+        start, end = ("0", args[0]) if len(args) == 1 else (args[0], args[1])
+        step = whole(each.iter.args[2]) if len(args) == 3 else 1
+        counter = each.target.id
+        name = "turn" if counter == "_" else c_name(counter)
+        sign, move = ("<", f"+= {step}") if step > 0 else (">", f"-= {-step}")
+        move = f"{name}++" if step == 1 else f"{name} {move}"
+        return f"for (long long {name} = {start}; {name} {sign} {end}; {move})", counter
+
+    def assigned(self, target: ast.expr, value: ast.expr, path: tuple[Any, ...]) -> list[str]:
+        """Lines of an assignment."""
+        if isinstance(target, ast.Tuple):
+            return self.unpacked(target.elts, value, path)
+        assert isinstance(target, ast.Name)
+        if target.id == "_":
+            return []
+        return [self.bound(target.id, self.value(value), path, value)]
+
+    def bound(self, name: str, value: Text, path: tuple[Any, ...], node: ast.AST) -> str:
+        """The line that gives a name its value."""
+        old = self.kinds.get(name)
+        if old is None or (old == INT and value.kind == DOUBLE):
+            self.kinds[name] = DOUBLE if old else value.kind
+        elif {old, value.kind} - {INT, DOUBLE} and old != value.kind:
+            self.refuse(node, f"{name} of two kinds")
+        pad, kind = "    " * (len(path) + 1), self.kinds[name]
+        text = self.converted(value, kind, node)
+        if name in self.declared:
+            return f"{pad}{c_name(name)} = {text};"
+        self.declared.add(name)
+        if self.blocks[name] != path:  # belongs to a block further out
+            self.declared.discard(name)
+            return f"{pad}{c_name(name)} = {text};"
+        const = "const " if self.counts[name] == 1 else ""
+        return f"{pad}{const}{self.unit.declared(kind)} {c_name(name)} = {text};"
+
+    def unpacked(
+        self, targets: Sequence[ast.expr], value: ast.expr, path: tuple[Any, ...]
+    ) -> list[str]:
+        """Lines that give several names their values at once."""
+        if isinstance(value, ast.IfExp) and all(
+            isinstance(way, ast.Tuple) and len(way.elts) == len(targets)
+            for way in (value.body, value.orelse)
+        ):
+            ways = zip(value.body.elts, value.orelse.elts, strict=True)  # type: ignore[attr-defined]
+            elements = [ast.IfExp(value.test, one, two) for one, two in ways]
+            value = ast.copy_location(ast.Tuple(elements, ast.Load()), value)
+        pad = "    " * (len(path) + 1)
+        if isinstance(value, ast.Tuple) and len(value.elts) == len(targets):
+            lines, late = [], []
+            for i, (target, each) in enumerate(zip(targets, value.elts, strict=True)):
+                names = _stored(target)
+                read = {n.id for later in value.elts[i + 1 :] for n in ast.walk(later)
+                        if isinstance(n, ast.Name)}  # fmt: skip
+                if not names & read:
+                    lines += self.assigned(target, each, path)
+                    continue
+                assert isinstance(target, ast.Name)
+                made = self.value(each)
+                kept = self.temporary()
+                declared = self.unit.declared(made.kind)
+                lines.append(f"{pad}const {declared} {kept} = {_pointed(made)};")
+                late.append((target.id, made._replace(text=kept, level=13, pointer=False)))
+            return [*lines, *(self.bound(name, made, path, value) for name, made in late)]
+        made = self.value(value)
+        if not made.kind.whole:
+            self.refuse(value, "an unpacking of something else than a tuple")
+        kept = self.held(made)
+        parts = self.parts(kept)
+        if len(parts) != len(targets):
+            self.refuse(value, f"an unpacking of {len(parts)} values into {len(targets)}")
+        names = [t.id if isinstance(t, ast.Name) else "_" for t in targets]
+        return [self.bound(name, part, path, value)
+                for name, part in zip(names, parts, strict=True) if name != "_"]  # fmt: skip
+
+    # -- values with parts -------------------------------------------------------------------------
+
+    def temporary(self) -> str:
+        self.temporaries += 1
+        return f"value_{self.temporaries}"
+
+    def held(self, made: Text) -> Text:
+        """A value with parts as something that has an address."""
+        if made.pointer or made.place:
+            return made
+        name = self.temporary()
+        line = f"const {self.unit.declared(made.kind)} {name} = {made.text};"
+        self.before.append(line)
+        return Text(name, LEVELS["atom"], made.kind)
+
+    def parts(self, made: Text) -> list[Text]:
+        """All parts of a value."""
+        kind = made.kind
+        if kind.word == "struct":
+            return [self.part(made, name) for name in kind.cls._fields]
+        return [self.element(made, i) for i in range(len(kind.items))]
+
+    def part(self, made: Text, name: str) -> Text:
+        """A field."""
+        kind = self.unit.kind(dict(hints_of(made.kind.cls))[name], made.kind.cls.__name__)
+        dot = "->" if made.pointer else "."
+        return Text(f"{_grouped(made, 13)}{dot}{c_name(name)}", 13, kind, place=made.place)
+
+    def element(self, made: Text, index: int | str) -> Text:
+        """An element of a tuple."""
+        made, items = self.held(made), made.kind.items
+        dot = "->" if made.pointer else "."
+        if all(item in (DOUBLE, INT) for item in items):
+            return Text(f"{_grouped(made, 13)}{dot}v[{index}]", 13, DOUBLE)
+        assert isinstance(index, int)
+        return Text(f"{_grouped(made, 13)}{dot}v{index}", 13, items[index])
+
+    def given(self, made: Text) -> str:
+        """A value as a function takes it."""
+        if not made.kind.whole:
+            return made.text
+        made = self.held(made)
+        return made.text if made.pointer else f"&{_grouped(made, 13)}"
+
+    def converted(self, made: Text, kind: Kind, node: ast.AST) -> str:
+        """A value where another kind is wanted."""
+        if kind == DOUBLE and made.kind == INT:
+            return _double(made)
+        if made.kind != kind and {made.kind, kind} != {BOOL, FLAG}:
+            if kind.whole and kind.word == made.kind.word == "tuple":
+                inner = [self.converted(p, k, node)
+                         for p, k in zip(self.parts(self.held(made)), kind.items, strict=False)]  # fmt: skip
+                return self.composed(kind, inner)
+            self.refuse(node, f"a value of kind {made.kind.word} for one of {kind.word}")
+        return _pointed(made)
+
+    def composed(self, kind: Kind, inner: Sequence[str]) -> str:
+        """A tuple of values."""
+        array = all(item in (DOUBLE, INT) for item in kind.items)
+        listed = ", ".join(inner)
+        return f"({self.unit.declared(kind)}){{{f'{{{listed}}}' if array else listed}}}"
+
+    # -- expressions -------------------------------------------------------------------------------
+
+    def value(self, node: ast.expr, wanted: Kind | None = None) -> Text:
+        """Any expression."""
+        method = getattr(self, f"on_{type(node).__name__.lower()}", None)
+        if method is None:
+            self.refuse(node, ast.unparse(node))
+        made: Text = method(node, wanted) if isinstance(node, ast.Tuple) else method(node)
+        return made
+
+    def number(self, node: ast.expr) -> Text:
+        """An expression that has to be a scalar."""
+        made = self.value(node)
+        if made.kind.whole:
+            self.refuse(node, f"arithmetic with {ast.unparse(node)}")
+        return made
+
+    def on_constant(self, node: ast.Constant) -> Text:
+        value: Any = node.value
+        if value is None:
+            return Text("false", 13, FLAG)
+        kind = BOOL if isinstance(value, bool) else INT if isinstance(value, int) else DOUBLE
+        return Text(literal(value), 13, kind)
+
+    def on_tuple(self, node: ast.Tuple, wanted: Kind | None = None) -> Text:
+        made = [self.value(each) for each in node.elts]
+        items = wanted.items if wanted and len(wanted.items) == len(made) else ()
+        kinds = [w if w == DOUBLE and m.kind == INT else m.kind
+                 for m, w in zip(made, items or [m.kind for m in made], strict=True)]  # fmt: skip
+        kind = Kind("tuple", None, tuple(kinds))
+        inner = [self.converted(m, k, node) for m, k in zip(made, kinds, strict=True)]
+        return Text(self.composed(kind, inner), 12, kind)
+
+    def on_name(self, node: ast.Name) -> Text:
+        if node.id in self.kinds:
+            local = node.id not in self.formals or node.id in self.copied
+            pointer = self.kinds[node.id].whole and not local
+            return Text(c_name(node.id), 13, self.kinds[node.id], pointer)
+        return self.outside(node, node.id, self.resolved(node))
+
+    def resolved(self, node: ast.Name) -> Any:
+        try:
+            return self.source.resolve(node.id)
+        except NameError:
+            self.refuse(node, f"the unknown name {node.id}")
+
+    def outside(self, node: ast.AST, name: str, value: Any) -> Text:
+        """A constant of a module."""
+        if value is None or isinstance(value, bool):
+            return Text(literal(bool(value)), 13, FLAG if value is None else BOOL)
+        if type(value) is float and not math.isfinite(value):
+            return Text(literal(value), 13 if value > 0.0 else 12, DOUBLE)
+        if type(value) in (int, float):
+            return Text(
+                self.unit.constant(name, value), 13, INT if type(value) is int else DOUBLE
+            )
+        if isinstance(value, tuple) and value and all(type(v) in (int, float) for v in value):
+            kind = Kind("tuple", None, (DOUBLE,) * len(value))
+            return Text(self.unit.constant(name, tuple(value)), 13, kind)
+        self.refuse(node, f"{name}, which is {type(value).__name__}")
+
+    def on_attribute(self, node: ast.Attribute) -> Text:
+        base = node.value
+        if isinstance(base, ast.Name) and base.id not in self.kinds:
+            module = self.resolved(base)
+            if isinstance(module, ModuleType):
+                return self.outside(node, node.attr, getattr(module, node.attr))
+        made = self.value(base)
+        if made.kind.word != "struct" or node.attr not in made.kind.cls._fields:
+            self.refuse(node, f"the field {node.attr}, which is unknown")
+        return self.part(made, node.attr)
+
+    def on_subscript(self, node: ast.Subscript) -> Text:
+        made = self.value(node.value)
+        if made.kind.word == "struct":
+            made = self.held(made)
+        try:
+            index: Any = ast.literal_eval(node.slice)
+        except ValueError:
+            index = _constant(node.slice)
+        if index is None:
+            return self.element(made, self.value(node.slice).text)
+        length = len(made.kind.items if made.kind.word == "tuple" else made.kind.cls._fields)
+        if not -length <= index < length:
+            self.refuse(node, f"the element {index}, which is not there")
+        index %= length
+        return self.element(made, index) if made.kind.word == "tuple" else self.parts(made)[index]
+
+    def on_unaryop(self, node: ast.UnaryOp) -> Text:
+        made = self.number(node.operand)
+        if isinstance(node.op, ast.Not):
+            return Text(f"!{_grouped(made, 12)}", 12, BOOL)
+        if isinstance(node.op, ast.UAdd):
+            return made
+        text = _grouped(made, 12)
+        return Text(f"-({text})" if text.startswith("-") else f"-{text}", 12, made.kind)
+
+    def on_binop(self, node: ast.BinOp) -> Text:
+        left = self.number(node.left)
+        op = ARITHMETIC[type(node.op)]
+        if op == "**":
+            power = whole(node.right)
+            if left.kind == INT:
+                self.refuse(node, "a power of a whole number")
+            if power == 2 and left.level == 13:
+                return Text(f"{left.text} * {left.text}", 11, DOUBLE)
+            return Text(f"whole_power({_double(left)}, {power})", 13, DOUBLE)
+        right = self.number(node.right)
+        kind = INT if left.kind == right.kind == INT and op != "/" else DOUBLE
+        level = LEVELS[op]
+        one = Text(_double(left), 12, DOUBLE) if kind == DOUBLE and left.kind == INT else left
+        two = Text(_double(right), 12, DOUBLE) if kind == DOUBLE and right.kind == INT else right
+        return Text(f"{_grouped(one, level)} {op} {_grouped(two, level + 1)}", level, kind)
+
+    def on_compare(self, node: ast.Compare) -> Text:
+        left, found = self.value(node.left), list[Text]()
+        for op, right_node in zip(node.ops, node.comparators, strict=True):
+            if isinstance(op, ast.Is | ast.IsNot):
+                if left.kind == FLAG:
+                    off = isinstance(op, ast.Is)
+                    text = f"!{_grouped(left, 12)}" if off else left.text
+                    found.append(Text(text, 12 if off else left.level, BOOL))
+                else:
+                    found.append(Text(literal(isinstance(op, ast.IsNot)), 13, BOOL))
+                continue
+            right = self.number(right_node)
+            if left.kind.whole:
+                self.refuse(node, f"a comparison of {ast.unparse(node.left)}")
+            word = COMPARISONS[type(op)]
+            sides = [Text(_double(each), 12, DOUBLE) if DOUBLE in (left.kind, right.kind)
+                     and each.kind == INT else each for each in (left, right)]  # fmt: skip
+            text = f"{_grouped(sides[0], 9)} {word} {_grouped(sides[1], 9)}"
+            found.append(Text(text, LEVELS[word], BOOL))
+            left = right
+        return found[0] if len(found) == 1 else self.joined(found, "&&")
+
+    def joined(self, found: Sequence[Text], op: str) -> Text:
+        # an `and` within an `or` keeps its brackets, as compilers and readers like it
+        level = LEVELS["<="] - 2 if op == "||" else LEVELS["&&"] + 1
+        return Text(f" {op} ".join(_grouped(each, level) for each in found), LEVELS[op], BOOL)
+
+    def on_boolop(self, node: ast.BoolOp) -> Text:
+        found = [self.number(each) for each in node.values]
+        if any(each.kind not in (BOOL, FLAG) for each in found):
+            self.refuse(node, "`and` or `or` of numbers")
+        return self.joined(found, "&&" if isinstance(node.op, ast.And) else "||")
+
+    def on_ifexp(self, node: ast.IfExp) -> Text:
+        test, one, two = self.number(node.test), self.value(node.body), self.value(node.orelse)
+        kind = DOUBLE if {one.kind, two.kind} == {INT, DOUBLE} else one.kind
+        texts = [self.converted(each, kind, node) for each in (one, two)]
+        sides = [text if each.level > 1 else f"({text})" for text, each in
+                 zip(texts, (one, two), strict=True)]  # fmt: skip
+        return Text(f"{_grouped(test, 4)} ? {sides[0]} : {sides[1]}", 1, kind, place=False)
+
+    # -- calls -------------------------------------------------------------------------------------
+
+    def on_call(self, node: ast.Call) -> Text:
+        function = node.func
+        name = function.id if isinstance(function, ast.Name) else ""
+        if name in self.calls:
+            return self.called(node, self.calls[name])
+        if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
+            found = getattr(self.resolved(function.value), function.attr, None)
+        elif name:
+            assert isinstance(function, ast.Name)
+            found = self.resolved(function)
+        else:
+            self.refuse(node, ast.unparse(node))
+        if found in (min, max):
+            return self.least(node, "lesser_of" if found is min else "greater_of")
+        if found is len:
+            return Text(str(len(self.value(node.args[0]).kind.items)), 13, INT)
+        if found is float:
+            return Text(_double(self.number(node.args[0])), 12, DOUBLE)
+        if found is int or found is math.floor:
+            inner = _double(self.number(node.args[0]))
+            inner = f"floor({inner})" if found is math.floor else inner
+            return Text(f"whole_number({inner})", 13, INT)
+        if found is abs:
+            return Text(f"fabs({_double(self.number(node.args[0]))})", 13, DOUBLE)
+        if found in MATH:
+            inner = ", ".join(_double(self.number(each)) for each in node.args)
+            return Text(f"{MATH[found]}({inner})", 13, DOUBLE)
+        if is_named_tuple(found):
+            return self.constructed(node, found)
+        if plain(found) in _BUILT_ON:
+            return self.specialised(node, found)
+        return self.called(node, found)
+
+    def least(self, node: ast.Call, function: str) -> Text:
+        """`min` or `max` of any number of values."""
+        made = [self.number(each) for each in node.args]
+        text = _double(made[0])
+        for each in made[1:]:
+            text = f"{function}({text}, {_double(each)})"
+        return Text(text, 13, DOUBLE)
+
+    def bind(self, node: ast.Call, names: Sequence[str], defaults: dict[str, Any]) -> list[Text]:
+        """Values for arguments, in their order."""
+        given = dict(zip(names, self.spread(node.args), strict=False))
+        given |= {each.arg: self.value(each.value) for each in node.keywords if each.arg}
+        for name in names:
+            if name not in given:
+                if name not in defaults:
+                    self.refuse(node, f"a call without {name}")
+                given[name] = self.outside(node, name, defaults[name])
+        if len(given) != len(names):
+            self.refuse(node, f"{ast.unparse(node)} with arguments that are not taken")
+        return [given[name] for name in names]
+
+    def spread(self, args: Sequence[ast.expr]) -> Iterator[Text]:
+        """Arguments, those behind a star one by one."""
+        for each in args:
+            if isinstance(each, ast.Starred):
+                for name in self.star:
+                    yield self.value(ast.Name(name, ast.Load()))
+            else:
+                yield self.value(each)
+
+    def constructed(self, node: ast.Call, cls: Any) -> Text:
+        """A named tuple."""
+        hints, kind = dict(hints_of(cls)), Kind("struct", cls)
+        made = self.bind(node, cls._fields, cls._field_defaults)
+        kinds = [self.unit.kind(hints[name], cls.__name__) for name in cls._fields]
+        texts = [self.converted(m, k, node) for m, k in zip(made, kinds, strict=True)]
+        if node.keywords:
+            pairs = zip(cls._fields, texts, strict=True)
+            texts = [f".{c_name(name)} = {text}" for name, text in pairs]
+        return Text(f"({self.unit.declared(kind)}){{{', '.join(texts)}}}", 12, kind)
+
+    def called(self, node: ast.Call, function: Any) -> Text:
+        """A call of an equation."""
+        source = parsed(function)
+        name = self.unit.add(function)
+        if name in map(c_name, self.kinds):
+            self.refuse(node, f"a call of {name} beside a value of that name")
+        hints = self.hints(source)
+        names = [each.arg for each in source.arguments]
+        texts = []
+        for made, formal in zip(self.bind(node, names, source.defaults), names, strict=True):
+            kind = hints[formal]
+            texts.append(
+                self.given(made) if made.kind == kind and kind.whole
+                else self.given(Text(self.converted(made, kind, node), 12, kind))
+            )  # fmt: skip
+        return Text(f"{name}({', '.join(texts)})", 13, hints["return"], place=False)
+
+    def hints(self, source: Parsed) -> dict[str, Kind]:
+        """Kinds of what an equation takes and returns."""
+        f = source.function
+        cells = zip(f.__code__.co_freevars, f.__closure__ or (), strict=False)
+        free = {cell: each.cell_contents for cell, each in cells}
+        hints = typing.get_type_hints(f, None, free or None)
+        return {name: self.unit.kind(hint, source.name) for name, hint in hints.items()}
+
+    def specialised(self, node: ast.Call, function: Any) -> Text:
+        """A call of `root`, `repeated` or `interpolate`, made for what it is given."""
+        source = unchecked(function)
+        formals = [each.arg for each in source.arguments]
+        calls, args = {}, list(node.args)
+        if formals[0] in ("residual", "step"):
+            first = args.pop(0)
+            assert isinstance(first, ast.Name | ast.Attribute)
+            base = first if isinstance(first, ast.Name) else first.value
+            assert isinstance(base, ast.Name)
+            found = self.resolved(base)
+            found = found if base is first else getattr(found, first.attr)  # type: ignore[union-attr]
+            calls = {formals.pop(0): found}
+            inner = parsed(found)
+            own = [each.arg for each in inner.arguments]
+            leading = len(own) - (len(args) - len(formals))
+            formals += own[leading:]
+        made = [self.value(each) for each in args]
+        made = [Text(_double(m), 12, DOUBLE) if m.kind == INT else m for m in made]
+        kinds = {name: each.kind for name, each in zip(formals, made, strict=True)}
+        kinds["return"] = kinds["state"] if "state" in kinds else DOUBLE
+        key = (*(plain(each) for each in calls.values()), *kinds.values())
+        name = self.unit.made(source, key, kinds, calls)
+        texts = ", ".join(self.given(each) for each in made)
+        return Text(f"{name}({texts})", 13, kinds["return"], place=False)
+
+
+_BUILT_ON = {plain(each) for each in (loops.root, loops.repeated, loops.interpolate)}
+"""Functions of the engine that equations call, written with more than equations may use."""
+
+
+def _grouped(made: Text, level: int) -> str:
+    return made.text if made.level >= level else f"({made.text})"
+
+
+def _pointed(made: Text) -> str:
+    """A value, not its address."""
+    return f"*{made.text}" if made.pointer else made.text
+
+
+def _double(made: Text) -> str:
+    """A scalar as a double."""
+    if made.kind != INT:
+        return made.text
+    if re.fullmatch(r"-?\d+", made.text):
+        return f"{made.text}.0"
+    return f"(double){_grouped(made, 12)}"
+
+
+def _constant(node: ast.expr) -> int | None:
+    """Value of arithmetic of whole numbers, nothing if it is none."""
+    if any(not isinstance(n, ast.Constant | ast.BinOp | ast.UnaryOp | ast.operator | ast.unaryop)
+           for n in ast.walk(node)):  # fmt: skip
+        return None
+    return int(eval(compile(ast.Expression(node), "", "eval"), {}))
+
+
+def _stored(node: ast.AST) -> set[str]:
+    """Names that get a value somewhere in it."""
+    return {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+
+
+def _common(one: tuple[Any, ...], two: tuple[Any, ...]) -> tuple[Any, ...]:
+    """The block around both."""
+    n = next((i for i, (a, b) in enumerate(zip(one, two, strict=False)) if a != b),
+             min(len(one), len(two)))  # fmt: skip
+    return one[:n]
+
+
+def _references(
+    statements: Iterable[ast.stmt], path: tuple[Any, ...]
+) -> Iterator[tuple[str, tuple[Any, ...], bool]]:
+    """Every name with the block that it stands in, and whether it gets a value there."""
+    for each in statements:
+        inner: list[ast.AST] = [each]
+        if isinstance(each, ast.If | ast.For):
+            inner = [each.test] if isinstance(each, ast.If) else [each.iter]
+            yield from _references(each.body, (*path, (id(each), 0)))
+            yield from _references(each.orelse, (*path, (id(each), 1)))
+        for node in (n for part in inner for n in ast.walk(part)):
+            if isinstance(node, ast.Name):
+                yield node.id, path, isinstance(node.ctx, ast.Store)
+        if isinstance(each, ast.AugAssign):
+            yield each.target.id, path, False  # type: ignore[union-attr]
+
+
+def _unrolled(statements: Iterable[ast.stmt], whole_body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
+    """Statements with the loops written out whose counter is an index or is read behind them."""
+    for each in statements:
+        if isinstance(each, ast.If):
+            each.body = list(_unrolled(each.body, whole_body))
+            each.orelse = list(_unrolled(each.orelse, whole_body))
+        if not isinstance(each, ast.For):
+            yield each
+            continue
+        assert isinstance(each.iter, ast.Call)
+        assert isinstance(each.target, ast.Name)
+        name, inside = each.target.id, {id(n) for n in ast.walk(each)}
+        outside = any(isinstance(n, ast.Name) and n.id == name and id(n) not in inside
+                      for s in whole_body for n in ast.walk(s))  # fmt: skip
+        ends = [_constant(a) for a in each.iter.args]
+        if None in ends or not (outside or any(isinstance(n, ast.Subscript) for n in ast.walk(each))):
+            each.body = list(_unrolled(each.body, whole_body))
+            yield each
+            continue
+        for number in range(*(end for end in ends if end is not None)):
+            value = ast.copy_location(ast.Constant(number), each)
+            body = [_Counted(name, number).visit(copy.deepcopy(s)) for s in each.body]
+            if outside:
+                yield ast.copy_location(ast.Assign([each.target], value), each)
+            yield from _unrolled(body, whole_body)
+
+
+class _Counted(ast.NodeTransformer):
+    """A counter's value in place of its name."""
+
+    def __init__(self, name: str, number: int) -> None:
+        self.name, self.number_node = name, ast.Constant(number)
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:  # noqa: N802 - the library's name
+        if node.id == self.name and isinstance(node.ctx, ast.Load):
+            return ast.copy_location(ast.Constant(self.number_node.value), node)
+        return node
