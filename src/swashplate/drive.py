@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, Record, record_of
 from swashplate.equations.marching.run import Start
+from swashplate.equations.marching.stepping import CompiledStep, stored_of
 from swashplate.equations.model import Equation
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError
@@ -21,7 +22,12 @@ from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.simulation.batch import Batch, SquaredError, simulate_drives
-from swashplate.simulation.instance import at_every_rate, with_equation
+from swashplate.simulation.instance import (
+    at_every_rate,
+    check_filter_stability,
+    instance_of,
+    with_equation,
+)
 from swashplate.simulation.residuals import Sensitivities, sensitivities
 from swashplate.simulation.result import Simulation
 from swashplate.simulation.run import check_voltage, measured_records, simulate_drive, steady_states
@@ -334,6 +340,34 @@ class Drive(Result):
         `h` is the interval between samples [s]; other arguments as in `simulate`.
         """
         return Stepper(self.parameters, h, interpolation, start)
+
+    def compiled_step(
+        self,
+        outputs: Sequence[str] = ("shaft_speed",),
+        *,
+        inputs: Sequence[str] = ("voltage",),
+        rate: float = SOURCE_RATE,
+    ) -> CompiledStep:
+        """The drive's step for compiled kernels that close loops around it.
+
+        Parameters
+        ----------
+        outputs : sequence of str
+            Signals of the step, by their names in `Simulation`.
+        inputs : sequence of str
+            ``"voltage"``, and of ``"load_torque"``, ``"pump_speed"`` and ``"supply_pressure"`` what
+            the loop gives; for the others the parameters count.
+        rate : float
+            Steps a second, without steps between; 512 or more are the march's own. [Hz]
+
+        Raises
+        ------
+        InputError
+            For signals that a drive does not have, and a rate too low for the card's filter.
+        """
+        check_filter_stability(self.parameters, 1.0 / rate)
+        instance = instance_of(self.parameters, by_voltage=True)
+        return CompiledStep(instance, inputs, stored_of(instance.model, outputs), 1.0 / rate)
 
     def linearize(
         self,

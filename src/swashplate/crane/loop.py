@@ -41,15 +41,9 @@ from swashplate.crane.kinematics import (
 )
 from swashplate.crane.rope import GRAVITY, Air, first_step, rope_step
 from swashplate.drive import Drive
-from swashplate.equations import equation, inlined, instance_of, kernel
+from swashplate.equations import Machine, compiled_step, equation, inlined, kernel
 from swashplate.equations.code import generating
-from swashplate.equations.marching.march import advance_source
-from swashplate.equations.marching.part import Stored
-from swashplate.equations.marching.run import Instance, check_domain, module
-from swashplate.equations.model import Model
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.instance import check_filter_stability
-from swashplate.simulation.instance import instance_of as instance_of_drive
 
 Array = NDArray[np.float64]
 
@@ -81,20 +75,6 @@ class Inverse(NamedTuple):
     high: float
     acceleration: float
     """The smaller one of both ways. [rad/s²]"""
-
-
-class Machine(NamedTuple):
-    """A compiled model's numbers: what its step takes, and where its state is kept."""
-
-    whole: NDArray[np.int64]
-    fraction: Array
-    params: Array
-    given: Array
-    constants: Array
-    lines: Array
-    states: Array
-    values: Array
-    out: Array
 
 
 class Fixed(NamedTuple):
@@ -379,16 +359,10 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                         for i in range(6):
                             seen[7 + i] = ship[m, i]
                     for i in range(picks.size):
-                        laws.values[i] = seen[picks[i]]
-                    margins[3] = min(
-                        margins[3],
-                        advance_law(
-                            laws.values, laws.lines, laws.whole, laws.fraction, laws.params,
-                            laws.given, h, laws.constants, laws.states, laws.out,
-                        ),
-                    )  # fmt: skip
-                    x += laws.out[0]
-                    y += laws.out[1]
+                        laws.inputs[i] = seen[picks[i]]
+                    margins[3] = min(margins[3], advance_law(laws))
+                    x += laws.outputs[0]
+                    y += laws.outputs[1]
                 if settings.clip > 0.0 or settings.share > 0.0:
                     x, y = clipped_offset((x, y), (path_x, path_y), boom, rope, fixed, inverses)
                 path_x += x
@@ -416,20 +390,11 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                 volts[2] = voltage_for(wanted.luff, inverses[2], actuation)
             if actuation != IDEAL:
                 a, b, c = plant.drives
-                a.values[0], b.values[0], c.values[0] = volts[0], volts[1], volts[2]
-                margins[0] = min(margins[0], hoist(
-                    a.values, a.lines, a.whole, a.fraction, a.params, a.given, h, a.constants,
-                    a.states, a.out,
-                ))  # fmt: skip
-                margins[1] = min(margins[1], slew(
-                    b.values, b.lines, b.whole, b.fraction, b.params, b.given, h, b.constants,
-                    b.states, b.out,
-                ))  # fmt: skip
-                margins[2] = min(margins[2], luff(
-                    c.values, c.lines, c.whole, c.fraction, c.params, c.given, h, c.constants,
-                    c.states, c.out,
-                ))  # fmt: skip
-                omega[0], omega[1], omega[2] = a.out[0], b.out[0], c.out[0]
+                a.inputs[0], b.inputs[0], c.inputs[0] = volts[0], volts[1], volts[2]
+                margins[0] = min(margins[0], hoist(a))
+                margins[1] = min(margins[1], slew(b))
+                margins[2] = min(margins[2], luff(c))
+                omega[0], omega[1], omega[2] = a.outputs[0], b.outputs[0], c.outputs[0]
                 if fixed.brake:
                     within_zone = fixed.slowest[0] < volts[0] < fixed.slowest[1]
                     still = still + h if within_zone else 0.0
@@ -485,40 +450,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
     return loop
 
 
-# --- models as the loop takes them ----------------------------------------------------------------
-
-
-@generating
-def compiled_step(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], stored: tuple[Stored, ...]
-) -> tuple[Callable[..., int], Any]:
-    """Compiled constants of a model, and its step for other kernels."""
-    text, names = advance_source(model, signals, options, stored)
-    made = module(f"{model.name}_in_loop", text, names)
-    return made["prepare"], made["advance"]
-
-
-def machine_of(
-    instance: Instance, signals: tuple[str, ...], stored: tuple[Stored, ...], h: float
-) -> tuple[Any, Machine]:
-    """A model's compiled step, and its numbers at rest."""
-    prepare, advance = compiled_step(instance.model, signals, instance.options, stored)
-    places = instance.places(signals, h)
-    constants = np.zeros(64)
-    prepare(instance.params, instance.given, h, constants)
-    lines = np.zeros((len(signals), (int(places.whole.max()) if places.whole.size else 0) + 3))
-    states = instance.start(dict.fromkeys(signals, 0.0), h).flat
-    return advance, Machine(
-        places.whole,
-        places.fraction,
-        instance.params,
-        instance.given,
-        constants,
-        lines,
-        states,
-        np.zeros(len(signals)),
-        np.zeros(len(stored)),
-    )
+# --- a loop that remembers ------------------------------------------------------------------------
 
 
 def inverse_of(inverse: InverseMap) -> Inverse:
@@ -556,26 +488,16 @@ class Loop:
     ) -> None:
         self.fixed, self.rate, self._law = fixed, rate, law
         self._h = 1.0 / rate
-        speed = (Stored(1, "signals", "shaft_speed"),)
-        for drive in drives:
-            check_filter_stability(drive.parameters, self._h)
-        self._instances = [instance_of_drive(drive.parameters, True) for drive in drives]
-        steps, machines = zip(
-            *(machine_of(each, ("voltage",), speed, self._h) for each in self._instances),
-            strict=True,
-        )
-        step, own, picks = None, Machine(*machines[0]), np.zeros(0, dtype=np.int64)
+        self._steps = [drive.compiled_step(rate=rate) for drive in drives]
+        machines = [each.machine() for each in self._steps]
+        own, picks = machines[0], np.zeros(0, dtype=np.int64)
         if law is not None:
-            instance = instance_of(law.model, law.values)
-            signals = law.model.external
-            stored = tuple(
-                Stored(0, "signals" if _is_signal(law.model, each) else "state", each)
-                for each in GIVES
-            )
-            step, own = machine_of(instance, signals, stored, self._h)
-            picks = np.array([SEEN.index(each) for each in signals], dtype=np.int64)
-            self._instances.append(instance)
-        self._loop = loop_of(steps[0], steps[1], steps[2], step)
+            seen = law.model.external
+            self._steps.append(compiled_step(law.model, law.values, seen, GIVES, rate))
+            own = self._steps[3].machine()
+            picks = np.array([SEEN.index(each) for each in seen], dtype=np.int64)
+        steps = [each.step for each in self._steps]
+        self._loop = loop_of(*steps, *[None] * (4 - len(steps)))
         g, home = fixed.geometry, fixed.home
         zero, boom = Shafts(0.0, 0.0, 0.0), boom_at(0.0, g, home)
         tip = tip_of(home.slew, boom, g)
@@ -621,12 +543,8 @@ class Loop:
         plant = self._plant
         self.state, ended = self._loop(self._h, self.fixed, self.state, plant, stick, ship, out)
         machines = (*plant.drives, plant.law)
-        for instance, machine, worst in zip(
-            self._instances, machines, plant.margins.tolist(), strict=False
+        for step, machine, worst in zip(
+            self._steps, machines, plant.margins.tolist(), strict=False
         ):
-            check_domain(instance, machine.states, worst, "command")
+            step.check(machine, worst, "command")
         return out, ended
-
-
-def _is_signal(model: Model, name: str) -> bool:
-    return model.signals is not None and name in model.signals._fields

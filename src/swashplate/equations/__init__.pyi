@@ -15,6 +15,9 @@ from .loops import interpolate as interpolate
 from .loops import repeated as repeated
 from .loops import root as root
 from .marching.lanes import report as report
+from .marching.stepping import CompiledStep as CompiledStep
+from .marching.stepping import Machine as Machine
+from .marching.stepping import compiled_step as compiled_step
 from .marching.use import Run as Run
 from .marching.use import instance_of as instance_of
 from .marching.use import sensitivities as sensitivities

@@ -170,8 +170,10 @@ def on_disk(compiled: Any, function: Callable[..., Any]) -> None:
     """Let a compiled function keep its machine code."""
     try:
         compiled._cache = _KernelCache(function)
-    except RuntimeError:  # no folder to cache in can be written
-        warn(UNCACHED, RuntimeWarning, stacklevel=3)
+    except RuntimeError:
+        # typed into a session, it has no file to be known by; else no folder can be written
+        if Path(plain(function).__code__.co_filename).is_file():
+            warn(UNCACHED, RuntimeWarning, stacklevel=3)
 
 
 # --- generated modules ----------------------------------------------------------------------------

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from math import inf
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.equations.cache import kernel
 from swashplate.equations.code import generating
-from swashplate.equations.marching.march import advance_source
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import Interpolation, least_substeps
-from swashplate.equations.marching.run import Start, check_domain, check_start, module
-from swashplate.equations.model import Model
+from swashplate.equations.marching.run import Start, check_start
+from swashplate.equations.marching.stepping import CompiledStep, Machine
 from swashplate.errors import InputError
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -44,36 +45,30 @@ SHOWN = (
     *(Stored(1, "signals", name) for name in Sample._fields[4:10]),
 )
 """What one sample leaves, in this order; the rest follows from it."""
-DRIVER = '''
-
-
-@kernel
-def steps(last, voltage, held, substeps, begun, h, machine, states, lines, out):
-    """Advance by one sample of a record, or take the first one."""
-    whole, fraction, params, given, constants = machine
-    values = np.empty(1)
-    worst = inf
-    for j in range(substeps if begun else 1):
-        values[0] = voltage
-        if begun and j < substeps - 1:
-            values[0] = last if held else last + (j + 1) / substeps * (voltage - last)
-        before = out[7]
-        margin = advance(values, lines, whole, fraction, params, given, h, constants, states, out)
-        worst = min(worst, margin)
-        if begun:
-            out[8] = out[8] + 0.5 * h * (before + out[7])
-    return worst
-'''
 
 
 @generating
-def _kernels(
-    model: Model, options: tuple[Any, ...]
-) -> tuple[Callable[..., int], Callable[..., float]]:
-    """The compiled constants and steps of a drive."""
-    text, names = advance_source(model, ("voltage",), options, SHOWN)
-    made = module("drive_step", text + DRIVER, {**names, "np": np})
-    return made["prepare"], made["steps"]
+def _steps(step: Callable[[Machine], float]) -> Callable[..., float]:
+    """The compiled march over the steps of one sample."""
+
+    @kernel
+    def steps(
+        last: float, voltage: float, held: bool, substeps: int, begun: bool, machine: Machine,
+        shown: Array,
+    ) -> float:  # fmt: skip
+        """Advance by one sample of a record, or take the first one."""
+        worst = inf
+        for j in range(substeps if begun else 1):
+            machine.inputs[0] = voltage
+            if begun and j < substeps - 1:
+                machine.inputs[0] = last if held else last + (j + 1) / substeps * (voltage - last)
+            before = machine.outputs[7]
+            worst = min(worst, step(machine))
+            if begun:
+                shown[0] = shown[0] + 0.5 * machine.h * (before + machine.outputs[7])
+        return worst
+
+    return steps
 
 
 class StepperState(NamedTuple):
@@ -106,34 +101,32 @@ class Stepper:
         check_filter_stability(parameters, self._step)
         self._instance = instance_of(parameters, True)
         self._start = start
-        prepare, self._steps = _kernels(self._instance.model, self._instance.options)
-        places = self._instance.places(("voltage",), self._step)
-        constants = np.zeros(64)
-        params, given = self._instance.params, self._instance.given
-        prepare(params, given, self._step, constants)
-        self._machine = (places.whole, places.fraction, params, given, constants)
-        self._states = self._instance.start({"voltage": 0.0}, self._step).flat
-        self._lines = np.zeros((1, int(places.whole.max()) + 3))
-        self._out = np.zeros(len(SHOWN) + 1)
+        self._compiled = CompiledStep(self._instance, ("voltage",), SHOWN, self._step)
+        self._steps = _steps(self._compiled.step)
+        self._machine = self._compiled.machine()
+        self._shown = np.zeros(1)
         self._last, self._begun = 0.0, False
 
     @property
     def state(self) -> StepperState:
         """A copy of the present state; assign it to return to that instant."""
-        numbers = np.concatenate([self._states, self._out, [self._last, float(self._begun)]])
-        line = self._lines[0].copy()
+        rest = [self._last, float(self._begun)]
+        m = self._machine
+        numbers = np.concatenate([m.states, m.outputs, self._shown, rest])
+        line = m.lines[0].copy()
         numbers.flags.writeable = line.flags.writeable = False
         return StepperState(numbers, line)
 
     @state.setter
     def state(self, state: StepperState) -> None:
-        size = self._states.size + self._out.size + 2
-        if state.line.shape != self._lines[0].shape or state.numbers.size != size:
+        m = self._machine
+        size = m.states.size
+        if state.line.shape != m.lines[0].shape or state.numbers.size != size + len(SHOWN) + 3:
             raise InputError("This state belongs to a stepper of another drive, delay or rate.")
-        self._states[:] = state.numbers[: self._states.size]
-        self._out[:] = state.numbers[self._states.size : -2]
+        m.states[:] = state.numbers[:size]
+        m.outputs[:], self._shown[:] = state.numbers[size:-3], state.numbers[-3]
         self._last, self._begun = float(state.numbers[-2]), bool(state.numbers[-1])
-        self._lines[0] = state.line
+        m.lines[0] = state.line
 
     def step(self, voltage: float) -> Sample:
         """Advance by one sample interval.
@@ -159,21 +152,17 @@ class Stepper:
         if not -FULL_VOLTAGE <= voltage <= FULL_VOLTAGE:
             raise InputError(f"The voltage is {voltage:g} V, but the card takes ±10 V.")
         if self._start == "steady" and not self._begun:
-            self._states[:] = self._instance.start({"voltage": voltage}, self._step, "steady").flat
-            self._lines[0] = voltage
+            self._machine = self._compiled.machine({"voltage": voltage}, "steady")
         worst = self._steps(
             self._last,
             voltage,
             self._held,
             self._substeps,
             self._begun,
-            self._step,
             self._machine,
-            self._states,
-            self._lines,
-            self._out,
+            self._shown,
         )
-        check_domain(self._instance, self._states, worst, "voltage")
+        self._compiled.check(self._machine, worst, "voltage")
         self._last, self._begun = voltage, True
-        plus, minus, *inside, position = self._out.tolist()
-        return Sample._make([voltage, plus, minus, plus - minus, *inside, position])
+        plus, minus, *inside = self._machine.outputs.tolist()
+        return Sample._make([voltage, plus, minus, plus - minus, *inside, float(self._shown[0])])

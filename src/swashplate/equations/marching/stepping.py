@@ -1,0 +1,221 @@
+"""One sample of a model, compiled, for kernels that close loops around models.
+
+Examples
+--------
+>>> valve = compiled_step(model, Valve(0.05, 0.1), ("command",), ("position",), rate=512.0)
+>>> step = valve.step
+>>> @kernel
+... def positioned(machine, target, path):
+...     worst = inf
+...     for n in range(path.size):
+...         machine.inputs[0] = 5.0 * (target - machine.outputs[0])
+...         worst = min(worst, step(machine))
+...         path[n] = machine.outputs[0]
+...     return worst
+>>> machine = valve.machine()
+>>> valve.check(machine, positioned(machine, 0.2, path))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.equations.code import generating
+from swashplate.equations.fields import is_real
+from swashplate.equations.marching.march import advance_source, output_of
+from swashplate.equations.marching.part import Stored
+from swashplate.equations.marching.run import Instance, Start, check_domain, module
+from swashplate.equations.marching.use import instance_of
+from swashplate.equations.model import Model
+from swashplate.errors import InputError
+
+Array = NDArray[np.float64]
+
+STEP = '''
+
+
+@inlined
+def step(machine):
+    """Take the inputs, give the outputs, go on to the next sample; the domain's margin."""
+    return advance(
+        machine.inputs, machine.lines, machine.whole, machine.fraction, machine.parameters,
+        machine.given, machine.h, machine.constants, machine.states, machine.outputs,
+    )
+'''
+
+
+class Machine(NamedTuple):
+    """A model's numbers in a loop: what a compiled step takes, and all that it remembers."""
+
+    inputs: Array
+    """Newest sample of each input; the loop sets them before each step."""
+    outputs: Array
+    """Outputs at that sample, behind the step."""
+    states: Array
+    lines: Array
+    """Inputs of late, newest first: what delays look at."""
+    whole: NDArray[np.int64]
+    fraction: Array
+    parameters: Array
+    given: Array
+    constants: Array
+    h: float
+    """[s]"""
+
+    def copied(self) -> Machine:
+        """The machine with a memory of its own: both go on from here apart."""
+        return self._replace(
+            inputs=self.inputs.copy(),
+            outputs=self.outputs.copy(),
+            states=self.states.copy(),
+            lines=self.lines.copy(),
+        )
+
+
+@generating
+def _kernels(
+    model: Model, inputs: tuple[str, ...], options: tuple[Any, ...], stored: tuple[Stored, ...]
+) -> tuple[Callable[..., int], Callable[[Machine], float], int]:
+    """Compiled constants of a model, its step, and how many constants there are."""
+    text, names = advance_source(model, inputs, options, stored)
+    made = module(f"{model.name}_step", text + STEP, names)
+    return made["prepare"], made["step"], text.count("constants[") // 2
+
+
+class CompiledStep:
+    """A model's compiled step: one sample, for kernels that close loops around it.
+
+    Made by `compiled_step`, and for drives by `Drive.compiled_step`.
+
+    Attributes
+    ----------
+    step : callable
+        ``step(machine) -> margin``: reads ``machine.inputs``, fills ``machine.outputs`` with the
+        same sample, takes the state to the next one, and returns the margin of the model's domain.
+        A `kernel` that calls it inlines it; numbers are those of `simulate` to the last bit.
+    inputs, outputs : tuple of str
+        Names, in the arrays' order.
+    """
+
+    def __init__(
+        self, instance: Instance, inputs: Sequence[str], stored: Sequence[Stored], h: float
+    ) -> None:
+        self._instance, self._h = instance, h
+        self.inputs, self.outputs = tuple(inputs), tuple(each.path for each in stored)
+        instance.check_inputs(self.inputs)
+        self._prepare, self.step, self._count = _kernels(
+            instance.model, self.inputs, instance.options, tuple(stored)
+        )
+
+    def __repr__(self) -> str:
+        return (
+            f"CompiledStep({self._instance.name!r}, {', '.join(self.inputs)} -> "
+            f"{', '.join(self.outputs)}, {1.0 / self._h:g} Hz)"
+        )
+
+    def machine(self, first: Mapping[str, float] | None = None, start: Start = "rest") -> Machine:
+        """A machine at its start.
+
+        Parameters
+        ----------
+        first : mapping of str to float, optional
+            Inputs at the first sample, from which a settled start follows; by default zero.
+        start : {"rest", "steady"}
+            As `Drive.simulate`.
+        """
+        found = self._instance
+        values = {name: float((first or {}).get(name, 0.0)) for name in self.inputs}
+        places = found.places(self.inputs, self._h)
+        constants = np.zeros(self._count)
+        self._prepare(found.params, found.given, self._h, constants)
+        longest = int(places.whole.max()) if places.whole.size else 0
+        lines = np.zeros((len(self.inputs), longest + 3))
+        if start == "steady":
+            lines[:] = np.array([*values.values()])[:, None]
+        return Machine(
+            np.array([*values.values()]),
+            np.zeros(len(self.outputs)),
+            found.start(values, self._h, start).flat,
+            lines,
+            places.whole,
+            places.fraction,
+            found.params,
+            found.given,
+            constants,
+            self._h,
+        )
+
+    def check(self, machine: Machine, margin: float, cause: str = "input") -> None:
+        """Refuse what a loop has computed outside the model's equations.
+
+        Parameters
+        ----------
+        machine : Machine
+            As the loop has left it.
+        margin : float
+            The least of the margins that the steps have returned.
+        cause : str
+            What has driven the model, for the sentence.
+
+        Raises
+        ------
+        DomainError
+            If the margin is not above 0, or a number of the state is not finite.
+        """
+        check_domain(self._instance, machine.states, margin, cause)
+
+
+def compiled_step(
+    model: Model,
+    p: Any,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    rate: float,
+    *,
+    options: Any = None,
+    given: Any = None,
+) -> CompiledStep:
+    """Compiled step of a model of one's own, for kernels that close loops around it.
+
+    Parameters
+    ----------
+    model, p, options, given :
+        As in `simulate`.
+    inputs, outputs : sequence of str
+        Signals that the loop gives and takes; inputs with a default parameter may be left out.
+    rate : float
+        Samples a second. [Hz]
+
+    Raises
+    ------
+    InputError
+        For numbers that do not fit the model, and signals that it does not have.
+    """
+    if not is_real(rate) or not 0.0 < rate < np.inf:
+        raise InputError(f"The rate is {rate!r} Hz, but must be a number above 0.")
+    instance = instance_of(model, p, options=options, given=given)
+    return CompiledStep(instance, inputs, stored_of(model, outputs), 1.0 / rate)
+
+
+def stored_of(model: Model, outputs: Sequence[str]) -> tuple[Stored, ...]:
+    """Where the outputs of a step come from.
+
+    Raises
+    ------
+    InputError
+        For signals that the model does not have, and integrals, which a loop adds up itself.
+    """
+    found = []
+    for output in outputs:
+        stored, integral = output_of(model, output)
+        if integral:
+            raise InputError(
+                f"{output} is the integral of {stored.path}, and not known within a step: take "
+                f"{stored.path} and add it up in the loop."
+            )
+        found.append(stored)
+    return tuple(found)

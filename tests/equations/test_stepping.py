@@ -1,0 +1,112 @@
+"""Compiled steps in loops of one's own: the numbers of `simulate`, for drives and own models."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from swashplate import Drive
+from swashplate.equations import Model, Tap, compiled_step, equation, kernel, simulate
+from swashplate.errors import DomainError, InputError
+
+
+def marched(compiled, machine, records):
+    """Outputs of a kernel that takes a step for each row of inputs, (n, outputs)."""
+    step = compiled.step
+
+    @kernel
+    def march(machine, records, out):
+        worst = np.inf
+        for n in range(records.shape[0]):
+            machine.inputs[:] = records[n]
+            worst = min(worst, step(machine))
+            out[n] = machine.outputs
+        return worst
+
+    out = np.empty((len(records), machine.outputs.size))
+    compiled.check(machine, march(machine, np.ascontiguousarray(records), out), "command")
+    return out
+
+
+VOLTAGE = 6.0 * np.sin(np.arange(700) / 90.0) ** 3
+
+
+@pytest.mark.interpreted
+@pytest.mark.parametrize(("name", "rate"), [("slew", 512.0), ("hoist", 1024.0)])
+def test_step_of_a_drive_gives_the_numbers_of_its_simulation(name, rate):
+    drive = Drive.preset(name).at_every_rate()
+    compiled = drive.compiled_step(("shaft_speed", "swash_angle", "current"), rate=rate)
+    out = marched(compiled, compiled.machine(), VOLTAGE[:, None])
+    run = drive.simulate(VOLTAGE, rate)
+    for k, signal in enumerate((run.shaft_speed, run.swash_angle, run.current)):
+        np.testing.assert_array_equal(out[:, k], signal)
+    assert repr(compiled) == (
+        f"CompiledStep('{name}', voltage -> shaft_speed, swash_angle, current, {rate:g} Hz)"
+    )
+
+
+def test_step_takes_measured_inputs_and_begins_settled():
+    drive = Drive.preset("hoist").replace(motor_leakage=1e-6, motor_constant=250.0)
+    torque = 3e4 * (1.0 + np.sin(np.arange(VOLTAGE.size) / 40.0))
+    compiled = drive.compiled_step(inputs=("voltage", "load_torque"))
+    command = VOLTAGE + 4.0
+    machine = compiled.machine({"voltage": 4.0, "load_torque": torque[0]}, "steady")
+    out = marched(compiled, machine, np.stack([command, torque], axis=1))
+    run = drive.simulate(command, load_torque=torque, start="steady")
+    np.testing.assert_array_equal(out[:, 0], run.shaft_speed)
+
+
+def test_copied_machines_go_on_apart():
+    compiled = Drive.preset("luff").compiled_step()
+    machine = compiled.machine()
+    records = VOLTAGE[:, None]
+    whole = marched(compiled, compiled.machine(), records)
+    marched(compiled, machine, records[:300])
+    other = machine.copied()
+    np.testing.assert_array_equal(marched(compiled, machine, records[300:]), whole[300:])
+    marched(compiled, machine, 0.0 * records)
+    np.testing.assert_array_equal(marched(compiled, other, records[300:]), whole[300:])
+
+
+class Lag(NamedTuple):
+    time: float
+    delay: float
+
+
+class Level(NamedTuple):
+    level: float
+
+
+@equation
+def approach(state: Level, command: float, p: Lag, h: float) -> Level:
+    return Level(state.level + h / p.time * (command - state.level))
+
+
+lag = Model("lag", Lag, Level, approach, taps={"command": Tap("command", delay="delay")})
+
+
+def test_step_of_ones_own_model_waits_as_its_simulation_does():
+    p = Lag(0.3, 0.0377)
+    compiled = compiled_step(lag, p, ("command",), ("level",), 100.0)
+    out = marched(compiled, compiled.machine(), VOLTAGE[:, None])
+    run = simulate(lag, p, {"command": VOLTAGE}, 100.0)
+    np.testing.assert_array_equal(out[:, 0], run["level"])
+
+
+def test_what_no_step_has_is_refused():
+    hoist = Drive.preset("hoist")
+    with pytest.raises(InputError, match="shaft_position is the integral of shaft_speed, and not"):
+        hoist.compiled_step(("shaft_position",))
+    with pytest.raises(InputError, match="has no signal 'noise'; it has current"):
+        hoist.compiled_step(("noise",))
+    with pytest.raises(InputError, match="hoist has no input 'wind'; it has voltage, "):
+        hoist.compiled_step(inputs=("voltage", "wind"))
+    with pytest.raises(InputError, match="hoist: card needs the signal 'voltage'"):
+        hoist.compiled_step(inputs=("load_torque",))
+    with pytest.raises(InputError, match=r"is unstable at a step of 1/20 s"):
+        hoist.compiled_step(rate=20.0)
+    with pytest.raises(InputError, match="The rate is 0 Hz, but must be a number above 0"):
+        compiled_step(lag, Lag(0.3, 0.0), ("command",), ("level",), 0)
+    compiled = compiled_step(lag, Lag(0.001, 0.0), ("command",), ("level",), 100.0)
+    with pytest.raises(DomainError, match="lag: lag's level is .* at the end of the record"):
+        marched(compiled, compiled.machine(), np.ones((700, 1)))
