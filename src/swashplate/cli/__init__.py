@@ -20,6 +20,7 @@ from swashplate.cli import (
     campaign,
     crane,
     doctor,
+    export,
     fit,
     full_order,
     linear,
@@ -64,6 +65,7 @@ Examples:
   swashplate whatif hoist --scale orifice=1.5 --maneuver step:9
   swashplate full-order hoist step:9                  is one state enough
   swashplate crane run tg3637 --slew 1 --until slew_deg=45
+  swashplate export hoist --fmu hoist.fmu             for other programs
   swashplate demo                                     everything at once
 
 Files are written in SI, whole or not at all. What is wrong is said in one
@@ -139,6 +141,7 @@ for name, panel, function, examples in (
     ("bode", "Analyse", linear.bode, linear.BODE_EXAMPLES),
     ("full-order", "Analyse", full_order.full_order, full_order.EXAMPLES),
     ("crane", "Analyse", crane.app, ""),
+    ("export", "Export", export.export, export.EXAMPLES),
     ("doctor", "This installation", doctor.doctor, doctor.EXAMPLES),
 ):
     if isinstance(function, typer.Typer):

@@ -32,8 +32,10 @@ class Extra(NamedTuple):
 
 
 EXTRAS = (
+    Extra("binaries", "ziglang", "exports of equations of one's own for every platform"),
     Extra("control", "control", "linear models as python-control's StateSpace"),
     Extra("dask", "distributed", "fit --dask: many starts on a cluster"),
+    Extra("fmu", "fmpy", "an FMU compared with the drive, export.compare"),
     Extra("mdf", "asammdf", "logs in ASAM MDF 4 (.mf4)"),
     Extra("sensitivity", "SALib", "swashplate sensitivity, Sobol indices"),
     Extra("tdms", "npTDMS", "logs in National Instruments' TDMS"),

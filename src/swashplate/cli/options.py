@@ -201,7 +201,7 @@ class ShownUnits:
     ] = None
 
 
-WRITTEN = {"out", "plot", "write", "pdf", "figures"}
+WRITTEN = {"out", "plot", "write", "pdf", "figures", "fmu", "c", "wasm"}
 """Parameters of commands that write files, and so replace older ones with --force alone."""
 
 
