@@ -12,8 +12,6 @@ import numpy as np
 import pytest
 
 from swashplate import Drive
-from swashplate.campaign import Campaign
-from swashplate.errors import InputError
 from swashplate.maneuvers import parse
 from swashplate.report.fit_report import write_live_page
 
@@ -26,16 +24,21 @@ const act = (words, value) => {
 const wait = setInterval(() => {
   if (document.body.dataset.ready !== "yes") return;
   clearInterval(wait);
-  const made = { first: [...live.latest.signals.shaft_speed], limits: [...live.latest.limits] };
+  const acting = [...live.latest.limits];
+  const { limits } = JSON.parse(document.getElementById("live").textContent);
+  const made = { first: [...live.latest.signals.shaft_speed] };
+  const acts = (bit) => acting.map((each) => (each & bit ? 1 : 0));
+  made.limits = Object.fromEntries(limits.map(([bit, name]) => [name, acts(bit)]));
   act("Orifice", 0.75);
   made.factor = live.factors.get("orifice");
   made.moved = [...live.latest.signals.shaft_speed];
   made.errors = live.latest.errors;
   made.toml = document.getElementById("toml").textContent;
-  dispatchEvent(new KeyboardEvent("keydown", { key: "r" }));
+  document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "r", bubbles: true }));
   made.reset = [...live.latest.signals.shaft_speed];
   made.milliseconds = document.body.dataset.milliseconds;
-  document.body.append(Object.assign(document.createElement("pre"), { id: "made", textContent: JSON.stringify(made) }));
+  const textContent = JSON.stringify(made);
+  document.body.append(Object.assign(document.createElement("pre"), { id: "made", textContent }));
 }, 5);
 </script></body>"""
 
@@ -68,7 +71,9 @@ def test_a_slider_gives_what_python_gives(tmp_path: Path) -> None:
     run = drive.simulate(voltage, 512.0)
     largest = np.abs(run.shaft_speed).max()
     np.testing.assert_allclose(made["first"], run.shaft_speed, rtol=0.0, atol=1e-12 * largest)
-    assert made["limits"] == [int(each) for each in run.limits]
+    for name, acts in made["limits"].items():
+        assert acts == run.active(name.replace("-", "_")).astype(int).tolist(), name
+    assert sum(made["limits"]["orifice"]) > 10
     moved = drive.scale(Z16=made["factor"]).simulate(voltage, 512.0).shaft_speed
     assert np.abs(moved - run.shaft_speed).max() > 0.01 * largest
     np.testing.assert_allclose(made["moved"], moved, rtol=0.0, atol=1e-12 * largest)

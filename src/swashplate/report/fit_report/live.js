@@ -42,7 +42,7 @@ class Machine {
   /** Signals (by name) over a run, and its limits, a byte a sample; or what is wrong. */
   simulate(run) {
     const { voltage, step, steady } = run;
-    const wrong = this.c.swp_page_begin(voltage.length, step, data.outputs.length, 1);
+    const wrong = this.c.swp_page_begin(voltage.length, step, data.outputs.length);
     if (wrong) return { wrong: this.sentence(wrong) };
     data.outputs.forEach(({ number }, k) => this.c.swp_page_select(k, number));
     new Float64Array(this.c.memory.buffer, this.c.swp_page_input(), voltage.length).set(voltage);
@@ -141,17 +141,17 @@ class LiveFigure extends Figure {
     return [grid[0], grid.at(-1)];
   }
 
-  spans(mask) {
+  spans(shaded) {
     const { grid, step } = this.showing;
     const made = [];
     for (const [bit, name] of data.limits) {
-      if (!(bit & mask)) continue;
+      if (!shaded.includes(name)) continue;
       let from = null;
       for (let row = 0; row <= grid.length; row++) {
         const acts = row < grid.length && this.now.limits[row] & bit;
         if (acts && from === null) from = grid[row] - 0.5 * step;
         if (!acts && from !== null) {
-          made.push([from, grid[row - 1] + 0.5 * step, `limit ${name}`]);
+          made.push([from, grid[row - 1] + 0.5 * step, name]);
           from = null;
         }
       }
@@ -166,7 +166,7 @@ class LiveFigure extends Figure {
     const line = (each, found) => found.seen[each].map((value) => value * run.shown[each].factor);
     run.shown.forEach((each, k) => {
       const lines = [["before", line(k, before)], ["simulated", line(k, now)]];
-      const own = { time: each.stamps ?? run.grid, breaks: each.breaks ?? none, ignored: each.ignored, shades: this.spans(each.mask) };
+      const own = { time: each.stamps ?? run.grid, breaks: each.breaks ?? none, ignored: each.ignored, shades: this.spans(each.shaded) };
       if (each.values) {
         const measured = each.values.map((value) => value * each.factor);
         made.push([{ ...own, lines: [["measured", measured], ...lines] }, "overlay", each.label]);
@@ -319,7 +319,7 @@ class Page {
         const words = ({ rmse, fit }) => `RMSE ${digits(rmse * each.factor, 3)} ${each.unit}, fit ${fit.toFixed(2)} %`;
         const row = document.createElement("p");
         row.append(Object.assign(document.createElement("b"), { textContent: each.name }), ` ${words(now.errors[k])}`);
-        row.append(Object.assign(document.createElement("span"), { textContent: ` before: ${words(this.before[number].errors[k])}` }));
+        row.append(Object.assign(document.createElement("span"), { textContent: ` ${data.before}: ${words(this.before[number].errors[k])}` }));
         return [row];
       }),
     );

@@ -5,7 +5,7 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Iterable, Sequence
 from datetime import date
-from math import inf, isfinite
+from math import isfinite
 from pathlib import Path
 from typing import Any
 from zlib import compress
@@ -13,24 +13,25 @@ from zlib import compress
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate import export
 from swashplate.analysis.whatif import LEVERS
 from swashplate.campaign import Campaign, Channel, Experiment
 from swashplate.campaign.speed import DIFFERENTIATOR, LOW_PASS, speed_of
-from swashplate.drive import Drive, HasParameters, set_of
+from swashplate.drive import Drive
 from swashplate.equations.marching.record import Record, record_of
 from swashplate.errors import InputError
+from swashplate.export import exported_drive, values_of
+from swashplate.export.libraries import WASM, all_sources, compiled_wasm, packaged
 from swashplate.identification.drive_model import SIGNALS, at_rate_of, voltage_record
 from swashplate.identification.validation import ignored_windows
 from swashplate.maneuvers import Maneuver
-from swashplate.parameters.parameter_set import Parameter, ParameterSet
+from swashplate.parameters.parameter_set import HasParameters, Parameter, ParameterSet, set_of
 from swashplate.report.fit_report.page import rendered, resource, script_json
 from swashplate.report.fit_report.runs import packed
 from swashplate.report.lines import SHADES, gap_rows
 from swashplate.report.style import in_lines
 from swashplate.simulation.result import Limit
-from swashplate.tables import write_text
-from swashplate.units import display_unit
+from swashplate.tables import listed, write_text
+from swashplate.units import DisplayUnit, display_unit, unit_text
 
 Array = NDArray[np.float64]
 
@@ -45,7 +46,7 @@ UNMEASURED = ("current", "shaft_speed")
 
 
 def write_live_page(
-    drive: Drive | ParameterSet | HasParameters,
+    drive: ParameterSet | HasParameters,
     path: str | Path,
     *,
     campaign: Campaign | None = None,
@@ -79,18 +80,17 @@ def write_live_page(
     Returns
     -------
     tuple of str
-        Sentences on what the page leaves out.
+        Sentences on what the page leaves out or changes.
 
     Raises
     ------
     InputError
         If there is nothing to simulate: no run is driven by a voltage, or neither a campaign nor a
-        command is given.
+        command is given; or the drive has an equation of its own and there is no compiler for it.
     FileError
         If the file cannot be written.
     """
-    parameters, said = set_of(drive), tuple[str, ...]()
-    runs: list[dict[str, Any]] = []
+    parameters = set_of(drive)
     if campaign is not None:
         tests = campaign.select(axis=axis)
         driven = [each for each in tests if each.input.kind == "voltage"]
@@ -99,53 +99,88 @@ def write_live_page(
                 f"{campaign.path.name} has no run that a voltage drives; a live page needs one."
             )
         parameters, said = at_rate_of(driven, parameters)
-        runs = [_run(each) for each in driven]
         left = [each.name for each in tests if each.input.kind != "voltage"]
         if left:
-            said += (f"Left out, driven by something else than a voltage: {', '.join(left)}.",)
+            said += (f"Left out, driven by something else than a voltage: {listed(left)}.",)
+        made = live_page(parameters, driven, campaign.title, campaign.virtual, name)
     elif command is not None:
-        record = record_of(command.sample(rate), rate, what="voltage")
-        runs = [{**_record(record), "name": command.name, "role": "", "channels": []}]
+        record, said = record_of(command.sample(rate), rate, what="voltage"), ()
+        run = {**_record(record), "name": command.name, "role": "", "channels": []}
+        made = _page(parameters, [run], parameters.title or parameters.name, False, name)
     else:
         raise InputError("A live page needs the runs of a campaign, or a command to simulate.")
-    limits = [(int(each), each.name.lower().replace("_", "-"), look) for each, look in _limits()]
-    listed = parameters_of(parameters)
+    write_text(made, path)
+    return said
+
+
+def live_page(
+    parameters: ParameterSet,
+    experiments: Sequence[Experiment],
+    title: str,
+    virtual: bool,
+    name: str,
+) -> str:
+    """HTML of a live page beside runs that a voltage drives; see `write_live_page`."""
+    return _page(parameters, [_run(each) for each in experiments], title, virtual, name)
+
+
+def _page(
+    parameters: ParameterSet,
+    runs: Sequence[dict[str, Any]],
+    title: str,
+    virtual: bool,
+    name: str,
+) -> str:
+    exported = exported_drive()
+    limits = [(1 << k, Limit[name.upper()]) for k, (_, name) in enumerate(exported.limits)]
+    values = parameters_of(parameters)
+    before = "as fitted" if any(each["main"] for each in values) else "as it is"
     content = {
-        "wasm": b64encode(export.wasm_bytes()).decode("ascii"),
-        "values": _doubles(export.values_of(parameters, step=runs[0]["step"])),
-        "parameters": listed,
-        "levers": _levers(parameters, listed),
-        "outputs": [{"name": each, "number": k} for k, each in enumerate(export.OUTPUTS)],
-        "limits": [[bit, word] for bit, word, _ in limits],
+        "wasm": b64encode(_compiled(parameters)).decode("ascii"),
+        "values": _doubles(values_of(Drive(parameters), runs[0]["step"])),
+        "parameters": values,
+        "levers": _levers(values),
+        "outputs": [{"name": each, "number": k} for k, each in enumerate(exported.names)],
+        "limits": [[bit, _word(limit)] for bit, limit in limits],
+        "before": before,
         "filter": {"low": LOW_PASS, "high": DIFFERENTIATOR},
         "unmeasured": [_shown(each) for each in UNMEASURED],
         "runs": runs,
     }
-    colours = "".join(f".stack .{word} {{ fill: {look.color}; }}\n" for _, word, look in limits)
-    made = rendered(
+    colours = "".join(
+        f".stack .{_word(limit)} {{ fill: {SHADES[limit].color}; }}\n" for _, limit in limits
+    )
+    return rendered(
         "live.html",
         ("curves.js", "live.js"),
         resource("live.css") + colours,
         data=script_json(content),
-        title=campaign.title if campaign is not None else parameters.title,
+        title=title,
         drive=parameters.title or parameters.name,
-        virtual=campaign is not None and campaign.virtual,
-        measured=campaign is not None,
-        fitted=any(each["main"] for each in listed),
-        limits=[(word, look.name, look.color) for _, word, look in limits],
+        virtual=virtual,
+        measured=any(run["channels"] for run in runs),
+        fitted=before == "as fitted",
+        before=before,
+        limits=[(SHADES[limit].name, SHADES[limit].color) for limit in SHADES],
         date=f"{date.today():%d %B %Y}",
         file=name,
     )
-    write_text(made, path)
-    return said
+
+
+def _compiled(parameters: ParameterSet) -> bytes:
+    """WebAssembly of the drive: the package's, or of a drive with equations of its own a new one."""
+    if not parameters.equations:
+        return packaged(WASM)
+    return compiled_wasm(all_sources(Drive(parameters)))
 
 
 # --- parameters and levers ------------------------------------------------------------------------
 
 
 def parameters_of(parameters: ParameterSet) -> list[dict[str, Any]]:
-    """Every value of a set with its number in the C source, its words and the ends of its slider."""
-    numbers = {name: k for k, name in enumerate(export.PARAMETERS)}
+    """Every value of a set: its number in C, its words, and the ends of its slider."""
+    names = [name for _, _, name in exported_drive().named("parameters")]
+    numbers = {name: k for k, name in enumerate(names)}
     made = []
     for parameter in parameters.values():
         definition = parameter.definition
@@ -153,7 +188,7 @@ def parameters_of(parameters: ParameterSet) -> list[dict[str, Any]]:
         for column, side, value in zip(definition.columns, sides, parameter.values, strict=False):
             if column not in numbers:
                 continue  # of an equation of one's own
-            unit = display_unit(definition.unit, abs(value) if isfinite(value) else 1.0)
+            unit = _unit(definition.unit)
             made.append(
                 {
                     "number": numbers[column],
@@ -172,6 +207,15 @@ def parameters_of(parameters: ParameterSet) -> list[dict[str, Any]]:
     return made
 
 
+def _unit(si: str) -> DisplayUnit:
+    """Unit of people for a parameter: mm, bar and degrees; SI for the others."""
+    return (
+        display_unit(si, 1e5 if si == "Pa" else 0.0)
+        if si in ("m", "Pa", "rad")
+        else (DisplayUnit(unit_text(si), 1.0))
+    )
+
+
 def slider(parameter: Parameter, value: float) -> tuple[float, float] | None:
     """Ends of a value's slider; None where no factor moves it. SI"""
     if parameter.own_bounds is not None and all(map(isfinite, parameter.own_bounds)):
@@ -184,14 +228,14 @@ def slider(parameter: Parameter, value: float) -> tuple[float, float] | None:
     return max(low, definition.lower), min(high, definition.upper)
 
 
-def _levers(parameters: ParameterSet, listed: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+def _levers(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Levers with the numbers that they move and the powers with which they do."""
     made = []
     for name in SHOWN:
         lever = LEVERS[name]
         moves = [
             (each["number"], lever.powers[key])
-            for each in listed
+            for each in values
             for key in (each["symbol"], each["column"])
             if key in lever.powers and each["value"] not in (0.0, 1e30)
         ]
@@ -271,7 +315,7 @@ def _shown(signal: str, name: str = "", unit: str = "", size: float = 0.0) -> di
     shown = display_unit(unit, size)
     words = name or signal.replace("_", " ")
     electric = "current" in signal
-    mask = sum(int(each) for each in Limit if bool(each & BEFORE_CURRENT) == electric)
+    shaded = [_word(each) for each in Limit if bool(each & BEFORE_CURRENT) == electric]
     return {
         "signal": signal,
         "name": words,
@@ -279,12 +323,13 @@ def _shown(signal: str, name: str = "", unit: str = "", size: float = 0.0) -> di
         "factor": shown.factor,
         "label": in_lines(shown.label(words), 24),
         "residual": in_lines(shown.label("residual"), 14),
-        "mask": mask,
+        "shaded": shaded,
     }
 
 
-def _limits() -> list[tuple[Limit, Any]]:
-    return [(each, SHADES[each]) for each in Limit]
+def _word(limit: Limit) -> str:
+    """A limit's name as a class of the page."""
+    return str(limit.name).lower().replace("_", "-")
 
 
 def _doubles(values: Array) -> str:
