@@ -20,7 +20,7 @@ from swashplate.drive import Drive
 from swashplate.equations.marching.record import Record, record_of
 from swashplate.errors import InputError
 from swashplate.export import exported_drive, values_of
-from swashplate.export.libraries import WASM, all_sources, compiled_wasm, packaged
+from swashplate.export.libraries import WASM, packaged
 from swashplate.identification.drive_model import SIGNALS, at_rate_of, voltage_record
 from swashplate.identification.validation import ignored_windows
 from swashplate.maneuvers import Maneuver
@@ -86,7 +86,7 @@ def write_live_page(
     ------
     InputError
         If there is nothing to simulate: no run is driven by a voltage, or neither a campaign nor a
-        command is given; or the drive has an equation of its own and there is no compiler for it.
+        command is given; or the drive has an equation of its own.
     FileError
         If the file cannot be written.
     """
@@ -131,12 +131,17 @@ def _page(
     virtual: bool,
     name: str,
 ) -> str:
+    if parameters.equations:
+        raise InputError(
+            f"{parameters.name} has an equation of its own, which the WebAssembly of the package "
+            "does not have: export its C source with swashplate.export.c."
+        )
     exported = exported_drive()
     limits = [(1 << k, Limit[name.upper()]) for k, (_, name) in enumerate(exported.limits)]
     values = parameters_of(parameters)
     before = "as fitted" if any(each["main"] for each in values) else "as it is"
     content = {
-        "wasm": b64encode(_compiled(parameters)).decode("ascii"),
+        "wasm": b64encode(packaged(WASM)).decode("ascii"),
         "values": _doubles(values_of(Drive(parameters), runs[0]["step"])),
         "parameters": values,
         "levers": _levers(values),
@@ -167,11 +172,10 @@ def _page(
     )
 
 
-def _compiled(parameters: ParameterSet) -> bytes:
-    """WebAssembly of the drive: the package's, or of a drive with equations of its own a new one."""
-    if not parameters.equations:
-        return packaged(WASM)
-    return compiled_wasm(all_sources(Drive(parameters)))
+def can_run(parameters: ParameterSet, experiment: Experiment) -> bool:
+    """Whether a page can run a drive as it is beside a run: see `write_live_page`."""
+    driven = experiment.input.kind == "voltage" and not parameters.equations
+    return driven and not at_rate_of([experiment], parameters)[1]
 
 
 # --- parameters and levers ------------------------------------------------------------------------
