@@ -24,7 +24,6 @@ def measured() -> Iterator[table.Row]:
     yield from rows.batch_rows(marches)
     yield from studies.fit_study_rows()
     yield from studies.full_order_rows()
-    yield from studies.sobol_rows()
     yield from processes.memory_rows()
     yield from processes.hour_rows()
     yield from processes.command_rows()

@@ -1,4 +1,4 @@
-"""Rows of the table for whole studies: a fit, its report, a full-order run, Sobol indices."""
+"""Rows of the table for whole studies: a fit, its report and a full-order run."""
 
 import tempfile
 import time
@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from statistics import median
 
-from processes import limited, work
-from table import Row, duration, size
+from processes import limited
+from table import Row, duration
 
 from swashplate import Campaign, maneuvers
 from swashplate.campaign import rig
@@ -69,15 +69,6 @@ def full_order_rows() -> Iterator[Row]:
     yield _limited("full-order model, compiled march", march, MARCHED)
     radau = _median_of(3, lambda: hoist.simulate_current(current, method="radau"))
     yield _limited("full-order model, SciPy Radau", radau, SOLVED)
-
-
-def sobol_rows() -> Iterator[Row]:
-    """Sobol's indices of eight levers and five outcomes over a 10 s maneuver."""
-    found = work("sobol")
-    for name in ("quarter", "all"):
-        what = f"Sobol analysis of 10 s, {found[f'{name} runs']:,} runs, two threads"
-        yield _limited(what, found[f"{name} seconds"], STUDIED)
-        yield Row(f"its memory, of {found[f'{name} runs']:,} runs", size(found[f"{name} growth"]))
 
 
 def _limited(what: str, found: float, limit: float) -> Row:

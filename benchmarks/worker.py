@@ -1,12 +1,11 @@
 """What must be measured in a process of its own; prints one JSON object.
 
-python benchmarks/worker.py batch SECONDS | hour FOLDER | sobol | first
+python benchmarks/worker.py batch SECONDS | hour FOLDER | first
 """
 
 import json
 import sys
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 from cases import CARD_SPREAD, PUMP_SPREAD, RATE, changes
@@ -14,18 +13,6 @@ from timing import alone, seconds
 
 from swashplate import Drive, SquaredError, maneuvers
 from swashplate.logs import read_series
-
-LEVERS = (
-    "orifice",
-    "pump",
-    "supply_pressure",
-    "rate_limits",
-    "dead_zone",
-    "spool_stroke",
-    "relief",
-    "plussing",
-)
-OUTCOMES = ("final_speed", "rise_time", "largest_acceleration", "tracking_error", "creep")
 
 
 def peak() -> float:
@@ -69,25 +56,6 @@ def hour(folder: Path) -> dict[str, float]:
     return {"read": read, "simulate": simulate, "write": write, "peak": peak()}
 
 
-def sobol() -> dict[str, float]:
-    """Sobol's indices of eight levers and five outcomes over a step of 10 s, on two threads."""
-    from swashplate.analysis import ranges_of, trial
-    from swashplate.analysis import sobol as indices
-
-    hoist = Drive.preset("hoist")
-    command = trial(hoist, maneuvers.step(9.0).sample())
-    ranges = ranges_of(LEVERS, 0.2)
-    found: dict[str, float] = {}
-    for name, samples in (("first", 16), ("quarter", 256), ("all", 1024)):
-        forget_peak()
-        before, begin = peak(), perf_counter()
-        study = indices(hoist, ranges, command, outcomes=OUTCOMES, samples=samples, threads=2)
-        found[f"{name} seconds"] = perf_counter() - begin
-        found[f"{name} growth"] = peak() - before
-        found[f"{name} runs"] = study.runs
-    return found
-
-
 def first() -> dict[str, float]:
     """A first simulation, with whatever the cache of compiled code holds."""
     voltage = maneuvers.sine(6.5, 0.1).sample(RATE)
@@ -100,8 +68,6 @@ def main(job: str, argument: str = "") -> None:
         found = batch(float(argument))
     elif job == "hour":
         found = hour(Path(argument))
-    elif job == "sobol":
-        found = sobol()
     else:
         found = first()
     print(json.dumps(found))

@@ -4,9 +4,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 
+@pytest.mark.slow
 def test_calibration_compares_its_methods(tmp_path: Path) -> None:
     """One campaign, all methods: rows for each, and a table."""
     words = ["--axes", "hoist", "--campaigns", "1", "--cells", "0", "--methods", "--jobs", "1"]

@@ -4,6 +4,8 @@ import ast
 import inspect
 from pathlib import Path
 
+import typer
+
 import swashplate
 from swashplate.cli import app
 
@@ -13,9 +15,10 @@ MOST = 8
 
 def test_no_function_takes_many_arguments_by_position() -> None:
     package = Path(swashplate.__file__).parent
-    groups = [app, *(group.typer_instance for group in app.registered_groups)]
-    registered = [each.callback for group in groups for each in group.registered_commands]
-    functions = [inspect.getclosurevars(each).nonlocals["function"] for each in registered if each]
+    found_commands = [*typer.main.get_group(app).commands.values()]
+    for each in found_commands:
+        found_commands += getattr(each, "commands", {}).values()
+    functions = [inspect.unwrap(each.callback) for each in found_commands if each.callback]
     commands = {(Path(inspect.getfile(each)), each.__name__) for each in functions}
     assert len(commands) > 20
     found = []

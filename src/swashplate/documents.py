@@ -156,8 +156,10 @@ _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 100
 
 def _sentence(error: ErrorDetails, model: type[BaseModel], others: list[ErrorDetails]) -> str:
     where = [str(part) for part in error["loc"] if part not in _BRANCHES]
-    path, kind = ".".join(where), error["type"]
-    parent, key = ".".join(where[:-1]), where[-1] if where else ""
+    # of a list the entries count from 1, as in other sentences
+    named = [f" {int(part) + 1}" if part.isdecimal() else f".{part}" for part in where]
+    path, kind = "".join(named).removeprefix("."), error["type"]
+    parent, key = "".join(named[:-1]).removeprefix("."), where[-1] if where else ""
     table = f"[{parent}]" if parent else "the file"
     if kind == "missing":
         unknown = [

@@ -21,14 +21,12 @@ from swashplate.parameters.files import dump_set, load_preset, load_set
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
-from swashplate.simulation.batch import Batch, SquaredError, simulate_drives
 from swashplate.simulation.instance import (
     at_every_rate,
     check_filter_stability,
     instance_of,
     with_equation,
 )
-from swashplate.simulation.residuals import Sensitivities, sensitivities
 from swashplate.simulation.result import Simulation
 from swashplate.simulation.run import check_voltage, measured_records, simulate_drive, steady_states
 from swashplate.simulation.stepper import Stepper
@@ -43,6 +41,8 @@ if TYPE_CHECKING:
         SweptInput,
         SweptOutput,
     )
+    from swashplate.simulation.batch import Batch, SquaredError
+    from swashplate.simulation.residuals import Sensitivities
     from swashplate.tables import Table
 
 Array = NDArray[np.float64]
@@ -264,6 +264,8 @@ class Drive(Result):
         voltage, rate, start, clip, **options :
             As in `simulate`; `time`, `interpolation`, `substeps`.
         """
+        from swashplate.simulation.residuals import sensitivities
+
         record = _record(voltage, rate, clip=clip, **options)
         return sensitivities(self.parameters, record, "voltage", start, parameters)
 
@@ -277,6 +279,8 @@ class Drive(Result):
         **options: Unpack[Given],
     ) -> Sensitivities:
         """The same for pump and motor alone over a signed current. [A]"""
+        from swashplate.simulation.residuals import sensitivities
+
         record = record_of(current, rate, what="current", **options)
         return sensitivities(self.parameters, record, "current", start, parameters)
 
@@ -316,6 +320,8 @@ class Drive(Result):
         InputError, FileError
             As in `swashplate.simulate_many`.
         """
+        from swashplate.simulation.batch import simulate_drives
+
         if (voltage is None) == (current is None):
             raise InputError("A batch needs either a voltage or a current.")
         if current is None:

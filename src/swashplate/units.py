@@ -250,6 +250,14 @@ def shown_in(words: Sequence[str], drum: float | None = None) -> Iterator[None]:
         _chosen.reset(token)
 
 
+def show_rod() -> None:
+    """Show what is called a shaft's motion as a rod's, in mm or what was chosen, for that while."""
+    chosen = _chosen.get()
+    for turning, moving in (("rad/s", "m/s"), ("rad", "m"), ("rad/s^2", "m/s^2")):
+        usual = _USUAL[moving][1][1]
+        _chosen.set({turning: chosen.get(moving, usual), **_chosen.get()})
+
+
 def display_unit(si: str, largest: float = float("inf")) -> DisplayUnit:
     """Unit to show a quantity in: the one chosen, else the usual one.
 

@@ -9,6 +9,7 @@ from swashplate.analysis import (
     Trial,
     command_for,
     performance,
+    proportional_speed,
     size,
     sizing,
     smallest_alone,
@@ -100,7 +101,8 @@ def test_an_acceleration_is_shared_by_orifice_and_pump(hoist):
 
 
 def test_a_tracking_error(hoist):
-    follow = trial(hoist, maneuvers.sine(9.0, 0.1).sample())
+    volts = maneuvers.sine(9.0, 0.1).sample()
+    follow = trial(hoist, volts, wanted=proportional_speed(hoist, volts, limited=False))
     required = Requirements(tracking_error=np.radians(18.0))
     found = size(hoist, required, {"pump": WIDEST}, follow=follow)
     assert found.before.tracking_error > required.tracking_error >= found.after.tracking_error

@@ -179,7 +179,7 @@ def test_a_counter_that_rolls_over(edited: Edit) -> None:
         ("counts_per_turn = 1000\n", "", "encoder_counts need counts_per_turn"),
         ("gear_ratio = 2.0", "gear_ratio = 0.0", "gear_ratio is 0.0"),
         ('{ column = "time", unit = "ms" }', "{ unit = 'ms' }", "either the column of the time"),
-        ('role = "validate"', 'role = "check"', "runs.1.role is 'check'"),
+        ('role = "validate"', 'role = "check"', "runs 2.role is 'check'"),
         ('role = "validate"', 'start = "given"', "start_pressure belong together"),
         ('role = "validate"', "ignore = [{ from = 2.0, to = 1.0 }]", "from 2.0 s to 1.0 s"),
         ('role = "validate"', 'only = ["boom"]', "names the axis 'boom', but the axes are winch"),

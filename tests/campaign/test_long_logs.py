@@ -3,9 +3,12 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
 import polars as pl
 import pytest
+from asammdf import MDF, Signal
+from nptdms import ChannelObject, TdmsWriter
 
 from swashplate import FileError, InputError
 from swashplate.campaign import Campaign
@@ -86,13 +89,61 @@ def test_the_table_serves_until_the_log_changes(long, tmp_path):
     assert pl.read_parquet_schema(beside).names() == ["0", "1", "2"]  # what is asked for
 
 
-def test_a_span_and_a_parquet_of_ones_own(long, tmp_path):
+def parquet(path: Path, table: dict[str, np.ndarray]) -> None:
+    pl.DataFrame(table).write_parquet(path)
+
+
+def hdf5(path: Path, table: dict[str, np.ndarray]) -> None:
+    with h5py.File(path, "w") as file:
+        for name, column in table.items():
+            file[name] = column
+
+
+def tdms(path: Path, table: dict[str, np.ndarray]) -> None:
+    with TdmsWriter(path) as writer:
+        for part in np.array_split(np.arange(ROWS), 3):
+            writer.write_segment([ChannelObject("a", *each) for each in cut(table, part)])
+
+
+def mdf(path: Path, table: dict[str, np.ndarray]) -> None:
+    signals = [Signal(table[name], table["time"], name=name) for name in ("u", "n")]
+    with MDF(version="4.10") as file:
+        file.append(signals)
+        file.save(path, overwrite=True)
+
+
+def cut(table: dict[str, np.ndarray], part: np.ndarray) -> list[tuple[str, np.ndarray]]:
+    return [(name, column[part]) for name, column in table.items()]
+
+
+@pytest.mark.parametrize(
+    ("write", "suffix"), [(parquet, "parquet"), (hdf5, "h5"), (tdms, "tdms"), (mdf, "mf4")]
+)
+def test_a_span_of_a_log_that_can_be_read_in_parts(long, tmp_path, write, suffix):
     time, u, n = signals()
-    pl.DataFrame({"time": time, "u": u, "n": n}).write_parquet(tmp_path / "log.parquet")
-    toml = TOML.replace("log.csv", "log.parquet") + "span = { from = 50.0 }\n"
-    campaign = long(toml=toml)
-    assert [each.name for each in campaign] == ["log from 58 s"]
-    assert not (tmp_path / "log.parquet.parquet").exists()
+    write(tmp_path / f"log.{suffix}", {"time": time, "u": u, "n": n})
+    toml = TOML.replace("log.csv", f"log.{suffix}") + "span = { from = 50.0 }\n"
+    (found,) = long(toml=toml)
+    assert found.name == "log from 58 s"
+    rows = (time >= found.input.time[0] - 1e-9) & (time <= found.input.time[-1] + 1e-9)
+    np.testing.assert_array_equal(found.input.values, u[rows])
+    np.testing.assert_array_equal(found["speed"].values, n[rows])
+    assert {each.name for each in tmp_path.iterdir()} == {f"log.{suffix}", "campaign.toml"}
+
+
+def test_a_long_log_whose_columns_differ_in_length(long, tmp_path, monkeypatch):
+    time, u, n = signals()
+    with TdmsWriter(tmp_path / "log.tdms") as writer:
+        fast = {"time": time, "u": u}
+        writer.write_segment([ChannelObject("fast", *each) for each in fast.items()])
+        slow = {"stamp": time[::2], "n": n[::2]}
+        writer.write_segment([ChannelObject("slow", *each) for each in slow.items()])
+    toml = TOML.replace("log.csv", "log.tdms").replace('"n",', '"n", time = { column = "stamp" },')
+    (found,) = long(toml=toml)
+    assert found.input.time.size == 2 * found["speed"].time.size == ROWS
+    monkeypatch.setattr("swashplate.logs.log.MOST", 3 * ROWS - 1)
+    with pytest.raises(FileError, match="has 36000 numbers in the 4 columns that are wanted, more"):
+        long(toml=toml)
 
 
 def test_so_much_motion_that_not_all_is_taken(long, monkeypatch):

@@ -46,17 +46,6 @@ def test_files(done, tmp_path):
     np.testing.assert_allclose(table["gain"], expected.gain.ravel())
 
 
-def test_an_amplitude_that_moves_nothing(done):
-    text = done("bode", "hoist", "--amplitude", "0.05", "--amplitude", "2", "--points", "3")
-    assert rows(text)["0.05"][0] == "none"
-
-
-def test_a_changed_drive_and_another_frequency(done):
-    text = done("bode", "hoist", "--scale", "Z16=2", "--frequency", "0.1", "--points", "3")
-    assert "Z16" in text
-    assert "At 0.1 Hz:" in text
-
-
 # --- compare --------------------------------------------------------------------------------------
 
 
@@ -73,32 +62,12 @@ def test_two_axes(done, number):
     assert number(text, "time to 90 % of it", 1) == pytest.approx(lag, abs=3e-3)
 
 
-def test_rms_difference(done):
-    text = done("compare", "hoist", "slew", "--maneuver", "sine:6.5,0.1")
-    voltage = maneuvers.sine(6.5, 0.1).sample()
-    speeds = [Drive.preset(name).simulate(voltage).shaft_speed for name in ("hoist", "slew")]
-    rms = np.degrees(np.sqrt(np.mean((speeds[0] - speeds[1]) ** 2)))
-    assert f"rms difference of the speeds: {rms:.2f} deg/s" in text
-
-
-def test_a_speed_never_reached(done):
-    text = done("compare", "hoist", "luff", "--maneuver", "step:9,start=1,stop=1.1,length=3")
-    (line,) = [line for line in text.splitlines() if line.startswith("time to 90 %")]
-    assert line.split()[-3:] == ["never", "never", "s"]
-
-
 def test_a_set_and_its_change(done, number, tmp_path):
     Drive.preset("hoist").scale(Z10=0.5).to_toml(tmp_path / "mine.toml")
     text = done("compare", "hoist", "mine.toml", "--maneuver", "step -9 V")
     assert "hoist and mine.toml, step -9 V" in text
     assert number(text, "peak speed, negative") == -185.00
     assert number(text, "peak speed, negative", 1) == -92.50
-
-
-def test_a_set_with_itself(done):
-    text = done("compare", "hoist", "hoist")
-    assert "hoist and hoist (2), step 9 V" in text
-    assert "rms difference of the speeds: 0.00 deg/s" in text
 
 
 def test_out_and_plot(done, tmp_path):
@@ -195,11 +164,6 @@ def test_what_is_to_be_tried_is_the_same_command(done, tmp_path):
         assert "See more" not in done("limits", "hoist", "step:9,stop=3,length=5", *changed)
 
 
-def test_nothing_to_change(done):
-    text = done("limits", "neutral", "step:9")
-    assert "No single change makes the error smaller." in text
-
-
 def test_a_drive_that_does_not_move_still_has_an_envelope(done):
     text = done("limits", "hoist", "--set", "Z17=5")
     assert "gain, mean" in text
@@ -227,22 +191,6 @@ def test_limits_files(done, tmp_path):
     assert "<svg" in (tmp_path / "when.svg").read_text()
 
 
-def test_a_log(done, tmp_path):
-    rows = "\n".join(f"{t / 10},{9 if 10 <= t < 60 else 0}" for t in range(100))
-    (tmp_path / "log.csv").write_text(f"time [s],stick [V]\n{rows}\n")
-    words = ("--interpolation", "previous", "--column", "stick")
-    text = done("limits", "hoist", "log.csv", *words)
-    assert "hoist, log.csv: " in text
-    assert "Change first: in-line orifice" in text
-
-
-def test_the_units_of_the_errors(done):
-    said = done("limits", "hoist", "step:9")
-    (head,) = [line for line in said.splitlines() if line.startswith("Limit ")]
-    assert " ".join(head.split()) == "Limit share of time deg/s share of error deg/s"
-    assert max(len(line) for line in said.splitlines() if "whatif" not in line) <= 80
-
-
 # --- linearize ------------------------------------------------------------------------------------
 
 
@@ -264,15 +212,6 @@ def test_what_is_printed(done, number):
     assert number(text, "phase at 0.3 Hz") == pytest.approx(-17.3, abs=0.1)
 
 
-def test_the_source_s_time_constant(done, number):
-    words = ("--current", "0", "--input", "solenoid_force", "--frequency", "0.1")
-    text = done("linearize", "luff", *words)
-    assert number(text, "time constant of the pump") == 0.2015
-    assert "no limit" in text
-    assert "gain at 0.1 Hz" in text
-    assert "Coulomb" not in text
-
-
 def test_a_speed_and_a_loop(done, number):
     text = done("linearize", "hoist", "--speed-deg-s", "-50", "--loop-gain", "0.1")
     assert number(text, "shaft speed") == -50.0
@@ -286,8 +225,9 @@ def test_a_speed_and_a_loop(done, number):
 
 
 def test_notes(done):
-    assert "The card's Coulomb term C is left out" in done("linearize", "slew", "--at", "2")
-    assert "left out" not in done("linearize", "slew", "--at", "2", "--coulomb", "tangent")
+    assert "Coulomb term C, which only motions below 0.01 A/s see, is left out" in done(
+        "linearize", "slew", "--at", "2"
+    )
     text = done("linearize", "neutral", "--at", "0", "--set", "G1=0.03")
     assert "One-sided at the card at 0 V: the side of positive voltage." in text
     assert ": 0.015/0.015 -> 0.03/0.03 A/V" in text
@@ -324,21 +264,6 @@ def test_one_at_a_time(done, tmp_path):
     assert table["at upper factor"][0] == pytest.approx(1.1 * table["as it is"][0], rel=1e-6)
 
 
-def test_sobol(done, tmp_path):
-    words = ("--outcome", "final_speed", "--outcome", "overshoot", "--sobol", "32")
-    text = done("sensitivity", "hoist", *FEW, *words, "--plot", "s.png", "--out", "s.parquet")
-    assert "by itself  in total" in text
-    assert "- 128 simulations; indices are good to" in text
-    assert "- None of the levers moves overshoot." in text
-    assert (tmp_path / "s.png").exists()
-    table = pl.read_parquet(tmp_path / "s.parquet")
-    assert table.height == 4
-    speed = table.filter(pl.col("outcome") == "final_speed")
-    assert speed["total"][0] == pytest.approx(1.0, abs=0.3)
-    assert speed["total"][1] == pytest.approx(0.0, abs=1e-3)
-    assert table.filter(pl.col("outcome") == "overshoot")["total"].null_count() == 2
-
-
 def test_a_log_is_a_command(done, tmp_path):
     done("simulate", "hoist", "step:9,stop=4,length=5", "--out", "log.csv")
     words = ("--lever", "pump", "--outcome", "final_speed", "--maneuver", "log.csv")
@@ -372,8 +297,8 @@ def test_a_tracking_error(done, number):
     assert line.split()[2:4] == ["<=", "18.00"]
 
 
-@pytest.mark.parametrize("wanted", [150.0, 200.0, 220.0])
-@pytest.mark.parametrize("levers", [("orifice",), ("pump",), ("orifice", "pump")])
+@pytest.mark.parametrize("wanted", [150.0, 220.0])
+@pytest.mark.parametrize("levers", [("orifice",), ("orifice", "pump")])
 def test_the_command_that_is_proposed_is_enough(done, wanted, levers):
     words = [word for lever in levers for word in ("--lever", lever)]
     text = done("size", "hoist", "--acceleration-deg-s2", f"{wanted:g}", *words)
@@ -382,11 +307,6 @@ def test_the_command_that_is_proposed_is_enough(done, wanted, levers):
     assert all(len(factor) <= 7 for factor in given.values())
     changed = pulled(Drive.preset("hoist"), {name: float(each) for name, each in given.items()})
     assert np.degrees(performance(changed).acceleration) >= wanted
-
-
-def test_size_nothing_to_change(done):
-    text = done("size", "hoist", "--speed-deg-s", "190", "--direction", "positive")
-    assert "nothing needs to be changed" in text
 
 
 # --- whatif ---------------------------------------------------------------------------------------
@@ -417,7 +337,7 @@ def test_the_levers_are_listed(done):
 def test_bands(done, tmp_path, monkeypatch):
     drawn = monte_carlo.independent_drives(Drive.preset("hoist"), {"Z10": 0.12396}, 50)
     monkeypatch.setattr(monte_carlo, "stored_draws", lambda *_, **__: drawn)
-    words = ("--uncertainty", "fitted", "--draws", "50", "--plot", "w.svg")
+    words = ("--uncertainty", "fitted", "--plot", "w.svg")
     text = done("whatif", "hoist", "--scale", "pump=1.5", "--maneuver", "step:9", *words)
     (line,) = [line for line in text.splitlines() if line.startswith("final speed")]
     # one per cent of 196 deg/s, about twice that each way
@@ -434,13 +354,6 @@ def test_an_outcome_that_is_not(done):
     words = ("--maneuver", "step:0.05", "--scale", "pump=1.1")
     text = done("whatif", "slew", *words)
     assert "- as it is: no rise_time, the shaft stands still" in text
-
-
-def test_degrees_at_the_edge(done, number):
-    """The table's speed is the run's, in degrees."""
-    text = done("whatif", "luff", "--scale", "pump=1.2", "--maneuver", "step:9")
-    expected = np.degrees(Drive.preset("luff").steady_speed(9.0))
-    assert number(text, "final speed") == pytest.approx(expected, abs=0.02)
 
 
 def test_a_log_is_a_command_like_a_maneuver(done, tmp_path, number):

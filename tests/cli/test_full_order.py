@@ -38,18 +38,6 @@ def test_a_run(done, number):
     assert re.search(r"which make the speed 2\.\d ms later \(9\d % of the mean squared", words)
 
 
-def test_modes(done):
-    text = done("full-order", "hoist", "rest:1")
-    hertz, ratio = cells(text, "spool")[:2]
-    # section 6.2.4 of Kruse (2001), and what is assumed
-    assert float(hertz) == pytest.approx(40.0, rel=0.02)
-    assert float(ratio) == pytest.approx(0.3, abs=0.02)
-    assert float(cells(text, "swash plate, held pressure")[0]) == pytest.approx(40.0, rel=0.02)
-    assert float(cells(text, "swash plate")[0]) == pytest.approx(920.0, rel=0.01)
-    # τ, 0.1214 s, less the lag of the modes
-    assert float(cells(text, "slow pole")[4]) == pytest.approx(0.1214, rel=0.03)
-
-
 def test_the_load_that_is_given(done, number):
     load = ("--physical", "load_torque=2kN*m", "--physical", "load_inertia=0")
     text = done("full-order", "hoist", "step:4", *load)
@@ -58,18 +46,6 @@ def test_the_load_that_is_given(done, number):
     # 2π over 25.1 l a turn times 2 kN m
     drop = f"{2.0 * np.pi / 25.1e-3 * 2e3 / 1e6:.3f}"
     assert cells(text, "motor pressure drop, MPa") == [drop, "to", drop]
-
-
-def test_units_of_what_is_given(done):
-    given = ("spool_frequency=30 Hz", "oil_volume=0.1l", "piston_damping=90", "swash_arm=.08")
-    words = [word for each in given for word in ("--physical", each)]
-    text = done("full-order", "hoist", "rest:1", *words)
-    assert cells(text, "spool_frequency") == ["30", "Hz", "given"]
-    assert cells(text, "oil_volume") == ["100", "cm³", "given"]
-    assert cells(text, "piston_damping") == ["90", "N", "s/m", "given"]
-    assert cells(text, "swash_arm") == ["80", "mm", "given"]
-    assert "swash_damping_ratio" not in text
-    assert float(cells(text, "spool")[0]) == pytest.approx(30.0, rel=0.02)
 
 
 def test_too_fast_for_one_state(done):
@@ -130,10 +106,3 @@ def test_a_drive_of_one_s_own(done, tmp_path):
     assert lines[1].startswith("Z15 (")
     assert lines[3] == "Left out of both models, which do not know refinements: spool_friction."
     assert cells(text, "spool_mass") == ["10", "g", "assumed"]
-
-
-def test_a_solver_agrees_with_the_march(done, number):
-    words = ("full-order", "hoist", "step:4,length=3,stop=2")
-    march, radau = done(*words), done(*words, "--method", "radau")
-    row = "largest difference"
-    assert number(radau, row) == pytest.approx(number(march, row), abs=2e-3)

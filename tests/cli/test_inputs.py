@@ -41,13 +41,6 @@ def test_each_command_takes_the_folder_of_a_fit(done, words):
 
 
 @pytest.mark.usefixtures("fitted")
-def test_it_is_the_fit_s_drive(done, number):
-    text = done("simulate", "fitted", "step:9")
-    assert text.startswith("fitted (hoist), step 9 V")
-    assert number(text, "peak speed, positive") == pytest.approx(1.1 * 195.997, rel=1e-3)
-
-
-@pytest.mark.usefixtures("fitted")
 def test_a_virtual_machine_from_a_folder(done):
     words = ("--maneuver", "step:4,stop=1.5,length=2", "--severity", "clean")
     assert "Campaign: v/campaign.toml" in done("rig", "fitted", "--out", "v", *words)

@@ -20,7 +20,7 @@ Words = Callable[..., str]
 def test_a_drive_is_held_against_the_runs_that_were_held_back(
     done: Words, held_out: Path, tmp_path: Path
 ) -> None:
-    said = done("validate", "hoist", "virtual/campaign.toml", "--out", "found", "--figures", "svg")
+    said = done("validate", "hoist", "virtual/campaign.toml", "--out", "found")
     assert "hoist_step_-5_V" in said
     assert "hoist_step_4_V" not in said
     assert re.search(r"\ncurrent +\n.* mA ", said, re.DOTALL)
@@ -29,7 +29,6 @@ def test_a_drive_is_held_against_the_runs_that_were_held_back(
     assert "'of its range' below means" in " ".join(said.split())
     assert "Predicts speed from counts to 0." in said
     assert "<svg" in (tmp_path / "found" / "report.html").read_text("utf-8")
-    assert [each.suffix for each in (tmp_path / "found" / "figures").iterdir()] == [".svg"]
     with (tmp_path / "found" / "measures.csv").open(encoding="utf-8") as file:
         rows = {row["channel"]: row for row in csv.DictReader(file)}
     assert set(rows) == {"current", "counts", "speed from counts"}
@@ -62,12 +61,6 @@ def test_roles(done: Words, held_out: Path) -> None:
     )
 
 
-def test_ignored_windows_stand_beside_the_fit(done: Words, held_out: Path) -> None:
-    text = held_out.read_text("utf-8")
-    held_out.write_text(f"{text}ignore = [{{ to = 0.5, why = 'noise' }}]\n", "utf-8")
-    assert "0 to 0.5 s (noise)" in done("validate", "hoist", "virtual/campaign.toml")
-
-
 def test_a_drive_that_is_not_usable_ends_with_1(
     run: Callable[..., Result], held_out: Path, tmp_path: Path
 ) -> None:
@@ -80,7 +73,6 @@ def test_a_drive_that_is_not_usable_ends_with_1(
 
 def test_refusals(refused: Words, held_out: Path) -> None:
     command = ("validate", "hoist", "virtual/campaign.toml")
-    assert "give --out DIR" in refused(*command, "--figures", "svg")
     assert "no axis 'boom'; it has hoist" in refused(*command, "--axis", "boom")
     assert "There is no file none.toml" in refused("validate", "none.toml", str(held_out))
     text = held_out.read_text("utf-8").replace('role = "validate"', 'role = "ignore"')
@@ -126,11 +118,10 @@ def test_the_report_is_written_again(done: Words, fitted: Fit, tmp_path: Path) -
     assert '<th class="n">truth</th>' not in (tmp_path / "again" / "report.html").read_text("utf-8")
 
 
-def test_figures_stand_beside_it(done: Words, fitted: Fit, tmp_path: Path) -> None:
-    words = ("--figures", "pdf", "--data", "all.parquet", "--out", "print")
+def test_samples_stand_beside_it(done: Words, fitted: Fit, tmp_path: Path) -> None:
+    words = ("--data", "all.parquet", "--out", "print")
     assert "Samples:   all.parquet" in done("report", "fitted", "virtual/campaign.toml", *words)
-    names = sorted(each.name for each in (tmp_path / "print" / "figures").iterdir())
-    assert names == ["overlay-01-hoist_step_4_V.pdf", "overlay-02-hoist_step_-5_V.pdf"]
+    assert (tmp_path / "print" / "report.html").is_file()
 
 
 def test_report_refusals(refused: Words, fitted: Fit, tmp_path: Path) -> None:

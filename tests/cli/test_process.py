@@ -13,7 +13,7 @@ import pytest
 from swashplate import __version__
 from swashplate.cli import doctor
 from swashplate.cli.terminal import long_work, show, waiting
-from swashplate.tables import UNIT, Column, Table, count
+from swashplate.tables import UNIT, Column, Table
 
 # --- process --------------------------------------------------------------------------------------
 
@@ -34,12 +34,11 @@ def swashplate(*words: str, cwd: Path, **more: str) -> subprocess.CompletedProce
     )
 
 
-@pytest.mark.parametrize("word", ["--help", "-h"])
-def test_help_is_a_page_with_examples(tmp_path, word):
-    done = swashplate(word, cwd=tmp_path, COLUMNS="80")
+def test_help_is_a_page_with_examples(tmp_path):
+    done = swashplate("-h", cwd=tmp_path, COLUMNS="80")
     assert done.returncode == 0
     assert done.stderr == ""
-    for words in ("sine:6.5,0.1", "swashplate simulate hoist step:9", "tour", "exit code 2"):
+    for words in ("sine:6.5,0.1", "swashplate simulate hoist step:9", "doctor", "exit code 2"):
         assert words in done.stdout
     assert max(map(len, done.stdout.splitlines())) <= 80
     assert "\x1b" not in done.stdout
@@ -49,11 +48,21 @@ def test_version(tmp_path):
     assert swashplate("--version", cwd=tmp_path).stdout == f"swashplate {__version__}\n"
 
 
-def test_help_imports_nothing_heavy(tmp_path):
+@pytest.mark.parametrize(
+    ("typed", "without"),
+    [
+        ("--help", HEAVY),
+        ("axes", HEAVY),
+        ("simulate --help", {*HEAVY, "swashplate.cli.fit"}),
+        ("simulate hoist step:9", {"matplotlib", "pint", "polars", "swashplate.cli.fit"}),
+    ],
+)
+def test_what_a_command_does_not_import(tmp_path, typed, without):
+    """Nobody waits for libraries that a command does not use."""
     words = (
         "import sys; from swashplate.cli import app; "
-        "app(['simulate', '--help'], standalone_mode=False); "
-        f"print(sorted({HEAVY} & set(sys.modules)))"
+        f"app({typed.split()}, standalone_mode=False); "
+        f"print(sorted({without} & set(sys.modules)))"
     )
     done = subprocess.run(
         [sys.executable, "-c", words], cwd=tmp_path, capture_output=True, text=True, check=True
@@ -61,16 +70,35 @@ def test_help_imports_nothing_heavy(tmp_path):
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-def test_simulating_imports_no_tables_figures_or_units(tmp_path):
-    words = (
-        "import sys; from swashplate.cli import app; "
-        "app(['simulate', 'hoist', 'step:9'], standalone_mode=False); "
-        "print(sorted({'matplotlib', 'pint', 'polars'} & set(sys.modules)))"
-    )
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("SOURCE_DATE_EPOCH", "yesterday", "SOURCE_DATE_EPOCH is 'yesterday', no number of sec"),
+        ("MPLBACKEND", "no_such_backend", None),
+    ],
+)
+def test_the_surroundings(tmp_path, name, value, said):
+    """A wrong date of files is refused; what notebooks draw with is of no concern here."""
+    words = ("simulate", "hoist", "rest:1", "--plot", "run.png")
+    done = swashplate(*words, cwd=tmp_path, **{name: value})
+    assert done.returncode == (0 if said is None else 2), done.stderr
+    assert (said or "") in done.stderr
+    assert (tmp_path / "run.png").exists() == (said is None)
+
+
+def test_a_folder_that_is_gone(tmp_path):
+    words = "import os, sys; os.rmdir(os.getcwd()); sys.argv = ['swashplate', 'axes']; "
+    folder = tmp_path / "gone"
+    folder.mkdir()
     done = subprocess.run(
-        [sys.executable, "-c", words], cwd=tmp_path, capture_output=True, text=True, check=True
+        [sys.executable, "-c", f"{words}from swashplate.cli import main; main()"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
     )
-    assert done.stdout.splitlines()[-1] == "[]"
+    assert done.returncode == 2
+    assert done.stderr == "Error: The current folder does not exist any more; go to another.\n"
 
 
 def test_an_error_is_one_sentence_and_no_traceback(tmp_path):
@@ -89,7 +117,7 @@ def test_a_terminal_without_our_characters(tmp_path):
     assert done.stdout.isascii()
 
 
-@pytest.mark.parametrize("words", [("show", "hoist"), ("show", "hoist", "--toml"), ("--help",)])
+@pytest.mark.parametrize("words", [("show", "hoist"), ("--help",)])
 def test_a_broken_pipe_is_silent(tmp_path, words):
     reading, writing = os.pipe()
     os.close(reading)
@@ -104,27 +132,24 @@ def test_a_broken_pipe_is_silent(tmp_path, words):
     assert done.stderr == b""
 
 
-@pytest.mark.parametrize("kind", ["ramp", "step", "sine"])
-def test_ctrl_c_leaves_whole_files_only(tmp_path, kind):
+def test_ctrl_c_leaves_whole_files_only(tmp_path):
     process = subprocess.Popen(
-        [sys.executable, "-m", "swashplate", "tour"],
+        [sys.executable, "-m", "swashplate", "rig", "hoist", "--out", "virtual"],
         cwd=tmp_path,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
     )
     deadline = time.monotonic() + 60.0
     # a hidden file is one that is being written
-    while not list(tmp_path.rglob(f".{kind}*.csv")) and time.monotonic() < deadline:
-        time.sleep(0.001)
+    while not list(tmp_path.rglob(".*.csv")) and time.monotonic() < deadline:
+        time.sleep(0.0005)
     process.send_signal(signal.SIGINT)
     said = process.communicate(timeout=60)[1]
     assert process.returncode == 130
     assert said == b""
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert [path for path in files if path.name.startswith(".")] == []
-    for path in files:
-        rows = {"ramp": 6657, "step": 5121}.get(path.name.split()[0])
-        assert rows is None or path.read_bytes().count(b"\n") == rows + 1
+    assert all(path.read_bytes().endswith(b"\n") for path in files)
 
 
 # --- terminal -------------------------------------------------------------------------------------
@@ -136,18 +161,6 @@ def test_ctrl_c_leaves_whole_files_only(tmp_path, kind):
 )
 def test_time_left_in_words(seconds: float | None, words: str) -> None:
     assert waiting(seconds) == words
-
-
-def test_an_upper_bound_is_called_one() -> None:
-    assert waiting(30.0, "at most") == "at most 30 s left"
-
-
-def test_what_is_count() -> None:
-    assert [count(number, "finding", "findings") for number in (0, 1, 2)] == [
-        "0 findings",
-        "1 finding",
-        "2 findings",
-    ]
 
 
 def test_a_pipe_gets_no_bar(capsys: pytest.CaptureFixture[str]) -> None:
@@ -206,15 +219,12 @@ def test_a_wrong_speed_is_said_and_ends_with_code_1(run, monkeypatch: pytest.Mon
 @pytest.mark.parametrize(
     "typed",
     [
-        "limits hoist",
         "limits hoist sine:9,0.1",
-        "sensitivity hoist --lever pump --lever orifice --sobol 16",
+        "sensitivity hoist --lever pump --lever orifice --span 0.2",
         "compensate slew sine:2,0.1",
         "size hoist --speed-deg-s 250",
         "linearize hoist --at 4 --loop-gain 0.01",
         "bode hoist --points 3",
-        "full-order hoist step:4",
-        "compare hoist slew",
         "excitation virtual/campaign.toml",
         "campaign check virtual/campaign.toml",
         "validate hoist virtual/campaign.toml --role all",

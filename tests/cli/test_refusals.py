@@ -15,93 +15,49 @@ REFUSED = {
     "bode hoist --amplitude 11": "reach 11 V",
     "bode hoist --amplitude 0.05": "nothing moves about 0 V",
     "bode hoist --linear-at 0": "so the gain is 0; linearise at +0.2065 V or beyond.",
-    "bode hoist --frequency nan": "The frequencies must be one or more finite numbers",
     "compare hoist slew --maneuver hop --out both.csv": "one of the tests of hoist",
-    "compare hoist slew --maneuver rest:1e20 --out both.csv": "simulated at once",
-    "compare hoist slew --rate 1 --out both.csv": "must be between 10 and 100000 Hz",
     "compensate hoist --speed-deg-s 200": "hoist cannot settle at 200 deg/s",
-    "compensate hoist --speed-deg-s nan": "must be finite",
     "compensate hoist --points 1": "takes 2 to 10001 points per direction, not 1",
-    "compensate hoist --set Z17=5": "No positive command up to 10 V moves hoist",
     "compensate slew rest:2": "asks for nothing but standstill",
     "limits hoist --error 0": "The error is 0, but must be above 0 and below 1",
     "limits hoist --frequency 300": "from 0.001 to 64 Hz",
-    "limits hoist --frequency nan": "from 0.001 to 64 Hz",
     "limits hoist sine:4,0.2 --frequency -1": "leave them out, or 'sine:4,0.2'",
     "limits hoist step:9 --error 0.1": "--error and --frequency belong to the sines",
     "linearize hoist": "give one of --at, --current and --speed-deg-s",
-    "linearize hoist --at 4 --current 0.4": "give one of --at, --current and",
     "linearize hoist --current 1 --input voltage": "needs --at or --speed-deg-s, not",
     "linearize hoist --at 0.1": "lies in the card's dead zone, so the gain is 0; linearise at +0.",
     "linearize hoist --at 0.15": "pump alone with --current 0 --input solenoid_force.",
-    "linearize hoist --at 9": "at its stop, so the gain is 0",
-    "linearize hoist --at 11": "the card takes ±10 V",
-    "linearize hoist --speed-deg-s 300": "no constant voltage settles at 300 deg/s",
     "linearize hoist --at 4 --loop-gain 1": "the closed loop is unstable",
-    "linearize hoist --at 4 --loop-gain nan": "not finite",
-    "linearize hoist --at 4 --sample-time 0": "must be above 0",
-    "linearize hoist --at 4 --frequency -1": "from 0 on",
-    "linearize hoist --at 4 --out model.mat": "is written as .toml or .json",
     "sensitivity hoist --lever pumpe": "no lever 'pumpe' (did you mean pump?)",
     "sensitivity hoist --lever pump=2": "--lever cannot read 'pump=2'; write it as pump or",
-    "sensitivity hoist --lever pump=a/b": "--lever cannot read 'pump=a/b'",
     "sensitivity hoist --lever pump=2/1": "must rise from 0 or more, not 2 to 1",
     "sensitivity hoist --lever pump --lever pump=1/2": "--lever gives pump twice",
-    "sensitivity hoist --span 2": "--span is 2, but must lie between 0 and 1",
-    "sensitivity hoist --sobol 100": "must be a power of 2",
     "sensitivity hoist --outcome speed": "There is no outcome 'speed'",
     "size hoist": "Require at least one of a speed",
     "size hoist --speed-deg-s 500": "the hoist reaches a speed of 370 deg/s (required 500)",
-    "size hoist --speed-deg-s -5": "must be positive",
     "size hoist --tracking-deg-s 5": "--tracking-deg-s and --maneuver belong together",
     "size hoist --speed-deg-s 250 --maneuver step:9": "belong together",
-    "size hoist --speed-deg-s 250 --lever pomp": "no lever 'pomp' (did you mean pump?)",
     "size hoist --speed-deg-s 250 --lever pump=1.2/2": "must reach from at most 1",
     "whatif hoist --scale orifise=1.5": "There is no lever 'orifise' (did you mean orifice?)",
     "whatif hoist --scale orifice": "--scale cannot read 'orifice'; write it as orifice=1.5",
     "whatif hoist --scale pump=1 --scale pump=2": "--scale gives pump twice",
-    "whatif hoist --scale pump=-1": "The factor on pump is -1, but must be 0 or more",
-    "whatif hoist --scale pump=0": "Z10",
-    "whatif hoist --scale pump=2 --maneuver hop:1": "hop",
-    "whatif hoist --scale pump=2 --rate 1": "The rate is 1 Hz",
     "whatif hoist --scale pump=2 --uncertainty none": "none holds no fit.json",
-    "whatif hoist --scale pump=2 --uncertainty x --draws 3": "bands need 20 or more",
     "full-order neutral": "neutral: spool_stroke (stroke of the spool, both ways) is inf m",
-    "full-order hoist --rate 1": "must be between 10 and 100000 Hz",
-    "full-order hoist step:9 --rate 1": "must be between 10 and 100000 Hz",
-    "full-order slew --like hoist": "slew: spool_mass on spool_arm alone has",
     "full-order hoist --plot run.png": "--plot draws one run; name a maneuver",
-    "full-order hoist --method radau": "--method radau checks one run; name a maneuver",
     "full-order hoist step:9 --out run.doc": "run.doc ends in '.doc'",
     "full-order hoist --physical oil_volume": "--physical cannot read 'oil_volume'; write",
-    "full-order hoist --physical oil_volume=nan": "at the stroking piston) is nan m^3, but must be",
     "full-order hoist --physical oil_volume=1e-4/2e-4": "oil_volume has one value, not a plus",
-    "full-order hoist --physical oil_volume=1kg": "in 'kg', which does not measure the same",
-    "full-order hoist --physical 'oil_volume=1 glug'": "the unknown unit 'glug'",
-    "full-order hoist --physical oil_volume=-1": "is -1 m^3, but must be above 0",
-    "full-order hoist --physical bulk_modulus=inf": "is inf Pa, but must be above 0",
     "full-order hoist --physical swash_arm=0.1 --physical swash_arm=80mm": "--physical gives",
-    "full-order hoist --physical return_spring_rate=7e4": "76102.8345 follows from Z1",
-    "full-order hoist --set Z2=0.1": "a physical set has Z2 = 0",
-    "full-order hoist --set Z11=0.01": "without load_torque no speed is lost to it",
     "simulate crane step:9": "no packaged set, file or folder 'crane'; packaged are hoist, slew",
     "simulate none.toml step:9": "There is no file none.toml",
-    "simulate sub/none step:9": "There is no file sub/none",
     "simulate hoist stepp:9": "'stepp' is no maneuver: choose one of rest, step",
     "simulate hoist 'step +8 V'": 'multisine; or name one of the tests of hoist, such as "step +9',
     "simulate neutral 'step +9 V'": "is no maneuver: choose one of rest, step",
     "simulate hoist step": "'amplitude'; step takes amplitude, start, stop, length; or name one",
     "simulate hoist step:x": "'x' is not a number",
-    "simulate hoist step:9,stop=-1": "a step needs 0 <= start < stop <= length",
     "simulate hoist step:9,top=3": "step takes amplitude, start, stop, length",
-    "simulate hoist step:nan": "amplitude must be finite",
-    "simulate hoist sine:4,-1": "frequency must be positive",
     "simulate hoist step:10.5": "The voltage is 10.5 V at 1 s, but the card takes ±10 V",
-    "simulate hoist step:1,length=10.001": "a whole number",
-    "simulate hoist rest:1e9": "more than the 1e+08 that are simulated at once",
     "simulate hoist step:9 --rate 9.9": "must be between 10 and 100000 Hz",
-    "simulate hoist step:9 --rate 0": "The rate is 0 Hz",
-    "simulate hoist step:9 --rate inf": "The rate is inf Hz",
     "simulate hoist step:9 --set z16=1e-4": "did you mean Z16?",
     "simulate hoist step:9 --set Z16": "--set cannot read 'Z16'; write it as Z16=1.2e-4",
     "simulate hoist step:9 --set Z16=": "cannot read 'Z16='",
@@ -159,7 +115,6 @@ def test_nothing_is_written_beside_a_figure_that_cannot_be(refused, typed, plot)
         ("simulate hoist rest:1 --plot {}", "a.png"),
         ("whatif hoist --scale pump=1.1 --maneuver step:1 --out {}", "a.toml"),
         ("compensate hoist --points 5 --out {}", "a.csv"),
-        ("tour --out {}", "overview.png"),
         ("rig hoist --maneuver rest:1 --out {}", "logs/a.csv"),
         ("demo --out {}", "mine/drive.toml"),
     ],
@@ -168,7 +123,7 @@ def test_what_is_there_is_replaced_with_force_alone(refused, done, tmp_path, typ
     place = tmp_path / "there" / file
     place.parent.mkdir(parents=True)
     place.write_text("old")
-    named = place if "." in file and "/" not in file and "tour" not in typed else place.parent
+    named = place.parent if "/" in file else place
     words = typed.format(named).split()
     said = refused(*words)
     assert str(named) in said
@@ -179,37 +134,6 @@ def test_what_is_there_is_replaced_with_force_alone(refused, done, tmp_path, typ
         assert place.read_bytes() != b"old"
 
 
-@pytest.mark.parametrize(
-    ("option", "word", "said"),
-    [
-        ("--set", "Zz=1", "There is no parameter 'Zz'"),
-        ("--set", "z16=1e-4", "did you mean Z16?"),
-        ("--set", "Z16", "--set cannot read 'Z16'; write it as Z16=1.2e-4"),
-        ("--set", "Z16=", "cannot read 'Z16='"),
-        ("--set", "=1", "There is no parameter ''"),
-        ("--set", "Z16=abc", "cannot read 'Z16=abc'"),
-        ("--set", "Z16=1,5", "cannot read 'Z16=1,5'"),
-        ("--set", "Z16=1.2.3", "cannot read 'Z16=1.2.3'"),
-        ("--set", "Z16=1/2/3", "cannot read 'Z16=1/2/3'"),
-        ("--set", "Z16=nan", "Z16_plus (opening at which the orifice limits the flow) is nan m"),
-        ("--set", "Z1=inf", "Z1 (pressure to swash plate tangent) is inf 1/Pa"),
-        ("--set", "Z13_plus=-0.2", "(stop of the swash plate) is -0.2 rad, but must be above 0"),
-        ("--set", "Z16=1 bar", "'bar', which does not measure the same as m"),
-        ("--set", "Z16=1 smoot_of_no_kind", "unknown unit"),
-        ("--set", "Z1=1/2", "Z1 has one value, not a plus and a minus one"),
-        ("--set", "Z16_plus=1/2", "Z16_plus has one value"),
-        ("--set", "Z19=100", "the solenoid would overpower the feedback spring"),
-        ("--scale", "Zz=2", "There is no parameter 'Zz'"),
-        ("--scale", "Z16=1.5mm", "--scale cannot read 'Z16=1.5mm'; write it as Z16=1.5"),
-        ("--scale", "Z16=x", "--scale cannot read 'Z16=x'"),
-        ("--scale", "Z16=-1", "must be above 0"),
-        ("--scale", "Z1=1/2", "takes one factor, not two"),
-    ],
-)
-def test_changes(refused, option, word, said):
-    assert said in refused("simulate", "hoist", "step:9", option, word, "--out", "run.csv")
-
-
 @pytest.mark.parametrize("option", ["--set", "--scale"])
 def test_a_change_is_given_once(refused, option):
     words = ("simulate", "hoist", "step:9", option, "Z16=1", option, "Z16=2")
@@ -217,7 +141,6 @@ def test_a_change_is_given_once(refused, option):
 
 
 @pytest.mark.parametrize("option", ["--out", "--plot"])
-@pytest.mark.parametrize("command", ["simulate", "compare"])
 @pytest.mark.parametrize(
     ("name", "said"),
     [
@@ -228,12 +151,11 @@ def test_a_change_is_given_once(refused, option):
         ("folder.{}", "cannot be written: it is a folder"),
     ],
 )
-def test_places_that_cannot_be_written(refused, tmp_path, command, option, name, said):
+def test_places_that_cannot_be_written(refused, tmp_path, option, name, said):
     ending = "csv" if option == "--out" else "png"
     (tmp_path / "file").write_text("")
     (tmp_path / f"folder.{ending}").mkdir()
-    words = (command, "hoist", "step:9") if command == "simulate" else (command, "hoist", "slew")
-    assert said in refused(*words, option, name.format(ending))
+    assert said in refused("simulate", "hoist", "step:9", option, name.format(ending))
 
 
 @pytest.mark.parametrize(

@@ -1,230 +1,87 @@
 """Every equation in C against its compiled twin, bit for bit, on numbers of all kinds.
 
-Equations are found by looking, so that a new one is compared or fails by its name.
+Equations are found by looking, so that a new one is compared or fails by its name; those of the
+constructs' test show every construct that an equation may use.
 """
 
 import ctypes
 import importlib
 import inspect
-import math
 import pkgutil
-import typing
-from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
+from tests.equations import test_constructs
+from tests.export.twins import InC, flagged
 
 import swashplate.equations
 import swashplate.models
-from swashplate.equations.c_source import Kind, Unit, hints_of
+from swashplate.equations.c_source import Unit
 from swashplate.equations.equation import is_function
-from swashplate.equations.marching.run import module
-from swashplate.equations.syntax import parsed, plain
-
-CALLS = 3000
-SPECIAL = np.array(
-    [math.nan, 0.0, -0.0, math.inf, -math.inf, 5e-324, -5e-324, 1e-310, -2e-308, 1.0, -1.0, 1e300]
-)
-COUNTS = ("count", "substeps")
-"""Arguments that say how often something is done: few times."""
+from swashplate.equations.syntax import plain
+from swashplate.errors import EquationError
 
 
-def equations() -> dict[str, Any]:
+def equations_of(space: dict[str, Any]) -> dict[str, Any]:
+    """Equations that a module defines."""
+    return {
+        name: thing
+        for name, thing in space.items()
+        if is_function(thing)
+        and plain(thing).__module__ == space["__name__"]
+        and inspect.getsource(plain(thing)).startswith("@equation\n")
+    }
+
+
+def packaged() -> dict[str, Any]:
     """All equations of the models and of the engine's library, by module and name."""
     found = {}
     for package in (swashplate.models, swashplate.equations):
         for each in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
             space = vars(importlib.import_module(each.name))
-            for name, thing in space.items():
-                if not is_function(thing) or plain(thing).__module__ != each.name:
-                    continue
-                if inspect.getsource(plain(thing)).startswith("@equation\n"):
-                    found[f"{each.name.rpartition('.')[2]}.{name}"] = thing
+            stem = each.name.rpartition(".")[2]
+            found |= {f"{stem}.{name}": thing for name, thing in equations_of(space).items()}
     return found
 
 
-EQUATIONS = equations()
-
-
-# --- numbers in, numbers out ----------------------------------------------------------------------
-
-
-def scalars(unit: Unit, kind: Kind, path: str) -> Iterator[tuple[str, str]]:
-    """Word and path of every scalar of a kind, in order."""
-    if kind.word == "struct":
-        for name, hint in hints_of(kind.cls):
-            yield from scalars(unit, unit.kind(hint, path), f"{path}.{name}")
-    elif kind.word == "tuple":
-        for i, item in enumerate(kind.items):
-            yield from scalars(unit, item, f"{path}.{i}")
-    else:
-        yield kind.word, path
-
-
-def in_c(unit: Unit, kind: Kind, number: Iterator[int]) -> str:
-    """A value in C of numbers in a row."""
-    if kind.word == "struct":
-        inner = [in_c(unit, unit.kind(h, ""), number) for _, h in hints_of(kind.cls)]
-        return f"{{{', '.join(inner) or '0'}}}"
-    if kind.word == "tuple":
-        return f"{{{{{', '.join(in_c(unit, item, number) for item in kind.items)}}}}}"
-    word = {"double": "in[{}]", "int": "(long long)in[{}]"}.get(kind.word, "in[{}] != 0.0")
-    return word.format(next(number))
-
-
-def out_c(unit: Unit, kind: Kind, text: str) -> Iterator[str]:
-    """The scalars of a value in C."""
-    if kind.word == "struct":
-        for name, hint in hints_of(kind.cls):
-            yield from out_c(unit, unit.kind(hint, ""), f"{text}.{name}")
-    elif kind.word == "tuple":
-        for i, item in enumerate(kind.items):
-            array = all(each.word in ("double", "int") for each in kind.items)
-            yield from out_c(unit, item, f"{text}.v[{i}]" if array else f"{text}.v{i}")
-    else:
-        yield f"(double){text}"
-
-
-def caller(unit: Unit, number: int, name: str, kinds: dict[str, Kind]) -> str:
-    """C that calls an equation with numbers in a row."""
-    count = iter(range(10_000))
-    lines, arguments = [], []
-    for i, kind in enumerate([k for n, k in kinds.items() if n != "return"]):
-        lines.append(f"    const {unit.declared(kind)} a{i} = {in_c(unit, kind, count)};")
-        arguments.append(f"&a{i}" if kind.whole else f"a{i}")
-    back = kinds["return"]
-    lines.append(f"    const {unit.declared(back)} r = {name}({', '.join(arguments)});")
-    lines += [f"    out[{j}] = {each};" for j, each in enumerate(out_c(unit, back, "r"))]
-    body = "\n".join([*lines, "    (void)r;"])
-    head = f"void call_{number}(const double *in, double *out)"
-    return f"{head};\n{head}\n{{\n    (void)in;\n    (void)out;\n{body}\n}}\n"
-
-
-class Twin:
-    """Python of an equation over rows of numbers, with its options decided."""
-
-    def __init__(self, unit: Unit, equation: Any, on: bool) -> None:
-        self.unit, self.names, self.on = unit, {"f": equation, "np": np}, on
-        source = parsed(equation)
-        hints = typing.get_type_hints(source.function)
-        self.columns: list[tuple[str, str]] = []
-        self.count = 0
-        given = [self.value(unit.kind(hints[a.arg], ""), a.arg) for a in source.arguments]
-        back = unit.kind(hints["return"], "")
-        lines = [f"    for i in range(rows.shape[0]):", f"        r = f({', '.join(given)})"]
-        out = list(self.scalar(back, "r"))
-        self.width = len(out)
-        lines += [f"        out[i, {j}] = {each}" for j, each in enumerate(out)]
-        self.text = "\n".join(["@kernel", "def rows_of(rows, out):", *lines, ""])
-
-    def value(self, kind: Kind, path: str) -> str:
-        if kind.word == "struct":
-            self.names[kind.cls.__name__] = kind.cls
-            inner = [self.value(self.unit.kind(h, ""), f"{path}.{n}") for n, h in hints_of(kind.cls)]
-            return f"{kind.cls.__name__}({', '.join(inner)})"
-        if kind.word == "tuple":
-            inner = [self.value(item, f"{path}.{i}") for i, item in enumerate(kind.items)]
-            return f"({', '.join(inner)},)"
-        self.columns.append((kind.word, path))
-        self.count += 1
-        place = f"rows[i, {self.count - 1}]"
-        if kind.word == "flag":
-            return "True" if self.on else "None"
-        return {"double": place, "int": f"int({place})"}.get(kind.word, f"{place} != 0.0")
-
-    def scalar(self, kind: Kind, text: str) -> Iterator[str]:
-        if kind.word == "struct":
-            for name, hint in hints_of(kind.cls):
-                yield from self.scalar(self.unit.kind(hint, ""), f"{text}.{name}")
-        elif kind.word == "tuple":
-            for i, item in enumerate(kind.items):
-                yield from self.scalar(item, f"{text}[{i}]")
-        else:
-            yield f"1.0 if {text} else 0.0" if kind.word == "bool" else text
-
-
-def rows(columns: list[tuple[str, str]], on: bool, seed: int) -> np.ndarray:
-    """Numbers of all sizes, some of them none, ties among them."""
-    rng = np.random.default_rng(seed)
-    shape = (CALLS, max(len(columns), 1))
-    made = rng.choice([-1.0, 1.0], shape) * 10.0 ** rng.uniform(-6.0, 6.0, shape)
-    near = rng.uniform(0.0, 1.0, shape)
-    third = np.arange(CALLS) % 3
-    made[third == 0] = near[third == 0]
-    tied = rng.random(shape) < 0.05
-    made[tied] = np.broadcast_to(made[:, :1], shape)[tied]
-    odd = (rng.random(shape) < 0.1) & (third == 1)[:, None]
-    made[odd] = rng.choice(SPECIAL, int(odd.sum()))
-    for j, (word, path) in enumerate(columns):
-        if word == "flag":
-            made[:, j] = float(on)
-        elif word == "bool":
-            made[:, j] = rng.integers(0, 2, CALLS)
-        elif word == "int" or path.rpartition(".")[2] in COUNTS:
-            made[:, j] = rng.integers(0, 4, CALLS)
-    return np.ascontiguousarray(made)
+REFUSED = ("rubbing", "rubbed")
+"""Constructs of which there are none in C: an option that is a tuple of numbers, or None."""
+CONSTRUCTS = equations_of(vars(test_constructs))
+SETS = {
+    "packaged": packaged(),
+    "constructs": {name: each for name, each in CONSTRUCTS.items() if name not in REFUSED},
+}
+CASES = [
+    pytest.param(word, key, on, id=f"{key}-{'on' if on else 'off'}")
+    for word, equations in SETS.items()
+    for key, each in equations.items()
+    for on in ((False, True) if flagged(each) else (False,))
+]
 
 
 @cache
-def translated() -> tuple[Unit, dict[str, int], str]:
-    """All equations as C, and their callers by number."""
-    unit = Unit("t_")
-    names = {key: unit.add(equation) for key, equation in EQUATIONS.items()}
-    callers, numbers = [], {}
-    for number, (key, name) in enumerate(names.items()):
-        hints = typing.get_type_hints(plain(EQUATIONS[key]))
-        kinds = {n: unit.kind(h, key) for n, h in hints.items()}
-        callers.append(caller(unit, number, name, kinds))
-        numbers[key] = number
-    structs = [text for _, text in unit.structs.values()]
-    constants = [text for _, text in unit.constants.values()]
-    head = "#include <math.h>\n#include <stdbool.h>\n"
-    parts = [head, *unit.helpers(), *structs, *constants, *unit.texts, *callers]
-    return unit, numbers, "\n\n".join(parts)
+def translated(word: str) -> InC:
+    """One of the sets as C."""
+    return InC(SETS[word])
 
 
 @pytest.fixture(scope="session")
-def library(compiled: Any) -> ctypes.CDLL:
-    """One library of all equations."""
-    text = translated()[2]
-    path: Path = compiled({"equations.c": text})
-    return ctypes.CDLL(str(path))
+def libraries(compiled: Any) -> dict[str, ctypes.CDLL]:
+    """A library of each set."""
+    return {word: ctypes.CDLL(str(compiled({"all.c": translated(word).text}))) for word in SETS}
 
 
-def bits(values: np.ndarray) -> np.ndarray:
-    """Bits of numbers, those that are none all alike."""
-    return np.where(np.isnan(values), np.nan, values).view(np.int64)
-
-
-def flagged(equation: Any) -> bool:
-    unit = Unit()
-    hints = typing.get_type_hints(plain(equation))
-    kinds = [unit.kind(h, "") for n, h in hints.items() if n != "return"]
-    return any(word == "flag" for kind in kinds for word, _ in scalars(unit, kind, ""))
-
-
-CASES = [(key, on) for key, each in EQUATIONS.items() for on in (False, True)
-         if not on or flagged(each)]  # fmt: skip
-
-
-@pytest.mark.parametrize(("key", "on"), CASES, ids=[f"{k}-{'on' * on}" for k, on in CASES])
+@pytest.mark.parametrize(("word", "key", "on"), CASES)
 def test_an_equation_in_c_has_the_bits_of_the_compiled_one(
-    key: str, on: bool, library: ctypes.CDLL
+    word: str, key: str, on: bool, libraries: dict[str, ctypes.CDLL]
 ) -> None:
-    unit, numbers, _ = translated()
-    twin = Twin(unit, EQUATIONS[key], on)
-    given = rows(twin.columns, on, numbers[key])
-    wanted, found = np.empty((CALLS, twin.width)), np.empty((CALLS, twin.width))
-    module(f"twin_{key.replace('.', '_')}", twin.text, twin.names)["rows_of"](given, wanted)
-    call = getattr(library, f"call_{numbers[key]}")
-    double = ctypes.POINTER(ctypes.c_double)
-    for i in range(CALLS):
-        call(given[i].ctypes.data_as(double), found[i].ctypes.data_as(double))
-    differ = np.argwhere(bits(wanted) != bits(found))
-    assert differ.size == 0, (
-        f"{key}: {differ.shape[0]} differ, first {wanted[tuple(differ[0])]!r} and "
-        f"{found[tuple(differ[0])]!r} of {given[differ[0][0]]}"
-    )
+    translated(word).compare(libraries[word], key, on)
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_has_no_counterpart_in_c_is_refused_by_name(name: str) -> None:
+    with pytest.raises(
+        EquationError, match=r"constructs.py, line \d+: rubbing .*Rubbing\.friction.*None"
+    ):
+        Unit().add(CONSTRUCTS[name])

@@ -31,9 +31,7 @@ def _text(folder: Path) -> Iterator[Path]:
         f" {t:8.3f} {u:10.6f}\n" for t, u, *_ in rows
     )
     quoted = '"time","a, b"\r\n' + "".join(f'"{t}","{u}"\r\n' for t, u, *_ in rows)
-    tabbed = "LabVIEW Measurement\t\nDate\t2008/10/06\n***End_of_Header***\t\nX\tY\n" + "".join(
-        f"{t}\t{u}\n" for t, u, *_ in rows
-    )
+    tabbed = "Hoist\nDate\t2008/10/06\nX\tY\n" + "".join(f"{t}\t{u}\n" for t, u, *_ in rows)
     column = "voltage\n" + "".join(f"{u}\n" for _, u, *_ in rows)
     for number, text in enumerate((plain, comma, spaced, quoted, tabbed, column)):
         path = folder / f"{number}.csv"

@@ -156,6 +156,18 @@ def test_a_better_optimum_stops_it() -> None:
     assert "against 1: fit again from there" in said
 
 
+def test_a_cost_that_is_lower_by_next_to_nothing_does_not_stop_it() -> None:
+    """Less than 2 % of the rise at an interval's end: it moves that end by less than 1 %."""
+
+    def dented(index: int, value: float, start: np.ndarray) -> tuple[float, np.ndarray]:
+        dent = 0.015 if abs(value - 0.35) < 0.2 else 0.0
+        return 1.0 + max(0.5 * value**2 - 5.0 * dent, -dent) * LIMIT, np.array([value])
+
+    found = profile(dented, ZERO, 1.0, 0, LIMIT, 1.0)
+    assert found.better is None
+    assert found.upper == pytest.approx(2.0**0.5, rel=0.02)
+
+
 def test_the_root_of_a_kinked_cost_is_found() -> None:
     kinked = lambda i, value, s: (1.0 + max(0.02 * abs(value), 3.0 * (value - 0.9)), ZERO)  # noqa: E731
     found = profile(kinked, ZERO, 1.0, 0, LIMIT, 0.3)

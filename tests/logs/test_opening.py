@@ -1,83 +1,16 @@
-"""Which reader takes a file, readers of other packages, and formats that are read apart."""
+"""Which reader takes a file, and formats that are read in a process of their own."""
 
 import os
 import signal
 import sys
-from importlib import metadata
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import polars as pl
 import pytest
+import scipy.io
 
 from swashplate import FileError
-from swashplate.logs import Column, Log, TextOptions, apart, log, open_log
-
-
-class Lines:
-    """A reader of a user's own: one number a line."""
-
-    name = "lines"
-    suffixes = (".lines",)
-
-    def open(self, path: Path, options: TextOptions) -> Log:
-        return Log(path, self.name, (Column("u"),), lambda _: [np.loadtxt(path)])
-
-
-@pytest.fixture
-def offered(monkeypatch):
-    """Offer objects as entry points of another package."""
-
-    def offer(**readers: object) -> None:
-        def load(reader: object) -> object:
-            if isinstance(reader, Exception):
-                raise reader
-            return reader
-
-        entries = [
-            SimpleNamespace(name=name, value=f"own:{name}", load=lambda reader=reader: load(reader))
-            for name, reader in readers.items()
-        ]
-        monkeypatch.setattr(
-            metadata, "entry_points", lambda group: entries if group == "swashplate.readers" else []
-        )
-
-    return offer
-
-
-def test_a_reader_of_another_package(offered, tmp_path):
-    offered(lines=Lines())
-    (tmp_path / "log.LINES").write_text("1.5\n2.5\n")
-    log = open_log(tmp_path / "log.LINES")
-    assert log.format == "lines"
-    assert log.read(["u"])["u"].tolist() == [1.5, 2.5]
-    with pytest.raises(FileError, match="There is no file"):
-        open_log(tmp_path / "none.lines")
-    with pytest.raises(
-        FileError, match=r"ends in '\.xyz'; a log is read from \.csv, .*, \.lines\."
-    ):
-        open_log(tmp_path / "log.xyz")
-
-
-def test_a_reader_that_is_none(offered, tmp_path):
-    (tmp_path / "log.lines").write_text("1\n")
-    offered(broken=ImportError("No module named 'own'"))
-    with pytest.raises(
-        FileError, match="reader 'broken' of own:broken cannot be loaded: No module"
-    ):
-        open_log(tmp_path / "log.lines")
-    offered(half=SimpleNamespace(name="half"))
-    with pytest.raises(
-        FileError, match="reader 'half' of own:half is none: it needs name, suffixes"
-    ):
-        open_log(tmp_path / "log.lines")
-
-
-def test_own_endings_need_no_other_package(offered, tmp_path):
-    offered(broken=ImportError("never asked for"))
-    (tmp_path / "log.csv").write_text("a,b\n1,2\n")
-    assert open_log(tmp_path / "log.csv").format == "CSV, commas, decimal point"
+from swashplate.logs import apart, log, open_log
 
 
 def test_what_is_no_file(tmp_path):
@@ -88,6 +21,10 @@ def test_what_is_no_file(tmp_path):
         open_log(tmp_path)
     with pytest.raises(FileError, match="There is no file"):
         open_log(tmp_path / "none.csv")
+    with pytest.raises(FileError, match=r"ends in '\.xyz'; a log is read from \.csv, "):
+        open_log(tmp_path / "log.xyz")
+    with pytest.raises(FileError, match=r"ends in '\.xlsx'.*: save a spreadsheet as CSV"):
+        open_log(tmp_path / "log.xlsx")
     os.mkfifo(tmp_path / "pipe.csv")
     with pytest.raises(FileError, match="pipe.csv is no ordinary file"):
         open_log(tmp_path / "pipe.csv")
@@ -119,7 +56,7 @@ def test_an_extra_that_is_not_installed(tmp_path, monkeypatch, content, library,
     for name in ("nptdms", "asammdf"):
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(FileError, match=rf"needs the library {library}.*'swashplate\[{extra}\]'"):
-        log.opener(extra.upper())(path, TextOptions())
+        log.opener(extra.upper())(path)
 
 
 @pytest.fixture
@@ -175,3 +112,14 @@ def test_every_byte_of_a_small_table_may_be_damaged(table):
         assert "log.parquet" in sentence
         assert sentence.endswith(".")
     assert kinds == {np.dtype(np.float64)}
+
+
+def test_a_large_file_of_an_old_matlab_is_refused(tmp_path, monkeypatch):
+    path = tmp_path / "log.mat"
+    scipy.io.savemat(path, {"t": np.arange(1e3)})
+    assert log.opener("MATLAB")(path).read(["t"])["t"].size == 1000
+    monkeypatch.setattr("swashplate.logs.arrays._LARGEST", 8000)
+    with pytest.raises(
+        FileError, match=r"up to version 7 are read as a whole.*save it with -v7\.3"
+    ):
+        log.opener("MATLAB")(path)

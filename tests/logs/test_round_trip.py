@@ -128,7 +128,6 @@ def test_text_of_dates(tmp_path, stamp, delimiter, decimal):
     (tmp_path / "log.csv").write_text(f"clock{delimiter}y\n" + "\n".join(rows) + "\n", "utf-8")
     log = open_log(tmp_path / "log.csv")
     assert log.columns == (Column("clock", "s"), Column("y", None))
-    assert log.notes == ("'clock' holds dates, read as seconds since the first.",)
     read = log.read(["clock", "y"])
     np.testing.assert_allclose(read["clock"], written, rtol=0.0, atol=1e-9)
     same(read["y"], [1.25] * 4)
@@ -146,21 +145,18 @@ def test_text_of_dates_over_several_pieces(tmp_path):
     same(read["k"], np.arange(count))
 
 
-def test_parquet_of_dates_and_texts(tmp_path):
+def test_parquet_of_dates(tmp_path):
     begin = datetime.datetime(2024, 1, 1)
     table = {
         "date [s]": [begin, None, begin + datetime.timedelta(seconds=1, microseconds=5)],
         "lasted": [datetime.timedelta(milliseconds=1500), None, datetime.timedelta(0)],
-        "text": ["1.5", " 2e3 ", None],
     }
     pl.DataFrame(table).write_parquet(tmp_path / "log.parquet")
     log = open_log(tmp_path / "log.parquet")
-    assert log.columns == (Column("date [s]", "s"), Column("lasted", "s"), Column("text", None))
-    assert log.notes == ("'date [s]' holds dates, read as seconds since the first.",)
+    assert log.columns == (Column("date [s]", "s"), Column("lasted", "s"))
     read = log.read(list(table))
     same(read["date [s]"], [0.0, np.nan, 1.000005])
     same(read["lasted"], [1.5, np.nan, 0.0])
-    same(read["text"], [1.5, 2000.0, np.nan])
 
 
 STRUCTURE = {
@@ -180,7 +176,7 @@ def matrix(name: str, form: str, array: np.ndarray, first: int = 0) -> dict[str,
     return {name + form.format(k + first): array[:, k] for k in range(array.shape[1])}
 
 
-def holds(file, expected, *, units=None, form=None, left_out=None, comments=None):
+def holds(file, expected, *, units=None, form=None, left_out=None):
     """Check what a file holds: all of its columns and, where given, what else it says."""
     log = open_log(file)
     read = log.read([column.name for column in log.columns])
@@ -190,7 +186,6 @@ def holds(file, expected, *, units=None, form=None, left_out=None, comments=None
     assert {c.name: c.unit for c in log.columns if c.unit} == (units or {})
     assert log.left_out == (left_out or {})
     assert form in (None, log.format)
-    assert comments in (None, log.comments)
 
 
 @pytest.mark.parametrize("form", ["4", "5", "5 packed"])
@@ -234,7 +229,7 @@ def test_matlab_73(tmp_path):
     file.write_bytes(content)
     expected = {"t": TIME, "s.u": TIME}
     expected |= matrix("x", "(:,{})", NOISE, 1) | matrix("y", "({},:)", NOISE, 1)
-    left_out = {"n": "it is a MATLAB text", "e": "it is empty"}
+    left_out = {"n": "it is a MATLAB char", "e": "it is empty"}
     holds(file, expected, form="MATLAB 7.3", left_out=left_out)
 
 
@@ -257,7 +252,7 @@ def test_hdf5(tmp_path, options):
     expected |= matrix("/run/x", "[:,{}]", NOISE) | matrix("/y", "[{},:]", NOISE)
     units = {"/run/time [ms]": "ms", "/run/counts": "1"}
     units |= {"/run/x[:,0]": "V", "/run/x[:,1]": "A", "/run/x[:,2]": "bar"}
-    holds(file, expected, units=units, comments=("operator: me",))
+    holds(file, expected, units=units)
 
 
 def test_tdms(tmp_path):
@@ -282,7 +277,7 @@ def test_tdms(tmp_path):
         "time": 2.0 + 0.125 * np.arange(60),
     }
     left_out, units = {"note": "it holds text"}, {"voltage": "V", "time": "s"}
-    holds(file, expected, units=units, left_out=left_out, comments=("operator: me",))
+    holds(file, expected, units=units, left_out=left_out)
 
 
 def test_tdms_of_several_groups_and_dates(tmp_path):

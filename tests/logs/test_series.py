@@ -20,7 +20,7 @@ from swashplate.tables import write_table
 
 
 def log_of(*columns: Column, **left_out: str) -> Log:
-    def load(positions):
+    def load(positions, first, last):
         return [np.full(3, float(position)) for position in positions]
 
     return Log(Path("log.xyz"), "test", columns, load, left_out=left_out)
@@ -87,7 +87,7 @@ def test_what_was_left_out_says_why():
 def test_a_column_is_loaded_once():
     asked = []
 
-    def load(positions):
+    def load(positions, first, last):
         asked.append(list(positions))
         return [np.zeros(1) for _ in positions]
 

@@ -40,7 +40,6 @@ def test_excavator(shared, name, rows):
     path = shared("excavator", name)
     log = open_log(path)
     assert log.format == "CSV, commas, decimal point"
-    assert log.notes == ()
     names = [column.name for column in log.columns]
     expected = np.loadtxt(path, delimiter=",", skiprows=1)
     assert expected.shape == (rows, len(names))

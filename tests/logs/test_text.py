@@ -99,14 +99,11 @@ def test_units_of_the_header(text, content, units):
 def test_a_second_row_of_names_is_no_row_of_units(text):
     log = text("Motor,Motor,Pump\nspeed,torque,pressure\n0,1,2\n3,4,5\n")
     assert [column.name for column in log.columns] == ["speed", "torque", "pressure"]
-    assert log.comments == ("Motor,Motor,Pump",)
-    assert log.notes == ("Taken as text above the table: line 1.",)
 
 
 def test_no_header(text, all_of):
     log = text("0,1.5\n0.5,2.5\n")
     assert all_of(log) == {"column 1": [0.0, 0.5], "column 2": [1.5, 2.5]}
-    assert log.notes == ("There is no header; the columns are called by their positions.",)
 
 
 def test_names_that_are_numbers(text):
@@ -117,49 +114,11 @@ def test_names_that_are_numbers(text):
 def test_names_without_text_and_names_twice(text):
     log = text("time,,v,v\n0,1,2,3\n1,2,3,4\n")
     assert [column.name for column in log.columns] == ["time", "column 2", "v #1", "v #2"]
-    assert log.notes == ("Columns of the same name are numbered: 'name #1', 'name #2'.",)
-
-
-def test_comments_and_notes(text):
-    log = text("# hoist\nRun 3\ntime,voltage\n# on\n0,1\n# off\n1,2")
-    assert log.comments == ("# hoist", "Run 3", "# on")
-    assert log.notes == (
-        "Taken as text above the table: line 2.",
-        "The last line has no end; if the file was cut off, the last number may be short.",
-    )
 
 
 def test_names_in_a_comment(text):
     log = text("# by NumPy\n# time voltage\n0.0 1.0\n1.0 2.0\n")
     assert [column.name for column in log.columns] == ["time", "voltage"]
-    assert log.notes == ("The names of the columns are from the comment in line 2.",)
-
-
-LABVIEW = (
-    "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\n"
-    "Decimal_Separator\t,\nMulti_Headings\tNo\nX_Columns\tOne\nTime_Pref\tAbsolute\n"
-    "Operator\tme\nDate\t2008/10/06\nTime\t15:56:00,0\n***End_of_Header***\t\n\t\n"
-    "Channels\t2\t\t\nSamples\t3\t3\t\nDate\t2008/10/06\t2008/10/06\t\nTime\t15:56\t15:56\t\n"
-    "Y_Unit_Label\tVolts\tmA\t\nX_Dimension\tTime\tTime\t\nX0\t0,0E+0\t0,0E+0\t\n"
-    "Delta_X\t0,1\t0,1\t\n***End_of_Header***\t\t\t\nX_Value\tVoltage\tCurrent\tComment\n"
-    "0,000000\t-1,0\t2,0\n0,100000\t-1,5\t2,5\n0,200000\t-2,5\t1E-3\n"
-)
-
-
-def test_labview(text, all_of):
-    log = text(LABVIEW, "log.lvm")
-    assert log.format == "CSV, tabs, decimal comma"
-    assert log.columns == (
-        Column("X_Value", "s"),
-        Column("Voltage", "Volts"),
-        Column("Current", "mA"),
-    )
-    assert all_of(log) == {
-        "X_Value": [0.0, 0.1, 0.2],
-        "Voltage": [-1.0, -1.5, -2.5],
-        "Current": [2.0, 2.5, 0.001],
-    }
-    assert "Operator\tme".replace("\t", "�") in log.comments
 
 
 def test_missing_and_infinite_numbers(text):

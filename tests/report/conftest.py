@@ -29,7 +29,7 @@ def texts(figure: Figure) -> Iterator[Text]:
 
 
 def is_drawn(text: Text, figure: Figure) -> bool:
-    for ax in figure.axes:
+    for ax in (each for own in figure.axes for each in (own, *own.child_axes)):
         for axis in (ax.xaxis, ax.yaxis):
             for tick in axis.get_major_ticks():
                 if text in (tick.label1, tick.label2):

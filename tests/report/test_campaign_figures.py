@@ -9,9 +9,10 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from swashplate import Drive, InputError, Simulation, maneuvers
+from swashplate import InputError
 from swashplate.campaign import Channel, Encoder, Experiment, InputSignal, Source
-from swashplate.report.figures import plot_campaign, plot_current, plot_encoder
+from swashplate.identification.assessment import motion_of
+from swashplate.report.figures import plot_campaign, plot_channel
 
 SOURCE = Source(Path("run.csv"), "a column")
 TIME = np.arange(513) / 64.0
@@ -132,7 +133,6 @@ def test_marks_say_what_is_left_out_weighted_clipped_or_missing(
         "gap in the stamps",
     ]
     assert labels(figure.axes[1]) >= {"ignored", "weight", "clipped", "gap in the stamps"}
-    assert "×10" in [text.get_text() for text in figure.axes[1].texts]
     assert_legible(figure)
 
 
@@ -189,77 +189,53 @@ def position(time: np.ndarray = FINE, noise: float | None = None) -> Channel:
     return Channel("boom", "position", "m", time, values, weight, SOURCE, noise=noise)
 
 
-def drawn(ax: Axes) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    return {each.get_label(): each.get_data() for each in ax.lines}
-
-
-def test_the_staircase_and_the_line_between_its_changes(
-    assert_legible: Callable[[Figure], None],
-) -> None:
-    figure = plot_encoder(encoder(), title="Counts of 1 degree")
+def test_a_position_and_its_speed(assert_legible: Callable[[Figure], None]) -> None:
+    figure = plot_channel(encoder(), title="Counts of 1 degree")
     upper, lower = figure.axes
-    found = drawn(upper)
+    raw = upper.lines[0].get_ydata()
     # 20 deg/s passes the edges of counts each 0.05 s, from 0.525 s on
-    np.testing.assert_allclose(found["raw"][1], np.floor(20.0 * np.maximum(FINE - 0.5, 0.0) + 0.5))
-    between = (FINE > 0.6) & (FINE < 1.9)
-    # a change shows in the next sample at the latest, and the line starts at a change
-    expected = 20.0 * (FINE[between] - 0.5) + 0.5
-    assert np.abs(found["interpolated"][1][between] - expected).max() < 20.0 * 1.5 / 512.0
+    np.testing.assert_allclose(raw, np.floor(20.0 * np.maximum(FINE - 0.5, 0.0) + 0.5))
     assert (upper.get_ylabel(), lower.get_ylabel()) == ("angle (deg)", "speed (deg/s)")
     (counts,) = upper.child_axes
     figure.draw_without_rendering()
     # read backwards: 20 degrees are as high as -20 counts
     height = upper.transData.transform((0.0, 20.0))[1]
     assert counts.transData.transform((0.0, -20.0))[1] == pytest.approx(height)
-    # the smooth speeds set the scale; how far the plain difference goes stands in the legend
-    assert lower.get_ylim()[1] < 40.0
-    assert any(each.startswith("plain difference, from ") for each in words(figure))
+    # the filtered speed sets the scale, not the jumps of neighbours
+    assert lower.get_ylim()[1] < 40.0 < np.nanmax(lower.lines[1].get_ydata())
     assert_legible(figure)
 
 
-def test_a_position_and_its_window(assert_legible: Callable[[Figure], None]) -> None:
-    figure = plot_encoder(position(), window=(0.5, 1.0))
+def test_a_channel_and_its_window(assert_legible: Callable[[Figure], None]) -> None:
+    figure = plot_channel(position(), window=(0.5, 1.0))
     assert figure.axes[0].get_ylabel() == "position (mm)"
     assert figure.axes[1].get_xlim() == pytest.approx((0.5, 1.0))
     assert_legible(figure)
     with pytest.raises(InputError, match="holds 0 samples of run.csv"):
-        plot_encoder(position(), window=(5.0, 6.0))
-    with pytest.raises(InputError, match="shows an encoder or a position"):
-        plot_encoder(channel())
+        plot_channel(position(), window=(5.0, 6.0))
 
 
-@pytest.fixture(scope="module")
-def sine(hoist: Drive) -> Simulation:
-    return hoist.simulate(maneuvers.sine(6.5, 0.1).sample())
-
-
-def ammeter(run: Simulation, error: float = 0.0, **entries) -> Channel:
-    """The ammeter of a run, off by an error."""
-    values = run.current_positive + run.current_negative + error
-    entries = {"name": "current", "time": run.time, "values": values, **entries}
-    weight = np.ones(run.time.size)
-    return channel("rectified_current", "A", **{"weight": weight, **entries})
-
-
-def test_a_current_against_the_simulated_one(
-    sine: Simulation, assert_legible: Callable[[Figure], None]
-) -> None:
-    weight = np.ones(sine.time.size)
-    weight[-512:] = 0.0
-    figure = plot_current(ammeter(sine, 0.02, weight=weight), sine)
+def test_a_channel_against_what_a_drive_does(assert_legible: Callable[[Figure], None]) -> None:
+    weight = np.ones(TIME.size)
+    weight[-64:] = 0.0
+    values = np.sin(TIME)
+    spoilt = np.where(weight == 0.0, 50.0, values)
+    figure = plot_channel(channel(values=spoilt, weight=weight), values - 0.02)
     upper, lower = figure.axes
-    assert upper.get_ylabel() == "|I₊| + |I₋| (A)"
-    assert lower.get_ylabel() == "difference (mA)"
-    _, y = drawn(lower)["counted"]
-    np.testing.assert_allclose(y[np.isfinite(y)], 20.0, rtol=1e-9)
-    assert labels(upper) >= {"ignored", "masked", "measured", "simulated"}
-    # each zero crossing of the signed current lies in a mask
-    crossings = np.flatnonzero(np.diff(np.sign(sine.current[np.abs(sine.current) > 0.05])))
-    masks = [each for each in upper.collections if each.get_label() == "masked"]
-    assert sum(len(each.get_paths()) for each in masks) >= crossings.size
-    assert "RMS 20 mA outside of what is shaded" in lower.texts[0].get_text()
+    assert (upper.get_ylabel(), lower.get_ylabel()) == (
+        "shaft speed (deg/s)",
+        "measured less simulated (deg/s)",
+    )
+    shown = lower.lines[1].get_ydata()[:-64]
+    np.testing.assert_allclose(shown, np.degrees(0.02), rtol=1e-9)
+    # what is ignored is shaded and does not set the scale
+    assert lower.get_ylim()[1] < np.degrees(1.1)
+    assert "ignored" in labels(upper)
     assert_legible(figure)
-    with pytest.raises(InputError, match="this figure compares a rectified_current"):
-        plot_current(channel(), sine)
-    with pytest.raises(InputError, match="choose one that holds two"):
-        plot_current(ammeter(sine), sine, window=(50.0, 60.0))
+    assert len(plot_channel(channel()).axes) == 1
+
+
+def test_positions_in_metres_are_of_a_rod() -> None:
+    assert motion_of([experiment(position()), experiment()]) == "rod"
+    assert motion_of([experiment(encoder()), experiment(position())]) == "shaft"
+    assert motion_of([experiment()]) == "shaft"

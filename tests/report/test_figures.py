@@ -16,7 +16,6 @@ from swashplate.analysis import (
     inverse_map,
     one_at_a_time,
     ranges_of,
-    sobol,
     trial,
     what_if,
 )
@@ -43,15 +42,12 @@ def made(hoist: Drive, step: Simulation, all_limits: Simulation, task: Trial) ->
     changed = what_if(hoist, {"orifice": 1.5, "pump": 1.5}, task)
     outcomes = ("final_speed", "rise_time", "overshoot")
     one = one_at_a_time(hoist, ranges_of(LEVERS), task, outcomes=outcomes)
-    shares = sobol(hoist, ranges_of(LEVERS), task, outcomes=("final_speed",), samples=32)
     inverse = inverse_map(luff)
     wanted = 0.5 * np.sin(task.time)
     current = hoist.simulate_current(0.5 * np.sin(np.arange(2000) / 300.0))
     loaded = FullOrderDrive.preset("hoist").replace(load_torque=2e3)
     both = compare(loaded, loaded.drive.simulate(maneuvers.step(9.0, length=8.0).sample()))
     response = hoist.frequency_response(np.geomspace(0.05, 5.0, 12), [1.0, 9.0])
-    runs = {"hoist": {"step +9 V": step, "sine 9 V": all_limits}, "luff": {"step": step}}
-    axes = {name: Drive.preset(name) for name in ("hoist", "slew", "luff")}
     return {
         "simulation": figures.plot_simulation(step),
         "all limits": figures.plot_simulation(all_limits),
@@ -59,14 +55,10 @@ def made(hoist: Drive, step: Simulation, all_limits: Simulation, task: Trial) ->
         "neutral": figures.plot_simulation(neutral.simulate(maneuvers.step(0.8).sample())),
         "full order": figures.plot_full_order(both),
         "comparison": figures.plot_comparison({"hoist": step, "by current": current}),
-        "overview": figures.plot_maneuvers_overview(runs),
-        "steady": figures.plot_steady_map(axes),
         "envelope": figures.plot_envelope(envelope(hoist)),
         "timeline": figures.plot_limit_timeline(all_limits),
         "whatif": figures.plot_whatif(changed, bands={"as it is": band}),
-        "bands": figures.plot_bands(band),
         "tornado": figures.plot_tornado(one),
-        "sobol": figures.plot_sobol(shares),
         "map": figures.plot_compensation(inverse),
         "improvement": figures.plot_compensation(inverse, improvement(luff, wanted)),
         "bode": figures.plot_bode(response, linear=hoist.linearize(4.0)),
@@ -75,8 +67,7 @@ def made(hoist: Drive, step: Simulation, all_limits: Simulation, task: Trial) ->
 
 NAMES = (
     *("simulation", "all limits", "by current", "neutral", "full order", "comparison"),
-    *("overview", "steady", "envelope", "timeline", "whatif", "bands", "tornado", "sobol"),
-    *("map", "improvement", "bode"),
+    *("envelope", "timeline", "whatif", "tornado", "map", "improvement", "bode"),
 )
 
 
@@ -184,6 +175,11 @@ def test_orifices_and_stops_are_marked_where_the_signal_comes_near(hoist: Drive)
     assert levels(4, low) == []
 
 
+def test_what_has_no_dead_zone_shows_none(made: dict[str, Figure]) -> None:
+    assert shades(made["neutral"], 1) == {}
+    assert legend(made["neutral"]) == []
+
+
 def test_an_hour_is_drawn_by_few_points_and_few_spans(hoist: Drive) -> None:
     time = np.arange(3600 * 512) / 512.0
     run = hoist.simulate(8.0 * np.sin(0.2 * time) + 1.5 * np.sin(20.0 * time))
@@ -221,24 +217,6 @@ def test_a_comparison_shows_what_differs(step: Simulation, hoist: Drive) -> None
         figures.plot_comparison({})
 
 
-def test_the_steady_map_groups_axes_of_like_speed(made: dict[str, Figure]) -> None:
-    figure = made["steady"]
-    words = [text.get_text() for ax in figure.axes for text in ax.texts]
-    assert {"−185.0 and +196.0", "−7.41 and +7.87", "creep +3.1 deg/s"} <= set(words)
-    # hoist and luff share a panel, slew has one of its own
-    assert labels(figure).count("steady speed (deg/s)") == 2
-    with pytest.raises(InputError, match="at least one drive"):
-        figures.plot_steady_map({})
-
-
-def test_an_overview_has_a_row_an_axis_and_a_column_a_kind(made: dict[str, Figure]) -> None:
-    figure = made["overview"]
-    assert [ax.get_title() for ax in figure.axes[:2]] == ["step", "sine"]
-    assert labels(figure)[::2][:2] == ["hoist speed (deg/s)", "luff speed (deg/s)"]
-    with pytest.raises(InputError, match="at least one run"):
-        figures.plot_maneuvers_overview({})
-
-
 def test_the_envelope_ends_at_the_swash_stop(made: dict[str, Figure]) -> None:
     words = [text.get_text() for text in made["envelope"].axes[0].texts]
     assert "swash stop\n+196.0 deg/s" in words
@@ -274,8 +252,6 @@ def test_the_strongest_lever_is_at_the_top(made: dict[str, Figure]) -> None:
     assert (ends[0], ends[-1]) == pytest.approx((176.4, 215.6), abs=0.05)
     assert speed.get_xlabel() == "final speed (deg/s)"
     assert "no lever moves it" in [text.get_text() for text in still.texts]
-    bars = [bar.get_width() for bar in made["sobol"].axes[0].patches]
-    assert max(bars) == pytest.approx(1.0, abs=0.3)
 
 
 def test_the_inverse_map_and_its_gap(made: dict[str, Figure]) -> None:

@@ -41,7 +41,6 @@ from .outcomes import command_for as command_for
 from .outcomes import find_outcomes as find_outcomes
 from .outcomes import outcome_matrix as outcome_matrix
 from .outcomes import outcome_unit as outcome_unit
-from .outcomes import overview_table as overview_table
 from .outcomes import peaks as peaks
 from .outcomes import performance as performance
 from .outcomes import proportional_speed as proportional_speed
@@ -52,12 +51,9 @@ from .outcomes import speed_per_volt as speed_per_volt
 from .outcomes import time_to_reach as time_to_reach
 from .outcomes import trial as trial
 from .sensitivity import OneAtATime as OneAtATime
-from .sensitivity import SobolIndices as SobolIndices
 from .sensitivity import one_at_a_time as one_at_a_time
 from .sensitivity import outcome_table as outcome_table
 from .sensitivity import ranges_of as ranges_of
-from .sensitivity import sensitivity_table as sensitivity_table
-from .sensitivity import sobol as sobol
 from .sizing import WIDEST as WIDEST
 from .sizing import Requirements as Requirements
 from .sizing import Sizing as Sizing

@@ -313,8 +313,6 @@ MOST_SAMPLES = 150_000_000  # Samples of speed that a band may take: 1.2 GB.
 class Bands(Result):
     """Where the speed lies at each instant."""
 
-    figure = "plot_bands"
-
     time: Array  # (n,) [s]
     lower: Array  # (n,) [rad/s]
     median: Array  # (n,) [rad/s]

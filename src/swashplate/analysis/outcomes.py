@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 
 REST = 0.5  # A command that rests at 0 V this long lets the drive settle at its creep. [s]
 STOPPED = 1.0 - 1e-9  # Part of the speed limit from which the plate counts as at its stop.
+TURNED = 0.05  # Part of its range by which a command may turn back and still go one way.
 REACHED = 0.9  # Part of the settled speed that counts as reached.
 
 # --- a command to judge drives by -----------------------------------------------------------------
@@ -57,6 +58,15 @@ class Trial(Result):
         """The last sample at which the command is at its largest, either way."""
         size = np.abs(self.voltage)
         return int(np.flatnonzero(size >= size.max() - 1e-9)[-1])
+
+    @property
+    def goes_straight(self) -> bool:
+        """Whether the command goes from its first move to its largest without turning back.
+
+        Turning back by less than a twentieth of the way is noise.
+        """
+        way = self.voltage[self.begin : self.held + 1] * np.sign(self.voltage[self.held])
+        return bool((np.maximum.accumulate(way) - way).max() <= TURNED * np.ptp(self.voltage))
 
     @property
     def rests(self) -> bool:
@@ -105,11 +115,16 @@ def trial(
     return Trial(volts, float(rate), speed)
 
 
-def proportional_speed(drive: Drive, voltage: ArrayLike) -> Array:
-    """Speed in proportion to a command (n,) [V], each way by `speed_per_volt`. [rad/s]"""
+def proportional_speed(drive: Drive, voltage: ArrayLike, *, limited: bool = True) -> Array:
+    """Speed in proportion to a command (n,) [V] by `speed_per_volt`. [rad/s]
+
+    Up to the drive's speed limits, which nothing but another drive can exceed; or `limited` not.
+    """
     volts = np.asarray(voltage, dtype=np.float64)
     plus, minus = speed_per_volt(drive, 1.0), speed_per_volt(drive, -1.0)
-    return np.where(volts >= 0.0, plus, minus) * volts
+    speed: Array = np.where(volts >= 0.0, plus, minus) * volts
+    ends = drive.steady_speed([-FULL_VOLTAGE, FULL_VOLTAGE])
+    return np.clip(speed, ends.min(), ends.max()) if limited else speed
 
 
 def speed_per_volt(drive: Drive, sign: float) -> float:
@@ -170,6 +185,8 @@ def find_outcomes(names: Sequence[str]) -> tuple[Outcome, ...]:
 
 def _reached(speed: Array, trial: Trial, part: float) -> Array:
     """(m,) time from the command's first move to a part of the final speed. [s]"""
+    if not trial.goes_straight:
+        return np.full(len(speed), np.nan)
     rising = speed[:, trial.begin : trial.held + 1]
     final = rising[:, -1]
     share = rising * np.sign(final)[:, None] - part * np.abs(final)[:, None]
@@ -205,6 +222,7 @@ def _travel(speed: Array, trial: Trial) -> Array:
 
 
 _NEVER = "the shaft stands still while the command is at its largest"
+_NO_RISE = f"{_NEVER}, or the command turns back on its way there"
 _ALL = (
     Outcome(
         *("final_speed", "rad/s"),
@@ -218,12 +236,12 @@ _ALL = (
     Outcome(
         *("rise_time", "s", "Time from 10 % to 90 % of the final speed."),
         lambda speed, trial: _reached(speed, trial, 0.9) - _reached(speed, trial, 0.1),
-        _NEVER,
+        _NO_RISE,
     ),
     Outcome(
         *("response_time", "s", "Time from the command's first move to 90 % of the final speed."),
         partial(_reached, part=0.9),
-        _NEVER,
+        _NO_RISE,
     ),
     Outcome(
         *("largest_acceleration", "rad/s^2"),
@@ -451,7 +469,8 @@ def run_tables(run: Simulation) -> tuple[Table, Table]:
         did.add(f"peak speed, {way}", speed, unit="rad/s")
     did.add("speed at the end", float(run.shaft_speed[-1]), unit="rad/s")
     did.add("position at the end", position, unit="rad", spec="z.1f")
-    did.add("", position / (2.0 * np.pi), unit="turns", spec="z.3f")
+    if display_unit("rad").name == "deg":
+        did.add("", position / (2.0 * np.pi), unit="turns", spec="z.3f")
     for way, current in zip(ways, peaks(run.current), strict=True):
         section = way == "positive"
         did.add(f"peak current, {way}", current, unit="A", spec="z.4f", section=section)
@@ -474,17 +493,4 @@ def side_by_side(drives: Mapping[str, Drive], runs: Mapping[str, Simulation]) ->
     made.add("peak speed, negative", *negative, unit="rad/s")
     made.add(f"settled speed at {volts:g} V", *settled, unit="rad/s")
     made.add("time to 90 % of it", *times, unit="s", spec=".3f")
-    return made
-
-
-def overview_table(runs: Mapping[str, Mapping[str, Simulation]]) -> Table:
-    """Peak speeds of many runs and the limits that they meet, by axis and maneuver."""
-    speed = ("z.2f", "rad/s")
-    words = Column("axis"), Column("maneuver"), Column("samples", "d")
-    limits = Column("limits met", wrap=True)
-    made = Table("Peak speeds", (*words, Column("plus", *speed), Column("minus", *speed), limits))
-    for axis, by_name in runs.items():
-        for number, (name, run) in enumerate(by_name.items()):
-            met = ", ".join(limit for limit, share in _time_shares(run).items() if share)
-            made.add(axis, name, run.time.size, *peaks(run.shaft_speed), met, section=number == 0)
     return made

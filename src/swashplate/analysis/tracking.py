@@ -255,8 +255,8 @@ def sine_table(sines: LargestSine) -> Table:
         f"Largest sine followed within {100.0 * sines.error:g} %",
         (
             Column("frequency", "g", "Hz"),
-            Column("lag forgiven", ".2f", "rad/s"),
-            Column("lag counted", ".2f", "rad/s"),
+            Column("with time shift", ".2f", "rad/s"),
+            Column("without", ".2f", "rad/s"),
         ),
     )
     for frequency, *amplitudes in zip(sines.frequencies, sines.shifted, sines.in_time, strict=True):

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import schema
-from swashplate.campaign.experiment import Channel, Encoder, Experiment, InputSignal
+from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.reading import (
     Columns,
-    Reading,
-    read_signal,
+    read_channel,
+    read_input,
     wanted_columns,
     windows,
 )
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from swashplate.drive import Drive
 
 Array = NDArray[np.float64]
+AnySignal = TypeVar("AnySignal", InputSignal, Channel)
 
 LISTED = 12
 """Runs that a sentence names."""
@@ -317,21 +318,20 @@ def _experiments(
     name: str, run_name: str, key: str, run: schema.Run, axis: schema.Axis, columns: Columns
 ) -> Iterator[Experiment]:
     """One experiment, or several where a counter's position across a gap is not known."""
-    drive = read_signal("the input", axis.input, axis, columns, run.span)
-    assert drive is not None  # an input without samples is refused
-    log, signals, cuts = columns.log, {}, dict[float, str]()
+    drive = read_input(axis, columns, run.span)
+    log, signals, cuts = columns.log, dict[str, Channel](), dict[float, str]()
     notes = [log.cut] if log.cut else []
-    for channel, entry in axis.channels.items():
-        read = read_signal(f"channel '{channel}'", entry, axis, columns, run.span)
+    for name_of, entry in axis.channels.items():
+        read = read_channel(name_of, axis, columns, run.span)
         if read is None:
-            notes.append(f"'{channel}' has no sample here and is left out of this run")
+            notes.append(f"'{name_of}' has no sample here and is left out of this run")
             continue
-        signals[channel] = read
+        signals[name_of] = read
         if entry.rolls_over_at is not None:
             for row in ambiguous_gaps(read.time, read.values, entry.rolls_over_at):
                 gap = read.time[row] - read.time[row - 1]
                 cuts[float(read.time[row])] = (
-                    f"within the gap of {gap:.3g} s the counter '{channel}', which begins anew "
+                    f"within the gap of {gap:.3g} s the counter '{name_of}', which begins anew "
                     f"after {entry.rolls_over_at}, may have gone round once more or less"
                 )
     if not signals:
@@ -341,8 +341,8 @@ def _experiments(
         )
     edges = [-np.inf, *sorted(cuts), np.inf]
     for part, (begin, end) in enumerate(pairwise(edges)):
-        piece = drive.within(begin, end)
-        kept = {each: read.within(begin, end) for each, read in signals.items()}
+        piece = _within(drive, begin, end)
+        kept = {each: _within(read, begin, end) for each, read in signals.items()}
         kept = {each: read for each, read in kept.items() if read.time.size > 1}
         if piece.time.size < 2 or not kept:
             continue
@@ -359,61 +359,45 @@ def _experiments(
         )
 
 
+def _within(signal: AnySignal, begin: float, end: float) -> AnySignal:
+    """The part of a signal from one instant to before another [s]."""
+    kept = (signal.time >= begin) & (signal.time < end)
+    if kept.all():
+        return signal
+    arrays: dict[str, Any] = {
+        key: each[kept] for key, each in vars(signal).items() if isinstance(each, np.ndarray)
+    }
+    return replace(signal, **arrays)
+
+
 def _experiment(
     name: str,
     of: tuple[str, str, schema.Run, schema.Axis],
-    drive: Reading,
-    signals: Mapping[str, Reading],
+    given: InputSignal,
+    signals: Mapping[str, Channel],
     notes: tuple[str, ...],
     *,
     split: bool,
 ) -> Experiment:
     run_name, key, run, axis = of
-    given = InputSignal(
-        axis.input.kind,
-        drive.unit,
-        drive.time,
-        drive.values,
-        axis.input.interpolation,
-        drive.source,
-        drive.limits,
-        drive.dropped,
-    )
     unit = {"voltage": "V", "current": "A"}.get(given.kind, given.unit)
     recognised = recognise(given.time, given.values, unit=unit)
     maneuver = run.maneuver or recognised.name
     ignored = applying((*axis.ignore, *run.ignore), maneuver)
     channels = {}
     for channel, read in signals.items():
-        entry = axis.channels[channel]
-        values, counts, encoder = read.values, None, None
-        if entry.counts_per_turn is not None:
-            encoder = Encoder(
-                entry.counts_per_turn, entry.gear_ratio, entry.sign, entry.rolls_over_at
-            )
-            counts = values
-            if entry.rolls_over_at is not None:
+        entry, encoder, counts = axis.channels[channel], read.encoder, read.counts
+        if encoder is not None and counts is not None:
+            if encoder.rolls_over_at is not None:
                 try:
-                    counts = unwrap_counts(values, entry.rolls_over_at).counts
+                    counts = unwrap_counts(counts, encoder.rolls_over_at).counts
                 except InputError as error:
                     raise InputError(f"{read.source}: {error}") from None
-            values = counts * encoder.angle_per_count
+            read = replace(read, counts=counts, values=counts * encoder.angle_per_count)
         weighted = applying((*entry.weights, *run.weights), maneuver)
         left_out = (*ignored, *applying(entry.ignore, maneuver))
-        channels[channel] = Channel(
-            channel,
-            entry.kind,
-            read.unit,
-            read.time,
-            values,
-            _weights(entry, read.time, given, left_out, weighted, run.weight),
-            read.source,
-            None if entry.noise is None else read.factor * entry.noise,
-            read.limits,
-            read.dropped,
-            encoder,
-            counts,
-        )
+        weight = _weights(entry, read.time, given, left_out, weighted, run.weight)
+        channels[channel] = replace(read, weight=weight)
     return Experiment(
         name,
         key,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import schema
-from swashplate.campaign.experiment import Source
+from swashplate.campaign.experiment import Channel, Encoder, InputSignal, Source
 from swashplate.campaign.schema import conversion, inside
 from swashplate.errors import FileError, InputError
 from swashplate.logs import LONG, Column, Log, check_duration, check_stamps, in_parts, unit_of
@@ -31,6 +31,8 @@ class Columns:
         self.log = log
         self.found = self.find(log, wanted)
         self.values = log.read(list(self.found))
+        self.stamps: dict[tuple[schema.Clock, int], Array] = {}
+        """Stamps by their clock and number, so that signals share them."""
         self.begins = {name: values[:1] for name, values in self.values.items()}
         if log.first:
             self.begins = log.between(0, 1).read(list(self.found))
@@ -64,8 +66,8 @@ def wanted_columns(axis: schema.Axis) -> Iterator[tuple[str, str]]:
                 yield clock.column, f"the time of {what}"
 
 
-class Reading(NamedTuple):
-    """A signal out of the log, in SI, on its stamps."""
+class _Samples(NamedTuple):
+    """Samples of a signal that can be used, in SI, and what a signal says of them."""
 
     unit: str
     time: Array
@@ -76,20 +78,53 @@ class Reading(NamedTuple):
     limits: tuple[float, float] | None
     dropped: int
 
-    def within(self, begin: float, end: float) -> Reading:
-        """The part from one instant to before another [s]."""
-        kept = (self.time >= begin) & (self.time < end)
-        return self._replace(time=self.time[kept], values=self.values[kept])
+
+def read_input(axis: schema.Axis, columns: Columns, span: schema.Window | None) -> InputSignal:
+    """The input of an axis as the campaign file says."""
+    read = _samples("the input", axis.input, axis, columns, span)
+    assert read is not None  # an input without samples is refused
+    held = axis.input.interpolation
+    return InputSignal(
+        axis.input.kind,
+        *read[:3],
+        held,
+        source=read.source,
+        limits=read.limits,
+        dropped=read.dropped,
+    )
 
 
-def read_signal(
+def read_channel(
+    name: str, axis: schema.Axis, columns: Columns, span: schema.Window | None
+) -> Channel | None:
+    """A channel as the campaign file says, all samples alike; None where all of them are missing.
+
+    Of an encoder the counts are as they were read, roll-overs and all.
+    """
+    entry, encoder = axis.channels[name], None
+    read = _samples(f"channel '{name}'", entry, axis, columns, span)
+    if read is None:
+        return None
+    if entry.counts_per_turn is not None:
+        encoder = Encoder(entry.counts_per_turn, entry.gear_ratio, entry.sign, entry.rolls_over_at)
+    return Channel(
+        *(name, entry.kind, *read[:3], np.ones(read.time.size), read.source),
+        None if entry.noise is None else read.factor * entry.noise,
+        read.limits,
+        read.dropped,
+        encoder,
+        None if encoder is None else read.values,
+    )
+
+
+def _samples(
     what: str,
     signal: schema.Input | schema.Channel,
     axis: schema.Axis,
     columns: Columns,
     span: schema.Window | None,
-) -> Reading | None:
-    """A signal as the campaign file says; None for a channel all of whose samples are missing."""
+) -> _Samples | None:
+    """Samples of a signal; None for a channel all of whose samples are missing."""
     column, numbers = columns.found[signal.column], columns.values[signal.column]
     said = f"{columns.log.path}: column '{column.name}' ({what})"
     time = stamps_in(signal.time or axis.time, axis.time, columns, numbers.size)
@@ -122,9 +157,9 @@ def read_signal(
     if not largest < LARGEST:
         raise InputError(f"{said} reaches {largest:.3g} {si}; check its unit, scale and offset.")
     limits = signal.limits
-    return Reading(
+    return _Samples(
         si,
-        np.ascontiguousarray(time[kept]),
+        time if kept.all() else np.ascontiguousarray(time[kept]),
         values,
         Source(columns.log.path, column.name),
         factor,
@@ -135,6 +170,12 @@ def read_signal(
 
 def stamps_in(clock: schema.Clock, main: schema.Clock, columns: Columns, size: int) -> Array:
     """Increasing time stamps of a signal; those of a calendar from the axis's first one on. [s]"""
+    if (clock, size) not in columns.stamps:
+        columns.stamps[clock, size] = _stamps(clock, main, columns, size)
+    return columns.stamps[clock, size]
+
+
+def _stamps(clock: schema.Clock, main: schema.Clock, columns: Columns, size: int) -> Array:
     with np.errstate(over="ignore"):
         if clock.rate is not None:
             time = clock.offset + (columns.log.first + np.arange(size)) / clock.rate
@@ -168,8 +209,9 @@ MOVES = 0.02
 """Share of its largest excursion from rest beyond which an input moves."""
 BEFORE, AFTER = 2.0, 5.0
 """What belongs to a window with motion before the input moves and after it has stopped. [s]"""
-HELD = 300_000
-"""Rows of one log that a campaign takes at most."""
+HELD = 120_000
+"""Rows of one log that a campaign takes at most, more than the 110,605 of Kruse's thirteen tests of
+the hoist: a fit of three channels takes about 1.6 kB of memory for each."""
 PIECE = 60_000
 """A longer motion is cut into pieces of so many rows, of which the later ones begin in motion."""
 
@@ -188,10 +230,10 @@ def windows(axes: Iterable[schema.Axis], log: Log, span: schema.Window | None) -
     """
     tested = list(axes)
     wanted = [each for axis in tested for each in wanted_columns(axis)]
-    told = len(log.notes)
-    log = in_parts(log, list(Columns.find(log, wanted)))
-    rows = log.rows or 0
-    if rows <= LONG or log.part is None:
+    found = list(Columns.find(log, wanted))
+    log = in_parts(log, found)
+    rows = log.rows_of(found)
+    if rows is None or rows <= LONG:
         return [log]
     moving = np.zeros(-(-rows // GRAIN), dtype=np.bool_)
     period = np.inf
@@ -219,7 +261,7 @@ def windows(axes: Iterable[schema.Axis], log: Log, span: schema.Window | None) -
             f"{log.path} has {rows} rows, in none of which the input moves: leave the run out with "
             'role = "ignore".'
         )
-    return _cut(log, moving, period, log.notes[told:])
+    return _cut(log, rows, moving, period)
 
 
 def _moves(ends: Array) -> NDArray[np.bool_]:
@@ -236,9 +278,8 @@ def _moves(ends: Array) -> NDArray[np.bool_]:
     return moves
 
 
-def _cut(log: Log, moving: NDArray[np.bool_], period: float, notes: tuple[str, ...]) -> list[Log]:
+def _cut(log: Log, rows: int, moving: NDArray[np.bool_], period: float) -> list[Log]:
     """Parts of a log about its motion, so many that all can be held."""
-    rows = log.rows or 0
     changes = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]])))
     first = np.maximum(changes[::2] * GRAIN - round(BEFORE / period), 0)
     last = np.minimum(changes[1::2] * GRAIN + round(AFTER / period), rows)
@@ -249,12 +290,14 @@ def _cut(log: Log, moving: NDArray[np.bool_], period: float, notes: tuple[str, .
         for begin, end in zip(begins, ends, strict=True)
         for place in range(begin, end, PIECE)
     ]
-    total = sum(end - begin for begin, end, _ in pieces)
-    every = int(-(-total // HELD))
+    every = 1
+    while sum(end - begin for begin, end, _ in pieces[::every]) > HELD and every < len(pieces):
+        every += 1
     taken = pieces[::every]
     said = f"the log has {len(pieces)} windows with motion"
     said += f", of which 1 in {every} is taken" * (every > 1)
-    said += "".join(f"; {each[0].lower()}{each[1:].rstrip('.')}" for each in notes)
+    if log.table is not None:
+        said += f"; its {rows} rows are read from {log.table.name}, written beside it"
     found = []
     for number, (begin, end, within) in enumerate(taken, 1):
         part = log.between(begin, end)

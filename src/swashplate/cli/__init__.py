@@ -1,13 +1,16 @@
 """The command line: parse, call, print.
 
-What takes long to import is imported inside the command that needs it, so that
-``swashplate --help`` is instant.
+A command's module is imported when it is called, and what takes long inside the function that needs
+it, so that no command waits for the imports of another.
 """
 
 import gc
 import io
 import os
 import sys
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,19 +18,6 @@ import typer
 from typer.core import TyperGroup
 
 from swashplate.__about__ import __version__
-from swashplate.cli import (
-    advise,
-    campaign,
-    crane,
-    doctor,
-    export,
-    fit,
-    full_order,
-    linear,
-    live,
-    simulate,
-    understand,
-)
 from swashplate.cli.options import command
 from swashplate.cli.terminal import say_error
 from swashplate.errors import FileError, InputError, SwashplateError
@@ -35,10 +25,10 @@ from swashplate.errors import FileError, InputError, SwashplateError
 HELP = """\
 Hydrostatic drives: from a joystick's voltage to the speed of the shaft.
 
-A drive is a control card, a pump and a motor. Packaged are three measured
-ones, the hoist, slew and luff axes of a crane, and a neutral one to start
-your own from. A command is a file of measured voltages or a maneuver: a
-name and its numbers in V, s and Hz.
+A drive is a proportional amplifier (the control card), a pump and a motor.
+Packaged are three measured ones, the hoist, slew and luff axes of a crane,
+and a neutral one to start your own from. A command is a file of measured
+voltages or a maneuver: a name and its numbers in V, s and Hz.
 
 Maneuvers, and some of the options that may follow their numbers:
   step:9                  9 V from 1 s to 6 s         start, stop, length
@@ -70,12 +60,83 @@ Examples:
 
 Files are written in SI, whole or not at all. What is wrong is said in one
 sentence on standard error, with exit code 2. 'swashplate COMMAND --help'
-tells more about a command.
+says more about a command.
 """
+
+
+COMMANDS = {
+    "Demonstrations": {"demo": "fit.demo"},
+    "Simulate": {
+        "simulate": "simulate.simulate",
+        "compare": "simulate.compare",
+        "axes": "simulate.axes",
+        "show": "simulate.show_parameters",
+    },
+    "Test": {"rig": "campaign.rig", "campaign": "campaign.app"},
+    "Identify": {
+        "guess": "campaign.guess",
+        "excitation": "advise.excitation",
+        "fit": "fit.fit",
+        "validate": "fit.validate",
+        "advise": "advise.advise",
+        "report": "fit.report",
+    },
+    "Analyse": {
+        "limits": "understand.limits",
+        "whatif": "understand.whatif",
+        "size": "understand.size",
+        "sensitivity": "understand.sensitivity",
+        "compensate": "understand.compensate",
+        "linearize": "linear.linearize",
+        "bode": "linear.bode",
+        "full-order": "full_order.full_order",
+        "crane": "crane.app",
+    },
+    "Take the drive along": {"export": "export.export", "live": "live.live"},
+    "This installation": {"doctor": "doctor.doctor"},
+}
+"""Where each command stands, by the panel of the help that lists it."""
+
+
+PANELS = {name: panel for panel, names in COMMANDS.items() for name in names}
+
+
+@cache
+def _loaded(name: str) -> Any:
+    """A command, imported now."""
+    module, _, function = COMMANDS[PANELS[name]][name].partition(".")
+    found = getattr(import_module(f"swashplate.cli.{module}"), function)
+    alone = typer.Typer(callback=lambda: None, rich_markup_mode="rich")
+    if isinstance(found, typer.Typer):
+        alone.add_typer(found, name=name, rich_help_panel=PANELS[name])
+    else:
+        command(alone, name, panel=PANELS[name])(found)
+    return typer.main.get_group(alone).commands[name]
+
+
+class _Commands(Mapping[str, Any]):
+    """The commands by name, each imported when it is first asked for."""
+
+    def __getitem__(self, name: str) -> Any:
+        return _loaded(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(PANELS)
+
+    def __len__(self) -> int:
+        return len(PANELS)
 
 
 class Commands(TyperGroup):
     """The commands; what a user can mend ends as one sentence and exit code 2."""
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given)
+        self.commands: Any = _Commands()
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Their names, none of them imported."""
+        return [*self.commands]
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command."""
@@ -114,40 +175,6 @@ def options(
     ] = False,
 ) -> None:
     """Options before the command."""
-
-
-for name, panel, function, examples in (
-    ("demo", "Demonstrations", fit.demo, fit.DEMO_EXAMPLES),
-    ("tour", "Demonstrations", simulate.tour, simulate.TOUR_EXAMPLES),
-    ("simulate", "Simulate", simulate.simulate, simulate.SIMULATE_EXAMPLES),
-    ("compare", "Simulate", simulate.compare, simulate.COMPARE_EXAMPLES),
-    ("axes", "Simulate", simulate.axes, simulate.AXES_EXAMPLES),
-    ("show", "Simulate", simulate.show_parameters, simulate.SHOW_EXAMPLES),
-    ("rig", "Test", campaign.rig, campaign.RIG_EXAMPLES),
-    ("campaign", "Test", campaign.app, ""),
-    ("guess", "Identify", campaign.guess, campaign.GUESS_EXAMPLES),
-    ("excitation", "Identify", advise.excitation, advise.EXCITATION_EXAMPLES),
-    ("fit", "Identify", fit.fit, fit.FIT_EXAMPLES),
-    ("validate", "Identify", fit.validate, fit.VALIDATE_EXAMPLES),
-    ("advise", "Identify", advise.advise, advise.ADVISE_EXAMPLES),
-    ("report", "Identify", fit.report, fit.REPORT_EXAMPLES),
-    ("live", "Analyse", live.live, live.EXAMPLES),
-    ("limits", "Analyse", understand.limits, understand.LIMITS_EXAMPLES),
-    ("whatif", "Analyse", understand.whatif, understand.WHATIF_EXAMPLES),
-    ("size", "Analyse", understand.size, understand.SIZE_EXAMPLES),
-    ("sensitivity", "Analyse", understand.sensitivity, understand.SENSITIVITY_EXAMPLES),
-    ("compensate", "Analyse", understand.compensate, understand.COMPENSATE_EXAMPLES),
-    ("linearize", "Analyse", linear.linearize, linear.LINEARIZE_EXAMPLES),
-    ("bode", "Analyse", linear.bode, linear.BODE_EXAMPLES),
-    ("full-order", "Analyse", full_order.full_order, full_order.EXAMPLES),
-    ("crane", "Analyse", crane.app, ""),
-    ("export", "Export", export.export, export.EXAMPLES),
-    ("doctor", "This installation", doctor.doctor, doctor.EXAMPLES),
-):
-    if isinstance(function, typer.Typer):
-        app.add_typer(function, name=name, rich_help_panel=panel)
-    else:
-        command(app, name, examples, panel)(function)
 
 
 def _check_surroundings() -> None:

@@ -18,7 +18,14 @@ from swashplate.cli.options import (
     option,
 )
 from swashplate.cli.terminal import Outputs, note, say, show, working
-from swashplate.cli.words import campaign_of, file_kind, maneuver_of, parameters_of, runs_to_fit
+from swashplate.cli.words import (
+    campaign_of,
+    configuration_of,
+    file_kind,
+    maneuver_of,
+    parameters_of,
+    runs_to_fit,
+)
 from swashplate.errors import InputError
 from swashplate.tables import TABLE, write_text
 
@@ -27,20 +34,6 @@ if TYPE_CHECKING:
     from swashplate.identification.experiment_design import Bench, Sensor
     from swashplate.parameters.parameter_set import ParameterSet
 
-EXCITATION_EXAMPLES = """\
-Examples:
-  swashplate excitation virtual/campaign.toml
-  swashplate excitation harbour/campaign.toml --setup mine.toml --from worn.toml
-  swashplate excitation harbour/campaign.toml --write fewer.toml --out runs.csv
-  swashplate fit harbour/campaign.toml --setup fewer.toml
-"""
-ADVISE_EXAMPLES = """\
-Examples:
-  swashplate advise hoist                                      a fresh plan
-  swashplate advise harbour/campaign.toml --drive fitted/drive.toml
-  swashplate advise harbour/campaign.toml --maneuver step:-9 --top 1
-  swashplate advise hoist --free Z9 --noise stroker_pressure=0.2bar
-"""
 LEGEND = (
     "Under 'runs', one letter a run: # gives 20 % or more of the information, + gives less, o "
     "meets the condition, but in no sample that is used, . does not meet it, - is not fitted "
@@ -66,6 +59,12 @@ def excitation(
     reach, how much each parameter changes what was measured, and which can
     change together without effect. Proposes a fit configuration in which all
     are determined.
+
+    For example:
+      swashplate excitation virtual/campaign.toml
+      swashplate excitation harbour/campaign.toml --setup mine.toml --from worn.toml
+      swashplate excitation harbour/campaign.toml --write fewer.toml --out runs.csv
+      swashplate fit harbour/campaign.toml --setup fewer.toml
     """
     from swashplate.identification.data_checks import check_sound, refuse_unsound
     from swashplate.identification.excitation import outlook, propose, proposed_setup
@@ -157,6 +156,12 @@ def advise(
     Ranks tests by the information that they would add to those made so far, at
     the drive's present values. Errors are standard errors from noise alone; a
     drive that differs from its model is known less well.
+
+    For example:
+      swashplate advise hoist                                      a fresh plan
+      swashplate advise harbour/campaign.toml --drive fitted/drive.toml
+      swashplate advise harbour/campaign.toml --maneuver step:-9 --top 1
+      swashplate advise hoist --free Z9 --noise stroker_pressure=0.2bar
     """
     from swashplate.drive import Drive
     from swashplate.identification import tables
@@ -236,7 +241,7 @@ def _bench(
         if axis is not None:
             raise InputError("--axis belongs to a campaign; a drive is one axis.")
         parameters = parameters_of(drive or word)
-        plan = load_setup(setup or parameters.name)
+        plan = load_setup(configuration_of(word, setup, parameters.name))
         return bench(smooth(parameters), plan, free=free, sensors=_noises(noise, fresh=parameters))
     campaign, chosen = campaign_of(Path(word), axis)
     plan = setup_of(campaign, chosen, setup)

@@ -25,8 +25,6 @@ from swashplate.cli.terminal import (
     note,
     say,
     show,
-    show_in,
-    widths_of,
     working,
 )
 from swashplate.cli.words import (
@@ -43,40 +41,6 @@ from swashplate.tables import FIGURE, count, write_text
 if TYPE_CHECKING:
     from swashplate.campaign import Campaign
 
-INIT_EXAMPLES = """\
-Examples:
-  swashplate campaign init logs/*.csv --drive hoist
-  swashplate campaign init trial1.mat trial2.mat --out trials.toml
-  swashplate campaign init log.csv --column voltage=u --column shaft_speed=n --unit n=1/min
-"""
-CHECK_EXAMPLES = """\
-Examples:
-  swashplate campaign check
-  swashplate campaign check harbour/campaign.toml --strict
-"""
-PLOT_EXAMPLES = """\
-Examples:
-  swashplate campaign plot harbour/campaign.toml --out overview.png
-  swashplate campaign plot --run hoistr6 --channel counts --from 5.8 --to 6.6
-"""
-SCHEMA_EXAMPLES = """\
-Example:
-  swashplate campaign schema > campaign.schema.json
-"""
-RIG_EXAMPLES = """\
-Examples:
-  swashplate rig hoist --out virtual-hoist
-  swashplate rig slew --out worn --seed 7 --severity harsh --backlash-deg 0.1
-  swashplate rig hoist --out loaded --set load_torque=30kN*m --set motor_leakage=1e-6
-  swashplate rig hoist --out short --maneuver step:4 --maneuver sine:6,0.2 --perturb 0.1
-  swashplate campaign check virtual-hoist/campaign.toml
-"""
-GUESS_EXAMPLES = """\
-Examples:
-  swashplate campaign init logs/*.csv --drive neutral
-  swashplate guess logs/campaign.toml
-  swashplate fit logs/campaign.toml --from logs/start.toml --setup logs/setup.toml
-"""
 LEGEND = (
     "jitter and longest gap in ms; clip: % of the samples at the ends of the instrument's range;\n"
     "stuck: longest standstill of a noisy signal in s; lost: jumps that no motion explains"
@@ -129,6 +93,11 @@ def init(
     What each column is gets guessed from its name and unit, and marked as such;
     what cannot be told says FIXME. Read the file, mend what is wrong, then run
     'swashplate campaign check'.
+
+    For example:
+      swashplate campaign init logs/*.csv --drive hoist
+      swashplate campaign init trial1.mat trial2.mat --out trials.toml
+      swashplate campaign init log.csv --column voltage=u --column shaft_speed=n --unit n=1/min
     """
     from swashplate.campaign.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
 
@@ -176,6 +145,10 @@ def check(
     counts, the maneuver recognised from the voltage, and below the table
     whatever someone should look into: also windows that no run takes, and runs
     that are far from what the axis's drive would do.
+
+    For example:
+      swashplate campaign check
+      swashplate campaign check harbour/campaign.toml --strict
     """
     from swashplate.campaign import (
         Campaign,
@@ -197,10 +170,8 @@ def check(
     counted = ", ".join(f"{roles.count(role)} to {role}" for role in dict.fromkeys(roles))
     virtual = " (virtual)" if campaign.virtual else ""
     note(f"{campaign.title}{virtual}: {len(campaign)} experiments ({counted})")
-    tables = {each.name: quality_table(each, qualities[each.name]) for each in campaign}
-    widths = widths_of(tables.values()) if tables else []
     for experiment in campaign:
-        show_in(widths, tables[experiment.name])
+        show(quality_table(experiment, qualities[experiment.name]))
         for text in experiment.notes:
             say(f"- {text}.")
         for each in qualities[experiment.name]:
@@ -232,8 +203,7 @@ def plot(
     channel: Annotated[
         str | None,
         option(
-            "An encoder or position: raw against smoothed, and its speed. A rectified current: "
-            "measured against simulated.",
+            "The channel: a position with its speed, another against what the axis's drive does.",
             metavar="NAME",
         ),
     ] = None,
@@ -244,6 +214,10 @@ def plot(
 
     The overview is one figure for each axis and eight runs, numbered if there
     are several.
+
+    For example:
+      swashplate campaign plot harbour/campaign.toml --out overview.png
+      swashplate campaign plot --run hoistr6 --channel counts --from 5.8 --to 6.6
     """
     from swashplate.campaign import Campaign
     from swashplate.report.figures import plot_campaign
@@ -278,34 +252,37 @@ def _close_look(
     begin: float | None,
     end: float | None,
 ) -> None:
-    channel = campaign[run][name]
+    from swashplate.identification.drive_model import SIGNALS
+
+    experiment, channel = campaign[run], campaign[run][name]
     first, last = float(channel.time[0]), float(channel.time[-1])
     window = (first if begin is None else begin, last if end is None else end)
     how = {"window": None if begin is end is None else window, "title": f"{run}, {name}"}
-    if channel.is_position:
-        files.draw(out, "plot_encoder", channel, **how)
-        return
-    if channel.kind != "rectified_current":
-        raise InputError(
-            f"{run} {name} is a {channel.kind}; a close look is for encoders, positions and "
-            "rectified currents."
-        )
-    signal, drive = campaign[run].input, campaign.drive(campaign[run].axis)
-    simulation = drive.simulate(signal.values, time=signal.time, interpolation=signal.interpolation)
-    files.draw(out, "plot_current", channel, simulation, **how)
+    simulated = None
+    known = channel.kind in SIGNALS and campaign.axes[experiment.axis].drive is not None
+    if known and not channel.is_position:
+        from swashplate.identification import predict
+
+        found = predict(campaign.drive(experiment.axis), [experiment])
+        simulated = next((each.simulated for each in found if each.channel == name), None)
+    files.draw(out, "plot_channel", channel, simulated, **how)
 
 
 def schema() -> None:
-    """Print a campaign file's JSON Schema, for editors that check while one writes."""
+    """Print a campaign file's JSON Schema, for editors that check while one writes.
+
+    For example:
+      swashplate campaign schema > campaign.schema.json
+    """
     from swashplate.campaign import json_schema
 
     typer.echo(json_schema(), nl=False)
 
 
-command(app, "init", INIT_EXAMPLES)(init)
-command(app, "check", CHECK_EXAMPLES)(check)
-command(app, "plot", PLOT_EXAMPLES)(plot)
-command(app, "schema", SCHEMA_EXAMPLES)(schema)
+command(app, "init")(init)
+command(app, "check")(check)
+command(app, "plot")(plot)
+command(app, "schema")(schema)
 
 
 def rig(
@@ -335,6 +312,13 @@ def rig(
     drive that is simulated, not the one that a fit starts from. Fit it as you
     would your machine's logs, then look into truth/. Every file says that it is
     virtual.
+
+    For example:
+      swashplate rig hoist --out virtual-hoist
+      swashplate rig slew --out worn --seed 7 --severity harsh --backlash-deg 0.1
+      swashplate rig hoist --out loaded --set load_torque=30kN*m --set motor_leakage=1e-6
+      swashplate rig hoist --out short --maneuver step:4 --maneuver sine:6,0.2 --perturb 0.1
+      swashplate campaign check virtual-hoist/campaign.toml
     """
     from swashplate.campaign import rig as bench
     from swashplate.tables import Column, Table
@@ -377,6 +361,11 @@ def guess(
     For a machine of unknown numbers: needs the command and a speed or a position,
     no current. Writes a drive to start a fit from, start.toml, and what the fit
     is to change within which bounds, setup.toml.
+
+    For example:
+      swashplate campaign init logs/*.csv --drive neutral
+      swashplate guess logs/campaign.toml
+      swashplate fit logs/campaign.toml --from logs/start.toml --setup logs/setup.toml
     """
     from swashplate.campaign import fit_configuration, guess_drive, guess_table, guessed_set
     from swashplate.drive import Drive

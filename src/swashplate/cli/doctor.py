@@ -15,10 +15,6 @@ from swashplate.__about__ import __version__
 from swashplate.cli.terminal import note, say, show, working
 from swashplate.tables import Column, Table
 
-EXAMPLES = """\
-Examples:
-  swashplate doctor
-"""
 LIBRARIES = ("numpy", "scipy", "numba", "polars", "pydantic", "matplotlib", "jinja2", "h5py")
 """Whose versions matter when a result or a figure differs."""
 
@@ -37,7 +33,6 @@ EXTRAS = (
     Extra("dask", "distributed", "fit --dask: many starts on a cluster"),
     Extra("fmu", "fmpy", "an FMU compared with the drive, export.compare"),
     Extra("mdf", "asammdf", "logs in ASAM MDF 4 (.mf4)"),
-    Extra("sensitivity", "SALib", "swashplate sensitivity, Sobol indices"),
     Extra("tdms", "npTDMS", "logs in National Instruments' TDMS"),
 )
 FULL_SPEED_DEG_S = 196.0
@@ -51,6 +46,9 @@ def doctor() -> None:
 
     Paste what it prints into a question or a report of a problem. Exit code 1
     if the simulation does not give the published speed.
+
+    For example:
+      swashplate doctor
     """
     show(_versions(), _machine(), _extras())
     with working("Simulating the hoist"):

@@ -12,9 +12,7 @@ import typer
 from swashplate.cli.options import (
     AxisName,
     CampaignPath,
-    Figures,
     OwnModel,
-    PrintFigures,
     Required,
     Seed,
     SetupWord,
@@ -24,11 +22,10 @@ from swashplate.cli.options import (
 )
 from swashplate.cli.terminal import (
     Shown,
-    Timing,
+    bullets,
     check_free,
     long_work,
     note,
-    progress,
     say,
     show,
     side,
@@ -36,6 +33,7 @@ from swashplate.cli.terminal import (
     working,
 )
 from swashplate.cli.words import (
+    CONFIGURATION,
     DRIVE,
     NUMBERS,
     campaign_of,
@@ -66,32 +64,6 @@ if TYPE_CHECKING:
     from swashplate.identification.validation import RunQuality
     from swashplate.parameters.parameter_set import ParameterSet
 
-FIT_EXAMPLES = """\
-Examples:
-  swashplate rig hoist --out virtual --perturb 0.1
-  swashplate fit virtual/campaign.toml --out fitted
-  swashplate fit harbour/campaign.toml --setup mine.toml --starts 50 --seed 1
-  swashplate fit harbour/campaign.toml --folds 5 --bootstrap 1000 --profile Z16_plus
-  swashplate fit valve/campaign.toml --model valve.py
-  swashplate simulate fitted/drive.toml step:9
-"""
-VALIDATE_EXAMPLES = """\
-Examples:
-  swashplate validate fitted/drive.toml virtual/campaign.toml
-  swashplate validate hoist harbour/campaign.toml --role all --out validation
-"""
-REPORT_EXAMPLES = """\
-Examples:
-  swashplate fit virtual/campaign.toml --out fitted
-  swashplate report fitted virtual/campaign.toml --truth virtual/truth
-  swashplate report fitted virtual/campaign.toml --figures pdf
-  swashplate report fitted virtual/campaign.toml --pdf report.pdf
-"""
-DEMO_EXAMPLES = """\
-Examples:
-  swashplate demo
-  swashplate demo --out results --seed 3
-"""
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as of other programs."""
 FEWEST_DRAWS = 40
@@ -152,17 +124,23 @@ def fit(
     require: Required = 10.0,
     report: Annotated[bool, option("Write report.html, one file that works offline.")] = True,
     pdf: PrintedReport = None,
-    figures: PrintFigures = None,
-    timing: Annotated[bool, option("Say how long each part took.", "--timing")] = False,
 ) -> None:
     """Identify a drive, or a model of your own, from its tests.
 
     Fits the runs with the role 'fit', stage after stage, predicts those with the
-    role 'validate', and says what the data can and cannot tell. Writes the drive
-    as a parameter file that 'simulate' takes, the estimates with their intervals,
-    and what 'report' needs to write the report again. Ctrl-C keeps the best so
-    far, of several starts those that ended, and the exit code is 130. It is 1 if
-    the result is not usable.
+    role 'validate', and says what the data determine. Writes the drive as a
+    parameter file that 'simulate' takes, the fit configuration, the estimates
+    with their intervals, and what 'report' needs to write the report again.
+    Ctrl-C keeps the best so far, of several starts those that ended, and the exit
+    code is 130. It is 1 if the result is not usable.
+
+    For example:
+      swashplate rig hoist --out virtual --perturb 0.1
+      swashplate fit virtual/campaign.toml --out fitted
+      swashplate fit harbour/campaign.toml --setup mine.toml --starts 50 --seed 1
+      swashplate fit harbour/campaign.toml --folds 5 --bootstrap 1000 --profile Z16_plus
+      swashplate fit valve/campaign.toml --model valve.py
+      swashplate simulate fitted/drive.toml step:9
     """
     if 0 < bootstrap < FEWEST_DRAWS:
         raise InputError(
@@ -171,10 +149,10 @@ def fit(
         )
     check_folder(out)
     if not resume:
-        made = (DRIVE, NUMBERS, "estimates.csv", STORED, *(["report.html"] if report else []))
+        made = [DRIVE, CONFIGURATION, NUMBERS, "estimates.csv", STORED]
+        made += ["report.html"] if report else []
         check_free(*(out / each for each in made))
-    _check_shown(out, report, pdf, figures)
-    clock = Timing()
+    _check_printed(report, pdf)
     if model is not None and (setup is not None or begin is not None or joint):
         raise InputError(f"{model} says what is free and where it begins: leave out the others.")
     with working("Starting"):
@@ -185,7 +163,6 @@ def fit(
         from swashplate.identification.own_model import ModelSetup
         from swashplate.identification.solving import longest_left
         from swashplate.identification.staging import setup_of
-    clock.ended("start")
     with working(f"Reading {path}"):
         campaign, chosen = campaign_of(path, axis)
         runs = runs_to_fit(campaign, chosen)
@@ -197,7 +174,6 @@ def fit(
             plan = setup_of(campaign, chosen, setup)
             drive = campaign.drive(chosen) if begin is None else None
             nominal = parameters_of(begin or "") if drive is None else drive.parameters
-    clock.ended("reading")
     executor = Dask(dask) if dask is not None else Processes(jobs or None)
     begun = perf_counter()
     with long_work("Fitting") as shown:
@@ -212,8 +188,7 @@ def fit(
         result = fitted(nominal, runs, plan, loss=loss, search=search, watch=watch)
         if joint and len(plan.stages) > 1 and not result.interrupted:
             result = refined(result, runs, watch=watch)
-    seconds = perf_counter() - begun
-    clock.ended("search, kernels loaded")
+    searched = perf_counter()
     if result.interrupted and starts:
         last = result.stages[-1]
         note(
@@ -224,17 +199,17 @@ def fit(
     wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, loss, require / 100.0)
     with working("Judging") as status:
         found = judge_fit(campaign, chosen, runs, nominal, plan, result, wanted, status.update)
-    clock.ended("judging")
+    judged = perf_counter()
     lines = _written(found, out)
-    lines += _shown(found, out, report=report, pdf=pdf, figures=figures)
-    clock.ended("report and files")
-    note(f"{campaign.title}{' (virtual)' if campaign.virtual else ''}: fitted in {seconds:.2f} s")
+    lines += _shown(found, out, report=report, pdf=pdf)
+    virtual = " (virtual)" if campaign.virtual else ""
+    note(
+        f"{campaign.title}{virtual}: searched for {searched - begun:.2f} s, judged for "
+        f"{judged - searched:.2f} s, wrote for {perf_counter() - judged:.2f} s"
+    )
     _say_fit(found)
     for line in lines:
         note(line)
-    if timing:
-        clock.ended("tables")
-        show(clock.table())
     if result.interrupted:
         note("Interrupted: this is the best so far, not an optimum.")
         raise typer.Exit(INTERRUPTED)
@@ -284,9 +259,9 @@ def _say_fit(found: Judged) -> None:
         show(estimates_table(each, bootstrap=bootstrap))
         say(f"{name}: {solution.message} after {solution.evaluations} evaluations.")
         drawn = () if bootstrap is None else bootstrap.sentences()
-        _listed(each.identifiability.sentences(), each.uncertainty.sentences(), drawn)
+        bullets(each.identifiability.sentences(), each.uncertainty.sentences(), drawn)
     for profile in found.profiles:
-        _listed(profile.profile.sentences(found.name_of(profile)))
+        bullets(profile.profile.sentences(found.name_of(profile)))
     say(fixed_line(found.result))
     note("")
     note("Runs that were fitted")
@@ -296,13 +271,7 @@ def _say_fit(found: Judged) -> None:
         show(*runs_tables(found.predicted))
     if found.folds is not None:
         show(folds_tables(found.folds, found.assessments)[0])
-        _listed(found.folds.sentences())
-
-
-def _listed(*groups: Sequence[str]) -> None:
-    for group in groups:
-        for sentence in group:
-            say(f"- {sentence}")
+        bullets(found.folds.sentences())
 
 
 def _written(found: Judged, out: Path) -> list[str]:
@@ -311,6 +280,7 @@ def _written(found: Judged, out: Path) -> list[str]:
 
     from swashplate.drive import Drive
     from swashplate.identification.own_model import ModelParameters
+    from swashplate.identification.setup import setup_text
     from swashplate.identification.tables import estimates_table
 
     made_folder(out)
@@ -321,7 +291,8 @@ def _written(found: Judged, out: Path) -> list[str]:
         lines = [f"Numbers:   {out / NUMBERS}"]
     else:
         Drive(found.fitted_set()).to_toml(out / DRIVE)
-        lines = [f"Drive:     {out / DRIVE}"]
+        write_text(setup_text(found.result.setup), out / CONFIGURATION)
+        lines = [f"Drive:     {out / DRIVE}", f"Settings:  {out / CONFIGURATION}"]
     tables = [
         estimates_table(each, bootstrap=found.bootstraps.get(each.stage.stage.name), own=own)
         for each in found.assessments
@@ -338,11 +309,9 @@ def _shown(
     *,
     report: bool = True,
     pdf: Path | None = None,
-    figures: Figures | None = None,
     truth: ParameterSet | None = None,
 ) -> list[str]:
-    """Write the report and the figures for print; lines that say so."""
-    from swashplate.report.figures import save_fit_figures
+    """Write the report, and print it; lines that say so."""
     from swashplate.report.fit_report import print_report, write_fit_report
 
     what, lines = (found.result, found.campaign), []
@@ -364,23 +333,11 @@ def _shown(
         with working("Printing the report"):
             print_report(out / "report.html", pdf)
         lines.append(f"Printed:   {pdf}")
-    if figures is not None:
-        with working("Drawing"):
-            paths = save_fit_figures(
-                *what,
-                out / "figures",
-                figures,
-                assessments=found.assessments,
-                validation=found.predicted,
-            )
-        lines.append(f"Figures:   {len(paths)} in {out / 'figures'}")
     return lines
 
 
-def _check_shown(out: Path, report: bool, pdf: Path | None, figures: Figures | None) -> None:
-    """See to it, before long work, that figures and a printed report can be written."""
-    if figures is not None:
-        check_free(out / "figures")
+def _check_printed(report: bool, pdf: Path | None) -> None:
+    """See to it, before long work, that a printed report can be written."""
     if pdf is None:
         return
     from swashplate.report.fit_report import find_browser
@@ -406,7 +363,7 @@ def _say_verdict(verdict: Verdict) -> None:
     show(criteria_table(verdict))
     if verdict.assumed:
         say("Assumed, cannot be checked from these logs:")
-    _listed(verdict.assumed)
+    bullets(verdict.assumed)
     if not verdict.usable:
         side.print(verdict.headline)
         raise typer.Exit(1)
@@ -430,23 +387,23 @@ def validate(
         Path | None, option("Folder for report.html and measures.csv.", metavar="DIR")
     ] = None,
     require: Required = 10.0,
-    figures: PrintFigures = None,
 ) -> None:
     """Predict runs from their command alone and judge the drive by them.
 
     Prints errors run by run, what is left in the residuals, and a verdict. The
     exit code is 1 if the drive is not usable for these runs.
+
+    For example:
+      swashplate validate fitted/drive.toml virtual/campaign.toml
+      swashplate validate hoist harbour/campaign.toml --role all --out validation
     """
     from swashplate.identification import tables
     from swashplate.identification.acceptance import verdict
     from swashplate.identification.validation import predict, with_speeds
 
-    if figures is not None and out is None:
-        raise InputError("--figures needs a folder to write them to: give --out DIR.")
     if out is not None:
         check_folder(out)
         check_free(out / "measures.csv", out / "report.html")
-        _check_shown(out, True, None, figures)
     with working(f"Reading {path}"):
         parameters: Parameters | None = None if model else parameters_of(drive)
         campaign, chosen = campaign_of(path, axis)
@@ -469,16 +426,14 @@ def validate(
     lines = []
     if out is not None:
         with working("Writing the report"):
-            lines = _validation_written(
-                parameters, campaign, predicted, judged, out, figures, drive
-            )
+            lines = _validation_written(parameters, campaign, predicted, judged, out, drive)
     virtual = " (virtual)" if campaign.virtual else ""
     note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
     show(*tables.runs_tables(qualities))
     say(MEASURES)
     show(tables.residual_table(predicted))
     say(RESIDUALS)
-    _listed(judged.sentences)
+    bullets(judged.sentences)
     for line in lines:
         note(line)
     _say_verdict(judged)
@@ -490,14 +445,12 @@ def _validation_written(
     predicted: Sequence[RunQuality],
     judged: Verdict,
     out: Path,
-    figures: Figures | None,
     drive: str,
 ) -> list[str]:
     """Write the report and its tables; lines that say so."""
     from swashplate.identification.assessment import versions
     from swashplate.identification.tables import runs_tables
     from swashplate.identification.validation import with_speeds
-    from swashplate.report.figures import save_run_figures
     from swashplate.report.fit_report import write_validation_report
 
     made_folder(out)
@@ -506,11 +459,7 @@ def _validation_written(
     write_validation_report(
         parameters, campaign, out / "report.html", predicted, judged=judged, notes=notes
     )
-    lines = [f"Measures:  {out / 'measures.csv'}", f"Report:    {out / 'report.html'}"]
-    if figures is not None:
-        paths = save_run_figures(predicted, campaign, out / "figures", figures)
-        lines.append(f"Figures:   {len(paths)} in {out / 'figures'}")
-    return lines
+    return [f"Measures:  {out / 'measures.csv'}", f"Report:    {out / 'report.html'}"]
 
 
 def report(
@@ -522,7 +471,6 @@ def report(
         option("Folder for report.html; by default where the fit is.", metavar="DIR"),
     ] = None,
     pdf: PrintedReport = None,
-    figures: PrintFigures = None,
     data: Annotated[
         Path | None,
         option(
@@ -543,6 +491,11 @@ def report(
 
     Nothing is fitted. The campaign must be the one that was fitted: if its
     samples, weights or ignored windows have changed, the report is refused.
+
+    For example:
+      swashplate fit virtual/campaign.toml --out fitted
+      swashplate report fitted virtual/campaign.toml --truth virtual/truth
+      swashplate report fitted virtual/campaign.toml --pdf report.pdf
     """
     from swashplate.campaign import Campaign
     from swashplate.identification.assessment import judge_stored
@@ -555,7 +508,7 @@ def report(
     folder = fitted if fitted.is_dir() else fitted.parent
     if out is not None and out != folder:  # the fit's own report is written again
         check_free(out / "report.html")
-    _check_shown(out or folder, True, pdf, figures)
+    _check_printed(True, pdf)
     with working(f"Reading {path}"):
         if not (folder / STORED).is_file():
             raise InputError(
@@ -570,7 +523,7 @@ def report(
     with working("Judging"):
         found = judge_stored(campaign, stored)
     place = made_folder(out or folder)
-    for line in _shown(found, place, pdf=pdf, figures=figures, truth=true):
+    for line in _shown(found, place, pdf=pdf, truth=true):
         note(line)
     if data is not None:
         write_samples(shown_runs(found.assessments, found.predicted), data)
@@ -608,6 +561,10 @@ def demo(
     Kruse (2001) through a 12-bit command, an ammeter and an encoder, fits card,
     pump and motor to ten of them, predicts the other three and writes a report.
     Takes less than a minute. An earlier demo is replaced.
+
+    For example:
+      swashplate demo
+      swashplate demo --out results --seed 3
     """
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
@@ -620,7 +577,7 @@ def demo(
     if not (out / "virtual" / "truth").is_dir():  # an earlier demo is replaced, nothing else
         check_free(out)
     setup = load_setup("hoist")
-    with progress(5) as begin:
+    with long_work("", 5) as begin:
         begin("testing the virtual hoist")
         truth = drawn(Drive.preset("hoist"), setup, seed)
         tests = rig.run("hoist", truth=truth, seed=seed)

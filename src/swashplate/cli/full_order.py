@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from swashplate.cli.options import (
     DriveChoice,
@@ -12,21 +12,10 @@ from swashplate.cli.options import (
     argument,
     option,
 )
-from swashplate.cli.terminal import Outputs, note, progress, say, show, working
+from swashplate.cli.terminal import Outputs, long_work, note, say, show, working
 from swashplate.cli.words import physical_values, simulated
 from swashplate.errors import InputError
 from swashplate.tables import FIGURE, TABLE
-
-Method = Literal["march", "radau"]
-
-EXAMPLES = """\
-Examples:
-  swashplate full-order hoist
-  swashplate full-order hoist step:9 --plot full.png
-  swashplate full-order fitted/drive.toml sine:4,1 --like luff
-  swashplate full-order hoist step:4 --physical load_torque=2kN*m --out run.csv
-  swashplate full-order hoist log.csv --interpolation previous --method radau
-"""
 
 
 def full_order(
@@ -54,9 +43,6 @@ def full_order(
             metavar="NAME=VALUE",
         ),
     ] = None,
-    method: Annotated[
-        Method, option("How the five states are integrated: march, or radau to check it by.")
-    ] = "march",
     out: TableFile = None,
     plot: FigureFile = None,
     *,
@@ -68,14 +54,17 @@ def full_order(
     physical values are completed from the drive's parameters and from assumed
     ones. Prints these, the modes, and by how much the speed of the one-state
     model differs. What is assumed can be replaced by what you know.
+
+    For example:
+      swashplate full-order hoist
+      swashplate full-order hoist step:9 --plot full.png
+      swashplate full-order fitted/drive.toml sine:4,1 --like luff
+      swashplate full-order hoist step:4 --physical load_torque=2kN*m --out run.csv
+      swashplate full-order hoist log.csv --interpolation previous
     """
     files = Outputs((out, TABLE), (plot, FIGURE))
     if command is None and plot is not None:
         raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
-    if command is None and method != "march":
-        raise InputError(
-            f"--method {method} checks one run; name a maneuver or a log, such as step:9."
-        )
     given = physical_values(physical or ())
     with working("Completing the physical values"):
         from swashplate.full_order import FullOrderDrive, comparison, physical_set
@@ -92,7 +81,7 @@ def full_order(
         from swashplate.equations.marching.record import least_substeps
 
         least_substeps(sampling.rate)  # one out of range is refused before anything is sampled
-        with progress(len(comparison.TABLE_MANEUVERS)) as begin:
+        with long_work("", len(comparison.TABLE_MANEUVERS)) as begin:
             found = comparison.validity(full, sampling.rate, begin=begin)
         files.write(out, "Table", found.write)
         said = f"{len(found.rows)} maneuvers"
@@ -101,7 +90,7 @@ def full_order(
     else:
         with working("Simulating"):
             name, run = simulated(full.drive, command, sampling)
-            both = comparison.compare(full, run, start=sampling.start, method=method)
+            both = comparison.compare(full, run, start=sampling.start)
         title = f"{drive.title}, {name}"
         files.write(out, "All signals, in SI", both.write)
         files.draw(plot, "plot_full_order", both, title=f"{title}, five states against one")

@@ -15,24 +15,10 @@ if TYPE_CHECKING:
     from swashplate.drive import Drive
     from swashplate.linear import LinearDrive
 
-LINEARIZE_EXAMPLES = """\
-Examples:
-  swashplate linearize hoist --at 4
-  swashplate linearize hoist --speed-deg-s -50 --loop-gain 0.1
-  swashplate linearize slew --at 2 --sample-time 0.01 --out slew.toml
-  swashplate linearize luff --current 0 --input solenoid_force
-"""
-BODE_EXAMPLES = """\
-Examples:
-  swashplate bode hoist
-  swashplate bode hoist --amplitude 1 --amplitude 9 --plot bode.png
-  swashplate bode slew --bias 3 --amplitude 0.1 --linear-at 3 --out bode.csv
-"""
 MOST_POINTS = 2000
 AMPLITUDES = (1.0, 4.0, 6.5, 9.0)
 
 Input = Literal["voltage", "current", "solenoid_force"]
-Coulomb = Literal["ignored", "tangent"]
 
 
 def linearize(
@@ -49,13 +35,6 @@ def linearize(
         Input | None,
         option("What moves the model; by default the voltage, or the current with --current."),
     ] = None,
-    coulomb: Annotated[
-        Coulomb,
-        option(
-            "The card's Coulomb term: left out, or with its slope at rest, which only motions "
-            "below 0.01 A/s see."
-        ),
-    ] = "ignored",
     sample_time: Annotated[
         float | None,
         option("Sample the model, with the recurrences of the simulation.", metavar="S"),
@@ -79,6 +58,12 @@ def linearize(
     Prints the operating point, the gain, the lag of the pump, the poles, the
     bandwidth and what a speed loop closed over the drive can bear. The model is
     exact for small motions; 'swashplate bode' shows what becomes of large ones.
+
+    For example:
+      swashplate linearize hoist --at 4
+      swashplate linearize hoist --speed-deg-s -50 --loop-gain 0.1
+      swashplate linearize slew --at 2 --sample-time 0.01 --out slew.toml
+      swashplate linearize luff --current 0 --input solenoid_force
     """
     from swashplate.linear import LINEAR_MODEL, DeadZoneError, model_tables
 
@@ -92,13 +77,9 @@ def linearize(
         raise InputError("--input voltage needs --at or --speed-deg-s, not --current.")
     with working("Linearising"):
         chosen = drive.chosen
-        if coulomb == "tangent" and chosen.parameters.coulomb_sign == "literal":
-            raise InputError(
-                "The literal sign of the card's Coulomb term has no slope; take --coulomb ignored."
-            )
         speed = None if speed_deg_s is None else radians(speed_deg_s)
         try:
-            model = chosen.linearize(at, current=current, speed=speed, input=input, coulomb=coulomb)
+            model = chosen.linearize(at, current=current, speed=speed, input=input)
         except DeadZoneError as error:
             raise DomainError(
                 f"{error.where}; {error.instead}, or the pump alone with "
@@ -110,13 +91,11 @@ def linearize(
         tables = model_tables(model, frequency, gain)
     files.write(out, "Model, in SI", model.write)
     kind = "" if model.sample_time is None else f", sampled at {model.sample_time:g} s"
-    note(f"{drive.title}, small motions of the {model.input.replace('_', ' ')}{kind}")
-    for line in drive.changes:
-        note(line)
+    drive.note(f"{drive.title}, small motions of the {model.input.replace('_', ' ')}{kind}")
     for switch in model.operating_point.one_sided:
         note(f"One-sided at the {switch}.")
-    if model.input == "voltage" and coulomb == "ignored" and _has_coulomb(model):
-        note("The card's Coulomb term C is left out; --coulomb tangent takes it in.")
+    if model.input == "voltage" and _has_coulomb(model):
+        note("The card's Coulomb term C, which only motions below 0.01 A/s see, is left out.")
     show(*tables)
     files.say()
 
@@ -157,6 +136,11 @@ def bode(
     those of its first harmonic, the distortion is all the rest of it. Prints the
     gain, the phase and the time by which the speed lags at one frequency: what a
     controller that is to damp a swing of that frequency has to make up for.
+
+    For example:
+      swashplate bode hoist
+      swashplate bode hoist --amplitude 1 --amplitude 9 --plot bode.png
+      swashplate bode slew --bias 3 --amplitude 0.1 --linear-at 3 --out bode.csv
     """
     import numpy as np
 
@@ -177,9 +161,7 @@ def bode(
     files.write(out, "Gain, phase and distortion, in SI", response.write)
     files.draw(plot, "plot_bode", response, linear=linear, mark=frequency)
     span = f"{grid.size} frequencies from {grid[0]:g} to {grid[-1]:g} Hz"
-    note(f"{drive.title}, sines about {bias:g} V: {span}")
-    for line in drive.changes:
-        note(line)
+    drive.note(f"{drive.title}, sines about {bias:g} V: {span}")
     note(f"At {frequency:g} Hz:")
     show(made)
     files.say()

@@ -11,14 +11,6 @@ from swashplate.cli.words import campaign_of, drive_file, maneuver_of
 from swashplate.errors import InputError
 from swashplate.tables import PAGE, check_place, ending
 
-EXAMPLES = """\
-Examples:
-  swashplate live fitted campaign.toml
-  swashplate live hoist --maneuver step:9 --out hoist.html
-  swashplate live fitted campaign.toml --scale orifice=1.5
-"""
-
-
 def live(
     drive: DriveChoice,
     path: Annotated[
@@ -36,6 +28,11 @@ def live(
     One file that works offline: open it in a browser, move a slider, and the
     simulated curves, their errors and the limits follow. Changed values stand
     below as lines to put into the drive's file.
+
+    For example:
+      swashplate live fitted campaign.toml
+      swashplate live hoist --maneuver step:9 --out hoist.html
+      swashplate live fitted campaign.toml --scale orifice=1.5
     """
     if (path is None) == (maneuver is None):
         raise InputError("Name a campaign, or a maneuver with --maneuver; one of them.")

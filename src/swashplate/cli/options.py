@@ -15,15 +15,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
 import typer
 
-from swashplate.cli.terminal import FORCED
-from swashplate.units import shown_in
+from swashplate.cli.terminal import FORCED, note
+from swashplate.units import show_rod, shown_in
 
 if TYPE_CHECKING:
     from swashplate.drive import Drive
 
 Interpolation = Literal["linear", "previous"]
 Start = Literal["rest", "steady"]
-Figures = Literal["svg", "pdf"]
 
 
 def option(help: str, *names: str, metavar: str | None = None, **more: Any) -> Any:
@@ -82,9 +81,6 @@ SetFile = Annotated[
     Path | None, option("Write the changed drive as a parameter file.", metavar="SET.toml")
 ]
 FigureFile = Annotated[Path | None, option("Draw a figure: .png, .svg or .pdf.", metavar="FILE")]
-PrintFigures = Annotated[
-    Figures | None, option("Figures for print as well, in the folder figures.")
-]
 Required = Annotated[float, option("Largest error of held-out runs, in % of their range.", min=0.0)]
 Seed = Annotated[int, option("Of everything drawn at random.", min=0)]
 Levers = Annotated[
@@ -128,7 +124,10 @@ class DriveChoice:
         """The drive."""
         from swashplate.cli.words import drive_of
 
-        return drive_of(self.drive, self.values or (), self.factors or ())
+        made = drive_of(self.drive, self.values or (), self.factors or ())
+        if made.parameters.motion == "rod":
+            show_rod()
+        return made
 
     @property
     def title(self) -> str:
@@ -142,6 +141,11 @@ class DriveChoice:
         from swashplate.cli.words import changes_between, parameters_of
 
         return changes_between(parameters_of(self.drive), self.chosen.parameters)
+
+    def note(self, heading: str) -> None:
+        """Print a heading, and below it what is changed."""
+        for line in (heading, *self.changes):
+            note(line)
 
 
 @dataclass(frozen=True)
@@ -201,14 +205,17 @@ class ShownUnits:
     ] = None
 
 
-WRITTEN = {"out", "plot", "write", "pdf", "figures", "fmu", "c", "wasm"}
+WRITTEN = {"out", "plot", "write", "pdf", "fmu", "c", "wasm"}
 """Parameters of commands that write files, and so replace older ones with --force alone."""
 
 
 def command(
-    app: typer.Typer, name: str, examples: str, panel: str | None = None
+    app: typer.Typer, name: str, examples: str = "", panel: str | None = None
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Register a command with its examples, its groups spread, --force and units added."""
+    """Register a command: its groups spread, --force and units added.
+
+    Examples at the end of its docstring are shown below its options.
+    """
 
     def register(function: Callable[..., None]) -> Callable[..., None]:
         hints = get_type_hints(function, include_extras=True)
@@ -233,11 +240,15 @@ def command(
             with shown_in([each.strip() for each in units.split(",") if each.strip()], drum):
                 function(**words)
 
-        run.__doc__ = function.__doc__
+        text, head, shown = inspect.cleandoc(function.__doc__ or "").partition("\n\nFor example:")
+        run.__doc__ = text
+        run.__wrapped__ = function  # type: ignore[attr-defined]
         # Typer reads the options off the signature, which functions have without declaring it
         run.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
         run.__annotations__ = {each.name: each.annotation for each in flat}
-        app.command(name, epilog=examples, rich_help_panel=panel)(run)
+        app.command(name, epilog=f"Examples:{shown}" if head else examples, rich_help_panel=panel)(
+            run
+        )
         return function
 
     return register

@@ -1,7 +1,8 @@
-"""``swashplate simulate``, ``compare``, ``axes``, ``show`` and ``tour``: drives under commands."""
+"""``swashplate simulate``, ``compare``, ``axes`` and ``show``: drives under commands."""
 
 from __future__ import annotations
 
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,40 +18,20 @@ from swashplate.cli.options import (
     argument,
     option,
 )
-from swashplate.cli.terminal import Outputs, check_free, note, progress, say, show, working
-from swashplate.cli.words import drive_of, maneuver_of, simulated
-from swashplate.tables import FIGURE, TABLE, check_folder, made_folder
+from swashplate.cli.terminal import Outputs, note, say, show, working
+from swashplate.cli.words import (
+    changes_between,
+    drive_of,
+    maneuver_of,
+    parameters_of,
+    simulated,
+)
+from swashplate.documents import parse_toml
+from swashplate.tables import FIGURE, TABLE, Column, Table
 
 if TYPE_CHECKING:
     from swashplate.drive import Drive
     from swashplate.simulation.result import Simulation
-
-SIMULATE_EXAMPLES = """\
-Examples:
-  swashplate simulate hoist step:9
-  swashplate simulate hoist "step +9 V" --plot step.png --units rpm
-  swashplate simulate hoist sine:6.5,0.1 --set Z16_plus=0.12mm --out sine.csv
-  swashplate simulate mine.toml log.csv --interpolation previous --out run.csv
-"""
-COMPARE_EXAMPLES = """\
-Examples:
-  swashplate compare hoist luff
-  swashplate compare hoist mine.toml --maneuver sine:6.5,0.1 --plot both.png
-"""
-AXES_EXAMPLES = """\
-Example:
-  swashplate axes
-"""
-SHOW_EXAMPLES = """\
-Examples:
-  swashplate show hoist
-  swashplate show hoist --toml > mine.toml    (a start for your own drive)
-"""
-TOUR_EXAMPLES = """\
-Examples:
-  swashplate tour
-  swashplate tour --out results/tour
-"""
 
 
 def simulate(
@@ -59,6 +40,8 @@ def simulate(
     sampling: Simulating,
     out: TableFile = None,
     plot: FigureFile = None,
+    begin: Annotated[float | None, option("Plot from here on.", "--from", metavar="S")] = None,
+    end: Annotated[float | None, option("Plot up to here.", "--to", metavar="S")] = None,
 ) -> None:
     """Simulate a drive over a maneuver or a measured voltage.
 
@@ -66,6 +49,12 @@ def simulate(
     and how long each of its limits held it back, the dead zone only while the
     command is not 0 V. --out writes every signal of the chain, --plot draws
     them. 'swashplate --help' lists the maneuvers.
+
+    For example:
+      swashplate simulate hoist step:9
+      swashplate simulate hoist "step +9 V" --plot step.png --units rpm
+      swashplate simulate hoist sine:6.5,0.1 --set Z16_plus=0.12mm --out sine.csv
+      swashplate simulate mine.toml log.csv --interpolation previous --out run.csv
     """
     files = Outputs((out, TABLE), (plot, FIGURE))
     with working("Simulating"):
@@ -74,11 +63,13 @@ def simulate(
         name, run = simulated(drive.chosen, command, sampling)
         tables, title = run_tables(run), f"{drive.title}, {name}"
     files.write(out, "All signals, in SI", run.write)
-    files.draw(plot, "plot_simulation", run, title=title)
+    window = None
+    if begin is not None or end is not None:
+        first, last = float(run.time[0]), float(run.time[-1])
+        window = (first if begin is None else begin, last if end is None else end)
+    files.draw(plot, "plot_simulation", run, window=window, title=title)
     duration = f"{run.time[-1] - run.time[0]:.6g} s"
-    note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
-    for line in drive.changes:
-        note(line)
+    drive.note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
     show(*tables)
     files.say()
 
@@ -98,6 +89,10 @@ def compare(
     The settled speed is the one that the maneuver's largest voltage would lead
     to if it were held. The time to 90 % of it counts from the moment at which
     the voltage first changes. --out writes the voltage and both speeds.
+
+    For example:
+      swashplate compare hoist luff
+      swashplate compare hoist mine.toml --maneuver sine:6.5,0.1 --plot both.png
     """
     from swashplate.equations.marching.record import least_substeps
 
@@ -142,23 +137,20 @@ def _write_speeds(runs: dict[str, Simulation], path: Path) -> None:
 
 
 def axes() -> None:
-    """List the packaged drives, their speeds and control cards."""
-    from swashplate.drive import Drive
-    from swashplate.parameters.files import preset_names
-    from swashplate.tables import Column, Table
+    """List the packaged drives and their control cards.
 
-    with working("Reading"):
-        drives = [Drive.preset(name) for name in preset_names()]
-        columns = [
-            Column(f"at {volts:+d} V" if volts else "at 0 V", "z.2f", "rad/s")
-            for volts in (-10, 0, 10)
-        ]
-        made = Table(
-            "Settled speeds", (Column("name"), Column("drive and card", wrap=True), *columns)
-        )
-        for drive in drives:
-            what = f"{drive.parameters.title}\n{drive.parameters.card}"
-            made.add(drive.name, what, *drive.steady_speed([-10.0, 0.0, 10.0]), section=True)
+    For example:
+      swashplate axes
+    """
+    # their files as they stand: nothing is checked or compiled for a list of names
+    made = Table("", (Column("name"), Column("drive", wrap=True), Column("control card")))
+    for path in sorted(
+        (resources.files("swashplate.parameters") / "sets").iterdir(), key=lambda p: p.name
+    ):
+        if path.name.endswith(".toml"):
+            found = parse_toml(path.read_text("utf-8"), path.name)
+            card = found["control_card"]
+            made.add(found["name"], found["title"], card if isinstance(card, str) else "its own")
     show(made)
 
 
@@ -172,15 +164,20 @@ def show_parameters(
 
     A parameter with a plus and a minus value has one for each direction; both
     are magnitudes. Units are SI.
+
+    For example:
+      swashplate show hoist
+      swashplate show hoist --toml > mine.toml    (a start for your own drive)
     """
-    parameters = drive.chosen.parameters
+    # in SI: a rod's drive has angles inside, which chosen units of its motion would change
+    parameters = drive_of(drive.drive, drive.values or (), drive.factors or ()).parameters
     if toml:
         from swashplate.parameters.files import dump_set
 
         typer.echo(dump_set(parameters), nl=False)
         return
     say(f"{parameters.name}: {parameters.title}")
-    for line in drive.changes:
+    for line in changes_between(parameters_of(drive.drive), parameters):
         note(line)
     show(*parameters.tables())
     rate = "any rate" if parameters.rate is None else f"{parameters.rate:g} Hz"
@@ -189,43 +186,3 @@ def show_parameters(
         f"{parameters.coulomb_sign}, card_switch {parameters.card_switch}, card's filter for "
         f"{rate}, options {', '.join(sorted(parameters.options)) or 'none'}"
     )
-
-
-def tour(
-    out: Annotated[
-        Path, option("Folder for tables and figures, made if missing.", metavar="FOLDER")
-    ] = Path("tour"),
-) -> None:
-    """Simulate the three packaged axes over all tests of Kruse (2001).
-
-    Writes one table a run, such as hoist/step +9 V.csv, and two figures: all
-    runs at a glance, and the settled speeds over the voltage. Takes some seconds.
-    """
-    from swashplate.analysis.outcomes import overview_table
-    from swashplate.drive import Drive
-    from swashplate.maneuvers import source_tests
-    from swashplate.parameters.files import AXES
-
-    check_folder(out)
-    check_free(out)
-    drives = {axis: Drive.preset(axis) for axis in AXES}
-    tests = {axis: source_tests(axis) for axis in AXES}
-    runs: dict[str, dict[str, Simulation]] = {axis: {} for axis in AXES}
-    with progress(sum(map(len, tests.values())) + 2) as begin:
-        for axis in AXES:
-            folder = made_folder(out / axis)
-            for name, maneuver in tests[axis].items():
-                begin(f"{axis}, {name}")
-                run = drives[axis].simulate(maneuver.sample())
-                run.write(folder / f"{name.replace('/', ' per ')}.csv")
-                runs[axis][name] = run
-        from swashplate.report.figures import plot_maneuvers_overview, plot_steady_map, save_figure
-
-        begin("drawing all runs")
-        save_figure(plot_maneuvers_overview(runs), out / "overview.png")
-        begin("drawing the settled speeds")
-        save_figure(plot_steady_map(drives), out / "steady.png")
-    show(overview_table(runs))
-    note(f"All signals of each run, in SI: {out}/AXIS/MANEUVER.csv")
-    note(f"All runs at a glance: {out / 'overview.png'}")
-    note(f"Settled speed over voltage: {out / 'steady.png'}")

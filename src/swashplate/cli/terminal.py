@@ -7,7 +7,6 @@ from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from textwrap import fill
-from time import perf_counter
 from typing import Any, Protocol
 
 import rich.table
@@ -16,13 +15,12 @@ from rich.console import Console
 from rich.status import Status
 
 from swashplate.errors import FileError
-from swashplate.tables import UNIT, Column, Form, Table, check_place, ending
+from swashplate.tables import UNIT, Form, Table, check_place, ending
 
-BEGUN = perf_counter()
 FORCED: ContextVar[bool] = ContextVar("FORCED", default=False)
 """Whether older files may be replaced: --force."""
-LINE, BETWEEN = 80, 2
-"""Characters of a line, and those between two columns."""
+BETWEEN = 2
+"""Characters between two columns."""
 NARROW = "\N{NO-BREAK SPACE}%"
 LEAST, LONGEST = 9, 30
 """Characters of a head that is broken, and of a name beside too many numbers."""
@@ -73,7 +71,7 @@ def _rich(
             width=widths[place] if widths else None,
             min_width=whole[place] if column.spec else None,
             # a name that is too long goes on in the next line
-            overflow="fold" if widths and not column.spec else "ellipsis",
+            overflow="ellipsis" if column.spec else "fold",
         )
     for row, cells in zip(table.rows, texts[1:], strict=True):
         if row.section:
@@ -123,26 +121,6 @@ def show(*tables: Table) -> None:
     output.print()
 
 
-def widths_of(tables: Iterable[Table]) -> list[int]:
-    """Widths of columns that fit all of several like tables; the first takes what the others leave.
-
-    They stand one above the other when each is printed with `show_in`.
-    """
-    shown = [each.of("t") for each in tables]
-    rows = [shown[0].heads(), *(each.texts(row) for each in shown for row in each.rows)]
-    names, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
-    left = LINE - sum(others) - BETWEEN * len(others)
-    return [max(min(names, left), len(rows[0][0])), *others]
-
-
-def show_in(widths: Sequence[int], table: Table) -> None:
-    """Print a table in columns of given widths."""
-    shown = table.of("t")
-    output.print()
-    output.print(_rich(shown, _texts(shown), widths))
-    output.print()
-
-
 def say(text: str) -> None:
     """Print text, broken into lines where the terminal is narrow."""
     output.print(text)
@@ -151,6 +129,13 @@ def say(text: str) -> None:
 def note(text: str) -> None:
     """Print a line, never broken, so that a path in it can be copied."""
     output.print(text, soft_wrap=True)
+
+
+def bullets(*groups: Iterable[str]) -> None:
+    """Print sentences as a list, group after group."""
+    for group in groups:
+        for sentence in group:
+            say(f"- {sentence}")
 
 
 def say_error(error: Exception) -> None:
@@ -168,45 +153,6 @@ def working(text: str) -> AbstractContextManager[Status]:
     return side.status(f"{text} ...")
 
 
-@contextmanager
-def progress(steps: int) -> Iterator[Callable[[str], None]]:
-    """A bar of so many steps; what it yields begins the next one, by its name."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}", markup=False))
-    bar = Progress(*columns, console=side, transient=True, disable=not side.is_terminal)
-    with bar:
-        task = bar.add_task("", total=steps)
-        begun = 0
-
-        def begin(what: str) -> None:
-            nonlocal begun
-            bar.update(task, completed=begun, description=what, refresh=True)
-            begun += 1
-
-        yield begin
-
-
-class Timing:
-    """Wall time of the parts of a command, from the start of the program on."""
-
-    def __init__(self) -> None:
-        self._last = BEGUN
-        self.parts: dict[str, float] = {}
-
-    def ended(self, part: str) -> None:
-        """A part ends now, which began where the one before ended. [s]"""
-        now = perf_counter()
-        self.parts[part], self._last = now - self._last, now
-
-    def table(self) -> Table:
-        """The parts, and all together."""
-        made = Table("Wall time", (Column("part"), Column("s", ".2f")))
-        for part, seconds in {**self.parts, "all": sum(self.parts.values())}.items():
-            made.add(part, seconds)
-        return made
-
-
 class Shown(Protocol):
     """Says how far a long piece of work is."""
 
@@ -216,8 +162,11 @@ class Shown(Protocol):
 
 
 @contextmanager
-def long_work(text: str) -> Iterator[Shown]:
-    """A bar with what is done now and the time left; nothing in a pipe."""
+def long_work(text: str, steps: int = 0) -> Iterator[Shown]:
+    """A bar with what is done now and the time left; nothing in a pipe.
+
+    Of so many steps, if there are any, each call begins the next one.
+    """
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
     columns = (
@@ -228,9 +177,12 @@ def long_work(text: str) -> Iterator[Shown]:
     )
     bar = Progress(*columns, console=side, transient=True, disable=not side.is_terminal)
     with bar:
-        task = bar.add_task(text, total=None, left="")
+        task, begun = bar.add_task(text, total=None, left=""), 0
 
         def show(what: str, share: float | None = None, left: str = "") -> None:
+            nonlocal begun
+            if steps:
+                share, left, begun = begun / steps, f"{begun} of {steps}", begun + 1
             total = None if share is None else 1.0
             bar.update(task, description=what, total=total, completed=share or 0.0, left=left)
 

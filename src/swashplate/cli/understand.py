@@ -16,14 +16,13 @@ from swashplate.cli.options import (
     FigureFile,
     Levers,
     Sampling,
-    Seed,
     SetFile,
     Simulating,
     TableFile,
     argument,
     option,
 )
-from swashplate.cli.terminal import Outputs, note, say, show, working
+from swashplate.cli.terminal import Outputs, bullets, note, say, show, working
 from swashplate.cli.words import (
     changes_between,
     factors_of,
@@ -39,42 +38,10 @@ if TYPE_CHECKING:
     from swashplate.analysis.limits import LimitShares
     from swashplate.analysis.monte_carlo import Bands
 
-LIMITS_EXAMPLES = """\
-Examples:
-  swashplate limits hoist
-  swashplate limits hoist --plot envelope.png --error 0.05 --frequency 0.3
-  swashplate limits luff sine:9,0.1 --plot timeline.png
-  swashplate limits mine.toml log.csv --interpolation previous --out shares.csv
-"""
-WHATIF_EXAMPLES = """\
-Examples:
-  swashplate whatif hoist --scale orifice=1.5 --scale pump=1.5
-  swashplate whatif slew --scale orifice_diameter=1.2 --maneuver step:6 --plot w.png
-  swashplate whatif fitted --scale dead_zone=0 --uncertainty fitted
-  swashplate whatif mine.toml --scale pump=1.2 --maneuver log.csv --interpolation previous
-  swashplate whatif --levers
-"""
-SIZE_EXAMPLES = """\
-Examples:
-  swashplate size hoist --speed-deg-s 250 --lever pump
-  swashplate size hoist --acceleration-deg-s2 200 --lever orifice=1/2 --lever pump=1/1.5
-  swashplate size hoist --tracking-deg-s 19 --maneuver sine:9,0.1 --out larger.toml
-"""
-SENSITIVITY_EXAMPLES = """\
-Examples:
-  swashplate sensitivity hoist
-  swashplate sensitivity hoist --lever orifice --lever pump=0.8/1.5 --plot tornado.png
-  swashplate sensitivity slew --maneuver step:4 --sobol 1024 --plot sobol.png
-"""
-COMPENSATE_EXAMPLES = """\
-Examples:
-  swashplate compensate hoist --out hoist-inverse.toml
-  swashplate compensate hoist --speed-deg-s 5 --speed-deg-s -120
-  swashplate compensate luff sine:4,0.1 --plot inverse.png
-"""
 ERROR = 0.1
 FREQUENCIES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
-LEVEL = 0.95
+LEVEL, SPAN = 0.95, (0.9, 1.1)
+"""Of bands, and the factors of a lever that names none."""
 CHOSEN = ("final_speed", "rise_time", "largest_acceleration", "tracking_error", "creep", "travel")
 SIZED = ("orifice", "pump")
 PULLED = (
@@ -129,6 +96,12 @@ def limits(
     often each limit acts, by how much the error falls without it, and so which
     component to change first. The error is the rms of the speed less that of a
     drive without limits. The shares need not add up to 100 %.
+
+    For example:
+      swashplate limits hoist
+      swashplate limits hoist --plot envelope.png --error 0.05 --frequency 0.3
+      swashplate limits luff sine:9,0.1 --plot timeline.png
+      swashplate limits mine.toml log.csv --interpolation previous --out shares.csv
     """
     files = Outputs((out, TABLE), (plot, FIGURE))
     if command is not None and (error is not None or frequencies):
@@ -164,9 +137,7 @@ def _say_envelope(
             refusal = f"No sine can be commanded: {no_inverse}"
     files.write(out, "Envelope, in SI", found.write)
     files.draw(plot, "plot_envelope", found)
-    note(f"{drive.title}: what it can do")
-    for line in drive.changes:
-        note(line)
+    drive.note(f"{drive.title}: what it can do")
     show(*tables)
     if refusal:
         say(refusal)
@@ -196,9 +167,7 @@ def _say_shares(
     files.write(out, "Shares of each limit, in SI", found.write)
     files.draw(plot, "plot_limit_timeline", run, wanted=found.wanted, title=title)
     error = quantity(found.error, "rad/s", spec=".3f")
-    note(f"{title}: {error} rms from a drive without limits")
-    for line in drive.changes:
-        note(line)
+    drive.note(f"{title}: {error} rms from a drive without limits")
     shares = found.acting()
     if shares.rows:
         show(shares)
@@ -265,8 +234,6 @@ def whatif(
         Path | None,
         option("The campaign of that fit, if it is not where it was.", metavar="CAMPAIGN.toml"),
     ] = None,
-    draws: Annotated[int, option("Drives drawn for the bands, 20 or more.")] = 200,
-    seed: Seed = 0,
     plot: FigureFile = None,
     out: SetFile = None,
     levers: Annotated[
@@ -281,13 +248,18 @@ def whatif(
     The speed that is wanted is in proportion to the voltage, at the ratio of
     the drive as it is. With --uncertainty outcomes get intervals and the figure
     bands: drives are drawn from the errors of a fit's estimates.
+
+    For example:
+      swashplate whatif hoist --scale orifice=1.5 --scale pump=1.5
+      swashplate whatif slew --scale orifice_diameter=1.2 --maneuver step:6 --plot w.png
+      swashplate whatif fitted --scale dead_zone=0 --uncertainty fitted
+      swashplate whatif mine.toml --scale pump=1.2 --maneuver log.csv --interpolation previous
+      swashplate whatif --levers
     """
     from swashplate.analysis.whatif import AS_IS, CHANGED, before_and_after, what_if
 
     files = Outputs((out, None), (plot, FIGURE))
     moved = factors_of(factors)
-    if uncertainty is not None and draws < 20:
-        raise InputError(f"--draws is {draws}, but bands need 20 or more.")
     choice = DriveChoice(drive)
     with working("Simulating"):
         name, trial = trial_of(choice.chosen, maneuver, sampling)
@@ -297,9 +269,7 @@ def whatif(
         with working("Drawing drives"):
             from swashplate.analysis import monte_carlo
 
-            before = monte_carlo.stored_draws(
-                uncertainty, drive=choice.chosen, campaign=campaign, draws=draws, seed=seed
-            )
+            before = monte_carlo.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
             drawn = {AS_IS: before, CHANGED: before.pulled(moved)}
             widths = {k: monte_carlo.half_widths(result, v, LEVEL) for k, v in drawn.items()}
             bands = {
@@ -316,8 +286,7 @@ def whatif(
     for line in changes_between(result.before.drive.parameters, result.after.drive.parameters):
         note(line)
     show(made)
-    for sentence in (*result.sentences(), *said):
-        say(f"- {sentence}")
+    bullets(result.sentences(), said)
     files.say()
 
 
@@ -365,9 +334,14 @@ def size(
     Smallest is the least sum of squares of the changes, each in per cent. What
     cannot be met is refused, with what can be reached. Levers are orifice and
     pump, from half to twice, unless others are named.
+
+    For example:
+      swashplate size hoist --speed-deg-s 250 --lever pump
+      swashplate size hoist --acceleration-deg-s2 200 --lever orifice=1/2 --lever pump=1/1.5
+      swashplate size hoist --tracking-deg-s 19 --maneuver sine:9,0.1 --out larger.toml
     """
     from swashplate.analysis import sizing
-    from swashplate.analysis.outcomes import trial
+    from swashplate.analysis.outcomes import proportional_speed, trial
 
     files = Outputs((out, None))
     if (tracking_deg_s is None) != (maneuver is None):
@@ -379,12 +353,12 @@ def size(
         follow, ranges = None, ranges_of(levers or SIZED, sizing.WIDEST)
         if maneuver is not None:
             voltage = maneuver_of(maneuver, drive.chosen).sample()
-            follow = trial(drive.chosen, voltage)
+            # a larger drive may well be what it takes to reach it
+            wanted = proportional_speed(drive.chosen, voltage, limited=False)
+            follow = trial(drive.chosen, voltage, wanted=wanted)
         found = sizing.size(drive.chosen, required, ranges, follow=follow)
     files.write(out, "Changed drive", found.drive.to_toml)
-    note(drive.title)
-    for line in drive.changes:
-        note(line)
+    drive.note(drive.title)
     show(sizing.levers_table(found), sizing.performance_table(found, required))
     if found.change == 0.0:
         say("The drive meets it as it is; nothing needs to be changed.")
@@ -400,7 +374,6 @@ def size(
 def sensitivity(
     drive: DriveChoice,
     levers: Levers = None,
-    span: Annotated[float, option("Levers without factors go this part down and up.")] = 0.1,
     outcomes: Annotated[
         list[str] | None,
         option(
@@ -414,56 +387,31 @@ def sensitivity(
         str,
         option('Command: a maneuver such as step:9 or "step +9 V", or a log.', metavar="NAME|FILE"),
     ] = "step:9",
-    samples: Annotated[
-        int | None,
-        option(
-            "Sobol's indices as well, from N base samples, a power of 2 (1024 is usual): N times "
-            "the number of levers and two simulations.",
-            "--sobol",
-            metavar="N",
-        ),
-    ] = None,
-    seed: Seed = 0,
     plot: FigureFile = None,
     out: TableFile = None,
     *,
     sampling: Sampling,
 ) -> None:
-    """Show which lever moves which outcome.
+    """Show which lever moves which outcome, each moved down and up by itself.
 
-    Each lever is moved down and up by itself. With --sobol all are moved at once,
-    and the variance of each outcome is shared out among them: by itself, and in
-    total with what a lever does together with others.
+    For example:
+      swashplate sensitivity hoist
+      swashplate sensitivity hoist --lever orifice --lever pump=0.8/1.5 --plot tornado.png
+      swashplate sensitivity slew --maneuver step:4 --out all.csv
     """
-    from swashplate.analysis import sensitivity as analysis
+    from swashplate.analysis import one_at_a_time, outcome_table
 
     files = Outputs((out, TABLE), (plot, FIGURE))
-    wanted, indices = tuple(outcomes) if outcomes else OUTCOMES, None
-    if not 0.0 < span < 1.0:
-        raise InputError(f"--span is {span:g}, but must lie between 0 and 1.")
     with working("Simulating"):
         name, trial = trial_of(drive.chosen, maneuver, sampling)
-        ranges = ranges_of(levers or PULLED, (1.0 - span, 1.0 + span))
-        single = analysis.one_at_a_time(drive.chosen, ranges, trial, outcomes=wanted)
-        if samples is not None:
-            indices = analysis.sobol(
-                drive.chosen, ranges, trial, outcomes=wanted, samples=samples, seed=seed
-            )
+        ranges = ranges_of(levers or PULLED, SPAN)
+        found = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
-    files.write(out, "All numbers, in SI", analysis.sensitivity_table(single, indices).write)
-    if indices is None:
-        files.draw(plot, "plot_tornado", single, title=f"{title}: each lever by itself")
-    else:
-        files.draw(plot, "plot_sobol", indices, title=f"{title}: shares of the variance")
-    note(title)
-    for line in drive.changes:
-        note(line)
-    show(*(analysis.outcome_table(single, indices, k) for k in range(len(single.outcomes))))
-    for sentence in dict.fromkeys((*single.sentences, *(indices.sentences if indices else ()))):
-        say(f"- {sentence}")
-    if indices is not None:
-        error = indices.largest_error
-        say(f"- {indices.runs} simulations; indices are good to {error:.2g} or better.")
+    files.write(out, "All numbers, in SI", found.table().write)
+    files.draw(plot, "plot_tornado", found, title=f"{title}: each lever by itself")
+    drive.note(title)
+    show(*(outcome_table(found, k) for k in range(len(found.outcomes))))
+    bullets(dict.fromkeys(found.sentences))
     files.say()
 
 
@@ -505,6 +453,11 @@ def compensate(
     is straight between its points, so that any controller can follow it. With
     what a stick does, compares three controllers in simulation: a straight
     line, the map, and the map with the drive's lag made up for.
+
+    For example:
+      swashplate compensate hoist --out hoist-inverse.toml
+      swashplate compensate hoist --speed-deg-s 5 --speed-deg-s -120
+      swashplate compensate luff sine:4,0.1 --plot inverse.png
     """
     from swashplate.analysis import compensation, tracking
 
@@ -524,8 +477,6 @@ def compensate(
             tables.append(tracking.improvement_table(bought, name))
     files.write(out, "Inverse map, in SI", found.write)
     files.draw(plot, "plot_compensation", found, bought)
-    note(f"{drive.title}: voltage for a wanted speed")
-    for line in drive.changes:
-        note(line)
+    drive.note(f"{drive.title}: voltage for a wanted speed")
     show(*tables)
     files.say()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
-from math import isfinite, isnan, nan
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -30,6 +30,8 @@ _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*
 _ENDING = re.compile(r"\.[A-Za-z]\w*$")
 DRIVE = "drive.toml"
 """The drive in a folder that a fit wrote."""
+CONFIGURATION = "setup.toml"
+"""The fit configuration in such a folder."""
 NUMBERS = "parameters.toml"
 """What a fit of a model of one's own writes in the place of a drive."""
 UNFELT, FEELING = "load_torque", ("motor_leakage", "motor_constant")
@@ -149,6 +151,12 @@ def parameters_of(word: str) -> ParameterSet:
     return load_preset(word) if file is None else load_set(file)
 
 
+def configuration_of(word: str, setup: str | None, name: str) -> str:
+    """The fit configuration for a drive: the one asked for, a fit folder's own, or its name's."""
+    own = Path(word) / CONFIGURATION
+    return setup or (str(own) if own.is_file() else name)
+
+
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelParameters:
     """A model of one's own with the numbers that a fit wrote into its folder.
 
@@ -180,8 +188,11 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
     """The drive of a name or file, with values set and then scaled, by parameter or by lever."""
     from swashplate.drive import Drive
 
-    drive = Drive(parameters_of(word)).replace(**_named("--set", values, _change))
-    scaled = _named("--scale", factors, _change)
+    set_as = "Z16=1.2e-4, Z16=1.2e-4/1.5e-4 (plus/minus) or Z16_plus=0.12mm"
+    scaled_as = "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
+    chosen: dict[str, Change] = _assigned("--set", values, set_as, _value)
+    scaled: dict[str, Change] = _assigned("--scale", factors, scaled_as, _factor)
+    drive = Drive(parameters_of(word)).replace(**chosen)
     own = {name: change for name, change in scaled.items() if not _is_lever(name)}
     drive = drive.scale(**own)
     if len(own) < len(scaled):
@@ -233,108 +244,89 @@ def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
     return lines
 
 
-def _named(
-    option: str, words: Iterable[str], read: Callable[[str, str], tuple[str, Value]]
+def _assigned(
+    option: str,
+    words: Iterable[str],
+    example: str,
+    read: Callable[[str, list[float], str], Value | None],
 ) -> dict[str, Value]:
-    """What words such as ``Z16=1.2`` say, by name, each given once."""
+    """What words such as ``Z16=1.2e-4/1.5e-4`` or ``Z16=0.12mm`` say, by name, each given once.
+
+    `read` makes a value of name, numbers and unit, None where they are not what it reads.
+    """
     found: dict[str, Value] = {}
     for word in words:
-        name, value = read(option, word)
+        name, equals, given = (part.strip() for part in word.partition("="))
+        match = _VALUE.fullmatch(given) if equals else None
+        value = None
+        if match is not None:
+            numbers = [float(number) for number in match.group(1, 2) if number]
+            value = read(name, numbers, (match[3] or "").strip())
+        if value is None:
+            raise InputError(f"{option} cannot read '{word}'; write it as {example}.")
         if name in found:
             raise InputError(f"{option} gives {name} twice; give it once.")
         found[name] = value
     return found
 
 
-def numbers_and_unit(given: str) -> tuple[list[float], str] | None:
-    """One number or two, and their unit, from ``1.2e-4``, ``0.12mm`` or ``1.2/1.5``."""
-    match = _VALUE.fullmatch(given)
-    if match is None:
-        return None
-    return [float(number) for number in match.group(1, 2) if number], (match[3] or "").strip()
-
-
 def _one_or_both(numbers: Sequence[float]) -> Change:
     return numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
 
 
-def _change(option: str, word: str) -> tuple[str, Change]:
+def _value(name: str, numbers: list[float], unit: str) -> Change:
     from swashplate.parameters.definitions import find
     from swashplate.units import to_si
 
-    scaled = option == "--scale"
-    name, equals, given = (part.strip() for part in word.partition("="))
-    read = numbers_and_unit(given) if equals else None
-    if read is None or (scaled and read[1]):
-        examples = (
-            "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
-            if scaled
-            else "Z16=1.2e-4, Z16=1.2e-4/1.5e-4 (plus/minus) or Z16_plus=0.12mm"
-        )
-        raise InputError(f"{option} cannot read '{word}'; write it as {examples}.")
-    numbers, unit = read
-    if not scaled and _is_lever(name):
+    if _is_lever(name):
         raise InputError(f"{name} is a lever, which has no value of its own: --scale {name}=1.5.")
-    if not (scaled and _is_lever(name)):
-        definition = find(name)
-        if unit:
-            what = f"{name} ({definition.name})"
-            numbers = [to_si(number, unit, definition.unit, what) for number in numbers]
-    return name, _one_or_both(numbers)
+    definition = find(name)
+    if unit:
+        what = f"{name} ({definition.name})"
+        numbers = [to_si(number, unit, definition.unit, what) for number in numbers]
+    return _one_or_both(numbers)
+
+
+def _factor(name: str, numbers: list[float], unit: str) -> Change | None:
+    from swashplate.parameters.definitions import find
+
+    if not _is_lever(name):
+        find(name)
+    return None if unit else _one_or_both(numbers)
 
 
 def physical_values(words: Sequence[str]) -> dict[str, Change]:
     """Physical values in SI from words such as ``oil_volume=100cm^3``."""
     from swashplate.full_order.physical_set import chosen_quantity, si_value
 
-    def read(option: str, word: str) -> tuple[str, Change]:
-        name, _, given = (part.strip() for part in word.partition("="))
-        found = numbers_and_unit(given)
-        if found is None:
-            raise InputError(
-                f"{option} cannot read '{word}'; write it as oil_volume=1e-4 or oil_volume=100cm^3."
-            )
-        quantity, (numbers, unit) = chosen_quantity(name), found
-        if unit:
-            numbers = [si_value(quantity, number, unit) for number in numbers]
-        return name, _one_or_both(numbers)
+    def read(name: str, numbers: list[float], unit: str) -> Change:
+        quantity = chosen_quantity(name)
+        return _one_or_both([si_value(quantity, x, unit) if unit else x for x in numbers])
 
-    return _named("--physical", words, read)
+    return _assigned("--physical", words, "oil_volume=1e-4 or oil_volume=100cm^3", read)
 
 
 def factors_of(words: Sequence[str]) -> dict[str, float]:
     """Factors by lever or parameter from words such as ``orifice=1.5``."""
     from swashplate.analysis.whatif import find_lever
 
-    def read(option: str, word: str) -> tuple[str, float]:
-        name, _, given = (part.strip() for part in word.partition("="))
-        try:
-            factor = float(given)
-        except ValueError:
-            raise InputError(f"{option} cannot read '{word}'; write it as orifice=1.5.") from None
+    def read(name: str, numbers: list[float], unit: str) -> float | None:
         find_lever(name)
-        return name, factor
+        return numbers[0] if len(numbers) == 1 and not unit else None
 
-    return _named("--scale", words, read)
+    return _assigned("--scale", words, "orifice=1.5", read)
 
 
 def ranges_of(words: Sequence[str], usual: Range) -> dict[str, Range]:
     """Ranges of factors by lever from words such as ``pump`` or ``pump=0.8/1.5``."""
     from swashplate.analysis.whatif import find_lever
 
-    def read(option: str, word: str) -> tuple[str, Range]:
-        name, equals, given = (part.strip() for part in word.partition("="))
+    def read(name: str, numbers: list[float], unit: str) -> Range | None:
         find_lever(name)
-        low, slash, high = given.partition("/")
-        try:
-            ends = (float(low), float(high) if slash else nan) if equals else usual
-        except ValueError:
-            ends = nan, nan
-        if any(map(isnan, ends)):
-            raise InputError(f"{option} cannot read '{word}'; write it as pump or pump=0.8/1.5.")
-        return name, ends
+        return (numbers[0], numbers[1]) if len(numbers) == 2 and not unit else None
 
-    return _named("--lever", words, read)
+    whole = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
+    return _assigned("--lever", whole, "pump or pump=0.8/1.5", read)
 
 
 def pairs_of(option: str, given: Sequence[str] | None, example: str) -> list[tuple[str, str]]:

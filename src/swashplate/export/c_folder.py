@@ -11,12 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive
-from swashplate.equations.c_interface import interface
-from swashplate.equations.c_model import Exported, Writer
-from swashplate.equations.c_model import feedthrough as feedthrough_of
-from swashplate.equations.c_source import c_name, literal
+from swashplate.equations.c_source import Exported, c_name, interface, literal
+from swashplate.equations.c_source import feedthrough as feedthrough_of
+from swashplate.equations.c_source.model import Writer
 from swashplate.equations.fields import numbers_of
-from swashplate.equations.marching.part import PartCode
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Instance, called
 from swashplate.equations.marching.use import instance_of as instance_of_model
@@ -24,7 +22,6 @@ from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError
 from swashplate.models.card import stable_step
 from swashplate.models.displacement_control import steep_stops
-from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import (
     PATHS,
@@ -114,6 +111,15 @@ def exported_model(model: Model) -> Exported:
     return Exported(model, c_name(model.name))
 
 
+def model_values(
+    model: Model, step: float, parameters: Any, *, options: Any = None, given: Any = None
+) -> Array:
+    """All numbers that the ``init`` of a model of one's own takes, as `values_of` has them."""
+    if not step > 0.0:
+        raise InputError(f"The step is {step:g} s, but must be above 0.")
+    return _values(instance_of_model(model, parameters, options=options, given=given), step)
+
+
 def c(
     what: Drive | Model,
     folder: str | Path,
@@ -153,10 +159,8 @@ def c(
     if isinstance(what, Drive):
         exported, values, name = exported_drive(what), values_of(what, step), what.name
     else:
-        if not step > 0.0:
-            raise InputError(f"The step is {step:g} s, but must be above 0.")
-        instance = instance_of_model(what, parameters, options=options, given=given)
-        exported, values, name = exported_model(what), _values(instance, step), what.name
+        values = model_values(what, step, parameters, options=options, given=given)
+        exported, name = exported_model(what), what.name
     name = re.sub(r"\W", "_", name, flags=re.ASCII).strip("_").lower() or "model"
     texts = interface(exported)
     words = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property
@@ -49,7 +49,7 @@ from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict, run_qualities
 from swashplate.parameters.definitions import find
 from swashplate.parameters.files import dump_set, read_set
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.parameter_set import Motion, ParameterSet
 from swashplate.results import Result
 from swashplate.tables import write_text
 
@@ -233,7 +233,14 @@ class Judged(Result):
             parameters[symbol] = parameter
         fitted = len(self.result.stages[0].problem.experiments)
         title = f"{self.campaign.title}: fitted to {fitted} runs, {today}"
-        return replace(found, title=title, parameters=parameters)
+        return replace(found, title=title, parameters=parameters, motion=motion_of(self.runs))
+
+
+def motion_of(runs: Iterable[Experiment]) -> Motion:
+    """What the drive of some runs moves: a rod where all positions were measured in m."""
+    channels = [each for run in runs for each in run.channels.values()]
+    units = {each.unit for each in channels if each.is_position}
+    return "rod" if units == {"m"} else "shaft"
 
 
 def _interval_words(assessments: Sequence[Assessment], found: ParameterSet) -> dict[str, list[str]]:

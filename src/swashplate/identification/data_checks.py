@@ -23,6 +23,7 @@ from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Setup
 from swashplate.identification.staging import stage_problem
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
@@ -274,9 +275,13 @@ def idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> l
     if idle and len(idle) == len(experiments):
         first, why = next(iter(idle.items()))
         others = ", and so it is in all other runs" if len(idle) > 1 else ""
+        peak = 1e3 * max(float(np.abs(each.input.values).max()) for each in experiments)
+        # a thousandth of a usual command, in volts that were declared as millivolts
+        meant = f' or, if the log is in V, write unit = "V": it then reaches {peak:.3g} V'
+        millivolts = experiments[0].input.kind == "voltage" and 1.0 <= peak <= FULL_VOLTAGE
         said = (
             f"{first}: {why}{others}; a drive that does not move cannot be identified: "
-            "use larger commands."
+            f"use larger commands{meant * millivolts}."
         )
         return [refusal(first, None, said)]
     return [

@@ -79,8 +79,9 @@ STRIDE = 0.35
 """Step aimed at, in the square root of the cost's rise over that of the threshold: three points
 a side on a parabola."""
 
-BETTER = 1e-3
-"""Part of the threshold by which a cost must lie below the optimum's to be a better optimum."""
+BETTER = 0.02
+"""Part of the threshold by which a cost must lie below the optimum's to be a better optimum: a
+smaller difference moves the ends of an interval by less than 1 % of their distance."""
 
 CLOSE = 1e-3
 """Relative error in the root of the cost's rise at which a crossing counts as found."""

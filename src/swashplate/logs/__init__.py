@@ -10,7 +10,6 @@ from swashplate.logs.dialect import TextOptions as TextOptions
 from swashplate.logs.log import SUFFIXES as SUFFIXES
 from swashplate.logs.log import Column as Column
 from swashplate.logs.log import Log as Log
-from swashplate.logs.log import Reader as Reader
 from swashplate.logs.log import Series as Series
 from swashplate.logs.log import check_duration as check_duration
 from swashplate.logs.log import check_finite as check_finite

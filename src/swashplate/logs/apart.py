@@ -55,23 +55,11 @@ def open_apart(reader: str, path: Path) -> Log:
     """
     told = _Other.ask(reader, path)[0]
 
-    def load(positions: Sequence[int]) -> list[Array]:
-        return _Other.ask(reader, path, positions)[1]
-
-    def part(positions: Sequence[int], first: int, last: int) -> list[Array]:
+    def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
         return _Other.ask(reader, path, positions, (first, last))[1]
 
-    return Log(
-        path,
-        told["format"],
-        tuple(Column(*column) for column in told["columns"]),
-        load,
-        tuple(told["comments"]),
-        tuple(told["notes"]),
-        told["left_out"],
-        part=part if told["in_parts"] else None,
-        rows=told["rows"],
-    )
+    columns = tuple(Column(*column) for column in told["columns"])
+    return Log(path, told["format"], columns, load, told["left_out"], tuple(told["lengths"]))
 
 
 class _Other:
@@ -88,7 +76,14 @@ class _Other:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
-            env={**os.environ, "POLARS_MAX_THREADS": str(threads), "RUST_BACKTRACE": "0"},
+            env={
+                **os.environ,
+                "POLARS_MAX_THREADS": str(threads),
+                "RUST_BACKTRACE": "0",
+                # a block is read with little ahead of it, and given back before the next
+                "POLARS_ROW_GROUP_PREFETCH_SIZE": "2",
+                "_RJEM_MALLOC_CONF": "dirty_decay_ms:0,muzzy_decay_ms:0",
+            },
         )
         self._end = finalize(self, _ended, self._process, self._errors)
 
@@ -98,15 +93,11 @@ class _Other:
         reader: str,
         path: Path,
         positions: Sequence[int] | None = None,
-        rows: tuple[int, int] | None = None,
+        rows: tuple[int, int | None] = (0, None),
     ) -> tuple[dict[str, Any], list[Array]]:
         """What the other process has to say of a file, and these columns of it."""
-        question: dict[str, Any] = {
-            "reader": reader,
-            "path": str(path.absolute()),
-            "said": str(path),
-        }
-        question |= {"positions": positions and list(positions), "rows": rows}
+        question: dict[str, Any] = {"reader": reader, "path": str(path.absolute()), "rows": rows}
+        question |= {"said": str(path), "positions": positions and list(positions)}
         with cls.lock:
             try:
                 cls.running = other = cls.running or cls()
@@ -192,8 +183,7 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
     """A log whose rows can be read in parts if it is long; a short one as it is.
 
     A long text log is converted to Parquet once, piece after piece: ``log.csv.parquet`` beside it
-    holds the columns asked for, and serves until the log changes. Formats that cannot be read in
-    parts stay as they are.
+    holds the columns asked for, and serves until the log changes. Other formats are as they are.
 
     Parameters
     ----------
@@ -207,7 +197,7 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
     FileError
         If a cell holds no number, or the table cannot be written.
     """
-    if log.rows is None or log.rows <= LONG or log.stream is None:
+    if log.stream is None or max(log.lengths, default=0) <= LONG:
         return log
     table = log.path.with_name(f"{log.path.name}.parquet")
     columns = list(dict.fromkeys(log.columns.index(log.find(name)) for name in names))
@@ -219,11 +209,8 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
         _convert(log, columns, table, json.dumps([*stamp, columns]))
         held = [*stamp, columns]
     stored = open_apart("Parquet", table)
-    note = f"Its {stored.rows} rows are read from {table.name}, written beside it."
     kept = tuple(log.columns[position] for position in held[3])
-    return replace(
-        stored, path=log.path, columns=kept, comments=log.comments, notes=(*log.notes, note)
-    )
+    return replace(stored, path=log.path, columns=kept, table=table)
 
 
 def _held(table: Path) -> list[Any] | None:
@@ -269,8 +256,8 @@ def _convert(log: Log, columns: Sequence[int], table: Path, stamp: str) -> None:
             failed[0]
             if failed
             else FileError(
-                f"{log.path} has about {log.rows} rows, more than are held at once, and its table "
-                f"{table.name} cannot be written beside it: {said(error)}."
+                f"{log.path} has about {max(log.lengths)} rows, more than are held at once, and "
+                f"its table {table.name} cannot be written beside it: {said(error)}."
             )
         ) from None
     finally:
@@ -291,8 +278,6 @@ def serve() -> None:
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print must not get between the answers
     warnings.simplefilter("ignore")
-    from swashplate.logs.dialect import TextOptions
-
     last: tuple[object, Log] | None = None
     for line in sys.stdin.buffer:
         asked = json.loads(line)
@@ -304,14 +289,12 @@ def serve() -> None:
             known = (reader, path, path.stat().st_mtime_ns, path.stat().st_size)
             if last is None or last[0] != known:
                 last = None
-                last = known, opener(reader)(path, TextOptions())
+                last = known, opener(reader)(path)
             log = last[1]
             if asked["positions"] is not None:
-                log = log.between(*asked["rows"]) if asked["rows"] else log
-                arrays = log.load(asked["positions"])
-            answer = {key: getattr(log, key) for key in ("format", "columns", "comments", "notes")}
-            answer |= {"left_out": dict(log.left_out), "rows": log.rows}
-            answer |= {"in_parts": log.part is not None}
+                arrays = log.load(asked["positions"], *asked["rows"])
+            answer = {key: getattr(log, key) for key in ("format", "columns", "lengths")}
+            answer["left_out"] = dict(log.left_out)
         except (KeyboardInterrupt, SystemExit):
             raise
         except BaseException as error:

@@ -10,20 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swashplate.errors import FileError
-from swashplate.logs.dialect import TextOptions
-from swashplate.logs.log import (
-    Array,
-    Column,
-    Log,
-    check_kind,
-    checked,
-    printable,
-    said,
-    split_unit,
-)
+from swashplate.logs.log import Array, Column, Log, check_kind, checked, printable, said, split_unit
 
 _MOST = 4096  # signals in one matrix; one with more of both rows and columns is a picture or a map
-_COMPLEX = "it holds complex numbers"
+_KINDS = {"c": "it holds complex numbers", "S": "it holds text", "U": "it holds text"}
+_OTHER = "it is no array of numbers"
 
 
 class _Signal(NamedTuple):
@@ -34,78 +25,93 @@ class _Signal(NamedTuple):
     """Dimension along which it is chosen, None for a vector."""
     place: int
     """Position along that dimension, from 0."""
+    length: int
 
 
-def _signals(name: str, shape: tuple[int, ...], *, matlab: bool) -> list[_Signal] | str:
+def _signals(
+    name: str, shape: tuple[int, ...], kind: str, *, matlab: bool
+) -> tuple[list[_Signal], str]:
     """Signals of an array of a shape in its own language's order, or why there are none.
 
     The longer dimension is taken for the time.
     """
+    if kind not in "iufb":
+        return [], _KINDS.get(kind, _OTHER)
     if 0 in shape:
-        return "it is empty"
+        return [], "it is empty"
     if len(shape) > 2:
-        return f"it has {len(shape)} dimensions"
+        return [], f"it has {len(shape)} dimensions"
     if len(shape) < 2 or 1 in shape:
-        return [_Signal(name, None, 0)]
+        return [_Signal(name, None, 0, prod(shape))], ""
     rows, columns = shape
     axis, count = (1, columns) if rows >= columns else (0, rows)
     if count > _MOST:
-        return f"it is a matrix of {rows} by {columns}"
+        return [], f"it is a matrix of {rows} by {columns}"
     first = 1 if matlab else 0
     form = (("({},:)", "(:,{})") if matlab else ("[{},:]", "[:,{}]"))[axis]
-    return [_Signal(name + form.format(place + first), axis, place) for place in range(count)]
+    return [
+        _Signal(name + form.format(place + first), axis, place, max(shape))
+        for place in range(count)
+    ], ""
 
 
 # --- MATLAB ---------------------------------------------------------------------------------------
 
-_NUMBERS = frozenset(
-    ["double", "single", "logical"]
-    + [f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)]
-)
-_WORDS = {"char": "text", "sparse": "sparse matrix", "opaque": "object"}
-_DEEPEST = 16  # structures within structures
+_LARGEST = 256 << 20
+"""A file of MATLAB 4 or 5 is read as a whole; a larger one is refused. [byte]"""
 
 
-def open_matlab(path: Path, options: TextOptions) -> Log:
+def open_matlab(path: Path) -> Log:
     """Look into a MATLAB file: vectors, matrices and the fields of structures.
 
     Columns are called as MATLAB writes them: ``x``, ``s.t``, ``x(1,:)``, ``x(:,1)``; of a matrix,
-    the longer dimension is taken for the time. Cells, texts, functions, tables and objects are
-    left out.
+    the longer dimension is taken for the time. Whatever else there is, is left out.
 
     Raises
     ------
     FileError
-        If it is damaged, of another kind, or has no vectors of numbers.
+        If it is damaged, of another kind, too large for its version, or has no vectors of numbers.
     """
     check_kind(path, "MATLAB", "HDF5")
     with path.open("rb") as file:
         head = file.read(2056)
+        size = file.seek(0, 2)
     # HDF5 begins at 0 or, behind MATLAB's own header, at a power of two
     if any(head[place : place + 8] == _HDF5 for place in (0, 512, 1024, 2048)):
         return _open(path, "MATLAB 7.3", _named, matlab=True)
-    order = head[126:128]
-    if order in (b"IM", b"MI"):
+    five = head[126:128] in (b"IM", b"MI")
+    if size > _LARGEST:
+        raise FileError(
+            f"{path} has {size >> 20} MB, and MATLAB files up to version 7 are read as a whole, up "
+            f"to {_LARGEST >> 20} MB: save it with -v7.3, or as CSV."
+        )
+    if five:
         if 2 in head[124:126]:
             raise FileError(f"{path} is MATLAB 7.3 by its header but no HDF5; it is damaged.")
-        _check_elements(path, "little" if order == b"IM" else "big")
+        _check_elements(path, "little" if head[126:128] == b"IM" else "big")
     columns, found, left_out = [], [], {}
-    for called, shape, kind in _variables(path):
-        several = _signals(called, shape, matlab=True) if kind in _NUMBERS else _why_not(kind)
-        if isinstance(several, str):
-            left_out[called] = several
-            continue
+    for called, value in _values(path):
+        array = np.asarray(value)
+        several, reason = _signals(called, array.shape, array.dtype.kind, matlab=True)
+        if reason:
+            left_out[called] = reason
         for signal in several:
             columns.append(Column(signal.name, split_unit(called)[1]))
             found.append((called, signal))
 
-    def load(positions: Sequence[int]) -> list[Array]:
-        return [_variable(path, *found[position]) for position in positions]
+    def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
+        values, arrays = dict(_values(path)), []
+        for position in positions:
+            called, signal = found[position]
+            value = np.asarray(values[called])
+            if signal.axis is not None:
+                value = np.take(value, signal.place, axis=signal.axis)
+            arrays.append(np.asarray(value, np.float64).ravel()[first:last])
+        return arrays
 
-    five = order in (b"IM", b"MI")
-    comments = (head[:116].decode("latin-1").strip(" \0"),) if five else ()
+    lengths = tuple(signal.length for _, signal in found)
     form = "MATLAB 5" if five else "MATLAB 4"
-    return checked(Log(path, form, tuple(columns), load, comments, left_out=left_out), "vectors")
+    return checked(Log(path, form, tuple(columns), load, left_out, lengths), "vectors")
 
 
 def _check_elements(path: Path, order: Any) -> None:
@@ -123,73 +129,39 @@ def _check_elements(path: Path, order: Any) -> None:
             begin += 8 + length
 
 
-def _loaded(path: Path, variable: str) -> Any:
+def _values(path: Path) -> Iterator[tuple[str, Any]]:
+    """Names and values of the variables and, of structures, of their fields."""
     from scipy.io import loadmat
 
-    # one variable after the other: no neighbour waits in memory
-    return loadmat(path, variable_names=[variable], appendmat=False).get(variable)
+    def of(called: str, value: Any) -> Iterator[tuple[str, Any]]:
+        if isinstance(value, dict):
+            for field, inner in value.items():
+                yield from of(f"{called}.{printable(field)}", inner)
+        else:
+            yield called, value
+
+    for name, value in loadmat(path, appendmat=False, simplify_cells=True).items():
+        if not name.startswith("__"):
+            yield from of(printable(name), value)
 
 
-def _variables(path: Path) -> Iterator[tuple[str, tuple[int, ...], str]]:
-    """Name, shape and class of each variable; of a structure of each of its fields."""
-    from scipy.io import whosmat
-
-    for variable, shape, kind in whosmat(path, appendmat=False):
-        if kind == "struct":
-            yield from _fields(printable(variable), _loaded(path, variable), 0)
-        elif kind != "function" or variable:
-            yield printable(variable), tuple(shape), kind
-
-
-def _fields(called: str, value: Any, depth: int) -> Iterator[tuple[str, tuple[int, ...], str]]:
-    if depth > _DEEPEST:
-        raise ValueError(f"'{called}' holds structures in more than {_DEEPEST} levels")
-    if value.dtype.names is None:
-        kinds = {"O": "cell", "U": "char", "S": "char", "c": "complex"}
-        yield called, value.shape, kinds.get(value.dtype.kind, "double")
-    elif value.size != 1:
-        yield called, value.shape, "array of structures"
-    else:
-        for field in value.dtype.names:
-            inner = value[field].ravel()[0]
-            if isinstance(inner, np.ndarray):
-                yield from _fields(f"{called}.{field}", inner, depth + 1)
-            else:
-                yield f"{called}.{field}", (), "object"
-
-
-def _why_not(kind: str) -> str:
-    return _COMPLEX if kind == "complex" else f"it is a MATLAB {_WORDS.get(kind, kind)}"
-
-
-def _variable(path: Path, called: str, signal: _Signal) -> Array:
-    variable, *fields = called.split(".")
-    value = _loaded(path, variable)
-    for field in fields:
-        value = value[field].ravel()[0]
-    if value.dtype.kind == "c":
-        raise FileError(f"{path}: '{called}' cannot be read as numbers: {_COMPLEX}.")
-    if signal.axis is not None:
-        value = np.take(value, signal.place, axis=signal.axis)
-    return np.asarray(value, np.float64).ravel(order="F")
-
-
-def _named(dataset: Any) -> tuple[str | None, str | None]:
+def _named(dataset: Any) -> tuple[str | None, str]:
     """What a dataset of version 7.3 is called, and why it cannot be read."""
     parts = dataset.name.strip("/").split("/")
     if parts[0].startswith("#"):  # what cells and objects refer to
-        return None, None
+        return None, ""
     kind = _text(dataset.attrs.get("MATLAB_class", "double"))
-    if "MATLAB_object_decode" in dataset.attrs or kind not in _NUMBERS:
-        return ".".join(parts), _why_not(kind)
-    return ".".join(parts), "it is empty" if dataset.attrs.get("MATLAB_empty", 0) else None
+    numbers = kind in ("single", "logical", "double") or kind.lstrip("u").startswith("int")
+    reason = "it is empty" if dataset.attrs.get("MATLAB_empty", 0) else ""
+    if "MATLAB_object_decode" in dataset.attrs or not numbers:
+        reason = f"it is a MATLAB {kind}"
+    return ".".join(parts), reason
 
 
 # --- HDF5 -----------------------------------------------------------------------------------------
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _UNITS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
-_KEPT = 500  # letters of an attribute that are kept as a comment
 _OBJECTS = 100_000  # in one file
 
 
@@ -200,11 +172,12 @@ class _Place(NamedTuple):
     field: str | None
     """Of a compound type."""
     axis: int | None
-    """Dimension of the dataset along which a row or column is chosen; None takes all."""
+    """Dimension of the dataset along which a row or column is chosen; None is a vector."""
     place: int
+    length: int
 
 
-def open_hdf5(path: Path, options: TextOptions) -> Log:
+def open_hdf5(path: Path) -> Log:
     """Look into an HDF5 file: every dataset of one or two dimensions.
 
     Columns are called ``/group/data``, those of a matrix ``/group/data[:,0]`` or
@@ -220,15 +193,11 @@ def open_hdf5(path: Path, options: TextOptions) -> Log:
     with path.open("rb") as file:
         if file.read(8) != _HDF5:
             raise FileError(f"{path} is no HDF5 file.")
-    return _open(path, "HDF5", lambda dataset: (f"/{dataset.name.lstrip('/')}", None), matlab=False)
+    return _open(path, "HDF5", lambda dataset: (f"/{dataset.name.lstrip('/')}", ""), matlab=False)
 
 
 def _open(
-    path: Path,
-    form: str,
-    naming: Callable[[Any], tuple[str | None, str | None]],
-    *,
-    matlab: bool,
+    path: Path, form: str, naming: Callable[[Any], tuple[str | None, str]], *, matlab: bool
 ) -> Log:
     """A log of the datasets that `naming` gives a name and no reason why they cannot be read."""
     import h5py
@@ -236,45 +205,36 @@ def _open(
     columns: list[tuple[Column, _Place]] = []
     left_out: dict[str, str] = {}
     with h5py.File(path, "r", locking=False) as file:
-        for dataset in _datasets(path, file):
+        names: list[str] = []
+        # visits neither soft nor external links, and an object of several names once
+        file.visit(names.append)
+        if len(names) > _OBJECTS:
+            raise FileError(
+                f"{path} has {len(names)} objects, more than the {_OBJECTS} that are read."
+            )
+        for dataset in (item for item in map(file.get, names) if isinstance(item, h5py.Dataset)):
             called, reason = naming(dataset)
             if called is None:
                 continue
             try:
-                reason = reason or _why_not_read(dataset)
-                if reason is None:
+                if not dataset.shape:
+                    reason = reason or "it is a single value"
+                elif dataset.is_virtual or dataset.external:
+                    reason = reason or "its numbers are in other files"
+                if not reason:
                     columns += _columns(called, dataset, left_out, matlab)
             except (TypeError, ValueError) as error:  # a type that NumPy does not have
                 reason = said(error)
-            if reason is not None:
+            if reason:
                 left_out[called] = reason
-        comments = tuple(_comments(file))
 
-    def load(positions: Sequence[int]) -> list[Array]:
+    def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
         with h5py.File(path, "r", locking=False) as file:
-            return [_dataset(path, file, columns[position][1]) for position in positions]
+            return [_dataset(path, file, columns[each][1], first, last) for each in positions]
 
-    names = tuple(column for column, _ in columns)
-    return checked(Log(path, form, names, load, comments, left_out=left_out))
-
-
-def _datasets(path: Path, file: Any) -> Iterator[Any]:
-    import h5py
-
-    names: list[str] = []
-    # visits neither soft nor external links, and an object of several names once
-    file.visit(names.append)
-    if len(names) > _OBJECTS:
-        raise FileError(f"{path} has {len(names)} objects, more than the {_OBJECTS} that are read.")
-    items = (file.get(each) for each in names)
-    return (item for item in items if isinstance(item, h5py.Dataset))
-
-
-def _why_not_read(dataset: Any) -> str | None:
-    if not dataset.shape:
-        return "it is a single value"
-    elsewhere = dataset.is_virtual or dataset.external
-    return "its numbers are in other files" if elsewhere else None
+    lengths = tuple(place.length for _, place in columns)
+    named = tuple(column for column, _ in columns)
+    return checked(Log(path, form, named, load, left_out, lengths))
 
 
 def _columns(
@@ -287,42 +247,34 @@ def _columns(
     columns: list[tuple[Column, _Place]] = []
     for field, kind in (fields or {None: dataset.dtype}).items():
         whole = called if field is None else f"{called}.{field}"
-        words = {"c": "complex numbers", "S": "text", "U": "text", "V": "records"}
-        several: list[_Signal] | str = (
-            _signals(whole, shape, matlab=matlab)
-            if kind.kind in "iufb"
-            else f"it holds {words.get(kind.kind, 'text, references or objects')}"
-        )
-        if isinstance(several, str):
-            left_out[whole] = several
+        several, reason = _signals(whole, shape, kind.kind, matlab=matlab)
+        if reason:
+            left_out[whole] = reason
             continue
         each = units if len(units) == len(several) else units[:1] * len(several)
         for signal, unit in zip(several, each, strict=False):
             axis = signal.axis if signal.axis is None or not matlab else 1 - signal.axis
             column = Column(signal.name, unit or split_unit(whole)[1])
-            columns.append((column, _Place(dataset.name, field, axis, signal.place)))
+            place = _Place(dataset.name, field, axis, signal.place, signal.length)
+            columns.append((column, place))
     return columns
-
-
-def _comments(file: Any) -> Iterator[str]:
-    for key in file.attrs:
-        try:
-            value = file.attrs[key]
-        except (TypeError, ValueError, OSError):
-            continue  # an attribute of a type that NumPy does not have
-        if np.ndim(value) == 0 and len(str(value)) <= _KEPT:
-            yield f"{key}: {_text(value)}"
 
 
 def _text(value: object) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
-def _dataset(path: Path, file: Any, place: _Place) -> Array:
+def _dataset(path: Path, file: Any, place: _Place, first: int, last: int | None) -> Array:
     dataset = file[place.dataset]
     _check_stored(path, dataset)
     source = dataset if place.field is None else dataset.fields(place.field)
-    where = {None: ..., 0: (place.place, slice(None)), 1: (slice(None), place.place)}[place.axis]
+    rows = slice(first, last)
+    if place.axis is None:
+        # a vector of n by 1 or 1 by n
+        where: Any = tuple(rows if size == place.length else 0 for size in dataset.shape)
+        where = where if dataset.ndim == 1 or place.length > 1 else ...
+    else:
+        where = (place.place, rows) if place.axis == 0 else (rows, place.place)
     return np.asarray(source[where], np.float64).ravel()
 
 

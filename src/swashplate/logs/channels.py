@@ -14,18 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swashplate.errors import FileError
-from swashplate.logs.dialect import TextOptions, shown
-from swashplate.logs.log import (
-    Array,
-    Column,
-    Log,
-    check_kind,
-    checked,
-    split_unit,
-)
-from swashplate.logs.text import numbers_of
-
-_KEPT = 500  # letters of an entry of the metadata that are kept as a comment
+from swashplate.logs.log import Array, Column, Log, check_kind, checked, split_unit
 
 
 def _missing(path: Path, library: str, extra: str) -> FileError:
@@ -36,22 +25,13 @@ def _missing(path: Path, library: str, extra: str) -> FileError:
     )
 
 
-def _comments(properties: Any) -> tuple[str, ...]:
-    return tuple(
-        f"{key}: {value}"
-        for key, value in properties.items()
-        if len(str(value)) <= _KEPT and not key.startswith("ARROW:")
-    )
-
-
 # --- Parquet --------------------------------------------------------------------------------------
 
 
-def open_parquet(path: Path, options: TextOptions) -> Log:
-    """Look into a Parquet file: its columns of numbers, dates, durations and text.
+def open_parquet(path: Path) -> Log:
+    """Look into a Parquet file: its columns of numbers, dates and durations.
 
-    Dates and times become seconds since the first of the column, durations seconds. Rows can be
-    read in parts.
+    Dates and times become seconds since the first of the column, durations seconds.
 
     Raises
     ------
@@ -73,24 +53,19 @@ def open_parquet(path: Path, options: TextOptions) -> Log:
     schema = pl.read_parquet_schema(path)
     columns, left_out = [], {}
     for column, kind in schema.items():
-        if kind.is_numeric() or kind.is_temporal() or kind in (pl.Boolean, pl.String):
+        if kind.is_numeric() or kind.is_temporal() or kind == pl.Boolean:
             columns.append(Column(column, "s" if kind.is_temporal() else split_unit(column)[1]))
         else:
             left_out[column] = f"it is of the type {kind}"
-    dated = [each for each, kind in schema.items() if kind in (pl.Date, pl.Datetime)]
-    notes = [f"'{each}' holds dates, read as seconds since the first." for each in dated]
 
-    def part(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
+    def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
         count = None if last is None else last - first
         # one column after the other: none that is done waits in the form that Polars reads it in
         return [_column(path, columns[position].name, first, count) for position in positions]
 
-    comments = _comments(pl.read_parquet_metadata(path))
     rows = int(pl.scan_parquet(path).select(pl.len()).collect().item())
-    found = tuple(columns)
-    return checked(
-        Log(path, "Parquet", found, part, comments, tuple(notes), left_out, part=part, rows=rows)
-    )
+    lengths = (rows,) * len(columns)
+    return checked(Log(path, "Parquet", tuple(columns), load, left_out, lengths))
 
 
 def _column(path: Path, column: str, first: int, count: int | None) -> Array:
@@ -98,14 +73,6 @@ def _column(path: Path, column: str, first: int, count: int | None) -> Array:
 
     stored = pl.scan_parquet(path).select(column)
     cells = stored.slice(first, count).collect()[column]
-    if cells.dtype == pl.String:
-        numbers = numbers_of(cells, ".")
-        if isinstance(numbers, tuple):
-            raise FileError(
-                f"{path}: column '{column}' holds '{shown(numbers.cell)}', which is no number, "
-                f"in data row {first + numbers.row + 1}."
-            )
-        return numbers
     if not cells.dtype.is_temporal():
         return cells.cast(pl.Float64).to_numpy()
     zero = 0
@@ -133,11 +100,12 @@ class _Source(NamedTuple):
 
     group: str
     channel: str
+    rows: int
     clock: tuple[float, float, int] | None = None
     """Begin [s], increment [s] and number of the samples of a waveform, which has no stamps."""
 
 
-def open_tdms(path: Path, options: TextOptions) -> Log:
+def open_tdms(path: Path) -> Log:
     """Look into a TDMS file: the channels of numbers and of times, in all groups.
 
     In a file of several groups, a column is called ``group/channel``. The clock of a waveform, an
@@ -164,7 +132,7 @@ def open_tdms(path: Path, options: TextOptions) -> Log:
                     continue
                 unit = channel.properties.get("unit_string") or split_unit(channel.name)[1]
                 unit = "s" if kind == "M" else unit
-                source = _Source(group.name, channel.name)
+                source = _Source(group.name, channel.name, len(channel))
                 columns[called] = Column(called, str(unit) if unit else None), source
                 step = channel.properties.get("wf_increment")
                 begin = channel.properties.get("wf_start_offset", 0.0)
@@ -172,22 +140,17 @@ def open_tdms(path: Path, options: TextOptions) -> Log:
                     clocks.setdefault((begin, step, len(channel)), channel.name)
             for clock, channel_name in clocks.items():
                 called = f"{prefix}time" if len(clocks) == 1 else f"{prefix}{channel_name} time"
-                source = _Source(group.name, channel_name, clock)
+                source = _Source(group.name, channel_name, clock[2], clock)
                 columns.setdefault(called, (Column(called, "s"), source))
         _check_stored(path, file, stored)
-        comments = _comments(file.properties)
     found, sources = zip(*columns.values(), strict=True) if columns else ((), ())
-    notes = tuple(
-        f"'{column.name}' is computed from the increment of a waveform."
-        for column, source in columns.values()
-        if source.clock
-    )
 
-    def load(positions: Sequence[int]) -> list[Array]:
+    def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
         with _tdms(path) as file:
-            return [_channel(path, file, sources[position]) for position in positions]
+            return [_channel(path, file, sources[each], first, last) for each in positions]
 
-    return checked(Log(path, "TDMS", found, load, comments, notes, left_out), "channels")
+    lengths = tuple(source.rows for source in sources)
+    return checked(Log(path, "TDMS", found, load, left_out, lengths), "channels")
 
 
 @contextmanager
@@ -252,21 +215,17 @@ def _check_stored(path: Path, file: Any, stored: int) -> None:
         )
 
 
-def _channel(path: Path, file: Any, source: _Source) -> Array:
+def _channel(path: Path, file: Any, source: _Source, first: int, last: int | None) -> Array:
+    last = source.rows if last is None else min(last, source.rows)
     if source.clock is not None:
-        offset, increment, count = source.clock
-        return offset + increment * np.arange(count, dtype=np.float64)
+        offset, increment, _ = source.clock
+        return offset + increment * np.arange(first, last, dtype=np.float64)
     channel = file[source.group][source.channel]
-    pieces = []
-    first = None
-    for chunk in channel.data_chunks():
-        numbers = np.asarray(chunk[:])
-        if numbers.dtype.kind == "M":
-            first = numbers[0] if first is None else first
-            numbers = (numbers - first) / np.timedelta64(1, "s")
-        pieces.append(numbers.astype(np.float64, copy=False))
-    found: Array = np.concatenate(pieces) if pieces else np.empty(0)
-    return _whole(path, source.channel, found, len(channel))
+    numbers = np.asarray(channel.read_data(first, last - first))
+    if numbers.dtype.kind == "M":
+        numbers = (numbers - channel.read_data(0, 1)[0]) / np.timedelta64(1, "s")
+    found: Array = numbers.astype(np.float64, copy=False)
+    return _whole(path, source.channel, found, last - first)
 
 
 def _whole(path: Path, called: str, numbers: Array, claimed: int) -> Array:
@@ -287,7 +246,7 @@ _VARIABLE = (1, 5)  # channels whose samples differ in length
 _LEFT_OUT = "it holds text or bytes"
 
 
-def open_mdf(path: Path, options: TextOptions) -> Log:
+def open_mdf(path: Path) -> Log:
     """Look into an MDF 4 file: the channels of numbers of all groups, and the clock of each group.
 
     In a file of several groups a column is called ``group/channel``, by the group's acquisition
@@ -331,17 +290,16 @@ def open_mdf(path: Path, options: TextOptions) -> Log:
                     unit = channel.unit or getattr(conversion, "unit", "") or None
                     columns.append(Column(called, unit or split_unit(channel.name)[1]))
                     sources.append((number, place, rows))
-        comments = (f"start: {mdf.header.start_time.isoformat()}",)
 
-    def load(positions: Sequence[int]) -> list[Array]:
+    def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
         with opened() as mdf:
             return [
-                _samples(path, mdf, columns[position].name, *sources[position])
-                for position in positions
+                _samples(path, mdf, columns[each].name, *sources[each], first, last)
+                for each in positions
             ]
 
-    made = Log(path, "MDF 4", tuple(columns), load, comments, left_out=left_out)
-    return checked(made, "channels")
+    lengths = tuple(rows for _, _, rows in sources)
+    return checked(Log(path, "MDF 4", tuple(columns), load, left_out, lengths), "channels")
 
 
 def _prefixes(mdf: Any) -> list[str]:
@@ -355,14 +313,29 @@ def _prefixes(mdf: Any) -> list[str]:
     ]
 
 
-def _samples(path: Path, mdf: Any, called: str, group: int, place: int, rows: int) -> Array:
+def _samples(
+    path: Path,
+    mdf: Any,
+    called: str,
+    group: int,
+    place: int,
+    rows: int,
+    first: int,
+    last: int | None,
+) -> Array:
+    count = (rows if last is None else min(last, rows)) - first
     # "ignore" leaves invalid samples where they are; they would be cut out otherwise
     samples, invalid = mdf.get(
-        group=group, index=place, samples_only=True, ignore_invalidation_bits=True
+        group=group,
+        index=place,
+        samples_only=True,
+        ignore_invalidation_bits=True,
+        record_offset=first,
+        record_count=count,
     )
     if samples.dtype.kind not in "iufb" or samples.ndim != 1:
         raise FileError(f"{path}: '{called}' cannot be read as numbers: {_LEFT_OUT}.")
-    numbers = _whole(path, called, np.array(samples, np.float64), rows)
+    numbers = _whole(path, called, np.array(samples, np.float64), count)
     if invalid is not None:
         numbers[np.asarray(invalid, bool)] = np.nan
     return numbers

@@ -157,19 +157,20 @@ NOT_A_NUMBER = ("nan", "na", "n/a", "#n/a", "null", "nan(ind)", "1.#qnan", "1.#i
 """Texts for a missing number, lower case and without sign: NaN as several programs write it."""
 INFINITE = ("inf", "infinity", "1.#inf")
 
-_CLOCK = r"\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9})?"
-_ZONE = r"(?: ?(?:Z|[+-]\d{2}:?\d{2}))?"
-_HALF = r" ?[AaPp]\.?[Mm]\.?"
-_DATES = (
-    (rf"\d{{4}}-\d{{2}}-\d{{2}} {_CLOCK}(?:{_HALF})?{_ZONE}", "%Y-%m-%d %H:%M:%S%.f"),
-    (rf"\d{{4}}-\d{{2}}-\d{{2}}T{_CLOCK}{_ZONE}", "%Y-%m-%dT%H:%M:%S%.f"),
-    (rf"\d{{4}}/\d{{2}}/\d{{2}} {_CLOCK}(?:{_HALF})?", "%Y/%m/%d %H:%M:%S%.f"),
-    (rf"\d{{2}}\.\d{{2}}\.\d{{4}} {_CLOCK}", "%d.%m.%Y %H:%M:%S%.f"),
+_CALENDAR = (
+    (r"\d{4}-\d{2}-\d{2}", "%Y-%m-%d"),
+    (r"\d{4}/\d{2}/\d{2}", "%Y/%m/%d"),
+    (r"\d{2}\.\d{2}\.\d{4}", "%d.%m.%Y"),
     # who writes AM and PM writes the month first
-    (rf"\d{{1,2}}/\d{{1,2}}/\d{{4}} {_CLOCK}{_HALF}", "%m/%d/%Y %H:%M:%S%.f"),
-    (rf"{_CLOCK}(?:{_HALF})?", "%H:%M:%S%.f"),
+    (r"\d{1,2}/\d{1,2}/\d{4}(?=.*[AaPp][Mm])", "%m/%d/%Y"),
+    ("", ""),
 )
-"""Forms that can be read in one way only; 03/04/2026 is none of them."""
+"""Dates that can be read in one way only; 03/04/2026 without AM or PM is none of them."""
+_CLOCK = re.compile(
+    r"(?P<between>[ T]?)\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9})?"
+    r"(?:(?P<half> ?)[AaPp][Mm])?(?:(?P<zone> ?)(?:Z|[+-]\d{2}:?\d{2}))?",
+    re.ASCII,
+)
 
 
 def is_number(cell: str, decimal: str) -> bool:
@@ -182,7 +183,20 @@ def is_number(cell: str, decimal: str) -> bool:
 
 def date_form(cell: str) -> str | None:
     """Format of a cell, stripped, that is a date with a clock time, or a clock time."""
-    return next((way for form, way in _DATES if re.fullmatch(form, cell, re.ASCII)), None)
+    for pattern, date in _CALENDAR:
+        day = re.match(pattern, cell, re.ASCII)
+        clock = _CLOCK.fullmatch(cell, day.end()) if day else None
+        if clock is None or bool(clock["between"]) != bool(date):
+            continue
+        half, zone = clock["half"], clock["zone"]
+        hours = "%H" if half is None else "%I"
+        form = f"{date}{clock['between']}{hours}:%M:%S%.f"
+        return (
+            form
+            + (f"{half}%p" if half is not None else "")
+            + (f"{zone}%#z" if zone is not None and date else "")
+        )
+    return None
 
 
 def shown(cell: str) -> str:
@@ -372,9 +386,6 @@ def _check_decimals(
 
 # --- what stands above the rows -------------------------------------------------------------------
 
-MARKER = "***End_of_Header***"
-"""LabVIEW ends both of its headers so."""
-_KEPT = 200  # lines before the data that are kept as comments
 Units = tuple[str | None, ...]
 
 
@@ -392,8 +403,6 @@ class Heading(NamedTuple):
     columns: tuple[Column, ...]
     first: int
     """Line of the first row of data; the first line of the file is 1."""
-    comments: tuple[str, ...]
-    notes: tuple[str, ...]
 
 
 def read_heading(
@@ -406,45 +415,50 @@ def read_heading(
     FileError
         If there is no row of numbers, or the header has another number of fields than the rows.
     """
-    marks = options.marks
+    marks, number = options.marks, options.header_row
     filled = [line for line in lines if not layout.is_blank(line.text)]
     comments = [line for line in filled if marks and line.text.lstrip().startswith(marks)]
     plain = sorted({*filled}.difference(comments))
     names: list[str] = []
     units: Units | None = None
-    used = 0
-    if options.header_row:
-        plain, names, units = _below(options.header_row, filled, plain, marks, layout, path)
-        first = 0
+    if number:
+        header = [line for line in filled if line.number == number]
+        plain = [line for line in plain if line.number > number]
+        if not header or not plain:
+            raise FileError(f"{path} has no header in line {number}, or no rows below it.")
+        names, _ = _names_and_units(_bare(header, marks), layout)
+        if not names:
+            _refuse_names(header[0], layout, path, marks)
+        units = units_of(layout.split(plain[0].text))
+        first = 0 if units is None else 1
     else:
         first = _first_row(plain, layout, path)
-        if options.header_row is None:
-            names, units, used = _names_and_units(plain[:first], layout, path)
-    preamble = plain[: first - used]
-    said = [line for line in comments if line.number < plain[first].number]
-    notes = []
-    if not names and options.header_row is None:
-        names, units, number = _commented_names(said, marks, layout)
-        notes.append(
-            f"The names of the columns are from the comment in line {number}."
-            if names
-            else "There is no header; the columns are called by their positions."
-        )
-    if preamble:
-        numbers = ", ".join(str(line.number) for line in preamble[:20])
-        notes.append(f"Taken as text above the table: line {numbers}.")
-    units = units or _labview_units([line.text for line in preamble], layout.width)
+    if number is None:
+        above = plain[:first]
+        names, units = _names_and_units([line.text for line in above], layout)
+        if above and not names:
+            _refuse_names(above[-1], layout, path)
+        if not names and layout.width > 1:
+            said = [line for line in comments if line.number < plain[first].number]
+            names, units = _names_and_units(_bare(said, marks), layout)
+            if units is None and (not all(names) or layout.has_number(names)):
+                names = []
+    if first == len(plain):
+        raise FileError(f"{path} has no rows below line {number}.")
     cells = layout.split(plain[first].text)
     columns = _columns(names, units, layout, cells)
     for place, (column, cell) in enumerate(zip(columns, cells, strict=False)):
         if date_form(cell):
             columns[place] = column._replace(unit="s")
-            notes.append(f"'{column.name}' holds dates, read as seconds since the first.")
-    if len(set(names)) < len(names):
-        notes.append("Columns of the same name are numbered: 'name #1', 'name #2'.")
-    told = sorted([*preamble, *said])[:_KEPT]
-    words = tuple(line.text.strip().rstrip("\t;, ") for line in told)
-    return Heading(tuple(columns), plain[first].number, words, tuple(notes))
+    return Heading(tuple(columns), plain[first].number)
+
+
+def _bare(comments: Sequence[Line], marks: tuple[str, ...]) -> list[str]:
+    """Comments without their marks, as NumPy writes names into one."""
+    texts = [line.text.lstrip() for line in comments]
+    for mark in marks:
+        texts = [text.removeprefix(mark) for text in texts]
+    return texts
 
 
 def _first_row(plain: Sequence[Line], layout: Layout, path: Path) -> int:
@@ -459,100 +473,44 @@ def _first_row(plain: Sequence[Line], layout: Layout, path: Path) -> int:
         top -= 1
     if top == first or len(rows[top]) != layout.width:
         return top
-    if top and _may_be_names(plain[top - 1], layout):
+    if top and len(layout.names(plain[top - 1].text)) == layout.width:
         return top + 1 if units_of(rows[top]) is not None else top
     # names that are numbers, such as those of channels
     named = any(cell and not is_number(cell, layout.decimal) for cell in rows[top])
     return top + 1 if named else top
 
 
-def _may_be_names(line: Line, layout: Layout) -> bool:
-    if not line.text.strip() or line.text.startswith(MARKER):
-        return False
-    return len(layout.names(line.text)) == layout.width
+def _names_and_units(above: Sequence[str], layout: Layout) -> tuple[list[str], Units | None]:
+    """Names and units in the last one or two of some lines; no names where these are none."""
+    if not above:
+        return [], None
+    names = layout.names(above[-1])
+    if len(names) == layout.width + 1 and names[-1] == "":
+        names.pop()
+    elif len(names) == layout.width - 1 and not layout.numeric[-1]:
+        names.append("")  # a delimiter at the end of each row
+    if len(names) != layout.width:
+        return [], None
+    units = units_of(names)
+    before = layout.names(above[-2]) if units is not None and len(above) > 1 else []
+    return (before, units) if len(before) == layout.width else (names, None)
 
 
-def _names_and_units(
-    above: Sequence[Line], layout: Layout, path: Path
-) -> tuple[list[str], Units | None, int]:
-    """Names, units and how many of the lines directly above the data are these."""
-    if not above or above[-1].text.startswith(MARKER):
-        return [], None, 0
-    names = layout.names(above[-1].text)
-    if len(names) == layout.width:
-        units = units_of(names)
-        if units is not None and len(above) > 1 and _may_be_names(above[-2], layout):
-            return layout.names(above[-2].text), units, 2
-        return names, None, 1
-    trimmed = _as_wide(names, layout)
-    if len(trimmed) == layout.width:
-        return trimmed, None, 1
-    if len(names) == 1 or above[-1].text.rstrip().endswith((":", ".")):
-        return [], None, 0  # a title
+def _refuse_names(
+    line: Line, layout: Layout, path: Path, marks: tuple[str, ...] | None = None
+) -> None:
+    """Refuse a header of another width than the rows; a title is none, unless marks are given."""
+    text = _bare([line], marks or ())[0]
+    count = len(layout.names(text))
+    if marks is None and (count == 1 or text.rstrip().endswith((":", "."))):
+        return
     hint = ""
-    if layout.delimiter == "," and layout.width >= 2 * len(names) - 1:
+    if layout.delimiter == "," and layout.width >= 2 * count - 1:
         hint = " Do decimal commas stand between commas? Export it with semicolons."
     raise FileError(
-        f"{path} has {len(names)} names in line {above[-1].number}, but {layout.width} fields in "
-        f"the rows below.{hint}"
+        f"{path} has {count} names in line {line.number}, but {layout.width} fields in the rows "
+        f"below.{hint}"
     )
-
-
-def _as_wide(names: list[str], layout: Layout) -> list[str]:
-    """Names for as many fields as the rows have, if a harmless difference is all there is."""
-    if len(names) == layout.width + 1 and names[-1] in ("", "Comment"):
-        return names[:-1]  # LabVIEW leaves room for a comment
-    if len(names) == layout.width - 1 and not layout.numeric[-1]:
-        return [*names, ""]  # a delimiter at the end of each row
-    return names
-
-
-def _below(
-    number: int,
-    filled: Sequence[Line],
-    plain: Sequence[Line],
-    marks: tuple[str, ...],
-    layout: Layout,
-    path: Path,
-) -> tuple[list[Line], list[str], Units | None]:
-    """Rows, names and units where the user said in which line the names are."""
-    header = next((line for line in filled if line.number == number), None)
-    if header is None:
-        raise FileError(f"{path} has no header in line {number}: it is empty or too far down.")
-    text = header.text.lstrip()
-    for mark in marks:
-        text = text.removeprefix(mark)
-    names = _as_wide(layout.names(text), layout)
-    if len(names) != layout.width:
-        raise FileError(
-            f"{path} has {len(names)} names in line {number}, but {layout.width} fields in "
-            "the rows."
-        )
-    rows = [line for line in plain if line.number > number]
-    units = units_of(layout.split(rows[0].text)) if rows else None
-    rows = rows[1:] if units else rows
-    if not rows:
-        raise FileError(f"{path} has no rows below line {number}.")
-    return rows, names, units
-
-
-def _commented_names(
-    comments: Sequence[Line], marks: tuple[str, ...], layout: Layout
-) -> tuple[list[str], Units | None, int]:
-    """Names in the last comment above the data, as NumPy writes them, units and line; or none."""
-    if not comments or layout.width == 1:
-        return [], None, 0
-    texts = [line.text.lstrip() for line in comments[-2:]]
-    for mark in marks:
-        texts = [text.removeprefix(mark) for text in texts]
-    above, names = layout.names(texts[0]), layout.names(texts[-1])
-    if len(names) != layout.width:
-        return [], None, 0
-    units = units_of(names)
-    if units is not None and len(texts) > 1 and len(above) == layout.width:
-        return above, units, comments[-2].number
-    named = all(names) and not layout.has_number(names)
-    return (names, None, comments[-1].number) if named else ([], None, 0)
 
 
 def _columns(
@@ -606,13 +564,3 @@ def _is_unit(cell: str) -> bool:
         return True
     parts = [part for part in _PARTS.split(cell.lower()) if part]
     return bool(parts) and all(part in _KNOWN for part in parts)
-
-
-def _labview_units(lines: Sequence[str], width: int) -> Units | None:
-    """Units in the header of LabVIEW's measurement files, whose first column is the time."""
-    for line in lines:
-        label, *units = line.rstrip().split("\t")
-        if label == "Y_Unit_Label" and len(units) < width:
-            padded = [*units, *[""] * (width - 1 - len(units))]
-            return ("s", *(unit or None for unit in padded))
-    return None

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib import import_module, metadata
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,21 +43,18 @@ class Log:
     columns : tuple of Column
         The columns that hold numbers; in text, all columns.
     load : callable
-        Given positions in `columns`, each once, reads those columns, in that order.
-    comments : tuple of str
-        Comment lines, lines before the header, attributes of the file.
-    notes : tuple of str
-        What was assumed or skipped, one sentence each.
+        Given positions in `columns`, each once, a first row and the one behind the last (None: all
+        of them), reads these rows of those columns, in that order.
     left_out : mapping of str to str
         What the file has besides and cannot be read as numbers: name and reason.
+    lengths : tuple of int
+        Rows of each column; of text, about.
     stream : callable, optional
-        Given such positions, reads those columns piece after piece; where the format can do so.
-    part : callable, optional
-        Given such positions, a first row and the one behind the last, reads these rows.
-    rows : int, optional
-        How many there are, where that is known without reading; of text, about.
-    first : int
-        Rows of the file that come before those of `load`.
+        Of text: given such positions, reads those columns piece after piece.
+    table : Path, optional
+        Where its rows are read from in place of the file.
+    first, last : int
+        Rows that `read` gives, where they are not all of them.
     cut : str
         Of a part of a file, which one it is; else empty.
     resumes : bool
@@ -67,18 +64,15 @@ class Log:
     path: Path
     format: str
     columns: tuple[Column, ...]
-    load: Callable[[Sequence[int]], Sequence[Array]] = field(repr=False)
-    comments: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    load: Callable[[Sequence[int], int, int | None], Sequence[Array]] = field(repr=False)
     left_out: Mapping[str, str] = field(default_factory=dict)
+    lengths: tuple[int, ...] = field(default=(), repr=False)
     stream: Callable[[Sequence[int]], Iterator[list[Array]]] | None = field(
         default=None, repr=False
     )
-    part: Callable[[Sequence[int], int, int], Sequence[Array]] | None = field(
-        default=None, repr=False
-    )
-    rows: int | None = None
+    table: Path | None = None
     first: int = 0
+    last: int | None = None
     cut: str = ""
     resumes: bool = False
 
@@ -90,8 +84,6 @@ class Log:
         left_out = {printable(name): printable(why) for name, why in self.left_out.items()}
         object.__setattr__(self, "columns", columns)
         object.__setattr__(self, "left_out", left_out)
-        object.__setattr__(self, "comments", tuple(map(printable, self.comments)))
-        object.__setattr__(self, "notes", tuple(map(printable, self.notes)))
 
     def find(self, wanted: str) -> Column:
         """The column of a name.
@@ -127,7 +119,8 @@ class Log:
         Raises
         ------
         FileError
-            If the file is damaged or a cell holds no number; it names file, column and row.
+            If the file is damaged, a cell holds no number (it names file, column and row), or the
+            columns together are larger than `MOST`.
         InputError
             If a column is missing.
         """
@@ -136,24 +129,27 @@ class Log:
         unique = list(dict.fromkeys(positions.values()))
         if not unique:
             return {}
-        arrays = dict(zip(unique, self.load(unique), strict=True))
+        if self.last is None and self.lengths:
+            count = sum(self.lengths[position] for position in unique)
+            if count > MOST:
+                raise FileError(
+                    f"{self.path} has {count} numbers in the {len(unique)} columns that are wanted,"
+                    f" more than the {MOST} that are read at once; cut it into shorter logs, or "
+                    "sample it more slowly."
+                )
+        arrays = dict(zip(unique, self.load(unique, self.first, self.last), strict=True))
         return {name: arrays[position] for name, position in positions.items()}
 
-    def between(self, first: int, last: int) -> Log:
-        """The log of a part of the rows, from the first (counted from 0) to before the last.
+    def rows_of(self, names: Iterable[str]) -> int | None:
+        """Rows of some columns, None where they differ in length or it is not known."""
+        counts = {self.lengths[self._position(name)] for name in names if self.lengths}
+        return counts.pop() if len(counts) == 1 else None
 
-        Only of a log that has `part`, which goes on to count from the file's first row.
-        """
-        part = self.part
-        assert part is not None
-        return replace(
-            self,
-            load=lambda positions: part(positions, first, last),
-            stream=None,
-            rows=last - first,
-            first=first,
-            cut=f"rows {first + 1} to {last} of {self.rows}",
-        )
+    def between(self, first: int, last: int) -> Log:
+        """The log of a part of the rows, from the first (counted from 0) to before the last."""
+        rows = max(self.lengths, default=0)
+        cut = f"rows {first + 1} to {last} of {rows}"
+        return replace(self, first=first, last=last, cut=cut, stream=None)
 
     def _position(self, wanted: str) -> int:
         names = [column.name for column in self.columns]
@@ -180,28 +176,8 @@ class Log:
         )
 
 
-@runtime_checkable
-class Reader(Protocol):
-    """What reads one format; a module or an object that has these three.
-
-    A package of your own offers one as an entry point of the group ``swashplate.readers``; it then
-    serves the endings that swashplate itself does not know.
-    """
-
-    name: str
-    """Of the format, for people."""
-    suffixes: tuple[str, ...]
-    """Endings of its files, lower case: ``(".csv", ".tsv")``."""
-
-    def open(self, path: Path, options: TextOptions) -> Log:
-        """Look into a file that exists and is not empty, without reading its columns.
-
-        Raises
-        ------
-        FileError
-            If it is not of this format or damaged.
-        """
-        ...
+MOST = 100_000_000
+"""Numbers that are read at once, 0.8 GB."""
 
 
 # --- files ----------------------------------------------------------------------------------------
@@ -288,35 +264,31 @@ def check_kind(path: Path, *expected: str) -> None:
 
 
 def checked(log: Log, what: str = "columns") -> Log:
-    """A log with a note on each thing that is left out; one without columns of numbers is refused.
+    """A log; one without columns of numbers is refused.
 
     `what` is what the format calls its columns, for the sentence.
     """
     if not log.columns:
         why = "".join(f"; '{each}': {reason}" for each, reason in log.left_out.items())[:300]
         raise FileError(f"{log.path} has no {what} of numbers{why}.")
-    left_out = (f"'{each}' is left out: {reason}." for each, reason in log.left_out.items())
-    return replace(log, notes=(*log.notes, *left_out))
+    return log
 
 
 # --- opening --------------------------------------------------------------------------------------
 
 READERS = {
-    "CSV": ("text.open_text", (".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".log")),
+    "CSV": ("", (".csv", ".tsv", ".txt", ".dat", ".asc", ".log")),
     "Parquet": ("channels.open_parquet", (".parquet", ".pq")),
     "MATLAB": ("arrays.open_matlab", (".mat",)),
     "HDF5": ("arrays.open_hdf5", (".h5", ".hdf5", ".hdf", ".he5")),
     "TDMS": ("channels.open_tdms", (".tdms",)),
     "MDF": ("channels.open_mdf", (".mf4", ".mdf")),
 }
-"""What opens each format, imported when a file is opened, and the endings of its files. All but
-text have libraries that cannot be trusted with a damaged file: see `apart`."""
+"""What opens each binary format, imported when a file is opened, and the endings of its files.
+Their libraries cannot be trusted with a damaged file: see `apart`."""
 
 SUFFIXES = tuple(suffix for _, suffixes in READERS.values() for suffix in suffixes)
 """Endings of files that swashplate reads itself."""
-
-GROUP = "swashplate.readers"
-"""Entry points by which other packages offer readers for more endings."""
 
 
 def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
@@ -326,7 +298,7 @@ def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
     ----------
     path : path
         Its ending says what it is: text (CSV and its kin), Parquet, MATLAB (all versions), HDF5,
-        TDMS, MDF 4, or what an installed package reads.
+        TDMS or MDF 4.
     options : TextOptions, optional
         How a text file is written, where that cannot be recognised from it.
 
@@ -341,59 +313,30 @@ def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
         If it is missing, empty, of an unknown or another kind, damaged, or needs an extra that is
         not installed; one sentence, which names the file.
     """
-    from swashplate.logs.dialect import TextOptions
-
     source = Path(path)
     suffix = source.suffix.lower()
     name = next((name for name, (_, suffixes) in READERS.items() if suffix in suffixes), None)
-    other = _other(source) if name is None else None
+    if name is None:
+        if source.is_dir():
+            raise FileError(f"{source} is a folder, not a log.")
+        instead = ": save a spreadsheet as CSV" if suffix.startswith(".xls") else ""
+        known = ", ".join(SUFFIXES)
+        raise FileError(f"{source} ends in '{source.suffix}'; a log is read from {known}{instead}.")
     check_file(source)
-    if name in (None, "CSV"):
-        look = other.open if other is not None else opener("CSV")
-        return look(source, options or TextOptions())
+    if name == "CSV":
+        from swashplate.logs.text import open_text
+
+        return open_text(source, options)
     from swashplate.logs.apart import open_apart
 
-    return open_apart(str(name), source)
+    return open_apart(name, source)
 
 
-def opener(name: str) -> Callable[[Path, TextOptions], Log]:
-    """What opens a format of this package, imported by its name in `READERS`."""
+def opener(name: str) -> Callable[[Path], Log]:
+    """What opens a binary format, imported by its name in `READERS`."""
     module, _, function = READERS[name][0].partition(".")
-    look: Callable[[Path, TextOptions], Log] = getattr(
-        import_module(f"swashplate.logs.{module}"), function
-    )
+    look: Callable[[Path], Log] = getattr(import_module(f"swashplate.logs.{module}"), function)
     return look
-
-
-def _other(path: Path) -> Reader:
-    suffix = path.suffix.lower()
-    others = _others()
-    for other in others:
-        if suffix in other.suffixes:
-            return other
-    if path.is_dir():
-        raise FileError(f"{path} is a folder, not a log.")
-    known = ", ".join((*SUFFIXES, *(each for other in others for each in other.suffixes)))
-    instead = ": save a spreadsheet as CSV" if suffix.startswith(".xls") else ""
-    raise FileError(f"{path} ends in '{path.suffix}'; a log is read from {known}{instead}.")
-
-
-def _others() -> list[Reader]:
-    readers = []
-    for entry in metadata.entry_points(group=GROUP):
-        try:
-            reader = entry.load()
-        except (ImportError, AttributeError) as error:
-            raise FileError(
-                f"The reader '{entry.name}' of {entry.value} cannot be loaded: {error}."
-            ) from None
-        if not isinstance(reader, Reader):
-            raise FileError(
-                f"The reader '{entry.name}' of {entry.value} is none: it needs name, suffixes and "
-                "open."
-            )
-        readers.append(reader)
-    return readers
 
 
 class Series(NamedTuple):

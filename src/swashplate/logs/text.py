@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from swashplate.errors import FileError
 from swashplate.logs.dialect import (
     INFINITE,
-    MARKER,
     NOT_A_NUMBER,
     SIGNS,
     Heading,
@@ -51,7 +50,7 @@ _SPACES = re.compile(r"[ \t]+")
 _BLANK = re.compile(r"^[ \t]*$(?=\n)", re.MULTILINE)
 
 
-def open_text(path: Path, options: TextOptions) -> Log:
+def open_text(path: Path, options: TextOptions | None = None) -> Log:
     """Look into a text file: encoding, delimiter, decimal sign, names, units, comments.
 
     Delimiter and decimal sign are those under which most rows have the same number of fields and
@@ -63,52 +62,40 @@ def open_text(path: Path, options: TextOptions) -> Log:
     FileError
         If it is no text, has no rows of numbers, or can be read in more than one way.
     """
+    options = options or TextOptions()
     encoding, mark = encoding_of(path, options.encoding)
     head = next(_pieces(path, encoding, mark), "").split("\n")[:-1]
     lines = [Line(number, text) for number, text in enumerate(head[:_HEAD], 1)]
-    start = max((line.number for line in lines if line.text.startswith(MARKER)), default=0)
     some = _SAMPLE
     if head:
         some = max(4, min(some, _SAMPLED * len(head) // (sum(map(len, head)) + 1)))
-    rest, marks = head[start:], options.marks
+    marks = options.marks
 
     def content(lines: Sequence[str]) -> list[str]:
         return [each for each in lines if each.strip() and not _comments(each, marks)]
 
-    sample = content(rest[: 4 * some])[:some] + content(rest[some :: 1 + len(rest) // some])
+    sample = content(head[: 4 * some])[:some] + content(head[some :: 1 + len(head) // some])
     sample += content(_later(path, encoding, some // 2))
     if not sample:
         raise FileError(f"{path} has no rows of numbers, only comments and empty lines.")
     layout = find_layout(sample, options, path)
     heading = read_heading(lines, layout, options, path)
-    notes = heading.notes
-    with path.open("rb") as file:
-        file.seek(-min(path.stat().st_size, 2), 2)
-        if file.read().strip(b"\0")[-1:] not in (b"\n", b"\r", b"\x1a"):
-            cut = "The last line has no end; if the file was cut off, the last number may be short."
-            notes = (*notes, cut)
     called = {"utf-8": "", "ascii": "", "iso8859-1": ", Latin-1"}
     form = called.get(encoding, f", {encoding.upper().removesuffix('-LE')}")
     table = Table(path, encoding, mark, layout, heading, marks)
 
-    def load(positions: Sequence[int]) -> list[Array]:
+    def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
         pieces = list(table.read(positions))
         return [
-            np.concatenate([piece.pop(0) for piece in pieces]) if pieces else np.empty(0)
+            np.concatenate([piece.pop(0) for piece in pieces])[first:last]
+            if pieces
+            else np.empty(0)
             for _ in positions
         ]
 
-    length = 1.0 + sum(map(len, head[start:])) / max(len(head) - start, 1)
-    return Log(
-        path,
-        f"{layout}{form}",
-        heading.columns,
-        load,
-        heading.comments,
-        notes,
-        stream=table.read,
-        rows=round(path.stat().st_size / length),
-    )
+    length = 1.0 + sum(map(len, head)) / max(len(head), 1)
+    rows = (round(path.stat().st_size / length),) * len(heading.columns)
+    return Log(path, f"{layout}{form}", heading.columns, load, {}, rows, table.read)
 
 
 def _comments(line: str, marks: tuple[str, ...]) -> bool:
@@ -432,27 +419,12 @@ def _microseconds(cells: polars.Series, *, due: bool) -> polars.Series | _NoNumb
     if written is None:
         row = int(text.is_not_null().arg_max() or 0)
         return _NoNumber(row, str(cells[row])) if due else None
-    # a comma before the fraction, a zone and a half of the day are what is left of local habits
-    plain = text.str.replace(",", ".", literal=True)
-    zone = plain.str.extract(r" ?(Z|[+-]\d{2}:?\d{2})$")
-    ahead = pl.Series([0])
-    if written[:2] == "%Y" and zone.is_not_null().any():
-        plain = plain.str.replace(r" ?(Z|[+-]\d{2}:?\d{2})$", "")
-        hours = zone.str.extract(r"^([+-]\d{2})").cast(pl.Int64).fill_null(0)
-        minutes = zone.str.extract(r"(\d{2})$").cast(pl.Int64).fill_null(0)
-        sign = 1 - 2 * zone.str.starts_with("-").fill_null(False).cast(pl.Int64)
-        ahead = (hours.abs() * 60 + minutes) * sign * 60_000_000
-    half = plain.str.extract(r"(?i) ?([ap])\.?m\.?$").str.to_lowercase()
-    if half.is_not_null().any():
-        plain = plain.str.replace(r"(?i) ?[ap]\.?m\.?$", "")
-        noon = plain.str.extract(r"(\d{1,2}):\d{2}:\d{2}").cast(pl.Int64) == 12
-        shift = ((half == "p") & ~noon).cast(pl.Int64) - ((half == "a") & noon).cast(pl.Int64)
-        ahead = ahead - shift.fill_null(0) * (_DAY // 2)
-    if written.startswith("%H"):
+    plain = text.str.replace(",", ".", literal=True)  # of the fraction
+    if not written.startswith(("%Y", "%m", "%d")):
         plain, written = "1970-01-01 " + plain, f"%Y-%m-%d {written}"
     found = plain.str.to_datetime(written, time_unit="us", strict=False)
     other = found.is_null() & text.is_not_null()
     if other.any():
         row = int(other.arg_max() or 0)
         return _NoNumber(row, str(cells[row]))
-    return found.cast(pl.Int64) - ahead
+    return found.cast(pl.Int64)

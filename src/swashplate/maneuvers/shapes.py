@@ -222,7 +222,7 @@ def multisine(
     # between two points it rises above the peak found by half its curvature at most
     curvature = float(((2.0 * np.pi * lines) ** 2).sum())
     peak = float(np.abs(together(time)).max()) + 0.5 * curvature * (0.5 * float(spacing)) ** 2
-    name = f"multisine {amplitude:g} V {low:g} to {high:g} Hz seed {seed}"
+    name = f"multisine {amplitude:g} V {low:.3g} to {high:.3g} Hz seed {seed}"
     return settled(name, amplitude, [Piece(start, Scaled(amplitude / peak, together))], end, length)
 
 

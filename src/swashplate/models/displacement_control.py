@@ -75,7 +75,7 @@ class Pump(NamedTuple):
     Z16_minus: Annotated[float, MINUS]
     Z17: Annotated[float, Definition("dead zone of the solenoids", "A", lower=0.0, source="6.61",
         needs=DRIVEN)]
-    Z18: Annotated[float, Definition("plussing: spool displacement at rest", "m", source="6.57",
+    Z18: Annotated[float, Definition("neutral offset of the spool", "m", source="6.57",
         symmetry={TRAVEL: 1.0, TILT: 1.0})]
     Z19_plus: Annotated[float, Definition("solenoid force, linear", "N/A", source="6.61",
         symmetry=OF_FORCE, needs=DRIVEN)]

@@ -14,6 +14,7 @@ from swashplate.parameters.definitions import Block, Definition, find, options_o
 from swashplate.parameters.parameter_set import (
     CardSwitch,
     CoulombSign,
+    Motion,
     Pair,
     Parameter,
     ParameterSet,
@@ -53,6 +54,7 @@ class ModelOptions(BaseModel):
     differential equation, for any rate."""
     options: list[str] | None = None
     """Terms of the pump that count; where they are not given, those whose parameters are not 0."""
+    motion: Motion = "shaft"
 
 
 class CardFile(BaseModel):
@@ -137,6 +139,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
         model.card_switch,
         model.rate or rate,
         options_of(values) if model.options is None else frozenset(model.options),
+        motion=model.motion,
     )
 
 
@@ -158,6 +161,8 @@ def dump_set(parameters: ParameterSet) -> str:
         options.add("rate", parameters.rate)
     if parameters.options != options_of(parameters.numbers):
         options.add("options", sorted(parameters.options))
+    if parameters.motion != "shaft":
+        options.add("motion", parameters.motion)
     text.add("model", options)
     for block in ("control_card", "pump_motor", "refinements"):
         if all(parameter.definition.block != block for parameter in parameters.values()):

@@ -27,6 +27,7 @@ from swashplate.tables import UNIT, Column, Table
 PressureRoot = Literal["published", "symmetric"]
 CoulombSign = Literal["smooth", "literal"]
 CardSwitch = Literal["sampled", "split"]
+Motion = Literal["shaft", "rod"]
 Status = Literal["fitted", "fixed", "assumed", "approximate", "inactive", "user"]
 
 
@@ -107,6 +108,9 @@ class ParameterSet(Mapping[str, Parameter]):
     """Terms of the pump that count: of `swashplate.parameters.definitions.OPTIONS`."""
     equations: tuple[Replacement, ...] = ()
     """One's own equations in the place of the pump's, see `Drive.with_equation`."""
+    motion: Motion = "shaft"
+    """What its last number moves: a shaft, or a rod, whose position in m then stands in the place
+    of the shaft's in rad."""
     numbers: Mapping[str, float] = field(init=False, repr=False, compare=False)
     """Every single value by column, e.g. ``Z16_plus``."""
 
@@ -179,6 +183,7 @@ class ParameterSet(Mapping[str, Parameter]):
             self.rate,
             self.options,
             self.equations,
+            self.motion,
         )
 
     @property

@@ -132,7 +132,7 @@ def card_options(parameters: ParameterSet) -> CardOptions:
 
 def pump_options(parameters: ParameterSet) -> PumpOptions:
     """Forms of the pump."""
-    numbers, on = parameters.numbers, set(parameters.options)
+    on = set(parameters.options)
     if interpreted(steep_stops)(pump_of(parameters)):
         on.add("steep")
     if parameters.pressure_root == "symmetric":

@@ -25,7 +25,6 @@ from swashplate.analysis import (
     LimitTimeline,
     OneAtATime,
     Outcome,
-    SobolIndices,
     Way,
     WhatIf,
     limit_timeline,
@@ -324,36 +323,6 @@ def _speed_limits(ax: Axes, result: WhatIf, looks: Mapping[str, Stroke]) -> None
                 ax.axhline(factor * limit, color=looks[name].color, linewidth=0.6, alpha=0.5)
 
 
-def plot_bands(band: Bands, *, title: str | None = None) -> Figure:
-    """Figure of the median speed with its band, and of the band about the median, enlarged.
-
-    Parameters
-    ----------
-    band : Bands
-        See `analysis.monte_carlo.bands`.
-    title : str, optional
-        By default it says what is shown.
-    """
-    words = "Shaft speed that the tests allow" if title is None else title
-    figure, axes = sheet([2.8, 1.4], words)
-    unit = display_unit("rad/s")
-    for ax, label in zip(axes, ("shaft speed", "about the median"), strict=True):
-        dress(ax, unit.label(label))
-        zero_line(ax)
-    shade_band(axes[0], band, BLUE)
-    draw(axes[0], band.time, unit.factor * band.median, BLUE)
-    shade_band(axes[1], band, BLUE, about=band.median)
-    width, when = band.widest
-    said = (
-        f"{100.0 * band.level:g} % of {band.draws} drives; widest {unit.factor * width:.3g} "
-        f"{unit.name} at {when:.3g} s"
-    )
-    write(axes[1], said, (0.0, 1.0))
-    fit_time(axes[-1], band.time)
-    label_below(axes[-1], "time (s)")
-    return figure
-
-
 def shade_band(ax: Axes, band: Bands, color: ColorType, *, about: Array | float = 0.0) -> None:
     """Shade a band of speeds; a long one by every so many samples."""
     step, factor = max(-(-band.time.size // (2 * COLUMNS)), 1), display_unit("rad/s").factor
@@ -411,56 +380,6 @@ def plot_tornado(result: OneAtATime, *, title: str | None = None) -> Figure:
         ax.axvline(base, color=INK, linewidth=0.8, zorder=3.0)
         _name_levers(ax, [result.levers[lever] for lever in order])
         _head(ax, outcome, _outcome_words(outcome, result.base[k]))
-    return figure
-
-
-def plot_sobol(result: SobolIndices, *, title: str | None = None) -> Figure:
-    """Figure of Sobol's indices, a panel an outcome: in total, and of first order within.
-
-    Parameters
-    ----------
-    result : SobolIndices
-        See `analysis.sensitivity.sobol`; outcomes without indices are left out.
-    title : str, optional
-        By default it says what is shown.
-
-    Raises
-    ------
-    InputError
-        If no outcome has indices.
-    """
-    shown = [k for k in range(len(result.outcomes)) if np.isfinite(result.total[:, k]).all()]
-    if not shown:
-        raise InputError("No outcome has Sobol indices: nothing to draw.")
-    legend: list[Artist] = [
-        Patch(color=SKY, label="in total"),
-        Patch(color=BLUE, label="by itself"),
-        handle("95 % interval", INK, width=0.8),
-    ]
-    words = f"Shares of the variance, {result.runs} runs" if title is None else title
-    figure, panels = _outcome_panels(len(shown), len(result.levers), words, legend)
-    for ax, k in zip(panels, shown, strict=True):
-        order = np.argsort(result.total[:, k], kind="stable")
-        total, error = result.total[order, k], result.total_error[order, k]
-        places = np.arange(order.size)
-        ax.barh(places, total, THICK, color=SKY, zorder=2.0)
-        ax.barh(places, np.maximum(result.first[order, k], 0.0), 0.4, color=BLUE, zorder=2.1)
-        ax.errorbar(
-            total,
-            places,
-            xerr=error,
-            fmt="none",
-            ecolor=INK,
-            elinewidth=0.8,
-            capsize=2.0,
-            zorder=3.0,
-        )
-        ax.set_xlim(0.0, max(1.0, 1.03 * float((total + error).max())))
-        _name_levers(ax, [result.levers[lever] for lever in order])
-        outcome = result.outcomes[k]
-        mean, deviation = (_outcome_words(outcome, x[k]) for x in (result.mean, result.deviation))
-        _head(ax, outcome, f"{mean} ± {deviation}")
-        label_below(ax, "share of the variance")
     return figure
 
 

@@ -1,4 +1,4 @@
-"""Figures of measured tests: the pages of a campaign."""
+"""Figures of measured tests: the pages of a campaign, and one channel closely."""
 
 from __future__ import annotations
 
@@ -18,30 +18,33 @@ from swashplate.report.lines import (
     GAP_MARK,
     IGNORED,
     Array,
-    Rows,
     draw,
     gap_rows,
     mark_gaps,
     merged,
+    rows_within,
     shade,
     shade_handle,
     stretches,
-    thinned,
 )
 from swashplate.report.style import (
     BLUE,
     FOOT,
     HEAD,
     INK,
+    LINE,
     ORANGE,
-    POINTS_PER_INCH,
     ROW,
     SMALL,
     THIN,
+    VERMILION,
     WIDTH,
     dress,
+    handle,
     label_below,
     new_figure,
+    right_axis,
+    sheet,
     write,
     write_title,
     zero_line,
@@ -95,91 +98,19 @@ def mark_handles(axes: Sequence[Axes], reasons: Sequence[str]) -> list[Patch | L
     return [handle for key, handle in handles.items() if key in met]
 
 
-# --- weights along a panel's foot -----------------------------------------------------------------
-
 WEIGHTS = 0.16
-"""Height of the largest weight. [inch]"""
-FACTOR = "#8c3f68"
-"""Colour of the factors written on it."""
-_LETTER = 0.62
-"""Width of a digit, in sizes of letters, on the safe side."""
+"""Part of a panel's height that the largest weight takes."""
 
 
-def usual_weight(weight: Array) -> float:
-    """The most frequent weight of those that are not zero; 1 if all are."""
+def mark_weights(ax: Axes, time: Array, weight: Array) -> None:
+    """Draw weights that differ along a panel's foot."""
     used = weight[weight > 0.0]
-    if not used.size:
-        return 1.0
-    values, counts = np.unique(used, return_counts=True)
-    return float(values[np.argmax(counts)])
-
-
-def has_weights(weight: Array) -> bool:
-    """Whether samples that count, count differently."""
-    used = weight[weight > 0.0]
-    return bool(used.size and used.max() > used.min())
-
-
-def mark_weights(ax: Axes, time: Array, weight: Array, wide: float) -> None:
-    """Draw the weights along a panel's foot, the largest `WEIGHTS` high, and write their factors.
-
-    Parameters
-    ----------
-    ax : Axes
-        Its limits must be final.
-    time, weight : (m,) arrays
-        Stamps [s] and weights of the samples. A stretch of one weight that is at least twice the
-        usual one, or at most half of it, has its factor written beside it, ``×10``, as far as
-        there is room.
-    wide : float
-        Width of the panel. [inch]
-    """
-    if not has_weights(weight):
-        return
-    foot = WEIGHTS / PANEL
-    turns = np.flatnonzero(np.diff(weight)) + 1
-    stepped = turns.size < COARSE
-    if stepped:
+    if used.size and used.max() > used.min():
+        turns = np.flatnonzero(np.diff(weight)) + 1
         rows = np.unique(np.r_[0, turns - 1, turns, weight.size - 1])
-    else:
-        # they follow the input and change from sample to sample
-        rows = thinned(time, weight, np.empty(0, dtype=np.intp), COARSE)
-    ax.fill_between(
-        time[rows],
-        foot * weight[rows] / float(weight.max()),
-        transform=ax.get_xaxis_transform(),
-        color=WEIGHTED,
-        linewidth=0.0,
-        zorder=1.0,
-        label="weight",
-    )
-    if stepped:
-        _write_factors(ax, time, weight, turns, 0.25 * foot, wide)
-
-
-def _write_factors(
-    ax: Axes, time: Array, weight: Array, turns: Rows, height: float, wide: float
-) -> None:
-    """Write beside each stretch of one weight how many times the usual one it is, with room."""
-    firsts = np.r_[0, turns]
-    starts, ends = time[firsts], time[np.r_[turns - 1, weight.size - 1]]
-    factors = weight[firsts] / usual_weight(weight)
-    first, last = ax.get_xlim()
-    inch = (last - first) / wide
-    apart = np.flatnonzero((factors > 0.0) & ((factors >= 2.0) | (factors <= 0.5)))
-    for index, following in zip(apart, np.append(starts[apart], last)[1:], strict=True):
-        words = f"×{factors[index]:.3g}"
-        letters = _LETTER * SMALL / POINTS_PER_INCH * (len(words) + 1)
-        if following - ends[index] > letters * inch:
-            write(
-                ax,
-                words,
-                (float(ends[index]), height),
-                (2.0, 0.0),
-                coords=ax.get_xaxis_transform(),
-                color=FACTOR,
-                va="bottom",
-            )
+        foot: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "label": "weight"}
+        height = WEIGHTS * weight[rows] / float(weight.max())
+        ax.fill_between(time[rows], height, color=WEIGHTED, linewidth=0.0, zorder=1.0, **foot)
 
 
 # --- pages of a campaign --------------------------------------------------------------------------
@@ -268,7 +199,7 @@ def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None
     A row is a run: over it its name, maneuver, role, rate and gaps; its input and channels side by
     side. A column has one unit and one scale; positions, whose zero is free, have it about the
     middle of each run. What is ignored is shaded and hatched, weights that differ stand along the
-    foot with their factors, samples at the end of their instrument's range are barred, gaps in the
+    foot, samples at the end of their instrument's range are barred, gaps in the
     stamps leave the line open and are pointed at.
 
     Parameters
@@ -317,7 +248,7 @@ def _page(experiments: Sequence[Experiment], columns: Sequence[Column], title: s
     figure = new_figure(width, HEAD + 2.0 * ROW + rows * (PANEL + ABOVE) + FOOT)
     grid = figure.subplots(rows, across, sharex="row", squeeze=False)
     for number, (row, experiment) in enumerate(zip(grid, experiments, strict=True)):
-        fill_row(list(row), columns, experiment, panel)
+        fill_row(list(row), columns, experiment)
         # room for the heading, and in the first row for the columns' names
         for ax, column in zip(row, columns, strict=True):
             heads = (_cut(column.name, panel, 0.085), _cut(column.words, panel, 0.066))
@@ -347,10 +278,8 @@ _NEAR_ZERO = 0.02
 _ROLES = {"fit": "for the fit", "validate": "for validation"}
 
 
-def fill_row(
-    row: Sequence[Axes], columns: Sequence[Column], experiment: Experiment, wide: float
-) -> None:
-    """Draw a run into a row of panels of a width [inch] that share their abscissa."""
+def fill_row(row: Sequence[Axes], columns: Sequence[Column], experiment: Experiment) -> None:
+    """Draw a run into a row of panels that share their abscissa."""
     signals = signals_of(experiment)
     first = min(float(signal.time[0]) for signal in signals.values())
     last = max(float(signal.time[-1]) for signal in signals.values())
@@ -366,13 +295,11 @@ def fill_row(
             ax.set_yticks([])
             write(ax, "not measured", (0.5, 0.5), (0.0, 0.0), ha="center", va="center")
             continue
-        _fill(ax, column, signal, experiment, wide)
+        _fill(ax, column, signal, experiment)
     _heading(row[0], experiment)
 
 
-def _fill(
-    ax: Axes, column: Column, signal: InputSignal | Channel, experiment: Experiment, wide: float
-) -> None:
+def _fill(ax: Axes, column: Column, signal: InputSignal | Channel, experiment: Experiment) -> None:
     from swashplate.campaign import Channel
 
     factor = column.unit.factor
@@ -386,16 +313,12 @@ def _fill(
     zero_line(ax)
     low, high = column.limits(factor * counted(signal))
     margin = _ROOM * (high - low) or 1.0
-    below = 0.0
-    if weight is not None and has_weights(weight):
-        # the weights at the foot have their own room
-        below = (high - low + 2.0 * margin) * WEIGHTS / (PANEL - WEIGHTS)
-    ax.set_ylim(low - margin - below, high + margin)
+    ax.set_ylim(low - margin, high + margin)
     if weight is None:
         shade(ax, _ignored(experiment, signal.time), IGNORED)
     else:
         shade(ax, stretches(signal.time, weight == 0.0), IGNORED)
-        mark_weights(ax, signal.time, weight, wide)
+        mark_weights(ax, signal.time, weight)
     if signal.limits is not None:
         mark_clipped(
             ax, signal.time, values, (factor * signal.limits[0], factor * signal.limits[1])
@@ -452,3 +375,89 @@ def _rates_in_words(rates: Mapping[str, float]) -> list[str]:
     if len(groups) == 2:
         return [f"{', '.join(groups[rate])} {words} Hz" for words, rate in written.items()]
     return [f"{min(written, key=float)} to {max(written, key=float)} Hz"]
+
+
+# --- one channel closely --------------------------------------------------------------------------
+
+ROUGH = "#d2d2d2"
+"""Colour of the difference of neighbours, which fills its panel where the count changes often."""
+
+
+def plot_channel(
+    channel: Channel,
+    simulated: Array | None = None,
+    *,
+    window: tuple[float, float] | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Figure of one measured channel: its samples, and below what a glitch shows in best.
+
+    Parameters
+    ----------
+    channel : Channel
+        Any. Below a position, a staircase of its samples, stands its speed: the difference of
+        neighbours, and Kruse's filters in their form for any rate, which set the scale.
+    simulated : (n,) array, optional
+        What a drive predicts for each sample, SI. It is drawn over the samples; below any other
+        channel than a position stands measured less simulated, on the scale of what counts.
+    window : (float, float), optional
+        First and last instant to show [s]. Everything is computed from the whole record.
+    title : str, optional
+        By default the channel's name.
+
+    Raises
+    ------
+    InputError
+        If the window holds fewer than two samples.
+    """
+    rows = rows_within(channel.time, window, str(channel.source))
+    time, values, used = channel.time[rows], channel.values[rows], channel.used[rows]
+    legend = [handle("measured", INK if channel.is_position else BLUE, width=THIN)]
+    if simulated is not None:
+        legend.append(handle("simulated", VERMILION))
+    lower: list[tuple[Array, Array, str, float]] = []
+    if channel.is_position:
+        from swashplate.campaign import speed_of
+
+        speeds = [(speed_of(channel, "difference"), ROUGH), (speed_of(channel, "exact"), BLUE)]
+        for speed, color in speeds:
+            within = (speed.time >= time[0]) & (speed.time <= time[-1])
+            lower.append((speed.time[within], speed.speed[within], color, LINE))
+        late = 1e3 * speeds[1][0].delay
+        legend.append(handle("speed: difference of neighbours", ROUGH))
+        legend.append(handle(f"speed: 10 and 30 Hz filters, {late:.1f} ms late", BLUE))
+        below, si = "speed", f"{channel.unit}/s"
+    elif simulated is not None:
+        lower.append((time, values - simulated[rows], INK, THIN))
+        below, si = "measured less simulated", channel.unit
+    heights = [2.4, 2.2] if lower else [3.2]
+    figure, axes = sheet(heights, channel.name if title is None else title, legend=legend)
+    unit = display_unit(channel.unit, float(np.abs(values).max()))
+    dress(axes[0], unit.label(channel.kind.replace("_", " ").replace("encoder counts", "angle")))
+    how: dict[str, Any] = {"held": channel.is_position, "width": THIN, "zorder": 2.5}
+    counted = values[used] if used.any() else values
+    room = 0.12 * float(np.ptp(counted)) or 1.0 / unit.factor
+    axes[0].set_ylim(unit.factor * (counted.min() - room), unit.factor * (counted.max() + room))
+    draw(axes[0], time, unit.factor * values, INK if channel.is_position else BLUE, **how)
+    if simulated is not None:
+        draw(axes[0], time, unit.factor * simulated[rows], VERMILION, zorder=3.0)
+    if channel.encoder is not None:
+        counts = right_axis(
+            axes[0], 1.0 / (unit.factor * channel.encoder.angle_per_count), "counts"
+        )
+        counts.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10], integer=True))
+    if lower:
+        scale = lower[-1][1] if channel.is_position or not used.any() else lower[-1][1][used]
+        unit = display_unit(si, float(np.abs(scale).max()))
+        dress(axes[1], unit.label(below))
+        margin = 0.12 * float(np.ptp(scale)) or 1.0 / unit.factor
+        axes[1].set_ylim(unit.factor * (scale.min() - margin), unit.factor * (scale.max() + margin))
+        zero_line(axes[1])
+        for when, what, color, width in lower:
+            draw(axes[1], when, unit.factor * what, color, width=width)
+    for ax in axes:
+        shade(ax, stretches(time, ~used), IGNORED)
+        mark_gaps(ax, time)
+    axes[-1].set_xlim(float(time[0]), float(time[-1]))
+    label_below(axes[-1], "time (s)")
+    return figure

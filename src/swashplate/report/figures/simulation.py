@@ -1,4 +1,4 @@
-"""Figures of simulations: one with its chain of signals, several compared, many at a glance."""
+"""Figures of simulations: one with its chain of signals, and several compared."""
 
 from __future__ import annotations
 
@@ -8,15 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from swashplate.errors import InputError
 from swashplate.full_order import Comparison
 from swashplate.linear import UNITS
-from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.lines import (
     NARROW,
     SHADES,
@@ -27,31 +24,24 @@ from swashplate.report.lines import (
     draw,
     fill_panel,
     fit_time,
+    rows_within,
     shade,
     shade_handle,
     stretches,
 )
 from swashplate.report.style import (
     BLUE,
-    FAINT,
-    GAP,
     INK,
-    LINE,
-    NORMAL,
-    SMALL,
-    THIN,
     VERMILION,
     Stroke,
     dress,
     handle,
     label_below,
     new_figure,
-    right_axis,
     sheet,
     signed,
     strokes,
     write,
-    write_title,
     zero_line,
 )
 from swashplate.simulation.result import Limit, Signals, Simulation
@@ -89,15 +79,27 @@ class Panel(NamedTuple):
     """Range that is shown at least, SI, so that rounding looks like nothing."""
 
 
-def plot_simulation(simulation: Simulation, *, title: str | None = None) -> Figure:
+def plot_simulation(
+    simulation: Simulation,
+    *,
+    window: tuple[float, float] | None = None,
+    title: str | None = None,
+) -> Figure:
     """Figure of the chain's signals over time, with the active limits shaded.
 
     Parameters
     ----------
     simulation : Simulation
         What to show. Voltage has a panel only if the simulation was driven by one.
+    window : (float, float), optional
+        First and last instant to show [s].
     title : str, optional
         By default the name of the parameter set.
+
+    Raises
+    ------
+    InputError
+        If the window holds fewer than two samples.
     """
     pump, run = simulation.pump, simulation
 
@@ -109,8 +111,9 @@ def plot_simulation(simulation: Simulation, *, title: str | None = None) -> Figu
         Trace(run.current_positive, BLUE, "positive"),
         Trace(run.current_negative, VERMILION, "negative"),
     )
-    dead_zone = (Mark(pump.Z17, f"dead zone {pump.Z17:.2f} A"),)
-    electric = acting(Limit.DEAD_ZONE, Limit.CURRENT_RATE)
+    # without a dead zone no current is within it, although its flag stands at exactly 0 A
+    dead_zone = (Mark(pump.Z17, f"dead zone {pump.Z17:.2f} A"),) if pump.Z17 else ()
+    electric = acting(*([Limit.DEAD_ZONE] if pump.Z17 else []), Limit.CURRENT_RATE)
     panels = [
         Panel("current", "A", current, electric, dead_zone),
         _spool(run.spool_position, run.orifice_opening, ends)._replace(
@@ -126,7 +129,8 @@ def plot_simulation(simulation: Simulation, *, title: str | None = None) -> Figu
     ]
     if run.voltage is not None:
         panels.insert(0, Panel("voltage", "V", (Trace(run.voltage, INK),)))
-    return _chain(panels, run.time, run.name if title is None else title)
+    rows = rows_within(run.time, window, run.name)
+    return _chain(panels, run.time, run.name if title is None else title, rows)
 
 
 def plot_signals(
@@ -239,7 +243,7 @@ def _swash(angle: Array, stops: Stops) -> Panel:
     return Panel("swash angle", "swash", (Trace(angle, BLUE),), marks=tuple(marks))
 
 
-def _chain(panels: Sequence[Panel], time: Array, title: str) -> Figure:
+def _chain(panels: Sequence[Panel], time: Array, title: str, rows: slice = slice(None)) -> Figure:
     """The panels one under another, with a legend of the limits that act anywhere."""
     acting = {limit for panel in panels for limit, spans in panel.limits if spans.size}
     legend = [shade_handle(SHADES[limit]) for limit in Limit if limit in acting]
@@ -247,20 +251,20 @@ def _chain(panels: Sequence[Panel], time: Array, title: str) -> Figure:
     for ax, panel in zip(axes, panels, strict=True):
         for limit, spans in panel.limits:
             shade(ax, spans, SHADES[limit])
-        largest = max(float(np.abs(trace.values).max()) for trace in panel.traces)
+        largest = max(float(np.abs(trace.values[rows]).max()) for trace in panel.traces)
         # an angle within the machine stays in degrees, whatever the shaft's is shown in
         unit = display_unit(panel.si, max(largest, panel.least) or inf)
         name, factor = ("deg", float(np.degrees(1.0))) if panel.si == "swash" else unit
         fill_panel(
             ax,
             f"{panel.words}\n({name})",
-            time,
-            [each._replace(values=factor * each.values) for each in panel.traces],
+            time[rows],
+            [each._replace(values=factor * each.values[rows]) for each in panel.traces],
             [each._replace(level=factor * each.level) for each in panel.marks],
             height=panel.height,
             least=factor * panel.least,
         )
-    fit_time(axes[-1], time)
+    fit_time(axes[-1], time[rows])
     label_below(axes[-1], "time (s)")
     return figure
 
@@ -335,113 +339,3 @@ def _differences(
         if time.size:
             difference = other.at(time, "shaft_speed") - first.shaft_speed[both]
             draw(ax, time, factor * difference, color, dashes=dashes)
-
-
-# --- many runs of several axes --------------------------------------------------------------------
-
-KINDS = ("ramp", "step", "sine")
-"""Kinds of maneuver in the order of their columns; others follow as they come."""
-PANEL = 1.45
-"""Height of a panel. [inch]"""
-_ROOM = 1.12
-"""The ordinate reaches this much beyond the largest speed, and beyond ±10 V."""
-_SCALE = LinearSegmentedColormap.from_list(
-    "command", ("#f0b429", "#e0631a", "#b0205b", "#5b1a7a", "#1a1446")
-)
-
-
-def plot_maneuvers_overview(
-    runs: Mapping[str, Mapping[str, Simulation]], *, title: str | None = None
-) -> Figure:
-    """Figure of the speeds of several axes, over thin lines of the commands.
-
-    Parameters
-    ----------
-    runs : mapping
-        Name of an axis to its runs, by names whose first word is the kind of maneuver: ``"step"``
-        of ``"step +9 V"``. Runs of one kind are drawn over one another, each in the colour of its
-        largest command; all commands are drawn to one scale.
-    title : str, optional
-        By default it says what is shown.
-
-    Raises
-    ------
-    InputError
-        If there is no run.
-    """
-    cells: dict[str, dict[str, list[Simulation]]] = {}
-    for axis, of_axis in runs.items():
-        for name, run in of_axis.items():
-            kind = (name.split() or [""])[0]
-            cells.setdefault(axis, {}).setdefault(kind, []).append(run)
-    if not cells:
-        raise InputError("An overview needs at least one run.")
-    met = list(dict.fromkeys(kind for of_axis in cells.values() for kind in of_axis))
-    kinds = [kind for kind in KINDS if kind in met] + [kind for kind in met if kind not in KINDS]
-    columns = {kind: [r for each in cells.values() for r in each.get(kind, ())] for kind in kinds}
-    lengths = [max(run.time[-1] - run.time[0] for run in columns[kind]) for kind in kinds]
-    figure = new_figure(28.0 / 3.0, 1.3 + len(cells) * (PANEL + GAP))
-    axes = figure.subplots(
-        len(cells),
-        len(kinds),
-        sharex="col",
-        sharey="row",
-        squeeze=False,
-        gridspec_kw={"width_ratios": np.sqrt(np.maximum(lengths, 1.0))},
-    )
-    for row, (axis, by_kind) in zip(axes, cells.items(), strict=True):
-        _fill_row(list(row), kinds, axis, by_kind)
-    for column, kind in zip(axes.T, kinds, strict=True):
-        column[0].set_title(kind, fontsize=NORMAL, fontweight="bold", color=INK, pad=6.0)
-        label_below(column[-1], "time (s)")
-        fit_time(column[-1], *(run.time for run in columns[kind]))
-    write_title(figure, "Simulated shaft speed" if title is None else title)
-    shades = ScalarMappable(Normalize(0.0, FULL_VOLTAGE), _SCALE)
-    bar = figure.colorbar(shades, ax=axes, orientation="horizontal", aspect=60, fraction=0.03)
-    bar.outline.set_visible(False)
-    bar.ax.tick_params(length=2.0, width=0.6, color=FAINT, labelsize=SMALL, labelcolor=INK)
-    bar.set_label("line colour: largest command (V)", fontsize=SMALL, color=INK)
-    return figure
-
-
-def _fill_row(
-    row: Sequence[Axes], kinds: Sequence[str], axis: str, runs: Mapping[str, Sequence[Simulation]]
-) -> None:
-    """Draw the runs of one axis, all to the same scales of speed and voltage."""
-    unit = display_unit("rad/s")
-    fastest = max(float(np.abs(run.shaft_speed).max()) for each in runs.values() for run in each)
-    bound = _ROOM * (unit.factor * fastest or 1.0)
-    speed_per_volt = bound / (_ROOM * FULL_VOLTAGE)
-    for ax, kind in zip(row, kinds, strict=True):
-        dress(ax)
-        zero_line(ax)
-        ax.set_ylim(-bound, bound)
-        for run, width in _widths(runs.get(kind, ())):
-            if run.voltage is not None:
-                draw(ax, run.time, speed_per_volt * run.voltage, FAINT, width=0.7, zorder=1.8)
-            color = _SCALE(_largest_command(run) / FULL_VOLTAGE)
-            draw(ax, run.time, unit.factor * run.shaft_speed, color, width=width)
-    row[0].set_ylabel(f"{axis}\n{unit.label('speed')}", fontsize=NORMAL, color=INK)
-    volts = right_axis(row[-1], 1.0 / speed_per_volt, "command (V)")
-    volts.set_yticks([-FULL_VOLTAGE, 0.0, FULL_VOLTAGE])
-
-
-def _widths(runs: Sequence[Simulation]) -> list[tuple[Simulation, float]]:
-    """The runs with the widths of their lines, the largest command first.
-
-    So what is smaller lies over it and stays visible. A run of the same extremes as one before it,
-    such as a sine of another frequency, has the same colour and is therefore drawn thinner.
-    """
-    widths = []
-    met: set[tuple[float, float]] = set()
-    for run in runs:
-        volts = np.zeros(1) if run.voltage is None else run.voltage
-        extremes = (round(float(volts.min()), 1), round(float(volts.max()), 1))
-        widths.append((run, THIN if extremes in met else LINE))
-        met.add(extremes)
-    return sorted(widths, key=lambda pair: _largest_command(pair[0]), reverse=True)
-
-
-def _largest_command(run: Simulation) -> float:
-    """The largest voltage either way; that of a run driven by current counts as none. [V]"""
-    return 0.0 if run.voltage is None else float(np.abs(run.voltage).max())

@@ -16,8 +16,8 @@ from swashplate.campaign import Campaign, examine, quality_table
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
-from swashplate.identification.acceptance import Statement, Verdict, starts_of, verdict
-from swashplate.identification.assessment import Assessment, StageProfile, assess
+from swashplate.identification.acceptance import Statement, Verdict, percent, starts_of, verdict
+from swashplate.identification.assessment import Assessment, StageProfile, assess, motion_of
 from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.identifiability import in_the_fits_scales
 from swashplate.identification.own_model import ModelParameters
@@ -37,8 +37,8 @@ from swashplate.report.fit_report.runs import (
     shown_runs,
 )
 from swashplate.report.fit_report.summary import light, run_error, run_lights, summary_section
-from swashplate.tables import NONE, Column, Table, count, joined, listed, write_text
-from swashplate.units import chosen_unit, shown_in, unit_text
+from swashplate.tables import NONE, Cell, Column, Table, count, joined, listed, write_text
+from swashplate.units import chosen_unit, show_rod, shown_in, unit_text
 
 Role = Literal["fit", "validate"]
 _PARTS = {
@@ -121,6 +121,8 @@ def write_fit_report(
     found = Drive(drive) if isinstance(drive, ParameterSet) else None
     head, shared = _shared(campaign, runs, fit.nominal)
     with _units_of_people():
+        if motion_of(run.experiment for run in runs) == "rod":
+            show_rod()
         sections = [
             summary_section(judged, campaign, found, assessed, runs, head["findings"]),
             *shared[:2],
@@ -259,11 +261,11 @@ def _qualities(runs: Sequence[ShownRun], role: Role | None = None) -> list[RunQu
 
 
 def _agreement_section(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> Section:
-    error = Column("error / range", ".1%", none=NONE)
+    error = Column("error / range", "s", none=NONE)
     columns = (Column(""), Column("run"), Column("role"), Column("maneuver"), Column("judged by"))
     overview = Table("", (*columns, error, Column("why"), Column("findings")))
     for number, (run, (look, why)) in enumerate(zip(runs, run_lights(runs, findings), strict=True)):
-        part = run_error(run)
+        part = run_error(run, runs)
         to_curves = Markup('<a href="#run-{}">{}</a>').format(number, run.name)
         links = Markup(" ").join(
             Markup('<a href="#finding-{0}">{0}</a>').format(each)
@@ -275,7 +277,7 @@ def _agreement_section(runs: Sequence[ShownRun], findings: dict[str, list[int]])
             run.role,
             run.experiment.maneuver,
             run.judged.quality.channel,
-            None if part == inf else part,
+            None if part == inf else Cell(part, percent(part)),
             why,
             links,
             look=look != "good",
@@ -285,7 +287,7 @@ def _agreement_section(runs: Sequence[ShownRun], findings: dict[str, list[int]])
         "RMSE is the root of the mean squared difference of the samples that count; NRMSE is RMSE "
         "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE); R² is "
         "1 − NRMSE². Error / range is RMSE over the largest less the smallest value measured in "
-        "the run; the verdict takes the range of all runs."
+        "all runs of that role, as in the verdict."
     )
     measures = Block("table", joined(made), "agreement")
     blocks = [
@@ -357,7 +359,7 @@ def _setup_section(
     else:
         made.add("drive", f"{drive.name}, card {drive.card}" if drive.card else drive.name)
     if title:
-        made.add("set-up", title)
+        made.add("fit configuration", title)
     for key, words in (notes or {}).items():
         if key != "campaign":
             made.add(key, words)
@@ -451,8 +453,7 @@ def _parameter_section(
     made = [tables.estimates_table(each, truth=scaled) for each in assessments]
     words = (
         "Change is from the nominal value. Intervals are for residuals that are correlated over "
-        "time; those for white noise stand beside them because other programs quote them. An "
-        "unknown at a bound has no symmetric interval. Parameter files have SI units."
+        "time. A parameter at a bound has no symmetric interval. Parameter files have SI units."
     )
     blocks = [text(words)]
     if truth is not None:
@@ -462,7 +463,7 @@ def _parameter_section(
                 "Truth is what was simulated, in the scales that the fit kept fixed: it was moved "
                 "to the fixed values along those directions that the tests do not determine. Other "
                 "fixed parameters that are not true shift the estimates, and no interval covers "
-                f"that. {inside} of {counted} intervals hold it."
+                f"that. {inside} of {counted} intervals contain it."
             )
         )
     for table, each in zip(made, assessments, strict=True):

@@ -20,8 +20,8 @@ from swashplate.identification.acceptance import (
     Grade,
     Verdict,
     following,
-    part_of_range,
     percent,
+    range_of,
     weak_unknowns,
 )
 from swashplate.identification.assessment import Assessment
@@ -138,11 +138,15 @@ def light(look: Light, words: str) -> Markup:
     return made.format(look, words, words, sign)
 
 
-def run_error(run: ShownRun) -> float:
-    """RMSE of a run's judged channel over its range in that run; infinite where nothing moves."""
-    shown = run.judged.quality
-    part = part_of_range([shown], shown.channel)
-    return np.inf if part is None else part
+def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
+    """RMSE of a run's judged channel over its range in all runs of its role, as the verdict has it.
+
+    Infinite where nothing moves.
+    """
+    own = run.judged.quality
+    judged = [each.judged.quality for each in runs if each.role == run.role]
+    reach = range_of([each for each in judged if each.channel == own.channel])
+    return own.measures.rmse / reach if reach > 0.0 else np.inf
 
 
 def run_lights(runs: Sequence[ShownRun], findings: dict[str, list[int]]) -> list[tuple[Light, str]]:
@@ -197,7 +201,8 @@ def summary_section(
 ) -> Section:
     """The first screen: `drive` is None for a model of one's own, which has no such numbers."""
     look = LIGHTS[judged.grade]
-    shown = [Block("verdict", (light(look, judged.grade), judged.headline), look)]
+    headline = judged.headline.replace(" %", "\N{NO-BREAK SPACE}%")
+    shown = [Block("verdict", (light(look, judged.grade), headline), look)]
     shown.append(Block("pair", list(_curves(runs, campaign.virtual))))
     numbers, limits = [], []
     if drive is not None:
@@ -223,12 +228,12 @@ def summary_section(
 def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[Block]:
     """The runs that are predicted best and worst, of those held out if there are any."""
     held = [k for k, run in enumerate(runs) if run.validates]
-    chosen = sorted(held or range(len(runs)), key=lambda k: run_error(runs[k]))
+    chosen = sorted(held or range(len(runs)), key=lambda k: run_error(runs[k], runs))
     ends = {"Best": chosen[0], "Worst": chosen[-1]} if len(chosen) > 1 else {"The": chosen[0]}
     for which, k in ends.items():
         kind = "held-out run" if held else "run" if runs[k].validates else "fitted run"
-        part = run_error(runs[k])
-        error = "never moves" if part == np.inf else f"error {percent(part)} of its range"
+        part = run_error(runs[k], runs)
+        error = "never moves" if part == np.inf else f"error {percent(part)} of the range"
         content = {
             "number": k,
             "run": runs[k],
@@ -248,13 +253,9 @@ def _limits(drive: Drive) -> list[str]:
     except SwashplateError as error:
         return [str(error)]
     acting = sorted(found.shares, key=lambda each: each.time_share or 0.0, reverse=True)
-    shares = (
-        f"{each.limit[0].upper()}{each.limit[1:]}: acts {percent(each.time_share)} of the time."
-        for each in acting[:3]
-        if each.time_share
-    )
-    head = "Steps from rest to ±10 V and back:"
-    return [f"{head} {' '.join(shares)}", *found.sentences()[:1]]
+    shares = [f"{e.limit} {percent(e.time_share)}" for e in acting[:3] if e.time_share]
+    head = "Share of the time of steps from rest to ±10 V and back"
+    return [f"{head}: {', '.join(shares) or 'nothing acts'}.", *found.sentences()[:1]]
 
 
 def _next(

@@ -12,25 +12,14 @@ from functools import cached_property
 from math import inf
 from typing import Any, get_type_hints
 
-from swashplate.equations.c_source import (
-    FLAG,
-
-    Kind,
-    Unit,
-    c_name,
-    comment,
-    hints_of,
-    literal,
-    wrapped,
-)
+from swashplate.equations.c_source.text import c_name, fields_of, indented, literal
+from swashplate.equations.c_source.unit import Unit
 from swashplate.equations.expressions import Node
 from swashplate.equations.fields import Definition, declared_by, floats_of
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.part import HOLDS, PartCode
 from swashplate.equations.model import Equation, Link, Model, Tap, Window, arguments_of
-from swashplate.equations.syntax import is_named_tuple, plain
-from swashplate.errors import InputError
-
+from swashplate.equations.syntax import plain
 
 OWN = """
 number_at put_at is_finite in_range number_of placed seen constant_window before_all good_inputs
@@ -40,7 +29,7 @@ given_places flag_places constant_places output_names input_names option_names
 PUBLIC = """
 size value_count init reset settle step correct output limits set_input clear_input set get
 set_option get_option set_step get_step update find find_output find_input find_option
-parameter_name output_name sentence
+parameter_name output_name sentence memory inputs parameter
 """
 """Names that the interface takes, of its own and behind the prefix."""
 
@@ -70,13 +59,14 @@ class Exported:
     @property
     def file(self) -> str:
         """Name of header and source."""
-        return self.type if self.prefix == self.model.name else f"swashplate_{self.model.name}"
+        own = self.prefix == c_name(self.model.name)
+        return self.prefix if own else f"swashplate_{self.model.name}"
 
     @property
     def type(self) -> str:
         """Name of the struct."""
-        name = self.model.name
-        return name if self.prefix == name else f"{self.prefix}_{name}"
+        own = self.prefix == c_name(self.model.name)
+        return f"{self.prefix}_{'model' if own else self.model.name}"
 
     # -- names -------------------------------------------------------------------------------------
 
@@ -189,6 +179,7 @@ class Writer:
     def __init__(self, exported: Exported) -> None:
         self.e, self.model = exported, exported.model
         own = {*OWN.split(), *(f"{exported.prefix}_{each}" for each in PUBLIC.split())}
+        own |= {exported.type}
         self.unit = Unit(f"{exported.prefix}_", exported.widest, own)
         self.P = exported.prefix.upper()
         self.taken = {
@@ -295,7 +286,7 @@ class Writer:
             found[name] = local
         if part.inputs is not None:
             struct = self.unit.struct(part.inputs)
-            kinds = dict(hints_of(part.inputs))
+            kinds = dict(fields_of(part.inputs))
             values = [found[n][1:] if kinds[n] is Window else found[n] for n in part.input_types]
             made = f"(struct {struct}){{{', '.join(values)}}}"
             lines.append(f"const struct {struct} {member}_inputs = {made};")
@@ -388,8 +379,12 @@ class Writer:
         ]
         for number, (i, _, tap) in enumerate(self.e.taps):
             delay = f"m->{self.e.members[i]}.{path_of(tap.delay)}" if tap.delay else "0.0"
-            made = f"placed(m, {number}, {delay}, {literal(float(tap.ahead))}, {tap.samples})"
-            places.append(f"if (!{made}) {{\n    return {self.P}_BAD_DELAY;\n}}")
+            places.append(
+                f"placed(m, {number}, {delay}, {literal(float(tap.ahead))}, {tap.samples})"
+            )
+        if places:
+            test = "\n    || ".join(f"!{each}" for each in places)
+            places = [f"if ({test}) {{\n    return {self.P}_BAD_DELAY;\n}}"]
         lines = [line for each in (*options, *checks, *places) for line in each.split("\n")]
         texts = [
             "/* Options, stability and delays of these parameters and this step. */",
@@ -451,19 +446,14 @@ class Writer:
         for i, part in enumerate(self.model.parts):
             if part.constants is not None:
                 kind = get_type_hints(plain(part.constants))["return"]
-                for path in floats_of(kind):
-                    found.append((path, f"{self.e.members[i]}_constants.{path_of(path)}"))
+                place = f"{self.e.members[i]}_constants"
+                found += [(path, f"{place}.{path_of(path)}") for path in floats_of(kind)]
         return found
 
 
 def path_of(path: str) -> str:
     """A path of Python's as one of C's."""
     return ".".join(c_name(each) for each in path.split("."))
-
-
-def indented(lines: Iterable[str]) -> list[str]:
-    """Lines of C moved in, long ones on several."""
-    return [each for line in lines for each in (wrapped(f"    {line}") if line else [""])]
 
 
 # --- feedthrough ----------------------------------------------------------------------------------
@@ -483,7 +473,7 @@ def feedthrough(exported: Exported) -> dict[str, frozenset[str]]:
     chosen = [[_on(kind, None) for kind in every], [_on(kind, "") for kind in every]]
     for i, kind in enumerate(every):
         for name in kind._fields if kind is not None else ():
-            chosen.append([_on(k, name if j == i else "") for j, k in enumerate(every)])
+            chosen += [[_on(k, name if j == i else "") for j, k in enumerate(every)]]
     found: dict[str, frozenset[str]] = dict.fromkeys(exported.names, frozenset())
     for options in chosen:
         parts = [PartCode(model, i, model.external, each) for i, each in enumerate(options)]

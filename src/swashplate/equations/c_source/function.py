@@ -9,19 +9,28 @@ from __future__ import annotations
 
 import ast
 import copy
-import inspect
 import math
 import re
-import textwrap
-import types
 import typing
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
 from types import ModuleType
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 from swashplate.equations import loops
-from swashplate.equations.fields import Definition
+from swashplate.equations.c_source.text import (
+    BOOL,
+    DOUBLE,
+    FLAG,
+    INT,
+    LEVELS,
+    Kind,
+    Text,
+    c_name,
+    comment,
+    fields_of,
+    literal,
+    wrapped,
+)
 from swashplate.equations.syntax import (
     ARITHMETIC,
     COMPARISONS,
@@ -35,300 +44,8 @@ from swashplate.equations.syntax import (
 )
 from swashplate.errors import EquationError
 
-WIDTH = 100
-"""Longest line of C."""
-HELPERS = {
-    "lesser_of": """\
-/* Python's min: of two that are equal or do not compare, the first. */
-static double lesser_of(double a, double b) { return b < a ? b : a; }
-""",
-    "greater_of": """\
-/* Python's max: of two that are equal or do not compare, the first. */
-static double greater_of(double a, double b) { return b > a ? b : a; }
-""",
-    "whole_power": """\
-/* A power with a whole number, by squaring as the equations' compiler does it. */
-static double whole_power(double base, int exponent)
-{
-    double power = 1.0;
-    for (int left = exponent < 0 ? -exponent : exponent; left != 0; left >>= 1) {
-        if (left & 1) {
-            power *= base;
-        }
-        base *= base;
-    }
-    return exponent < 0 ? 1.0 / power : power;
-}
-""",
-    "whole_number": """\
-/* A number without its fraction as a whole number; for what has none the lowest. */
-static long long whole_number(double value)
-{
-    return value >= -9.2e18 && value <= 9.2e18 ? (long long)value : -9223372036854775807LL - 1;
-}
-""",
-}
-"""Functions that stand for what C has not, or has otherwise."""
-WORDS = set(
-    """
-auto break case char const continue default do double else enum extern float for goto if inline int
-long register restrict return short signed sizeof static struct switch typedef union unsigned void
-volatile while bool true false NULL INFINITY NAN size_t offsetof main errno memcpy memset strcmp
-isfinite isnan isinf signbit lesser_of greater_of whole_power whole_number fabs fmod pow ldexp frexp
-modf ceil round trunc rint cosh sinh tanh acosh asinh atanh cbrt log10 log2 log1p exp2 expm1 erf erfc
-gamma lgamma tgamma fmin fmax fdim fma j0 j1 jn y0 y1 yn index time signal div abs linux unix
-""".split()  # noqa: SIM905
-) | set(MATH.values())
-"""Names that C or its library keeps for itself."""
-BREAKS = re.compile(r"[,;] | (?=[?:+/=*-] |&& |\|\| )|\{(?=\.)")
-"""Where a long line of C may end."""
-LEVELS = {"?": 1, "||": 2, "&&": 3, "==": 7, "!=": 7, "<": 8, "<=": 8, ">": 8, ">=": 8}
-LEVELS |= {"+": 10, "-": 10, "*": 11, "/": 11, "unary": 12, "atom": 13}
-
-
-@dataclass(frozen=True)
-class Kind:
-    """What a value is: double, int, bool, flag (an option), struct or tuple."""
-
-    word: str
-    cls: Any = None
-    items: tuple[Kind, ...] = ()
-
-    @property
-    def whole(self) -> bool:
-        """Whether it has parts, and is passed by its address."""
-        return self.word in ("struct", "tuple")
-
-
-DOUBLE, INT, BOOL, FLAG = Kind("double"), Kind("int"), Kind("bool"), Kind("flag")
-SCALARS = {DOUBLE: "double", INT: "long long", BOOL: "bool", FLAG: "bool"}
-
-
-class Text(NamedTuple):
-    """An expression in C."""
-
-    text: str
-    level: int
-    kind: Kind
-    pointer: bool = False
-    """Whether it is the address of what it stands for."""
-    place: bool = True
-    """Whether it has an address, if it has parts."""
-
-
-def c_name(name: str) -> str:
-    """A name of Python's as one of C's."""
-    plain_name = "".join(c if c.isascii() else f"u{ord(c):04x}" for c in name)
-    return f"{plain_name}_" if plain_name in WORDS else plain_name
-
-
-def snake(name: str) -> str:
-    """Name of a class in lower case: ``CardOptions`` is ``card_options``."""
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
-
-
-def literal(value: float) -> str:
-    """A number as C writes it."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int):
-        return str(value)
-    if math.isinf(value):
-        return "INFINITY" if value > 0.0 else "-INFINITY"
-    return "NAN" if math.isnan(value) else repr(float(value))
-
-
-def wrapped(line: str) -> list[str]:
-    """A line of C on as many lines as it takes."""
-    indent = " " * (len(line) - len(line.lstrip()))
-    lines, rest = list[str](), line
-    while len(rest) > WIDTH:
-        ends = [m.end() for m in BREAKS.finditer(rest, len(indent) + 8, WIDTH + 1)]
-        if not ends:
-            break
-        at = max([m for m in ends if rest[m - 2] in ",;"] or ends)
-        at = at if at > WIDTH // 2 else max(ends)
-        lines.append(rest[:at].rstrip())
-        rest = f"{indent}    {rest[at:]}"
-    return [*lines, rest]
-
-
-def comment(text: str) -> list[str]:
-    """A docstring as a comment."""
-    lines = inspect.cleandoc(text).replace("*/", "* /").splitlines()
-    if len(lines) == 1 and len(lines[0]) < WIDTH - 6:
-        return [f"/* {lines[0]} */"]
-    return [f"/* {lines[0]}", *(f" * {line}".rstrip() for line in lines[1:]), " */"]
-
-
-# --- all that was translated ----------------------------------------------------------------------
-
-
-@dataclass
-class Unit:
-    """Structs, constants and functions, in the order in which C needs them."""
-
-    prefix: str = ""
-    """What stands before the tags of structs."""
-    longest: int = 3
-    """Elements of a tuple whose length the types leave open: samples of a `Window`."""
-    reserved: set[str] = field(default_factory=set)
-    """Names that functions may not have."""
-    structs: dict[Any, tuple[str, str]] = field(default_factory=dict)
-    constants: dict[str, tuple[Any, str]] = field(default_factory=dict)
-    functions: dict[Any, str] = field(default_factory=dict)
-    """Names in C, by function and what it is made for."""
-    texts: list[str] = field(default_factory=list)
-    under_way: list[Any] = field(default_factory=list)
-
-    def add(self, function: Any) -> str:
-        """Translate an equation and all that it calls; its name in C.
-
-        Raises
-        ------
-        EquationError
-            If something in it has no counterpart in C; the sentence has file, line and function.
-        """
-        return self.made(parsed(function), (), {}, {})
-
-    def made(
-        self, source: Parsed, key: tuple[Any, ...], kinds: dict[str, Kind], calls: dict[str, Any]
-    ) -> str:
-        """A function for certain kinds of arguments, or for other functions among them."""
-        whole_key = (source.function, *key)
-        if whole_key in self.functions:
-            return self.functions[whole_key]
-        if whole_key in self.under_way:
-            source.refuse(None, "a call of itself", "write a loop over a literal range")
-        stem = "_of_".join([source.name, *(plain(each).__name__ for each in calls.values())])
-        name = self.free(c_name(stem), source.function, {*self.functions.values(), *self.reserved})
-        self.under_way.append(whole_key)
-        text = Function(self, source, name, kinds, calls).text()
-        self.under_way.pop()
-        self.functions[whole_key] = name
-        self.texts.append(text)
-        return name
-
-    def free(self, name: str, owner: Any, taken: Iterable[str]) -> str:
-        """A name that nothing else has: with its module's, then with a number."""
-        used, module = set(taken), owner.__module__.rpartition(".")[2].strip("_") or "own"
-        names = (name, f"{module}_{name}", *(f"{name}_{k}" for k in range(2, 1000)))
-        return next(each for each in names if each not in used)
-
-    def struct(self, cls: Any) -> str:
-        """A class of named tuples; its tag."""
-        if cls not in self.structs:
-            tag = c_name(f"{self.prefix}{snake(cls.__name__)}")
-            tag = self.free(tag, cls, [known for known, _ in self.structs.values()])
-            fields = [
-                (self.declaration(self.kind(hint, cls.__name__), c_name(name)), note)
-                for (name, hint), note in zip(hints_of(cls), _notes(cls), strict=True)
-            ]
-            doc = inspect.getdoc(cls) or ""
-            doc = "" if doc.startswith(f"{cls.__name__}(") else doc.splitlines()[0]
-            lines = [*(comment(doc) if doc else []), f"struct {tag} {{"]
-            for text, note in fields:
-                lines.append(f"    {text};" + (f" /* {note} */" if note else ""))
-            lines += [] if fields else ["    char nothing;"]
-            self.structs[cls] = (tag, "\n".join([*lines, "};"]))
-        return self.structs[cls][0]
-
-    def tuple(self, kind: Kind) -> str:
-        """A tuple's struct; its tag."""
-        doubles = all(item in (DOUBLE, INT) for item in kind.items)
-        letters = "".join(item.word[0] for item in kind.items)
-        tag = f"{self.prefix}{'double' if doubles else letters}_{len(kind.items)}"
-        if tag not in self.structs:
-            inner = [f"double v[{len(kind.items)}]"]
-            if not doubles:
-                inner = [self.declaration(item, f"v{i}") for i, item in enumerate(kind.items)]
-            lines = [f"struct {tag} {{", *(f"    {each};" for each in inner), "};"]
-            self.structs[tag] = (tag, "\n".join(lines))
-        return tag
-
-    def helpers(self) -> list[str]:
-        """Functions that the translated ones call."""
-        text = "\n".join(self.texts)
-        return [each for name, each in HELPERS.items() if f"{name}(" in text]
-
-    def kind(self, hint: Any, where: str) -> Kind:
-        """Kind of what has a type."""
-        origin, args = typing.get_origin(hint), typing.get_args(hint)
-        known = {float: DOUBLE, int: INT, bool: BOOL, type(None): FLAG}
-        if hint in known:
-            return known[hint]
-        if origin in (typing.Union, types.UnionType) and set(args) == {bool, type(None)}:
-            return FLAG
-        if is_named_tuple(hint):
-            return Kind("struct", hint)
-        if origin is tuple:
-            args = (args[0],) * self.longest if args[-1] is Ellipsis else args
-            return Kind("tuple", None, tuple(self.kind(each, where) for each in args))
-        raise EquationError(
-            f"{where}: the type {getattr(hint, '__name__', hint)} has no counterpart in C; an "
-            "equation that is exported takes float, int, bool, bool | None for an option, tuples "
-            "and named tuples of them."
-        )
-
-    def declared(self, kind: Kind) -> str:
-        """A kind as C writes it."""
-        if kind in SCALARS:
-            return SCALARS[kind]
-        return f"struct {self.struct(kind.cls) if kind.word == 'struct' else self.tuple(kind)}"
-
-    def declaration(self, kind: Kind, name: str, *, formal: bool = False) -> str:
-        """A name with its kind; what has parts is given to functions by its address."""
-        if formal and kind.whole:
-            return f"const {self.declared(kind)} *{name}"
-        return f"{self.declared(kind)} {name}"
-
-    def constant(self, name: str, value: Any) -> str:
-        """A number from outside an equation; its name in C."""
-        name = {"pi": "PI", "e": "EULER", "tau": "TAU"}.get(name, name)
-        name = c_name(name if name.isupper() and len(name) > 3 or name == "PI" else f"{name}_VALUE")
-        name = name.upper()
-        known = [n for n, (v, _) in self.constants.items() if n.startswith(name) and v == value]
-        if known:
-            return known[0]
-        name = next(n for n in (name, *(f"{name}_{k}" for k in range(2, 1000)))
-                    if n not in self.constants)  # fmt: skip
-        if isinstance(value, tuple):
-            kind = Kind("tuple", None, (DOUBLE,) * len(value))
-            inner = ", ".join(literal(float(each)) for each in value)
-            text = f"static const {self.declared(kind)} {name} = {{{{{inner}}}}};"
-        else:
-            word = "bool" if isinstance(value, bool) else "double"
-            word = "long long" if type(value) is int else word
-            text = f"static const {word} {name} = {literal(value)};"
-        self.constants[name] = (value, "\n".join(wrapped(text)))
-        return name
-
-
-def hints_of(cls: Any) -> list[tuple[str, Any]]:
-    """Fields of a class of named tuples with their types."""
-    hints = typing.get_type_hints(cls)
-    return [(name, hints.get(name, float)) for name in cls._fields]
-
-
-def _notes(cls: Any) -> list[str]:
-    """What is said about each field: its definition, or the comment behind it."""
-    hints = typing.get_type_hints(cls, include_extras=True)
-    try:
-        text = inspect.getsource(cls)
-    except (OSError, TypeError):
-        text = ""
-    said = dict(re.findall(r"^    (\w+):.*?# (?!fmt|noqa|type:)(.*)$", text, re.MULTILINE))
-    notes = []
-    for name in cls._fields:
-        definition = next(iter(getattr(hints.get(name), "__metadata__", ())), None)
-        if isinstance(definition, Definition) and definition.unit:
-            notes.append(f"{definition.name} [{definition.unit}]")
-        else:
-            notes.append(said.get(name, ""))
-    return notes
-
-
-# --- one function ---------------------------------------------------------------------------------
+if typing.TYPE_CHECKING:
+    from swashplate.equations.c_source.unit import Unit
 
 
 class Function:
@@ -344,8 +61,7 @@ class Function:
             cells = zip(f.__code__.co_freevars, f.__closure__ or (), strict=False)
             free = {cell: each.cell_contents for cell, each in cells}
             hints = typing.get_type_hints(f, None, free or None)
-            where = f"{source.file}, line {source.node.lineno}: {source.name}"
-            kinds = {n: unit.kind(hint, where) for n, hint in hints.items()}
+            kinds = {n: unit.kind(hint, n) for n, hint in hints.items()}
         self.returns = kinds["return"]
         self.formals = {n: kind for n, kind in kinds.items() if n != "return"}
         if source.node.args.vararg:
@@ -414,6 +130,7 @@ class Function:
         return lines
 
     def statement(self, each: ast.stmt, path: tuple[Any, ...]) -> list[str]:
+        """Lines of one statement."""
         pad = "    " * (len(path) + 1)
         if isinstance(each, ast.Return):
             assert each.value is not None
@@ -516,7 +233,7 @@ class Function:
             for way in (value.body, value.orelse)
         ):
             ways = zip(value.body.elts, value.orelse.elts, strict=True)  # type: ignore[attr-defined]
-            elements = [ast.IfExp(value.test, one, two) for one, two in ways]
+            elements: list[ast.expr] = [ast.IfExp(value.test, one, two) for one, two in ways]
             value = ast.copy_location(ast.Tuple(elements, ast.Load()), value)
         pad = "    " * (len(path) + 1)
         if isinstance(value, ast.Tuple) and len(value.elts) == len(targets):
@@ -538,17 +255,17 @@ class Function:
         made = self.value(value)
         if not made.kind.whole:
             self.refuse(value, "an unpacking of something else than a tuple")
-        kept = self.held(made)
-        parts = self.parts(kept)
+        parts = self.parts(self.held(made))
         if len(parts) != len(targets):
             self.refuse(value, f"an unpacking of {len(parts)} values into {len(targets)}")
-        names = [t.id if isinstance(t, ast.Name) else "_" for t in targets]
+        targeted = [t.id if isinstance(t, ast.Name) else "_" for t in targets]
         return [self.bound(name, part, path, value)
-                for name, part in zip(names, parts, strict=True) if name != "_"]  # fmt: skip
+                for name, part in zip(targeted, parts, strict=True) if name != "_"]  # fmt: skip
 
     # -- values with parts -------------------------------------------------------------------------
 
     def temporary(self) -> str:
+        """A new name for a value on its way."""
         self.temporaries += 1
         return f"value_{self.temporaries}"
 
@@ -570,7 +287,8 @@ class Function:
 
     def part(self, made: Text, name: str) -> Text:
         """A field."""
-        kind = self.unit.kind(dict(hints_of(made.kind.cls))[name], made.kind.cls.__name__)
+        cls = made.kind.cls
+        kind = self.unit.kind(dict(fields_of(cls))[name], f"{cls.__name__}.{name}")
         dot = "->" if made.pointer else "."
         return Text(f"{_grouped(made, 13)}{dot}{c_name(name)}", 13, kind, place=made.place)
 
@@ -596,9 +314,8 @@ class Function:
             return _double(made)
         if made.kind != kind and {made.kind, kind} != {BOOL, FLAG}:
             if kind.whole and kind.word == made.kind.word == "tuple":
-                inner = [self.converted(p, k, node)
-                         for p, k in zip(self.parts(self.held(made)), kind.items, strict=False)]  # fmt: skip
-                return self.composed(kind, inner)
+                pairs = zip(self.parts(self.held(made)), kind.items, strict=False)
+                return self.composed(kind, [self.converted(p, k, node) for p, k in pairs])
             self.refuse(node, f"a value of kind {made.kind.word} for one of {kind.word}")
         return _pointed(made)
 
@@ -626,6 +343,7 @@ class Function:
         return made
 
     def on_constant(self, node: ast.Constant) -> Text:
+        """A literal number."""
         value: Any = node.value
         if value is None:
             return Text("false", 13, FLAG)
@@ -633,6 +351,7 @@ class Function:
         return Text(literal(value), 13, kind)
 
     def on_tuple(self, node: ast.Tuple, wanted: Kind | None = None) -> Text:
+        """A tuple of the kinds that are wanted, or of its own."""
         made = [self.value(each) for each in node.elts]
         items = wanted.items if wanted and len(wanted.items) == len(made) else ()
         kinds = [w if w == DOUBLE and m.kind == INT else m.kind
@@ -642,6 +361,7 @@ class Function:
         return Text(self.composed(kind, inner), 12, kind)
 
     def on_name(self, node: ast.Name) -> Text:
+        """A local value, or a constant of the module."""
         if node.id in self.kinds:
             local = node.id not in self.formals or node.id in self.copied
             pointer = self.kinds[node.id].whole and not local
@@ -649,6 +369,7 @@ class Function:
         return self.outside(node, node.id, self.resolved(node))
 
     def resolved(self, node: ast.Name) -> Any:
+        """What a name of the module stands for."""
         try:
             return self.source.resolve(node.id)
         except NameError:
@@ -661,15 +382,14 @@ class Function:
         if type(value) is float and not math.isfinite(value):
             return Text(literal(value), 13 if value > 0.0 else 12, DOUBLE)
         if type(value) in (int, float):
-            return Text(
-                self.unit.constant(name, value), 13, INT if type(value) is int else DOUBLE
-            )
+            return Text(self.unit.constant(name, value), 13, INT if type(value) is int else DOUBLE)
         if isinstance(value, tuple) and value and all(type(v) in (int, float) for v in value):
             kind = Kind("tuple", None, (DOUBLE,) * len(value))
             return Text(self.unit.constant(name, tuple(value)), 13, kind)
         self.refuse(node, f"{name}, which is {type(value).__name__}")
 
     def on_attribute(self, node: ast.Attribute) -> Text:
+        """A field, or a constant of a module."""
         base = node.value
         if isinstance(base, ast.Name) and base.id not in self.kinds:
             module = self.resolved(base)
@@ -681,6 +401,7 @@ class Function:
         return self.part(made, node.attr)
 
     def on_subscript(self, node: ast.Subscript) -> Text:
+        """An element of a tuple."""
         made = self.value(node.value)
         if made.kind.word == "struct":
             made = self.held(made)
@@ -697,6 +418,7 @@ class Function:
         return self.element(made, index) if made.kind.word == "tuple" else self.parts(made)[index]
 
     def on_unaryop(self, node: ast.UnaryOp) -> Text:
+        """A sign or `not`."""
         made = self.number(node.operand)
         if isinstance(node.op, ast.Not):
             return Text(f"!{_grouped(made, 12)}", 12, BOOL)
@@ -706,6 +428,7 @@ class Function:
         return Text(f"-({text})" if text.startswith("-") else f"-{text}", 12, made.kind)
 
     def on_binop(self, node: ast.BinOp) -> Text:
+        """An arithmetic operation, in the order of the equation."""
         left = self.number(node.left)
         op = ARITHMETIC[type(node.op)]
         if op == "**":
@@ -723,6 +446,7 @@ class Function:
         return Text(f"{_grouped(one, level)} {op} {_grouped(two, level + 1)}", level, kind)
 
     def on_compare(self, node: ast.Compare) -> Text:
+        """A comparison, also of several terms, and `is None`."""
         left, found = self.value(node.left), list[Text]()
         for op, right_node in zip(node.ops, node.comparators, strict=True):
             if isinstance(op, ast.Is | ast.IsNot):
@@ -745,17 +469,20 @@ class Function:
         return found[0] if len(found) == 1 else self.joined(found, "&&")
 
     def joined(self, found: Sequence[Text], op: str) -> Text:
+        """Tests joined by one operator."""
         # an `and` within an `or` keeps its brackets, as compilers and readers like it
         level = LEVELS["<="] - 2 if op == "||" else LEVELS["&&"] + 1
         return Text(f" {op} ".join(_grouped(each, level) for each in found), LEVELS[op], BOOL)
 
     def on_boolop(self, node: ast.BoolOp) -> Text:
+        """`and` and `or` of tests."""
         found = [self.number(each) for each in node.values]
         if any(each.kind not in (BOOL, FLAG) for each in found):
             self.refuse(node, "`and` or `or` of numbers")
         return self.joined(found, "&&" if isinstance(node.op, ast.And) else "||")
 
     def on_ifexp(self, node: ast.IfExp) -> Text:
+        """A conditional expression."""
         test, one, two = self.number(node.test), self.value(node.body), self.value(node.orelse)
         kind = DOUBLE if {one.kind, two.kind} == {INT, DOUBLE} else one.kind
         texts = [self.converted(each, kind, node) for each in (one, two)]
@@ -766,6 +493,7 @@ class Function:
     # -- calls -------------------------------------------------------------------------------------
 
     def on_call(self, node: ast.Call) -> Text:
+        """A call of an equation, a function of `math` or a named tuple."""
         function = node.func
         name = function.id if isinstance(function, ast.Name) else ""
         if name in self.calls:
@@ -830,9 +558,9 @@ class Function:
 
     def constructed(self, node: ast.Call, cls: Any) -> Text:
         """A named tuple."""
-        hints, kind = dict(hints_of(cls)), Kind("struct", cls)
+        hints, kind = dict(fields_of(cls)), Kind("struct", cls)
         made = self.bind(node, cls._fields, cls._field_defaults)
-        kinds = [self.unit.kind(hints[name], cls.__name__) for name in cls._fields]
+        kinds = [self.unit.kind(hints[n], f"{cls.__name__}.{n}") for n in cls._fields]
         texts = [self.converted(m, k, node) for m, k in zip(made, kinds, strict=True)]
         if node.keywords:
             pairs = zip(cls._fields, texts, strict=True)
@@ -862,7 +590,7 @@ class Function:
         cells = zip(f.__code__.co_freevars, f.__closure__ or (), strict=False)
         free = {cell: each.cell_contents for cell, each in cells}
         hints = typing.get_type_hints(f, None, free or None)
-        return {name: self.unit.kind(hint, source.name) for name, hint in hints.items()}
+        return {name: self.unit.kind(hint, name) for name, hint in hints.items()}
 
     def specialised(self, node: ast.Call, function: Any) -> Text:
         """A call of `root`, `repeated` or `interpolate`, made for what it is given."""
@@ -884,7 +612,7 @@ class Function:
         made = [self.value(each) for each in args]
         made = [Text(_double(m), 12, DOUBLE) if m.kind == INT else m for m in made]
         kinds = {name: each.kind for name, each in zip(formals, made, strict=True)}
-        kinds["return"] = kinds["state"] if "state" in kinds else DOUBLE
+        kinds["return"] = kinds.get("state", DOUBLE)
         key = (*(plain(each) for each in calls.values()), *kinds.values())
         name = self.unit.made(source, key, kinds, calls)
         texts = ", ".join(self.given(each) for each in made)
@@ -923,7 +651,9 @@ def _constant(node: ast.expr) -> int | None:
 
 def _stored(node: ast.AST) -> set[str]:
     """Names that get a value somewhere in it."""
-    return {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    return {
+        n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+    }
 
 
 def _common(one: tuple[Any, ...], two: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -965,7 +695,9 @@ def _unrolled(statements: Iterable[ast.stmt], whole_body: Sequence[ast.stmt]) ->
         outside = any(isinstance(n, ast.Name) and n.id == name and id(n) not in inside
                       for s in whole_body for n in ast.walk(s))  # fmt: skip
         ends = [_constant(a) for a in each.iter.args]
-        if None in ends or not (outside or any(isinstance(n, ast.Subscript) for n in ast.walk(each))):
+        if None in ends or not (
+            outside or any(isinstance(n, ast.Subscript) for n in ast.walk(each))
+        ):
             each.body = list(_unrolled(each.body, whole_body))
             yield each
             continue
@@ -983,7 +715,7 @@ class _Counted(ast.NodeTransformer):
     def __init__(self, name: str, number: int) -> None:
         self.name, self.number_node = name, ast.Constant(number)
 
-    def visit_Name(self, node: ast.Name) -> ast.expr:  # noqa: N802 - the library's name
+    def visit_Name(self, node: ast.Name) -> ast.expr:
         if node.id == self.name and isinstance(node.ctx, ast.Load):
             return ast.copy_location(ast.Constant(self.number_node.value), node)
         return node

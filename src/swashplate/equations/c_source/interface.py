@@ -2,443 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from importlib.resources import files
 
-from swashplate.equations.c_model import Exported, Writer, indented, path_of
-from swashplate.equations.c_source import HELPERS, c_name, literal, wrapped
-from swashplate.equations.fields import floats_of
+from swashplate.equations.c_source.model import Exported, Writer, path_of
+from swashplate.equations.c_source.text import HELPERS, c_name, indented, literal, wrapped
 from swashplate.equations.model import Window
 
-HEADER = """\
-/* @title@
- *
- * SI throughout. Plain data: no pointers, so that a copy of the struct is a copy of the state, and
- * two of them never meet. No allocation, no globals, no input or output.
- */
-#ifndef @GUARD@
-#define @GUARD@
-
-#include <stdbool.h>
-#include <stddef.h>
-
-#ifdef __cplusplus
-extern "C" {
-#endif
-
-#ifndef @P@_LINE
-#define @P@_LINE 1024 /* samples of a delay line: the longest delay is @P@_LINE - @samples@ steps */
-#endif
-#ifndef @P@_API
-#define @P@_API
-#endif
-
-/* What a call may return; @p@_sentence says it in words. */
-enum {
-    @P@_OK = 0,
-    @P@_BAD_VALUE = 1, /* not a number, or out of range: nothing has changed */
-    @P@_UNSTABLE = 2,  /* the equations do not bear this step with these parameters */
-    @P@_BAD_DELAY = 3, /* a delay is longer than its line */
-    @P@_DOMAIN = 4     /* the equations do not hold here, or a number overflowed: reset */
-};
-
-@enums@
-
-@structs@
-
-typedef struct @type@ @type@;
-
-@P@_API size_t @p@_size(void);        /* bytes of a @type@ */
-@P@_API size_t @p@_value_count(void); /* numbers that @p@_init takes */
-
-/* At rest, with `count` values: step, parameters, options, and constants that follow from them. */
-@P@_API int @p@_init(@type@ *m, const double *values, size_t count);
-@P@_API int @p@_reset(@type@ *m); /* at rest, values kept */
-@settle@
-/* One sample; the first one after init, reset or settle is that at time zero. */
-@P@_API int @p@_step(@type@ *m@signals@);
-/* The last sample again, with another command and the inputs as they are set now, as if it had been
- * so from the beginning. */
-@P@_API int @p@_correct(@type@ *m@signals@);
-
-@P@_API double @p@_output(const @type@ *m, int output); /* of the last sample */
-@P@_API unsigned @p@_limits(const @type@ *m);           /* limits that act there, as bits */
-
-/* Inputs that were measured: from the next sample on; cleared, a parameter stands for them. */
-@P@_API int @p@_set_input(@type@ *m, int input, double value);
-@P@_API int @p@_clear_input(@type@ *m, int input);
-
-/* Parameters, options and the step count from the next sample on. */
-@P@_API int @p@_set(@type@ *m, int parameter, double value);
-@P@_API double @p@_get(const @type@ *m, int parameter);
-@P@_API int @p@_set_option(@type@ *m, int option, bool on);
-@P@_API bool @p@_get_option(const @type@ *m, int option);
-@P@_API int @p@_set_step(@type@ *m, double step); /* [s] */
-@P@_API double @p@_get_step(const @type@ *m);
-@P@_API int @p@_update(@type@ *m); /* now, not in the next sample */
-
-/* Numbers of names, -1 for none; names of numbers, NULL for none. */
-@P@_API int @p@_find(const char *parameter);
-@P@_API int @p@_find_output(const char *output);
-@P@_API int @p@_find_input(const char *input);
-@P@_API int @p@_find_option(const char *option);
-@P@_API const char *@p@_parameter_name(int parameter);
-@P@_API const char *@p@_output_name(int output);
-@P@_API const char *@p@_sentence(int status);
-
-#ifdef __cplusplus
-}
-#endif
-
-#endif
-"""
-SETTLE = """\
-/* Settled under a constant command and the inputs that are set; before the first step. */
-@P@_API int @p@_settle(@type@ *m@signals@);
-"""
-TOP = """\
-/* @title@ */
-#include "@file@.h"
-
-#include <float.h>
-#include <math.h>
-#include <string.h>
-
-#ifdef __FAST_MATH__
-#error "compile without -ffast-math: the order of operations and what is no number count"
-#endif
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
-#error "double arithmetic must be done in double: with gcc on 32-bit x86 say -msse2 -mfpmath=sse"
-#endif
-#ifdef __clang__
-#pragma STDC FP_CONTRACT OFF /* gcc does not know it: compile with -ffp-contract=off */
-#endif
-"""
-NUMBERS = """\
-/* --- numbers by their places ------------------------------------------------------------------ */
-
-struct @p@_parameter {
-    const char *name;
-    size_t place;
-    double lower, upper;
-    bool above;  /* the lower bound itself is not allowed */
-    bool closed; /* the upper bound itself is allowed */
-};
-
-static double number_at(const @type@ *m, size_t place)
-{
-    double value;
-    memcpy(&value, (const char *)m + place, sizeof value);
-    return value;
-}
-
-static void put_at(@type@ *m, size_t place, double value)
-{
-    memcpy((char *)m + place, &value, sizeof value);
-}
-
-static bool is_finite(double value) { return value - value == 0.0; }
-
-static bool in_range(const struct @p@_parameter *p, double value)
-{
-    const bool low = p->above ? value > p->lower : value >= p->lower;
-    return low && (p->closed ? value <= p->upper : value < p->upper);
-}
-
-static int number_of(const char *const *names, int count, const char *name)
-{
-    for (int i = 0; i < count; i++) {
-        if (strcmp(names[i], name) == 0) {
-            return i;
-        }
-    }
-    return -1;
-}
-"""
-LINES = """\
-/* --- delay lines ------------------------------------------------------------------------------ */
-
-/* Where a tap reads: whole samples back and the rest of one. */
-static bool placed(@type@ *m, int tap, double delay, double ahead, int samples)
-{
-    const double steps = delay / m->step;
-    const double end = greater_of(steps, ahead) - ahead;
-    if (!(steps >= 0.0 && end <= (double)(@P@_LINE - samples))) {
-        return false;
-    }
-    m->whole[tap] = (int)end;
-    m->fraction[tap] = end - (double)m->whole[tap];
-    return true;
-}
-
-static struct @window@ seen(const @type@ *m, int tap, int line, int samples)
-{
-    struct @window@ window = {{{0.0}}, m->fraction[tap]};
-    for (int j = 0; j < samples; j++) {
-        const int at = m->newest + m->whole[tap] + j;
-        window.s.v[j] = m->line[line][at < @P@_LINE ? at : at - @P@_LINE];
-    }
-    return window;
-}
-"""
-CONSTANT = """\
-static struct @window@ constant_window(double value)
-{
-    struct @window@ window = {{{0.0}}, 0.0};
-    for (int j = 0; j < @samples@; j++) {
-        window.s.v[j] = value;
-    }
-    return window;
-}
-"""
-FILL = """\
-/* Lines and inputs as they were before the record. */
-static void before_all(@type@ *m@signals@)
-{
-@before@}
-"""
-PUSH = """\
-static bool good_inputs(@formals@)
-{
-    return @bounds@;
-}
-
-/* The newest inputs, in their lines. */
-static void put_inputs(@type@ *m@signals@)
-{
-@push@}
-
-/* The sample that is next, of the inputs as they are. */
-static int taken(@type@ *m)
-{
-    if (!m->now.begun && !m->settled) {
-        rested_start(m);
-    }
-    m->before = m->now;
-    return one_sample(m);
-}
-"""
-INTERFACE = """\
-/* --- interface -------------------------------------------------------------------------------- */
-
-size_t @p@_size(void) { return sizeof(@type@); }
-
-size_t @p@_value_count(void) { return @count@; }
-
-int @p@_init(@type@ *m, const double *values, size_t count)
-{
-    if (count != @count@ || !(values[0] > 0.0 && values[0] <= @longest@)) {
-        return @P@_BAD_VALUE;
-    }
-    memset(m, 0, sizeof *m);
-    const double *next = values;
-    m->step = *next++;
-    for (int i = 0; i < @P@_PARAMETERS; i++, next++) {
-        if (!in_range(&parameter_table[i], *next)) {
-            return @P@_BAD_VALUE;
-        }
-        put_at(m, parameter_table[i].place, *next);
-    }
-@rest@    m->stale = false;
-    const int status = checked(m);
-    if (status != @P@_OK) {
-        return status;
-    }
-    return @p@_reset(m);
-}
-
-int @p@_update(@type@ *m)
-{
-    if (!m->stale) {
-        return @P@_OK;
-    }
-    const int status = checked(m);
-    if (status == @P@_OK) {
-        computed(m);
-        m->stale = false;
-    }
-    return status;
-}
-
-int @p@_reset(@type@ *m)
-{
-    memset(&m->now, 0, sizeof m->now);
-    m->before = m->now;
-    m->settled = false;
-    before_all(m@zeros@);
-    return @p@_update(m);
-}
-@settle@
-int @p@_step(@type@ *m@signals@)
-{
-    if (!good_inputs(@given@)) {
-        return @P@_BAD_VALUE;
-    }
-    const int status = @p@_update(m);
-    if (status != @P@_OK) {
-        return status;
-    }
-@move@    put_inputs(m@passed@);
-    return taken(m);
-}
-
-int @p@_correct(@type@ *m@signals@)
-{
-    if (!m->now.begun || !good_inputs(@given@)) {
-        return @P@_BAD_VALUE;
-    }
-    const int status = @p@_update(m);
-    if (status != @P@_OK) {
-        return status;
-    }
-    m->now = m->before;
-    put_inputs(m@passed@);
-    return taken(m);
-}
-
-double @p@_output(const @type@ *m, int output)
-{
-    switch (output) {
-@outputs@    default:
-        return NAN;
-    }
-}
-
-unsigned @p@_limits(const @type@ *m)
-{
-@limits@}
-
-int @p@_set_input(@type@ *m, int input, double value)
-{
-    if (!is_finite(value)) {
-        return @P@_BAD_VALUE;
-    }
-@no_inputs@    switch (input) {
-@set_inputs@    default:
-        return @P@_BAD_VALUE;
-    }
-}
-
-int @p@_clear_input(@type@ *m, int input)
-{
-@no_inputs@    switch (input) {
-@clear_inputs@    default:
-        return @P@_BAD_VALUE;
-    }
-}
-
-int @p@_set(@type@ *m, int parameter, double value)
-{
-    if (parameter < 0 || parameter >= @P@_PARAMETERS || !in_range(&parameter_table[parameter], value)) {
-        return @P@_BAD_VALUE;
-    }
-    if (value != number_at(m, parameter_table[parameter].place)) {
-        put_at(m, parameter_table[parameter].place, value);
-        switched(m, parameter);
-        m->stale = true;
-    }
-    return @P@_OK;
-}
-
-double @p@_get(const @type@ *m, int parameter)
-{
-    if (parameter < 0 || parameter >= @P@_PARAMETERS) {
-        return NAN;
-    }
-    return number_at(m, parameter_table[parameter].place);
-}
-
-int @p@_set_option(@type@ *m, int option, bool on)
-{
-@no_options@@no_on@    switch (option) {
-@set_options@    default:
-        return @P@_BAD_VALUE;
-    }
-}
-
-bool @p@_get_option(const @type@ *m, int option)
-{
-@no_options@    switch (option) {
-@get_options@    default:
-        return false;
-    }
-}
-
-int @p@_set_step(@type@ *m, double step)
-{
-    if (!(step > 0.0 && step <= @longest@)) {
-        return @P@_BAD_VALUE;
-    }
-    if (step != m->step) {
-        m->step = step;
-        m->stale = true;
-    }
-    return @P@_OK;
-}
-
-double @p@_get_step(const @type@ *m) { return m->step; }
-
-int @p@_find(const char *parameter)
-{
-    for (int i = 0; i < @P@_PARAMETERS; i++) {
-        if (strcmp(parameter_table[i].name, parameter) == 0) {
-            return i;
-        }
-    }
-    return -1;
-}
-
-int @p@_find_output(const char *output) { return number_of(output_names, @P@_OUTPUTS, output); }
-
-int @p@_find_input(const char *input) { return number_of(input_names, @P@_INPUTS, input); }
-
-int @p@_find_option(const char *option) { return number_of(option_names, @P@_OPTIONS, option); }
-
-const char *@p@_parameter_name(int parameter)
-{
-    return parameter < 0 || parameter >= @P@_PARAMETERS ? NULL : parameter_table[parameter].name;
-}
-
-const char *@p@_output_name(int output)
-{
-    return output < 0 || output >= @P@_OUTPUTS ? NULL : output_names[output];
-}
-
-const char *@p@_sentence(int status)
-{
-    switch (status) {
-    case @P@_OK:
-        return "all is well";
-    case @P@_BAD_VALUE:
-        return "a value is no number or out of range; nothing has changed";
-    case @P@_UNSTABLE:
-        return "the equations are unstable at this step: take a shorter one";
-    case @P@_BAD_DELAY:
-        return "a delay is longer than its line: compile with a larger @P@_LINE";
-    case @P@_DOMAIN:
-        return "the equations do not hold for these numbers, or one of them overflowed";
-    default:
-        return "there is no such status";
-    }
-}
-"""
-SETTLED = """
-int @p@_settle(@type@ *m@signals@)
-{
-    if (!good_inputs(@given@)) {
-        return @P@_BAD_VALUE;
-    }
-    const int status = @p@_reset(m);
-    if (status != @P@_OK) {
-        return status;
-    }
-    before_all(m@passed@);
-    put_inputs(m@passed@);
-    settled_start(m);
-    m->settled = true;
-    m->before = m->now;
-    return @finite@ ? @P@_OK : @P@_DOMAIN;
-}
-"""
+_SECTION = re.compile(r"^/\*== (\w+) ==\*/\n", re.MULTILINE)
+_PARTS = _SECTION.split((files(__package__) / "interface.c.in").read_text("utf-8"))[1:]
+TEXTS = dict(zip(_PARTS[::2], _PARTS[1::2], strict=True))
+"""Sections of the text around the equations, by name."""
 
 
 def interface(exported: Exported) -> dict[str, str]:
@@ -510,9 +85,9 @@ class _Interface:
         ]  # fmt: skip
         structs = [text for _, text in list(writer.unit.structs.values())]
         structs = [*structs[: self.first_private()], self.struct()]
-        settle = self.filled(SETTLE) if e.settles else ""
+        settle = self.filled(TEXTS["settle"]) if e.settles else ""
         return self.filled(
-            HEADER,
+            TEXTS["header"],
             enums="\n\n".join(each for each in enums if each),
             structs="\n\n".join(structs),
             settle=settle,
@@ -537,7 +112,8 @@ class _Interface:
             lines += [f"    double {c_name(name)};", f"    bool {c_name(name)}_given;"]
         lines += ["};", "", f"struct {e.type} {{", "    double step; /* [s] */"]
         for member, part in zip(e.members, self.model.parts, strict=True):
-            lines += [f"    struct {tag} {member}{tail};" for tag, tail in self.of_part(part)]
+            tags = self.writer.members_of(part)
+            lines += [f"    struct {tag} {member}{tail};" for tag, tail in tags]
         lines.append(f"    struct {e.prefix}_inputs inputs;")
         lines.append(f"    struct {e.prefix}_memory now, before; /* before the last sample */")
         if e.taps:
@@ -553,10 +129,6 @@ class _Interface:
         lines.append("    bool settled; /* the start is not at rest */")
         return "\n".join([*lines, "};"])
 
-    def of_part(self, part: object) -> Sequence[tuple[str, str]]:
-        """Tags and endings of the members that belong to a part."""
-        return [(tag, tail) for tag, tail in self.writer.members_of(part)]
-
     # -- source ------------------------------------------------------------------------------------
 
     def source(self) -> str:
@@ -566,25 +138,29 @@ class _Interface:
         constants = [text for _, text in unit.constants.values()]
         core = "\n\n".join(writer.core)
         sections = [
-            self.filled(TOP),
+            self.filled(TEXTS["top"]),
             "\n".join(self.helpers()),
-            self.filled(NUMBERS),
-            *([self.filled(LINES, window=window)] if e.taps else []),
-            *([self.filled(CONSTANT, window=window)] if "constant_window(" in core else []),
+            self.filled(TEXTS["numbers"]),
+            *([self.filled(TEXTS["lines"], window=window)] if e.taps else []),
+            *(
+                [self.filled(TEXTS["constant"], window=window)]
+                if "constant_window(" in core
+                else []
+            ),
             "/* --- equations " + "-" * 80 + " */\n",
             *(["\n\n".join(private) + "\n"] if private else []),
             *(["\n".join(constants) + "\n"] if constants else []),
             "\n\n".join(unit.texts) + "\n",
             "/* --- the model " + "-" * 80 + " */\n",
             core + "\n",
-            self.filled(FILL, before=self.before_all()),
-            self.filled(PUSH, bounds=self.bounds(), push=self.pushed()),
+            self.filled(TEXTS["fill"], before=self.before_all()),
+            self.filled(TEXTS["push"], bounds=self.bounds(), push=self.pushed()),
             self.tables(),
             self.switched(),
             self.filled(
-                INTERFACE,
+                TEXTS["interface"],
                 rest=self.rest(),
-                settle=self.filled(SETTLED, finite=self.finite()) if e.settles else "",
+                settle=self.filled(TEXTS["settled"], finite=self.finite()) if e.settles else "",
                 move=self.moved(),
                 outputs=self.outputs(),
                 limits=self.limits(),
@@ -784,9 +360,7 @@ def _body(lines: Sequence[str]) -> str:
     return "".join(f"{line}\n" for line in indented(lines))
 
 
-def _enum(
-    says: str, prefix: str, names: Sequence[str], count: str, *, bits: bool = False
-) -> str:
+def _enum(says: str, prefix: str, names: Sequence[str], count: str, *, bits: bool = False) -> str:
     if not names and not count:
         return ""
     lines = [f"/* {says}. */", "enum {"]

@@ -1,0 +1,6 @@
+"""C99 from equations and models: names, docstrings and operations as they stand in Python."""
+
+import lazy_loader
+
+# names are imported when they are first used
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

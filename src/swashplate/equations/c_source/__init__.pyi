@@ -1,0 +1,9 @@
+from .interface import interface as interface
+from .model import Exported as Exported
+from .model import feedthrough as feedthrough
+from .text import HELPERS as HELPERS
+from .text import Kind as Kind
+from .text import c_name as c_name
+from .text import fields_of as fields_of
+from .text import literal as literal
+from .unit import Unit as Unit

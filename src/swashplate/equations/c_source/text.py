@@ -1,0 +1,148 @@
+"""C as text: names, numbers, kinds of values, lines and comments."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, get_type_hints
+
+from swashplate.equations.syntax import MATH
+
+WIDTH = 100
+"""Longest line of C."""
+HELPERS = {
+    "lesser_of": """\
+/* Python's min: of two that are equal or do not compare, the first. */
+static double lesser_of(double a, double b) { return b < a ? b : a; }
+""",
+    "greater_of": """\
+/* Python's max: of two that are equal or do not compare, the first. */
+static double greater_of(double a, double b) { return b > a ? b : a; }
+""",
+    "whole_power": """\
+/* A power with a whole number, by squaring as the equations' compiler does it. */
+static double whole_power(double base, int exponent)
+{
+    double power = 1.0;
+    for (int left = exponent < 0 ? -exponent : exponent; left != 0; left >>= 1) {
+        if (left & 1) {
+            power *= base;
+        }
+        base *= base;
+    }
+    return exponent < 0 ? 1.0 / power : power;
+}
+""",
+    "whole_number": """\
+/* A number without its fraction as a whole number; for what has none the lowest. */
+static long long whole_number(double value)
+{
+    return value >= -9.2e18 && value <= 9.2e18 ? (long long)value : -9223372036854775807LL - 1;
+}
+""",
+}
+"""Functions that stand for what C has not, or has otherwise."""
+WORDS = set(
+    """
+auto break case char const continue default do double else enum extern float for goto if inline int
+long register restrict return short signed sizeof static struct switch typedef union unsigned void
+volatile while bool true false NULL INFINITY NAN size_t offsetof main errno memcpy memset strcmp
+isfinite isnan isinf signbit lesser_of greater_of whole_power whole_number fabs fmod pow ldexp frexp
+modf ceil round trunc rint cosh sinh tanh acosh asinh atanh cbrt log10 log2 log1p exp2 expm1 erf
+erfc gamma lgamma tgamma fmin fmax fdim fma j0 j1 jn y0 y1 yn index time signal div abs linux unix
+""".split()  # noqa: SIM905
+) | set(MATH.values())
+"""Names that C or its library keeps for itself."""
+BREAKS = re.compile(r"[,;] | (?=[?:+/=*-] |&& |\|\| )|\{(?=\.)")
+"""Where a long line of C may end."""
+LEVELS = {"?": 1, "||": 2, "&&": 3, "==": 7, "!=": 7, "<": 8, "<=": 8, ">": 8, ">=": 8}
+LEVELS |= {"+": 10, "-": 10, "*": 11, "/": 11, "unary": 12, "atom": 13}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a value is: double, int, bool, flag (an option), struct or tuple."""
+
+    word: str
+    cls: Any = None
+    items: tuple[Kind, ...] = ()
+
+    @property
+    def whole(self) -> bool:
+        """Whether it has parts, and is passed by its address."""
+        return self.word in ("struct", "tuple")
+
+
+DOUBLE, INT, BOOL, FLAG = Kind("double"), Kind("int"), Kind("bool"), Kind("flag")
+SCALARS = {DOUBLE: "double", INT: "long long", BOOL: "bool", FLAG: "bool"}
+
+
+class Text(NamedTuple):
+    """An expression in C."""
+
+    text: str
+    level: int
+    kind: Kind
+    pointer: bool = False
+    """Whether it is the address of what it stands for."""
+    place: bool = True
+    """Whether it has an address, if it has parts."""
+
+
+def c_name(name: str) -> str:
+    """A name of Python's as one of C's."""
+    plain_name = "".join(c if c.isascii() else f"u{ord(c):04x}" for c in name)
+    return f"{plain_name}_" if plain_name in WORDS else plain_name
+
+
+def snake(name: str) -> str:
+    """Name of a class in lower case: ``CardOptions`` is ``card_options``."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+
+
+def literal(value: float) -> str:
+    """A number as C writes it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if math.isinf(value):
+        return "INFINITY" if value > 0.0 else "-INFINITY"
+    return "NAN" if math.isnan(value) else repr(float(value))
+
+
+def wrapped(line: str) -> list[str]:
+    """A line of C on as many lines as it takes."""
+    indent = " " * (len(line) - len(line.lstrip()))
+    lines, rest = list[str](), line
+    while len(rest) > WIDTH:
+        ends = [m.end() for m in BREAKS.finditer(rest, len(indent) + 8, WIDTH + 1)]
+        if not ends:
+            break
+        at = max([m for m in ends if rest[m - 2] in ",;"] or ends)
+        at = at if at > WIDTH // 2 else max(ends)
+        lines.append(rest[:at].rstrip())
+        rest = f"{indent}    {rest[at:]}"
+    return [*lines, rest]
+
+
+def comment(text: str) -> list[str]:
+    """A docstring as a comment."""
+    lines = inspect.cleandoc(text).replace("*/", "* /").splitlines()
+    if len(lines) == 1 and len(lines[0]) < WIDTH - 6:
+        return [f"/* {lines[0]} */"]
+    return [f"/* {lines[0]}", *(f" * {line}".rstrip() for line in lines[1:]), " */"]
+
+
+def fields_of(cls: Any) -> list[tuple[str, Any]]:
+    """Fields of a class of named tuples with their types."""
+    hints = get_type_hints(cls)
+    return [(name, hints.get(name, float)) for name in cls._fields]
+
+
+def indented(lines: Iterable[str]) -> list[str]:
+    """Lines of C moved in, long ones on several."""
+    return [each for line in lines for each in (wrapped(f"    {line}") if line else [""])]

@@ -1,0 +1,337 @@
+"""The C interface: refusals, copies of a state, changes on the way, a provisional command."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swashplate import Drive, InputError
+from swashplate.export import drive_sources, feedthrough, values_of
+from swashplate.simulation.stepper import Sample
+
+OK, BAD_VALUE, UNSTABLE, BAD_DELAY, DOMAIN = range(5)
+H = 1.0 / 512.0
+NAMES = Sample._fields[1:]
+N = np.arange(1200)
+COMMAND = np.clip(8.0 * np.sin(N / 60.0) + 3.0 * np.sign(np.sin(N / 17.0)), -10.0, 10.0)
+
+
+def outputs(model: Any) -> list[float]:
+    return [model.output(model.number("_output", name)) for name in NAMES]
+
+
+# --- refusals -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("voltage", [float("nan"), float("inf"), 10.5, -10.0000001])
+def test_a_command_that_is_none_changes_nothing(hoist: Drive, in_c: Any, voltage: float) -> None:
+    model, same = in_c(hoist), in_c(hoist)
+    for value in (4.0, 5.0, 6.0):
+        model.step(value), same.step(value)
+    before = bytes(model.model)
+    for call in (model.step, model.correct, model.settle):
+        assert call(voltage) == BAD_VALUE
+    assert bytes(model.model) == before
+    assert model.step(7.0) == same.step(7.0) == OK
+    assert outputs(model) == outputs(same)
+
+
+def test_values_of_another_number_or_none_are_refused(hoist: Drive, in_c: Any) -> None:
+    model, values = in_c(hoist), values_of(hoist)
+    assert model.init(values, values.size - 1) == BAD_VALUE
+    for at in range(values.size):
+        broken = values.copy()
+        broken[at] = np.nan
+        assert model.init(broken) == BAD_VALUE, at
+    assert model.init(values) == OK
+
+
+def test_a_parameter_out_of_its_range_is_refused_and_kept(hoist: Drive, in_c: Any) -> None:
+    model = in_c(hoist)
+    for name, bad in (
+        ("Z10", 0.0), ("Z10", float("nan")), ("tau", -1e-9), ("tau", 10.0), ("Z13_plus", 2.0),
+        ("Z19_plus", float("inf")), ("Z6", -1.0), ("zeta_plus", 0.0),
+    ):  # fmt: skip
+        number, was = model.number("", name), model.get(model.number("", name))
+        assert model.set(number, bad) == BAD_VALUE, (name, bad)
+        assert model.get(number) == was
+    assert model.set(model.number("", "Z14"), float("inf")) == OK
+    assert model.set(70, 1.0) == model.set(-1, 1.0) == BAD_VALUE
+    assert np.isnan(model.get(70))
+    assert np.isnan(model.get(-1))
+
+
+def test_a_step_that_the_filter_does_not_bear_is_said(hoist: Drive, in_c: Any) -> None:
+    model = in_c(hoist)
+    omega = model.number("", "omega_minus")
+    zeta = hoist.parameters.numbers["zeta_minus"]
+    good = model.get(omega)
+    assert model.set(omega, 2.0 * zeta / H) == OK
+    assert model.update() == UNSTABLE
+    assert model.step(1.0) == UNSTABLE
+    assert model.correct(1.0) == BAD_VALUE  # there was no sample
+    assert model.set(omega, good) == OK
+    assert model.step(1.0) == OK
+    assert model.set(omega, 2.0 * zeta / H) == OK
+    assert model.correct(1.0) == UNSTABLE
+    assert model.settle(1.0) == UNSTABLE
+    for step in (0.0, -1.0, float("nan"), 1.0 / 511.0):
+        assert model.set_step(step) == BAD_VALUE
+    assert model.get_step() == H
+    with pytest.raises(InputError, match=r"1/512"):
+        values_of(hoist, 0.01)
+
+
+def test_an_initialisation_that_is_unstable_or_too_late_is_said(hoist: Drive, in_c: Any) -> None:
+    model, values = in_c(hoist), values_of(hoist)
+    for name, value, status in (("omega_plus", 4e3, UNSTABLE), ("tau", 2.5, BAD_DELAY)):
+        broken = values.copy()
+        broken[1 + model.number("", name)] = value
+        assert model.init(broken) == status
+    flags = values.copy()
+    flags[1 + 70] = 0.5
+    assert model.init(flags) == BAD_VALUE
+
+
+def test_a_delay_longer_than_the_line_is_said(hoist: Drive, in_c: Any) -> None:
+    model = in_c(hoist)
+    tau = model.number("", "tau")
+    assert model.set(tau, 1021.0 * H) == OK
+    assert model.update() == OK
+    assert model.set(tau, 1022.0 * H) == OK
+    assert model.update() == BAD_DELAY
+    assert model.step(0.0) == BAD_DELAY
+
+
+def test_a_domain_that_is_left_is_said_and_a_reset_heals(hoist: Drive, in_c: Any) -> None:
+    model = in_c(hoist)
+    force = model.number("", "Z19_plus")
+    was = model.get(force)
+    assert model.set(force, 1e4 * was) == OK
+    assert DOMAIN in [model.step(10.0) for _ in range(300)]
+    assert model.settle(10.0) in (OK, DOMAIN)
+    assert model.set(force, was) == OK
+    assert model.reset() == OK
+    assert (
+        model.run(COMMAND, NAMES)["shaft_speed"] == in_c(hoist).run(COMMAND, NAMES)["shaft_speed"]
+    ).all()
+
+
+def test_every_status_has_a_sentence_of_its_own(hoist: Drive, in_c: Any) -> None:
+    model = in_c(hoist)
+    said = [model.function("sentence")(status) for status in (*range(5), 5, -1)]
+    assert len(set(said)) == 6
+    assert said[5] == said[6]
+
+
+def test_names_and_numbers_agree(hoist: Drive, in_c: Any) -> None:
+    model = in_c(hoist)
+    for kind, asked, known in (
+        ("", "parameter_name", [*hoist.parameters.numbers]),
+        ("_output", "output_name", [*NAMES]),
+    ):
+        for name in known:
+            number = model.number(kind, name)
+            assert model.function(asked)(number) == name.encode()
+        assert model.number(kind, "nothing") == -1
+        assert model.function(asked)(-1) is None
+        assert model.function(asked)(1000) is None
+    assert model.number("_option", "symmetric") >= 0
+    assert model.number("_option", "leaky") == model.number("_input", "voltage") == -1
+    for name, value in hoist.parameters.numbers.items():
+        assert model.get(model.number("", name)) == value
+
+
+def test_inputs_and_options_that_are_none_are_refused(hoist: Drive, in_c: Any) -> None:
+    model = in_c(hoist)
+    assert model.set_input(3, 1.0) == model.set_input(0, float("nan")) == BAD_VALUE
+    assert model.clear_input(-1) == model.set_option(99, True) == BAD_VALUE
+    assert not model.get_option(99)
+    assert np.isnan(model.output(99))
+
+
+# --- state ----------------------------------------------------------------------------------------
+
+
+def test_two_drives_interleaved_do_not_meet(in_c: Any) -> None:
+    hoist, slew = Drive.preset("hoist"), Drive.preset("slew")
+    apart = [in_c(drive).run(COMMAND, NAMES) for drive in (hoist, slew)]
+    first, second = in_c(hoist), in_c(slew)
+    for n, voltage in enumerate(COMMAND.tolist()):
+        assert first.step(voltage) == second.step(-voltage if n < 0 else voltage) == OK
+        for model, alone in zip((first, second), apart, strict=True):
+            assert outputs(model) == [alone[name][n] for name in NAMES]
+
+
+def test_a_copy_of_the_struct_is_a_copy_of_the_state(hoist: Drive, in_c: Any) -> None:
+    model, other = in_c(hoist), in_c(hoist)
+    model.run(COMMAND[:500], NAMES)
+    kept = bytes(model.model)
+    first = model.run(COMMAND[500:], NAMES)
+    model.model.raw = kept
+    again = model.run(COMMAND[500:], NAMES)
+    other.run(-COMMAND[:100], NAMES)
+    other.model.raw = kept
+    elsewhere = other.run(COMMAND[500:], NAMES)
+    for name in NAMES:
+        assert (first[name] == again[name]).all()
+        assert (first[name] == elsewhere[name]).all()
+    assert np.ptp(first["shaft_speed"]) > 0.1
+
+
+def test_a_reset_drive_is_a_new_one_with_the_values_kept(hoist: Drive, in_c: Any) -> None:
+    model = in_c(hoist)
+    assert model.settle(5.0) == OK
+    model.run(COMMAND, NAMES)
+    assert model.set(model.number("", "Z16_plus"), 5e-5) == OK
+    assert model.reset() == OK
+    fresh = in_c(hoist.replace(Z16_plus=5e-5))
+    assert (
+        model.run(COMMAND, NAMES)["swash_angle"] == fresh.run(COMMAND, NAMES)["swash_angle"]
+    ).all()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"Z16_plus": 6e-5}, {"Z7": 0.3}, {"Z13_plus": 0.5, "Z13_minus": 0.45}, {"omega_plus": 40.0},
+     {"cam_ripple": 0.01}, {"lim1_plus": 1.0, "a_plus": 9.0}],
+    ids=lambda changes: ",".join(changes),
+)  # fmt: skip
+def test_a_parameter_changed_on_the_way_is_a_stepper_that_goes_on(
+    hoist: Drive, in_c: Any, changes: dict[str, float]
+) -> None:
+    model, stepper = in_c(hoist), hoist.stepper(interpolation="previous")
+    for voltage in COMMAND[:600].tolist():
+        stepper.step(voltage)
+        assert model.step(voltage) == OK
+    after = hoist.replace(**changes).stepper(interpolation="previous")  # type: ignore[arg-type]
+    for name, value in changes.items():
+        assert model.set(model.number("", name), value) == OK
+    after.state = stepper.state
+    for voltage in COMMAND[600:].tolist():
+        sample = after.step(voltage)
+        assert model.step(voltage) == OK
+        assert outputs(model) == list(sample[1:])
+
+
+def test_a_value_set_to_what_it_is_recomputes_nothing(hoist: Drive, in_c: Any) -> None:
+    """The constants that Python computed are kept, whatever the library's `exp` is."""
+    model = in_c(hoist)
+    before = bytes(model.model)
+    for name in hoist.parameters.numbers:
+        number = model.number("", name)
+        assert model.set(number, model.get(number)) == OK
+    assert model.set_step(H) == OK
+    assert model.set_option(0, model.get_option(0)) == OK
+    assert bytes(model.model) == before
+
+
+def test_options_and_step_set_are_those_of_another_drive(hoist: Drive, in_c: Any) -> None:
+    model = in_c(hoist)
+    parameters = hoist.parameters
+    for option, form in (
+        ("literal", {"coulomb_sign": "literal"}),
+        ("split", {"card_switch": "split"}),
+        ("symmetric", {"pressure_root": "symmetric"}),
+    ):
+        number = model.number("_option", option)
+        assert model.set_option(number, True) == OK
+        assert model.get_option(number)
+        parameters = replace(parameters, **form)  # type: ignore[arg-type]
+    assert model.set_step(0.001) == OK
+    wanted = in_c(Drive(parameters), 0.001)
+    one, two = model.run(COMMAND, NAMES), wanted.run(COMMAND, NAMES)
+    for name in NAMES:
+        assert (one[name] == two[name]).all()
+
+
+# --- a provisional command ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tau", [0.0, 0.4 * H, 0.014])
+@pytest.mark.parametrize("start", ["rest", "steady"])
+def test_a_corrected_sample_is_as_if_the_command_had_been_known(
+    hoist: Drive, in_c: Any, tau: float, start: str
+) -> None:
+    drive = hoist.replace(tau=tau, load_inertia=5e3, motor_leakage=1e-6)
+    known, late = in_c(drive), in_c(drive)
+    torque = known.number("_input", "load_torque")
+    loads = 2e4 * np.cos(N / 30.0)
+    for model in (known, late):
+        assert model.set_input(torque, float(loads[0])) == OK
+        if start == "steady":
+            assert model.settle(float(COMMAND[0])) == OK
+    guess = 0.0
+    for voltage, load in zip(COMMAND.tolist(), loads.tolist(), strict=True):
+        assert known.set_input(torque, load) == OK
+        assert known.step(voltage) == OK
+        assert late.step(guess) == OK
+        if tau > 1.5 * H and guess == voltage:
+            assert outputs(late)[:4] == outputs(known)[:4]
+        assert late.set_input(torque, load) == OK
+        assert late.correct(voltage) == OK
+        assert outputs(late) == outputs(known)
+        guess = voltage
+
+
+def test_with_a_delay_no_output_waits_for_the_newest_command(hoist: Drive, in_c: Any) -> None:
+    drive = hoist.replace(tau=1.5 * H)
+    known, late = in_c(drive), in_c(drive)
+    for voltage in COMMAND.tolist():
+        assert known.step(voltage) == late.step(0.0) == OK
+        assert outputs(known) == outputs(late)
+        assert late.correct(voltage) == OK
+
+
+def test_inputs_set_and_cleared(hoist: Drive, in_c: Any) -> None:
+    model, plain = in_c(hoist), in_c(hoist)
+    speed = model.number("_input", "pump_speed")
+    assert model.set_input(speed, 0.5) == OK
+    model.run(COMMAND[:300], NAMES)
+    plain.run(COMMAND[:300], NAMES)
+    assert outputs(model) != outputs(plain)
+    assert model.clear_input(speed) == OK
+    one, two = model.run(COMMAND[300:], NAMES), plain.run(COMMAND[300:], NAMES)
+    assert (one["shaft_speed"] == two["shaft_speed"]).all()
+
+
+def test_feedthrough_is_what_a_jump_of_an_input_moves_at_once(in_c: Any) -> None:
+    drive = Drive.preset("hoist").replace(
+        motor_leakage=1e-6, load_inertia=5e3, line_stiffness=1e6, cam_ripple=0.01,
+        cam_ripple_per_torque=5e-7, motor_constant=250.0, Z12=0.1, load_torque=1e4,
+    )  # fmt: skip
+    said = feedthrough()
+    values = {"load_torque": 3e4, "pump_speed": 1.2, "supply_pressure": 2.5e6}
+    moved: dict[str, set[str]] = {name: set() for name in said}
+    for changes in ({}, {"line_stiffness": 0.0}):
+        for signal, value in values.items():
+            one, two = in_c(drive.replace(**changes)), in_c(drive.replace(**changes))
+            for model in (one, two):
+                model.run(COMMAND[:400], NAMES)
+            assert two.set_input(two.number("_input", signal), value) == OK
+            one.step(3.0), two.step(3.0)
+            for name in said:
+                number = one.number("_output", name)
+                if one.output(number) != two.output(number):
+                    moved[name].add(signal)
+    assert moved == {name: set(inputs) for name, inputs in said.items()}
+
+
+# --- size -----------------------------------------------------------------------------------------
+
+
+def test_a_state_is_small(hoist: Drive, in_c: Any, compiled: Callable[..., Path]) -> None:
+    assert in_c(hoist).function("size")() <= 10_000
+    short = compiled(drive_sources(), ["-DSWP_LINE=64"])
+    model = in_c(hoist, H, short)
+    assert model.function("size")() <= 2_000
+    run = hoist.simulate(COMMAND, 512.0, interpolation="previous")
+    assert (model.run(COMMAND, ["shaft_speed"])["shaft_speed"] == run.shaft_speed).all()
+
+
+def test_fast_mathematics_does_not_compile(compiled: Callable[..., Path]) -> None:
+    with pytest.raises(AssertionError, match="fast-math"):
+        compiled(drive_sources(), ["-ffast-math"])

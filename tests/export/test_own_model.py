@@ -1,0 +1,280 @@
+"""A model of one's own in C: a folder that compiles, and the bits of its march."""
+
+import subprocess
+from math import floor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from tests.equations.test_own_model import COMMAND, STROKE, P, valve
+from tests.export.conftest import InC
+
+from swashplate import Drive, FileError, InputError
+from swashplate.equations import (
+    Model,
+    Tap,
+    equation,
+    instance_of,
+    interpolate,
+    join,
+    repeated,
+    root,
+    simulate,
+)
+from swashplate.equations.c_source import interface
+from swashplate.errors import EquationError
+from swashplate.export import c, drive_sources, exported_model, model_values, values_of
+from swashplate.models import displacement_control
+
+OFF = None
+PULLED = (0.0, 0.2, 1.0)
+
+
+class Tank(NamedTuple):
+    area: float
+    outlet: float
+    delay: float
+    leak: float = 0.0
+
+
+class Level(NamedTuple):
+    level: float = 0.25
+    flow: float = 0.0
+
+
+class Told(NamedTuple):
+    head: float
+    steps: float
+
+
+class Ways(NamedTuple):
+    rough: bool | None = OFF
+    stepped: bool | None = OFF
+
+
+class Full(NamedTuple):
+    full: bool
+    empty: bool
+
+
+class Around(NamedTuple):
+    height: float
+
+
+@equation
+def balance(flow: float, level: float, p: Tank) -> float:
+    return flow * flow - p.outlet * level * abs(level) + p.leak * flow
+
+
+@equation
+def sunk(state: Level, number: float, p: Tank, h: float) -> Level:
+    return Level(state.level - 0.1 * h * (1.0 + number) * p.leak * state.level, state.flow)
+
+
+@equation
+def tank_sample(state: Level, pumped: float, p: Tank, options: Ways) -> Told:
+    head = interpolate(state.level, PULLED, (0.0, p.outlet, 2.0))
+    steps = floor(4.0 * state.level + pumped)
+    if options.stepped is not None:
+        head = head - 0.25 * floor(head * 4.0)
+    return Told(head, steps)
+
+
+@equation
+def tank_step(
+    state: Level, signals: Told, pumped: float, outside: float, p: Tank, h: float, options: Ways,
+    given: Around,
+) -> Level:  # fmt: skip
+    flow = root(balance, 0.0, 50.0, state.level, p)
+    if options.rough is not None:
+        flow = signals.head**3
+    level = state.level
+    for i in range(3):
+        level = level + h * (pumped - flow) / (p.area * (i + 1.0))
+    then = repeated(sunk, 3.0, Level(level, flow), p, h)
+    return Level(min(max(then.level, outside), given.height), then.flow)
+
+
+@equation
+def tank_limits(state: Level, given: Around) -> Full:
+    return Full(state.level >= given.height, not state.level > 0.02)
+
+
+@equation
+def tank_domain(state: Level) -> float:
+    return 9.0 - state.level
+
+
+tank = Model(
+    "tank",
+    parameters=Tank,
+    state=Level,
+    step=tank_step,
+    sample=tank_sample,
+    options=Ways,
+    given=Around,
+    taps={"pumped": Tap("pumped", delay="delay")},
+    defaults={"outside": "leak"},
+    limits=tank_limits,
+    domain=tank_domain,
+    integrals={"drained": "flow"},
+)
+NUMBERS, AROUND, RATE = Tank(0.5, 0.8, 0.033, 0.01), Around(1.5), 50.0
+PUMPED = 0.3 + 0.4 * np.sin(np.arange(400) / 9.0)
+
+
+def exported(model: Model, compiled: Any, rate: float, **numbers: Any) -> InC:
+    library = compiled(interface(exported_model(model)))
+    return InC(library, model.name, model_values(model, 1.0 / rate, **numbers))
+
+
+def test_a_valve_has_the_bits_of_its_march(compiled: Any) -> None:
+    run = simulate(valve, P, {"command": COMMAND}, 100.0, given=STROKE)
+    model = exported(valve, compiled, 100.0, parameters=P, given=STROKE)
+    found = model.run(COMMAND, ["opening", "position"])
+    for name, values in found.items():
+        assert (run[name] == values).all()
+    assert np.ptp(found["position"]) > 0.1
+
+
+@pytest.mark.parametrize(
+    "options", [Ways(), Ways(rough=True), Ways(stepped=True), Ways(True, True)]
+)
+def test_roots_tables_loops_and_options_have_the_bits_of_the_march(
+    options: Ways, compiled: Any
+) -> None:
+    inputs = {"pumped": PUMPED, "outside": 0.1 + 0.05 * np.cos(np.arange(400) / 30.0)}
+    run = simulate(tank, NUMBERS, inputs, RATE, options=options, given=AROUND)
+    model = exported(tank, compiled, RATE, parameters=NUMBERS, given=AROUND)
+    for name in ("rough", "stepped"):
+        number = model.number("_option", name)
+        assert model.set_option(number, getattr(options, name) is not None) == 0
+    names = ("head", "steps", "level", "flow", "drained")
+    outside, places = model.number("_input", "outside"), [model.number("_output", n) for n in names]
+    for n in range(PUMPED.size):
+        assert model.set_input(outside, float(inputs["outside"][n])) == 0
+        assert model.step(float(PUMPED[n])) == 0
+        assert [model.output(place) for place in places] == [run[name][n] for name in names]
+    assert np.ptp(run["level"]) > 0.1
+
+
+def test_models_in_series_have_the_bits_of_their_march(compiled: Any) -> None:
+    line = join("line", tank, follower, links={"gap": gap}, integrals={"travel": "place"})
+    numbers = line.parameters(NUMBERS, Lag(0.1))
+    given = line.given(AROUND)
+    run = simulate(line, numbers, {"pumped": PUMPED}, RATE, given=given)
+    model = exported(line, compiled, RATE, parameters=numbers, given=given)
+    found = model.run(PUMPED, ["place", "gap", "travel", "level"])
+    for name, values in found.items():
+        assert (run[name] == values).all(), name
+
+
+class Lag(NamedTuple):
+    time: float
+
+
+class Place(NamedTuple):
+    place: float
+
+
+@equation
+def follow(state: Place, head: float, p: Lag, h: float) -> Place:
+    return Place(state.place + h / p.time * (head - state.place))
+
+
+@equation
+def gap(head: float, place: float) -> float:
+    return head - place
+
+
+follower = Model("follower", Lag, Place, follow)
+
+
+def test_a_domain_that_is_left_is_said(compiled: Any) -> None:
+    model = exported(tank, compiled, RATE, parameters=NUMBERS, given=Around(99.0))
+    assert 4 in [model.step(200.0) for _ in range(100)]
+    assert model.step(float("nan")) == 1
+
+
+def test_limits_are_bits(compiled: Any) -> None:
+    model = exported(tank, compiled, RATE, parameters=NUMBERS, given=AROUND)
+    seen = set()
+    for pumped in [3.0] * 60 + [-9.0] * 60:
+        assert model.step(pumped) == 0
+        seen.add(model.limits())
+    assert seen == {0, 1, 2}
+
+
+# --- folders --------------------------------------------------------------------------------------
+
+
+def test_a_folder_of_c_compiles_and_runs(compiled: Any, hoist: Drive, tmp_path: Path) -> None:
+    for what, numbers, steady in (
+        (hoist, {}, hoist.steady_speed(9.0)),
+        (valve, {"step": 0.01, "parameters": P, "given": STROKE}, None),
+    ):
+        files = c(what, tmp_path / what.name, **numbers)  # type: ignore[arg-type]
+        sources = {file.name: file.read_text("utf-8") for file in files}
+        assert {"main.c", "CMakeLists.txt", "README.md", f"{what.name}_values.h"} <= set(sources)
+        program = compiled(sources, program="example")
+        printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout
+        rows = [line.split() for line in printed.splitlines()]
+        assert len(rows) > 15
+        assert float(rows[-1][0]) == pytest.approx(2.0, abs=0.11)
+        if steady is not None:
+            assert float(rows[-1][1]) == pytest.approx(steady, rel=1e-6)
+
+
+def test_a_folder_that_cannot_be_made_is_said(hoist: Drive, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(FileError, match="file"):
+        c(hoist, tmp_path / "file" / "folder")
+
+
+def test_steps_that_are_none_are_refused(hoist: Drive, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="step"):
+        c(valve, tmp_path, 0.0, parameters=P, given=STROKE)
+    with pytest.raises(InputError, match="1/512"):
+        c(hoist, tmp_path, 0.1)
+    with pytest.raises(InputError, match="parameters must be a Valve"):
+        c(valve, tmp_path)
+
+
+def test_a_drive_with_an_equation_of_its_own_has_it_in_c(compiled: Any, hoist: Drive) -> None:
+    own = hoist.with_equation(displacement_control.head_root, slower_root)
+    command = 9.0 * np.sin(np.arange(1500) / 80.0)
+    run = own.simulate(command, 512.0, interpolation="previous", start="steady")
+    model = InC(compiled(drive_sources(own)), "swp", values_of(own))
+    assert model.settle(float(command[0])) == 0
+    found = model.run(command, ["shaft_speed"])["shaft_speed"]
+    assert (run.shaft_speed == found).all()
+    plain = hoist.simulate(command, 512.0, interpolation="previous", start="steady")
+    assert (plain.shaft_speed != found).any()
+
+
+@equation
+def slower_root(head: float) -> float:
+    return 0.9 * head / (1.0 + abs(head) ** 2 / 1e14)
+
+
+# --- what has no counterpart ----------------------------------------------------------------------
+
+
+class Chosen(NamedTuple):
+    size: float | None = None
+
+
+@equation
+def sized(state: Level, pumped: float, options: Chosen, h: float) -> Level:
+    if options.size is None:
+        return state
+    return Level(state.level + h * options.size * pumped, 0.0)
+
+
+def test_what_cannot_be_translated_is_refused_by_name(tmp_path: Path) -> None:
+    model = Model("sized", Tank, Level, sized, options=Chosen)
+    with pytest.raises(EquationError, match=r"Chosen\.size is of type .*None"):
+        c(model, tmp_path, 0.01, parameters=NUMBERS, options=Chosen(1.0))
+    assert not list(tmp_path.iterdir())
+    assert instance_of(model, NUMBERS, options=Chosen(1.0)).name == "sized"
