@@ -1,7 +1,8 @@
 """Make the package's libraries: compile, run where they can be run, and write down what was done.
 
-For maintainers: ``make binaries``. Needs the extra ``binaries``; a Windows library is run under Wine
-and an ARM one under QEMU's user emulation where these are found. Building again gives equal bytes.
+For maintainers: ``make binaries``. Needs the extra ``binaries``. A Windows library is run under
+Wine, one for ARM under QEMU's user emulation, where these are found. Building again gives equal
+bytes.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 import tomlkit
 
 from swashplate import Drive
-from swashplate.export import fmi, libraries
+from swashplate.export import feedthrough, fmi, libraries
 
 ROOT = Path(__file__).parents[1]
 BINARIES = ROOT / "src" / "swashplate" / "export" / "binaries"
@@ -54,6 +55,7 @@ def main() -> None:
         entry["equal_bits"] = verdict(name, content)
         print(f"{name}: {len(content)} bytes; {entry['equal_bits']}")
         entries[name] = entry
+    made["feedthrough"] = {name: sorted(read) for name, read in feedthrough().items()}
     made["libraries"] = entries
     (BINARIES / libraries.MANIFEST).write_text(tomlkit.dumps(made), "utf-8")
     compressed = sum(len(zlib.compress(each, 9)) for each in contents.values())

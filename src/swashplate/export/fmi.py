@@ -1,7 +1,7 @@
 """FMU of a drive, FMI 2.0 or 3.0 for co-simulation: what it declares, carries and promises.
 
-The drive runs on its own grid of samples inside, whatever the master's steps are; the library is the
-package's own, and the drive's numbers are a resource that it reads.
+Inside, the drive runs on its own grid of samples, whatever the master's steps are. The library is
+the package's own; the drive's numbers are a resource that it reads.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -16,11 +17,11 @@ from typing import TYPE_CHECKING, Any, Literal
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from swashplate.__about__ import __version__
-from swashplate.errors import InputError
-from swashplate.export.c_folder import feedthrough, values_of
+from swashplate.errors import FileError, InputError
+from swashplate.export.c_folder import exported_drive, feedthrough, values_of
 from swashplate.export.libraries import (
     NAME,
     Platform,
@@ -28,11 +29,13 @@ from swashplate.export.libraries import (
     compiled,
     layout_of,
     library_sources,
+    manifest,
     packaged,
 )
 from swashplate.export.variables import LONGEST_STEP, NONE, TIME, Variable, variables
+from swashplate.results import Result
 from swashplate.simulation.instance import check_filter_stability
-from swashplate.tables import write_whole
+from swashplate.tables import UNIT, Column, Table, write_whole
 from swashplate.units import si_exponents, to_si
 
 if TYPE_CHECKING:
@@ -42,7 +45,7 @@ Version = Literal["2.0", "3.0"]
 Array = NDArray[np.float64]
 
 LATE = 1.5
-"""Steps that a delay must have at least, so that no output depends on the voltage of its instant."""
+"""Steps that a delay must have, so that no output depends on the voltage of its instant."""
 MAGIC, RESOURCE_VERSION, TOKEN_LENGTH = b"SWPDRIVE", 1, 64
 LONGEST_LINE = 1020
 """Steps that the delay line of the libraries can hold."""
@@ -149,7 +152,7 @@ def packed(drive: Drive, fmi: Version, step: float, platforms: Iterable[Platform
     """The file's content: the same bytes for the same drive and options."""
     own = bool(drive.parameters.equations)
     texts = library_sources(drive if own else None)
-    table = variables(drive.parameters, step, direct(drive, step))
+    table = table_of(drive, step)
     numbers = finite_values(drive, step)
     layout = layout_of({name: texts[name] for name in ("swashplate_drive.c", "swashplate_drive.h")})
     token = _token(fmi, texts, numbers, table)
@@ -176,14 +179,17 @@ def finite_values(drive: Drive, step: float) -> Array:
     return np.where(np.isinf(values), np.copysign(NONE, values), values)
 
 
+def table_of(drive: Drive, step: float) -> tuple[Variable, ...]:
+    """Every variable of a drive at a step [s]."""
+    return variables(exported_drive(drive), drive.parameters, step, direct(drive, step))
+
+
 def direct(drive: Drive, step: float) -> dict[str, set[str]]:
     """By output, the inputs that it depends on at the same instant."""
-    found = {name: set(inputs) for name, inputs in feedthrough(drive).items()}
-    late = drive.parameters.numbers["tau"] < LATE * step
-    for inputs in found.values():
-        if not late:
-            inputs.discard("voltage")
-    return found
+    at_once = {"voltage"} if drive.parameters.numbers["tau"] < LATE * step else set[str]()
+    own = bool(drive.parameters.equations)
+    read = feedthrough(drive) if own else manifest()["feedthrough"]
+    return {name: {*inputs, *at_once} for name, inputs in read.items()}
 
 
 def resource(numbers: Array, layout: int, token: str) -> bytes:
@@ -207,7 +213,7 @@ def _token(
 
 
 def _zipped(members: Mapping[str, bytes]) -> bytes:
-    """A zip whose bytes depend on its content alone; the description first, as importers read it."""
+    """A zip whose bytes depend on its content alone, the description first."""
     target = BytesIO()
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as made:
         for name in sorted(members, key=lambda each: (each != "modelDescription.xml", each)):
@@ -395,7 +401,6 @@ def _build_description(units: Sequence[str]) -> bytes:
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, "utf-8") + b"\n"
 
 
-
 def _add_units(root: ET.Element, table: Sequence[Variable]) -> None:
     definitions = ET.SubElement(root, "UnitDefinitions")
     for unit in sorted({each.unit for each in table if each.unit != "1"} | {"s"}):
@@ -406,3 +411,101 @@ def _add_units(root: ET.Element, table: Sequence[Variable]) -> None:
         for shown in DISPLAYED.get(unit, ()):
             factor = 1.0 / to_si(1.0, shown, unit, "a display unit")
             ET.SubElement(made, "DisplayUnit", {"name": shown, "factor": repr(factor)})
+
+
+# --- comparison -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Comparison(Result):
+    """An FMU's outputs beside those of the drive, sample by sample."""
+
+    name: str
+    """Name of the drive."""
+    samples: int
+    differences: Mapping[str, float]
+    """Largest difference of each output, SI."""
+    units: Mapping[str, str]
+    """SI unit of each output."""
+
+    @property
+    def equal(self) -> bool:
+        """Whether every number is equal to the last bit."""
+        return not any(self.differences.values())
+
+    def tables(self) -> list[Table]:
+        """Largest difference of each output."""
+        columns = (Column("output"), Column("largest difference", ".3g"), UNIT)
+        made = Table(f"FMU of {self.name} against the drive, {self.samples} samples", columns)
+        for name, difference in self.differences.items():
+            made.add(name, difference, unit=self.units[name], look=difference != 0.0)
+        return [made]
+
+
+def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> Comparison:
+    """Run an FMU with FMPy and compare it with the drive, at the FMU's own step.
+
+    Parameters
+    ----------
+    path : path
+        The FMU.
+    drive : Drive
+        That it was made of.
+    voltage : (n,) array_like
+        Command at each step of the FMU. [V]
+
+    Returns
+    -------
+    Comparison
+        Largest differences, 0 where the FMU's numbers are the drive's.
+
+    Raises
+    ------
+    InputError
+        If FMPy is not installed, the command is none, or the FMU fails.
+    FileError
+        If the file is no FMU.
+    """
+    try:
+        import fmpy
+    except ImportError:
+        raise InputError(
+            "Comparing needs FMPy: install the extra fmu (pip install 'swashplate[fmu]')."
+        ) from None
+    command = np.asarray(voltage, dtype=np.float64)
+    if command.ndim != 1 or command.size < 2:
+        raise InputError("A command to compare by needs at least two samples.")
+    step = _step_of(Path(path), fmpy)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # said when it was exported
+        chosen = exportable(drive, step)
+    run = chosen.simulate(command, 1.0 / step, interpolation="previous")
+    signals = np.empty(command.size, [("time", np.float64), ("voltage", np.float64)])
+    signals["time"], signals["voltage"] = np.arange(command.size) * step, command
+    names = [name for name in run.names if name not in ("time", "voltage")]
+    try:
+        found = fmpy.simulate_fmu(
+            str(path),
+            start_time=0.0,
+            stop_time=float(signals["time"][-1]),
+            output_interval=step,
+            input=signals,
+            output=names,
+        )
+    except Exception as error:
+        raise InputError(f"{path} fails: {error}") from None
+    if len(found) != command.size:
+        raise InputError(f"{path} gave {len(found)} samples for a command of {command.size}.")
+    differences = {name: float(np.abs(found[name] - run[name]).max()) for name in names}
+    units = {each.name: each.unit for each in table_of(chosen, step)}
+    return Comparison(chosen.name, command.size, differences, units)
+
+
+def _step_of(path: Path, fmpy: Any) -> float:
+    """The own step that an FMU declares. [s]"""
+    try:
+        described = fmpy.read_model_description(str(path), validate=False)
+        (found,) = [each for each in described.modelVariables if each.name == "step"]
+        return float(found.start)
+    except Exception:
+        raise FileError(f"{path} is no FMU of swashplate.") from None

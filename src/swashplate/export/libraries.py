@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 from swashplate.documents import parse_toml
 from swashplate.errors import FileError, InputError
-from swashplate.export.c_folder import drive_sources
+from swashplate.export.c_folder import drive_sources, exported_drive
 from swashplate.export.variables import c_header
 
 NAME = "swashplate_drive"
@@ -76,6 +76,7 @@ FLAGS = (
     "-fno-fast-math",
     "-fvisibility=hidden",
     "-fno-ident",
+    "-fno-stack-protector",
     "-DNDEBUG",
 )
 WASM_FLAGS = ("-std=c11", "-Os", "-g0", "-ffp-contract=off", "-fno-ident", "-DNDEBUG")
@@ -132,8 +133,8 @@ def library_sources(drive: Any = None) -> dict[str, str]:
     drive : Drive, optional
         One with equations of its own; by default the packaged equations.
     """
-    texts = dict(drive_sources() if drive is None else drive_sources(drive))
-    header = c_header(layout_of(texts))
+    texts = dict(drive_sources(drive))
+    header = c_header(exported_drive(drive), layout_of(texts))
     own = {name: _source(name) for name in FMI_SOURCES}
     return {**texts, "fmi_variables.h": header, **own}
 
@@ -215,7 +216,7 @@ def compiled(texts: Mapping[str, str], platform: Platform) -> bytes:
 def compiled_wasm(texts: Mapping[str, str]) -> bytes:
     """WebAssembly of the drive, made of C texts by Zig's compiler."""
     if not has_zig():
-        raise InputError("WebAssembly needs the extra binaries: pip install 'swashplate[binaries]'.")
+        raise InputError("WebAssembly needs a compiler: pip install 'swashplate[binaries]'.")
     with TemporaryDirectory(prefix="swashplate-") as place:
         folder = Path(place)
         written(texts, folder)
@@ -229,7 +230,9 @@ def _options(platform: Platform) -> list[str]:
     api = "__declspec(dllexport)"
     if platform.ending != ".dll":
         api = '__attribute__((visibility("default")))'
-    shared = ["-shared"] if platform.ending == ".dll" else ["-shared", "-fPIC"]
+    # no C++ unwinds through them; on Windows the C library needs its tables
+    bare = ["-fno-asynchronous-unwind-tables", "-fno-unwind-tables"]
+    shared = ["-shared"] if platform.ending == ".dll" else ["-shared", "-fPIC", *bare]
     return [*FLAGS, f"-DSWP_API={api}", *shared]
 
 

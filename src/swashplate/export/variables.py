@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Literal
 
-from swashplate.export.c_folder import INPUTS, OPTIONS, OUTPUTS, PARAMETERS
+from swashplate.equations.c_model import Exported
 from swashplate.linear.model import UNITS
-from swashplate.parameters.definitions import find, is_column
+from swashplate.parameters.definitions import find
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 
@@ -25,7 +25,7 @@ NONE = 1e30
 """What stands for infinity, "no limit", where a number must be finite: the numbers that follow from
 it are the same to the last bit."""
 LONGEST_STEP = 1.0 / 512.0
-"""Longest step of the model's own grid; a record with fewer samples is simulated in substeps. [s]"""
+"""Longest step of the model's own grid. [s]"""
 
 # Value references. They never change: tests/export/value_references.csv is the stored list.
 INPUT, OUTPUT, PARAMETER, STEP, START_STEADY, CLIP, OPTION, TIME = (
@@ -99,6 +99,7 @@ def finite(value: float) -> float:
 
 
 def variables(
+    exported: Exported,
     parameters: ParameterSet,
     step: float,
     feedthrough: Mapping[str, Collection[str]],
@@ -107,6 +108,8 @@ def variables(
 
     Parameters
     ----------
+    exported : Exported
+        The drive as it is in C, whose order of inputs, outputs, options and parameters counts.
     parameters : ParameterSet
         The drive's, for the start values.
     step : float
@@ -121,9 +124,9 @@ def variables(
         Variable(
             name, INPUT + i, "input", "continuous", _SIGNALS[name], _UNITS[name], at_first[name]
         )
-        for i, name in enumerate(("voltage", *INPUTS))
+        for i, name in enumerate(("voltage", *exported.measured))
     ]
-    for i, name in enumerate(OUTPUTS):
+    for i, name in enumerate(exported.names):
         direct = frozenset(feedthrough.get(name, ()))
         found.append(
             Variable(
@@ -137,9 +140,8 @@ def variables(
             )
         )
     numbers = parameters.numbers
-    for i, name in enumerate(PARAMETERS):
-        # an input of that name has its value
-        if name not in INPUTS and is_column(name):
+    for i, (_, _, name) in enumerate(exported.named("parameters")):
+        if name not in exported.measured:  # an input of that name has its value
             value = numbers[name] if name in numbers else parameters[name].values[0]
             found.append(_parameter(name, PARAMETER + i, value))
     words = "step of the model's own grid, whatever the master's steps are"
@@ -159,7 +161,7 @@ def variables(
     ]
     settings += [
         (_OPTIONS[name][0], OPTION + i, _OPTIONS[name][1], forms[name])
-        for i, name in enumerate(OPTIONS)
+        for i, name in enumerate(name for _, name in exported.settable)
         if name in _OPTIONS
     ]
     for name, reference, meaning, on in settings:
@@ -191,19 +193,21 @@ def _parameter(column: str, reference: int, value: float) -> Variable:
     )
 
 
-def c_header(layout: int) -> str:
+def c_header(exported: Exported, layout: int) -> str:
     """Text of ``fmi_variables.h``: what the FMU's C code has of this table.
 
     Parameters
     ----------
+    exported : Exported
+        The drive as it is in C.
     layout : int
         Hash of the drive's C sources, 64 bits: whose numbers the library can read.
     """
     names = ("OUTPUT", "PARAMETER", "STEP", "START_STEADY", "CLIP", "OPTION", "TIME")
     known = globals()
     references = "\n".join(f"#define SWP_FMI_{name} {known[name]}u" for name in names)
-    defaults = ", ".join(f"SWP_PARAMETER_{DEFAULTS[name]}" for name in INPUTS)
-    inputs = ", ".join(f'"{name}"' for name in INPUTS)
+    defaults = ", ".join(f"SWP_PARAMETER_{DEFAULTS[name]}" for name in exported.measured)
+    inputs = ", ".join(f'"{name}"' for name in exported.measured)
     return f"""\
 /* Made by swashplate from its table of variables: value references and what goes with them. */
 #ifndef SWASHPLATE_FMI_VARIABLES_H

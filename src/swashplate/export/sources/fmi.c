@@ -37,11 +37,46 @@ SWP_FMU_API int swp_fmu_fail(swp_fmu *fmu, const char *message) {
     return SWP_FMU_ERROR;
 }
 
+/* Text put together without printf, which would double the size of a library. */
+typedef struct {
+    char text[256];
+    size_t length;
+} words;
+
+static void add(words *to, const char *text) {
+    while (*text && to->length + 1 < sizeof to->text) to->text[to->length++] = *text++;
+    to->text[to->length] = '\0';
+}
+
+/* A number with seven decimals at most. */
+static void add_number(words *to, double value) {
+    char digits[32];
+    size_t at = sizeof digits - 1;
+    digits[at] = '\0';
+    if (value < 0.0) add(to, "-");
+    if (!(fabs(value) < 1e11)) {
+        add(to, "1e11 or more");
+        return;
+    }
+    uint64_t scaled = (uint64_t)(fabs(value) * 1e7 + 0.5);
+    int some = 0;
+    for (int i = 0; i < 7; i++, scaled /= 10) {
+        some = some || scaled % 10;
+        if (some) digits[--at] = (char)('0' + scaled % 10);
+    }
+    if (some) digits[--at] = '.';
+    do digits[--at] = (char)('0' + scaled % 10);
+    while (scaled /= 10);
+    add(to, digits + at);
+}
+
 /* A refused value: the instance goes on as it was. */
 static int refuse(swp_fmu *fmu, const char *what, const char *why) {
-    char message[256];
-    snprintf(message, sizeof message, "%s: %s", what, why);
-    fmu->say(fmu, SWP_FMU_DISCARD, message);
+    words message = {{0}, 0};
+    add(&message, what);
+    add(&message, ": ");
+    add(&message, why);
+    fmu->say(fmu, SWP_FMU_DISCARD, message.text);
     return SWP_FMU_DISCARD;
 }
 
@@ -200,11 +235,14 @@ static int updated(swp_fmu *fmu) {
 static int clipped(swp_fmu *fmu, double *voltage) {
     swp_memory *m = &fmu->memory;
     if (fabs(*voltage) <= SWP_FMI_FULL_VOLTAGE) return SWP_FMU_OK;
-    char message[160];
-    snprintf(message, sizeof message, "The voltage is %g V, but the card takes +-%g V%s.", *voltage,
-             SWP_FMI_FULL_VOLTAGE, m->clip ? "; it is clipped (said once)" : " and clip is false");
-    if (!m->clip) return swp_fmu_fail(fmu, message);
-    if (!m->clipped) fmu->say(fmu, SWP_FMU_WARNING, message);
+    words message = {{0}, 0};
+    add(&message, "The voltage is ");
+    add_number(&message, *voltage);
+    add(&message, " V, but the card takes +-");
+    add_number(&message, SWP_FMI_FULL_VOLTAGE);
+    add(&message, m->clip ? " V; it is clipped (said once)" : " V and clip is false");
+    if (!m->clip) return swp_fmu_fail(fmu, message.text);
+    if (!m->clipped) fmu->say(fmu, SWP_FMU_WARNING, message.text);
     m->clipped = 1;
     *voltage = *voltage > 0.0 ? SWP_FMI_FULL_VOLTAGE : -SWP_FMI_FULL_VOLTAGE;
     return SWP_FMU_OK;
