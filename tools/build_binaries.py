@@ -48,7 +48,6 @@ def main() -> None:
     print(f"{libraries.WASM} ...", flush=True)
     contents[libraries.WASM] = libraries.compiled_wasm(libraries.all_sources())
     for name, content in contents.items():
-        (BINARIES / name).write_bytes(content)
         entry = tomlkit.table()
         entry["sha256"] = sha256(content).hexdigest()
         entry["bytes"] = len(content)
@@ -57,6 +56,8 @@ def main() -> None:
         entries[name] = entry
     made["feedthrough"] = {name: sorted(read) for name, read in feedthrough().items()}
     made["libraries"] = entries
+    for name, content in contents.items():
+        (BINARIES / name).write_bytes(content)
     (BINARIES / libraries.MANIFEST).write_text(tomlkit.dumps(made), "utf-8")
     compressed = sum(len(zlib.compress(each, 9)) for each in contents.values())
     print(f"{compressed} bytes compressed together")

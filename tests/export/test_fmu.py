@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -241,7 +242,7 @@ def test_ramps_by_the_derivative_of_the_input(made, hoist, fmi):
     voltage = np.array([0.0, 8.0, -6.0, 9.0, 3.0, 3.0])
     long, samples = 0.125, 64
     master = made(hoist).begin()
-    for i, (volts, following) in enumerate(zip(voltage[:-1], voltage[1:], strict=True)):
+    for i, (volts, following) in enumerate(pairwise(voltage)):
         master.set(voltage=volts)
         master.fmu.setRealInputDerivatives([0], [1], [(following - volts) / long])
         master.step(i * long, long)
@@ -295,7 +296,14 @@ def test_state_can_be_set_back_and_stored(made, hoist):
 def test_state_of_another_size_version_or_drive_is_refused(made, hoist):
     master = made(hoist).begin()
     kept = master.state
-    wrong = [kept[:-8], kept + bytes(8), b"X" + kept[1:], kept[:8] + b"\x07" + kept[9:], b"", b"SWP"]
+    wrong = [
+        kept[:-8],
+        kept + bytes(8),
+        b"X" + kept[1:],
+        kept[:8] + b"\x07" + kept[9:],
+        b"",
+        b"SWP",
+    ]
     wrong.append(made(hoist.replace(Z16=2e-4)).begin().state)
     for given in wrong:
         with pytest.raises(FMICallException):
@@ -373,7 +381,9 @@ def test_refuses_what_is_no_number(made, hoist, value):
     master.step(0.0, H)
 
 
-@pytest.mark.parametrize(("name", "value"), [("Z16_plus", -1e-4), ("Z9", 0.0), ("V_dz_minus", -1.0)])
+@pytest.mark.parametrize(
+    ("name", "value"), [("Z16_plus", -1e-4), ("Z9", 0.0), ("V_dz_minus", -1.0)]
+)
 def test_refuses_a_parameter_out_of_range(made, hoist, name, value):
     master = made(hoist).begin()
     kept = master.get(name)
@@ -476,7 +486,9 @@ def test_forms_of_the_card_can_be_chosen(made, hoist, options):
     name, value = words.get(next(iter(options)), ("card_switch", "split"))
     from dataclasses import replace
 
-    assert np.array_equal(found, stepped(Drive(replace(drive.parameters, **{name: value})), voltage))
+    assert np.array_equal(
+        found, stepped(Drive(replace(drive.parameters, **{name: value})), voltage)
+    )
 
 
 def test_damaged_files_make_no_instance(made, hoist, tmp_path):
@@ -484,7 +496,14 @@ def test_damaged_files_make_no_instance(made, hoist, tmp_path):
     folder = tmp_path / "0 ä"
     resource = folder / "resources" / "drive.bin"
     good = resource.read_bytes()
-    wrong = [b"", good[:100], good[:-1], good + b"\0", b"X" + good[1:], good[:12] + b"\x01" + good[13:]]
+    wrong = [
+        b"",
+        good[:100],
+        good[:-1],
+        good + b"\0",
+        b"X" + good[1:],
+        good[:12] + b"\x01" + good[13:],
+    ]
     wrong.append(good[:24] + b"{0" + good[26:])  # another token
     wrong.append(good[:16] + b"12345678" + good[24:])  # another layout
     wrong.append(good[:96] + np.array([np.nan]).tobytes() + good[104:])  # V_dz_plus

@@ -335,3 +335,14 @@ def test_a_state_is_small(hoist: Drive, in_c: Any, compiled: Callable[..., Path]
 def test_fast_mathematics_does_not_compile(compiled: Callable[..., Path]) -> None:
     with pytest.raises(AssertionError, match="fast-math"):
         compiled(drive_sources(), ["-ffast-math"])
+
+
+@pytest.mark.parametrize("flags", ["-O0", "-O3", "-O3 -march=native -fno-math-errno"])
+def test_other_flags_leave_the_bits_alone(
+    hoist: Drive, in_c: Any, compiled: Callable[..., Path], flags: str
+) -> None:
+    model = in_c(hoist, H, compiled(drive_sources(), flags.split()))
+    found = model.run(COMMAND, NAMES)
+    run = hoist.simulate(COMMAND, 512.0, interpolation="previous")
+    for name in NAMES:
+        assert (found[name] == getattr(run, name)).all(), name

@@ -14,6 +14,7 @@ from swashplate import Drive, FileError, InputError
 from swashplate.equations import (
     Model,
     Tap,
+    discretised,
     equation,
     instance_of,
     interpolate,
@@ -168,6 +169,31 @@ def test_models_in_series_have_the_bits_of_their_march(compiled: Any) -> None:
     found = model.run(PUMPED, ["place", "gap", "travel", "level"])
     for name, values in found.items():
         assert (run[name] == values).all(), name
+
+
+class Oil(NamedTuple):
+    stiffness: float
+    drag: float
+
+
+class Motion(NamedTuple):
+    pressure: float
+    speed: float
+
+
+@equation
+def oil_rates(state: Motion, flow: float, p: Oil) -> Motion:
+    return Motion(p.stiffness * (flow - state.speed), state.pressure - p.drag * state.speed)
+
+
+def test_continuous_equations_have_the_bits_of_their_march(compiled: Any) -> None:
+    cylinder = Model("cylinder", Oil, Motion, discretised(oil_rates, "midpoint"))
+    p = Oil(40.0, 2.0)
+    run = simulate(cylinder, p, {"flow": PUMPED}, RATE)
+    found = exported(cylinder, compiled, RATE, parameters=p).run(PUMPED, ["pressure", "speed"])
+    for name, values in found.items():
+        assert (run[name] == values).all()
+    assert np.ptp(found["pressure"]) > 0.1
 
 
 class Lag(NamedTuple):

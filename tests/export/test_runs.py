@@ -80,7 +80,9 @@ BATTERY = [
     Case(changes={"Z7": 0.3}), Case(changes={"Z7": 0.3}, start="steady"),
     Case("slew", {"Z12": 0.2}), Case(changes={"Z13": 0.5, "Z15": float("inf")}, start="steady"),
     Case(changes={"Z13": (0.45, 0.1)}), Case(changes={"Z14": 1e-4, "Z16": 2e-4}),
-    Case(changes={"Z15": 3e5}, start="steady"), Case(changes={"lim1": float("inf"), "a": 0.0}),
+    Case(changes={"Z15": 2e5}, start="steady"), Case(changes={"Z9": 3e5}),
+    Case(changes={"Z13": 1.2, "Z3": 0.06, "Z1": 4.6e-6, "Z15": float("inf")}, start="steady"),
+     Case(changes={"lim1": float("inf"), "a": 0.0}),
     Case(exact=True), Case(exact=True, start="steady", rate=1000.0, forms={"card_switch": "split"}),
     Case(changes={"zeta": 0.4}, exact=True), Case(changes={"zeta": 3.0, "C": 0.0}, exact=True),
     Case(changes={"zeta_plus": 1.0}, exact=True, rate=777.0),
@@ -199,7 +201,7 @@ def whole_interface(model: Any) -> None:
         model.function("sentence")(number)
         model.function("parameter_name")(number)
         model.function("output_name")(number)
-        for on in (True, False):
+        for on in (True, True, False):
             model.set_option(number, on)
             model.get_option(number)
     for kind in ("", "_output", "_input", "_option"):

@@ -15,14 +15,6 @@ from swashplate.tables import Form, check_folder
 
 FMU = Form("an FMU", (".fmu",))
 WASM = Form("WebAssembly", (".wasm",))
-EXAMPLES = """\
-Examples:
-  swashplate export hoist --fmu hoist.fmu
-  swashplate export fitted/ --fmu winch.fmu --fmi 3.0 --platforms linux64,win64
-  swashplate export mine.toml --c folder --compile
-  swashplate export hoist --set tau=10ms --step 0.001 --fmu hoist.fmu
-  swashplate export hoist --wasm hoist.wasm
-"""
 
 
 def export(
@@ -61,6 +53,13 @@ def export(
 
     The FMU runs in Simulink, OpenModelica, FMPy and other importers without Python and
     without a compiler: the package brings its libraries along.
+
+    For example:
+      swashplate export hoist --fmu hoist.fmu
+      swashplate export fitted/ --fmu winch.fmu --fmi 3.0 --platforms linux64,win64
+      swashplate export mine.toml --c folder
+      swashplate export hoist --set tau=10ms --step 0.001 --fmu hoist.fmu
+      swashplate export hoist --wasm hoist.wasm
     """
     if fmu is None and c is None and wasm is None:
         raise InputError("Say what to export: --fmu FILE.fmu, --c DIR or --wasm FILE.wasm.")
@@ -89,7 +88,11 @@ def export(
                     ),
                 )
             if c is not None:
-                for made in exporting.c(chosen, c, step=own, compile=compile):
+                written = exporting.c(chosen, c, own)
+                if compile:
+                    (header,) = (each.name for each in written if each.name.endswith("drive.h"))
+                    written.append(exporting.compiled_c(c, header))
+                for made in written:
                     note(f"C: {made}")
             if wasm is not None:
                 files.write(

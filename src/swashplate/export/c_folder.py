@@ -50,6 +50,7 @@ def exported_drive(drive: Drive | None = None) -> Exported:
         bounds={"voltage": FULL_VOLTAGE},
         stable={0: stable_step},
         follows={(1, "steep"): steep_stops},
+        internal=frozenset({"own"}),
         longest=STEP,
     )
 

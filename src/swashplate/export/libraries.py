@@ -18,12 +18,16 @@ from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from swashplate.documents import parse_toml
 from swashplate.errors import FileError, InputError
-from swashplate.export.c_folder import drive_sources, exported_drive
+from swashplate.export.c_folder import STEP, drive_sources, exported_drive, values_of
 from swashplate.export.variables import c_header
+from swashplate.tables import write_whole
+
+if TYPE_CHECKING:
+    from swashplate.drive import Drive
 
 NAME = "swashplate_drive"
 """Stem of every library: FMI's model identifier."""
@@ -42,6 +46,8 @@ class Platform(NamedTuple):
     fmi3: tuple[str, ...]
     targets: tuple[str, ...]
     """Zig's; a library for several has them side by side."""
+    optimize: str = "-O2"
+    """Two that are large, with a C library or two parts inside, are compiled for size."""
 
 
 PLATFORMS: dict[str, Platform] = {
@@ -56,7 +62,12 @@ PLATFORMS: dict[str, Platform] = {
         ("aarch64-linux-gnu.2.17",),
     ),
     "win64": Platform(
-        "x86_64-windows.dll", ".dll", ("win64",), ("x86_64-windows",), ("x86_64-windows-gnu",)
+        "x86_64-windows.dll",
+        ".dll",
+        ("win64",),
+        ("x86_64-windows",),
+        ("x86_64-windows-gnu",),
+        "-Os",
     ),
     "darwin64": Platform(
         "darwin.dylib",
@@ -64,13 +75,13 @@ PLATFORMS: dict[str, Platform] = {
         ("darwin64", "aarch64-darwin"),
         ("x86_64-darwin", "aarch64-darwin"),
         ("x86_64-macos.11.0", "aarch64-macos.11.0"),
+        "-Os",
     ),
 }
 """By the names that users give."""
 
 FLAGS = (
     "-std=c11",
-    "-O2",
     "-g0",
     "-ffp-contract=off",
     "-fno-fast-math",
@@ -125,7 +136,7 @@ def digest(texts: Mapping[str, str]) -> str:
     return made.hexdigest()
 
 
-def library_sources(drive: Any = None) -> dict[str, str]:
+def library_sources(drive: Drive | None = None) -> dict[str, str]:
     """Every C text of a library by its file's name, FMI's own headers apart.
 
     Parameters
@@ -139,9 +150,9 @@ def library_sources(drive: Any = None) -> dict[str, str]:
     return {**texts, "fmi_variables.h": header, **own}
 
 
-def all_sources() -> dict[str, str]:
-    """Every C text that the package's binaries are made of."""
-    return {**library_sources(), "wasm.c": _source("wasm.c")}
+def all_sources(drive: Drive | None = None) -> dict[str, str]:
+    """Every C text that libraries and WebAssembly are made of; as `library_sources`."""
+    return {**library_sources(drive), "wasm.c": _source("wasm.c")}
 
 
 @cache
@@ -176,6 +187,56 @@ def packaged(name: str) -> bytes:
     if sha256(content).hexdigest() != manifest()["libraries"][name]["sha256"]:
         raise FileError(f"{path} is damaged; install swashplate again.")
     return content
+
+
+# --- WebAssembly ----------------------------------------------------------------------------------
+
+VALUES_SECTION = "swashplate.values"
+"""Section of a ``.wasm`` file with the drive's numbers, little-endian doubles: what
+``WebAssembly.Module.customSections`` finds, and the function ``swp_page_init`` takes."""
+
+
+def wasm(drive: Drive, path: str | Path, *, step: float = STEP) -> Path:
+    """Write a drive as WebAssembly, its numbers in a section of their own.
+
+    Parameters
+    ----------
+    drive : Drive
+        Whose. One with an equation of its own is compiled, which needs the extra ``binaries``.
+    path : path
+        The file; an older one is replaced.
+    step : float
+        Step of its grid, at most 1/512. [s]
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the card's filter is unstable at that step, or a compiler is missing.
+    FileError
+        If the file cannot be written.
+    """
+    numbers = values_of(drive, step).astype("<f8").tobytes()
+    own = bool(drive.parameters.equations)
+    code = compiled_wasm(all_sources(drive)) if own else packaged(WASM)
+    name = VALUES_SECTION.encode()
+    content = bytes([len(name)]) + name + numbers
+    made = code + b"\0" + _leb128(len(content)) + content
+    write_whole(path, lambda beside: beside.write_bytes(made) and None)
+    return Path(path)
+
+
+def _leb128(number: int) -> bytes:
+    """An unsigned number as WebAssembly has it: seven bits a byte, the lowest first."""
+    made = bytearray()
+    while number > 127:
+        made.append(number & 127 | 128)
+        number >>= 7
+    return bytes([*made, number])
 
 
 # --- compiling ------------------------------------------------------------------------------------
@@ -213,6 +274,38 @@ def compiled(texts: Mapping[str, str], platform: Platform) -> bytes:
     return parts[0] if len(parts) == 1 else universal(parts)
 
 
+def compiled_c(folder: Path, header: str) -> Path:
+    """A shared library of a folder of C source, made for this machine.
+
+    Parameters
+    ----------
+    folder : path
+        With what `swashplate.export.c` wrote.
+    header : str
+        Name of the header there, ``swashplate_drive.h``.
+
+    Raises
+    ------
+    InputError
+        If there is no compiler, or it fails.
+    """
+    stem = header.removesuffix(".h")
+    machine = _this_machine()
+    ending = machine.ending if machine else ".so"
+    compiler = [shutil.which("cc") or shutil.which("gcc") or ""]
+    if not compiler[0]:
+        if not has_zig():
+            raise InputError(
+                "--compile needs a C compiler: install one, or the extra binaries "
+                "(pip install 'swashplate[binaries]')."
+            )
+        compiler = [sys.executable, "-m", "ziglang", "cc"]
+    shared = ["-shared"] if ending == ".dll" else ["-shared", "-fPIC"]
+    words = ["-std=c99", "-O2", "-ffp-contract=off", *shared, "-o", f"{stem}{ending}"]
+    _run([*compiler, *words, f"{stem}.c", "-lm"], folder)
+    return folder / f"{stem}{ending}"
+
+
 def compiled_wasm(texts: Mapping[str, str]) -> bytes:
     """WebAssembly of the drive, made of C texts by Zig's compiler."""
     if not has_zig():
@@ -233,7 +326,7 @@ def _options(platform: Platform) -> list[str]:
     # no C++ unwinds through them; on Windows the C library needs its tables
     bare = ["-fno-asynchronous-unwind-tables", "-fno-unwind-tables"]
     shared = ["-shared"] if platform.ending == ".dll" else ["-shared", "-fPIC", *bare]
-    return [*FLAGS, f"-DSWP_API={api}", *shared]
+    return [*FLAGS, platform.optimize, f"-DSWP_API={api}", *shared]
 
 
 def _zig(target: str) -> list[str]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Literal
 
-from swashplate.equations.c_model import Exported
+from swashplate.equations.c_source import Exported
 from swashplate.linear.model import UNITS
 from swashplate.parameters.definitions import find
 from swashplate.parameters.parameter_set import ParameterSet

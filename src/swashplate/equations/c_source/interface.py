@@ -160,7 +160,7 @@ class _Interface:
             self.filled(
                 TEXTS["interface"],
                 rest=self.rest(),
-                settle=self.filled(TEXTS["settled"], finite=self.finite()) if e.settles else "",
+                settle=self.filled(TEXTS["settled"]) if e.settles else "",
                 move=self.moved(),
                 outputs=self.outputs(),
                 limits=self.limits(),
@@ -291,11 +291,6 @@ class _Interface:
             lines += [*indented([f"    {line}"]), "        break;"]
         return "\n".join([*lines, "    default:", "        break;", "    }", "}", ""])
 
-    def finite(self) -> str:
-        tests = [f"is_finite(m->now.{self.e.members[i]}.{path_of(path)})"
-                 for i, path in self.model.places("state")]  # fmt: skip
-        return "\n        && ".join(tests) or "true"
-
     def outputs(self) -> str:
         lines = []
         for name, read in zip(self.e.names, self.read, strict=True):
@@ -337,8 +332,10 @@ class _Interface:
             place = f"m->{self.e.members[i]}_options.{c_name(name)}"
             lines += [
                 f"case {self.P}_OPTION_{c_name(name)}:",
-                f"    m->stale = m->stale || {place} != on;",
-                f"    {place} = on;",
+                f"    if ({place} != on) {{",
+                f"        {place} = on;",
+                "        m->stale = true;",
+                "    }",
                 f"    return {self.P}_OK;",
             ]
         return _body(lines)

@@ -22,9 +22,9 @@ from swashplate.equations.model import Equation, Link, Model, Tap, Window, argum
 from swashplate.equations.syntax import plain
 
 OWN = """
-number_at put_at is_finite in_range number_of placed seen constant_window before_all good_inputs
-put_inputs taken one_sample rested_start settled_start checked computed switched parameter_table
-given_places flag_places constant_places output_names input_names option_names
+number_at put_at is_finite all_finite in_range number_of placed seen constant_window before_all
+good_inputs put_inputs taken one_sample rested_start settled_start checked computed switched
+parameter_table given_places flag_places constant_places output_names input_names option_names
 """
 PUBLIC = """
 size value_count init reset settle step correct output limits set_input clear_input set get
@@ -53,6 +53,8 @@ class Exported:
     """By part: margin above 0 where its equations bear the step, of ``p, h, options``."""
     follows: Mapping[tuple[int, str], Equation] = field(default_factory=dict)
     """By part and option: whether it is on, of ``p``; it cannot be set."""
+    internal: frozenset[str] = frozenset()
+    """Options that belong to the equations, and are not for users."""
     longest: float = inf
     """Longest step. [s]"""
 
@@ -107,7 +109,8 @@ class Exported:
     @cached_property
     def settable(self) -> list[tuple[int, str]]:
         """Options that do not follow from parameters."""
-        return [o for o in self.options if o not in self.switches and o not in self.follows]
+        follows = {*self.switches, *self.follows}
+        return [o for o in self.options if o not in follows and o[1] not in self.internal]
 
     @cached_property
     def signals(self) -> tuple[str, ...]:
@@ -210,17 +213,17 @@ class Writer:
 
     def functions(self) -> list[str]:
         """The functions around one sample."""
-        made = [self.updates(), self.starts(False)]
+        made = [self.updates(), self.finite(), self.starts(False)]
         made += [self.starts(True)] if self.e.settles else []
         return [*made, self.sample()]
 
-    def argument(self, i: int, name: str, inputs: Mapping[str, str]) -> str:
+    def argument(self, i: int, name: str, inputs: Mapping[str, str], state: str) -> str:
         """What an equation of a part takes under a name."""
         member, part = self.e.members[i], self.model.parts[i]
         if name in inputs:
             return inputs[name]
         return {
-            "state": f"&m->now.{member}",
+            "state": f"&m->{state}.{member}",
             "signals": f"&m->{member}_signals",
             "inputs": f"&{member}_inputs",
             "p": f"&m->{member}",
@@ -230,10 +233,12 @@ class Writer:
             "given": f"&m->{member}_given" if part.given else "",
         }[name]
 
-    def call(self, i: int, equation: Equation, inputs: Mapping[str, str]) -> str:
+    def call(
+        self, i: int, equation: Equation, inputs: Mapping[str, str], state: str = "now"
+    ) -> str:
         """A call of one of a part's equations."""
         name = self.unit.add(equation)
-        given = (self.argument(i, each, inputs) for each in arguments_of(equation))
+        given = (self.argument(i, each, inputs, state) for each in arguments_of(equation))
         return f"{name}({', '.join(given)})"
 
     def link(self, link: Link, state: str) -> str:
@@ -254,13 +259,14 @@ class Writer:
         `window` is how a tap is read: at its place, or all of one value before the record.
         """
         part, member = self.model.parts[i], self.e.members[i]
+        state = "now" if window == "before" else "before"
         lines, found = [], dict[str, str]()
         for name in part.input_types:
             link, tap = self.model.link_of(i, name), part.tap(name)
             local = f"{member}_{c_name(name)}"
             default = part.defaults.get(name)
             if link is not None:
-                lines.append(f"const double {local} = {self.link(link, 'now')};")
+                lines.append(f"const double {local} = {self.link(link, state)};")
             elif part.looked_at(name):
                 number = self.e.taps.index((i, name, tap))
                 line, struct = self.e.lines.index(tap.signal), self.unit.struct(Window)
@@ -309,33 +315,31 @@ class Writer:
             member = self.e.members[i]
             lines, inputs = self.inputs(i, "line")
             tail = []
-            if part.sample is not None:
-                tail.append(f"m->{member}_signals = {self.call(i, part.sample, inputs)};")
-            if part.limits is not None:
-                tail.append(f"m->{member}_limits = {self.call(i, part.limits, inputs)};")
+            for word, equation in (("signals", part.sample), ("limits", part.limits)):
+                if equation is not None:
+                    made = self.call(i, equation, inputs, "before")
+                    tail.append(f"m->{member}_{word} = {made};")
             if part.domain is not None:
-                tail.append(f"good = {self.call(i, part.domain, inputs)} > 0.0 && good;")
-            step = f"next.{member} = {self.call(i, part.step, inputs)};"
+                margin = self.call(i, part.domain, inputs, "before")
+                tail.append(f"good = {margin} > 0.0 && good;")
+            step = f"m->now.{member} = {self.call(i, part.step, inputs, 'before')};"
             body += [*self.used(lines, [*tail, step]), *tail]
             late.append(step)
-        body += [f"struct {self.e.prefix}_memory next = m->now;", *late]
+        body += late
         for name, signal in self.model.integrals.items():
-            value, own = self.output(signal, "now"), c_name(name)
-            body.append(f"const double {own}_rate = {value};")
-            grown = f"m->now.{own} + 0.5 * m->step * (m->now.{own}_rate + {own}_rate)"
-            body.append(f"next.{own} = m->now.begun ? {grown} : 0.0;")
-            body.append(f"next.{own}_rate = {own}_rate;")
+            value, own = self.output(signal), c_name(name)
+            body.append(f"m->now.{own}_rate = {value};")
+            grown = f"m->before.{own} + 0.5 * m->step * (m->before.{own}_rate + m->now.{own}_rate)"
+            body.append(f"m->now.{own} = m->before.begun ? {grown} : 0.0;")
         head = [
             "/* One sample: everything at this instant, then all states to the next. */",
             f"static int one_sample({self.e.type} *m)",
             "{",
             "    bool good = true;",
         ]
-        body += ["next.begun = true;", "m->now = next;"]
-        checks = [f"good = is_finite(next.{self.e.members[i]}.{path_of(path)}) && good;"
-                  for i, path in self.model.places("state")]  # fmt: skip
-        end = [f"return good ? {self.P}_OK : {self.P}_DOMAIN;"]
-        return "\n".join([*head, *indented([*body, *checks, *end]), "}"])
+        body.append("m->now.begun = true;")
+        end = [f"return good && all_finite(&m->now) ? {self.P}_OK : {self.P}_DOMAIN;"]
+        return "\n".join([*head, *indented([*body, *end]), "}"])
 
     def starts(self, settled: bool) -> str:
         """States at the first sample, at rest or settled."""
@@ -390,7 +394,7 @@ class Writer:
             "/* Options, stability and delays of these parameters and this step. */",
             f"static int checked({self.e.type} *m)",
             "{",
-            *indented([*lines, f"return {self.P}_OK;"]),
+            *indented([*(lines or ["(void)m;"]), f"return {self.P}_OK;"]),
             "}",
             "",
             "/* Constants of these parameters and this step. */",
@@ -400,6 +404,22 @@ class Writer:
             "}",
         ]
         return "\n".join(texts)
+
+    def finite(self) -> str:
+        """Whether all states are finite: without a branch for each."""
+        lines = ["double none = 0.0;"]
+        for i, path in self.model.places("state"):
+            place = f"s->{self.e.members[i]}.{path_of(path)}"
+            lines.append(f"none += {place} - {place};")
+        lines += ["return none == 0.0;"] if len(lines) > 1 else ["(void)s;", "return none == 0.0;"]
+        text = [
+            "/* Whether all states are finite: what is not leaves no zero behind. */",
+            f"static bool all_finite(const struct {self.e.prefix}_memory *s)",
+            "{",
+            *indented(lines),
+            "}",
+        ]
+        return "\n".join(text)
 
     # -- numbers -----------------------------------------------------------------------------------
 
