@@ -225,7 +225,6 @@ def campaign(_, item):
     from swashplate import Campaign, Drive
     from swashplate.campaign import rig
     from swashplate.errors import SwashplateError
-    from swashplate.identification.acceptance import verdict
     from swashplate.identification.assessment import assess
     from swashplate.identification.data_checks import check_runs
     from swashplate.identification.fitting import fit, smooth
@@ -233,6 +232,7 @@ def campaign(_, item):
     from swashplate.identification.setup import load_setup
     from swashplate.identification.staging import true_value
     from swashplate.identification.validation import predict
+    from swashplate.identification.verdict import verdict
 
     fault, nominal = FAULTS[name], Drive.preset(axis)
     tests, machine = simulated_campaign(fault, axis, seed)

@@ -50,8 +50,8 @@ PARAMETERS = """\
 A drive in numbers. `swashplate show hoist --toml > mine.toml` writes one to start from; symbols,
 units and ranges: [nomenclature](../nomenclature.md)."""
 SETUP = """\
-The parameters that a fit estimates, stage by stage. `swashplate excitation --write` makes one for
-your tests; [identification](../identification.md) has an example."""
+The parameters that a fit estimates, stage by stage. `swashplate excitation` says which of
+them your tests determine; [identification](../identification.md) has an example."""
 
 
 def api_pages() -> Iterator[tuple[str, str]]:

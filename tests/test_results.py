@@ -72,7 +72,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
     runs = campaign.select(role="fit")
     hoist = Drive.preset("hoist")
     fitted = fit(hoist, campaign, setup)
-    judged = judge_fit(campaign, "hoist", runs, hoist.parameters, setup, fitted, Wanted())
+    judged = judge_fit(campaign, runs, hoist.parameters, setup, fitted, Wanted())
     return Work(campaign, fitted, judged)
 
 

@@ -359,7 +359,8 @@ class Drive(Result):
         Parameters
         ----------
         outputs : sequence of str
-            Signals of the step, by their names in `Simulation`.
+            Signals of the step, by their names in `Simulation`; ``"limits"`` are the pump's, a bit
+            each: dead zone, orifice, spool, swash stop, relief.
         inputs : sequence of str
             ``"voltage"``, and of ``"load_torque"``, ``"pump_speed"`` and ``"supply_pressure"`` what
             the loop gives; for the others the parameters count.

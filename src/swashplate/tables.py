@@ -265,8 +265,8 @@ def quantity(value: float, unit: str, digits: int = 3, spec: str = "") -> str:
 
 
 def listed(words: Sequence[str]) -> str:
-    """``a, b and c``."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+    """``a, b and c``; empty for none."""
+    return " and ".join([*([", ".join(words[:-1])] if words[:-1] else []), *words[-1:]])
 
 
 def count(number: int, what: str, several: str = "") -> str:

@@ -17,7 +17,7 @@ from swashplate.analysis import (
 )
 from swashplate.campaign import Campaign, rig
 from swashplate.errors import FileError
-from swashplate.identification.assessment import assess, save_fit
+from swashplate.identification.assessment import Judged, assess
 from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.fitting import fit
 from swashplate.identification.setup import Free, Setup, load_setup
@@ -181,7 +181,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = rig.write(virtual, place / "virtual")
     campaign = Campaign.from_toml(path)
     result = fit(Drive.preset("hoist").parameters, campaign.experiments, small_setup())
-    save_fit(result, campaign.experiments, place / "fit.json", campaign=path)
+    Judged(campaign, result, campaign.experiments).store(place / "fit.json")
     return place
 
 

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import Result
 
 from swashplate import Campaign, Drive
-from swashplate.identification.assessment import save_fit
+from swashplate.identification.assessment import Judged
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Setup
 
@@ -101,7 +101,7 @@ def fitted(held_out: Path, tmp_path: Path) -> Fit:
     found = fit(Drive.preset("hoist").parameters, runs, SETUP)
     (tmp_path / "fitted").mkdir()
     Drive(found.parameters).to_toml(tmp_path / "fitted" / "drive.toml")
-    save_fit(found, runs, tmp_path / "fitted" / "fit.json", campaign=held_out, notes={"seed": "7"})
+    Judged(campaign, found, runs, notes={"seed": "7"}).store(tmp_path / "fitted" / "fit.json")
     return found
 
 

@@ -77,7 +77,7 @@ REFUSED = {
     "size hoist --speed-deg-s 250 --out no/a.toml": "folder no does not",
     "linearize hoist --at 4 --out a.csv": "written as .toml or .json",
     "compensate hoist --out a.xlsx": "written as .toml, .csv or .parquet",
-    "excitation none.toml --write no/a.toml": "folder no does not exist",
+    "excitation none.toml --out no/a.csv": "folder no does not exist",
     "excitation none.toml --out a.txt": "written as .csv or .parquet",
     "campaign plot none.toml --out a.gif": ".png, .svg or .pdf",
 }

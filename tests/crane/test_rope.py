@@ -5,7 +5,7 @@ from math import cos, hypot, pi, radians, sin, sqrt
 import numpy as np
 import pytest
 
-from swashplate.crane import Crane, load_motion
+from swashplate.crane import Crane, Suspension, load_motion
 from swashplate.crane.crane import Pose
 from swashplate.crane.kinematics import (
     Boom,
@@ -13,11 +13,14 @@ from swashplate.crane.kinematics import (
     Vector,
     boom_of,
     luff_rope,
+    rope_length,
     rotation,
+    shaft_torques,
     shafts_for,
     tip_of,
     to_inertial,
 )
+from swashplate.crane.rope import hook_pulls
 from swashplate.errors import InputError
 
 G = 9.80665
@@ -217,6 +220,125 @@ def test_rope_too_short_for_the_step_is_refused():
         load_motion(tip[:, :2], 2.0)
 
 
+# --- elastic rope, hook and slings ----------------------------------------------------------------
+
+
+def test_elastic_rope_bounces_at_its_frequency_and_damping():
+    # √(EA/(L m)) = 9.258201 rad/s, by Verlet's step (ωh)²/24 = 1.36e-5 faster
+    stiff, mass, length = 6e7, 35000.0, 20.0
+    hangs = length * (1.0 + G * mass / stiff)
+    paths = [
+        load_motion(
+            still(20.0),
+            length,
+            start=[0.0, 0.0, -hangs - 0.01],
+            velocity=[0.0, 0.0, 0.0],
+            suspension=Suspension(stiff, damping),
+            mass=mass,
+        )
+        for damping in (0.0, 0.05)
+    ]
+    free, damped = (each.position[:, 2] + hangs for each in paths)
+    omega = 2.0 * pi / np.diff(rising(free, RATE)).mean()
+    assert omega / 9.258201 - 1.0 == pytest.approx(1.36e-5, abs=2e-7)
+    assert paths[0].pull.max() == pytest.approx(G + 0.01 * stiff / (length * mass), rel=1e-4)
+    peaks = 1 + np.flatnonzero((damped[1:-1] > damped[:-2]) & (damped[1:-1] >= damped[2:]))
+    decay = np.log(damped[peaks[0]] / damped[peaks[4]]) / (8.0 * pi)
+    assert decay / sqrt(1.0 + decay**2) == pytest.approx(0.05, rel=2e-3)
+
+
+def test_hook_and_load_swing_at_the_frequencies_of_a_double_pendulum():
+    # m1 L l ω⁴ - (m1 + m2) g (L + l) ω² + (m1 + m2) g² = 0 for 5 t on 15 m and 30 t on 6 m
+    made = load_motion(
+        still(400.0),
+        15.0,
+        start=[0.05, 0.0, -sqrt(21.0**2 - 0.05**2)],
+        velocity=[0.0, 0.0, 0.0],
+        suspension=Suspension(hook=5000.0, sling=6.0),
+        mass=30000.0,
+    )
+    slow, quick = 0.69386952, 3.94158260
+    for omega, other in ((slow, quick), (quick, slow)):
+        # x_load = g/(g - l ω²) x_hook in a mode: what the other one has falls out
+        share = G / (G - 6.0 * other**2)
+        alone = made.position[:, 0] - share * made.hook[:, 0]
+        found = 2.0 * pi / np.diff(rising(alone, RATE)).mean()
+        assert found == pytest.approx(omega, rel=4e-6)
+    slings = np.linalg.norm(made.position - made.hook, axis=1)
+    assert np.abs(slings - 6.0).max() < 1e-13
+    assert np.abs(np.linalg.norm(made.hook, axis=1) - 15.0).max() < 1e-13
+
+
+def test_stiff_elastic_rope_with_a_hook_tends_to_the_rigid_one():
+    start = [3.0, 0.0, -sqrt(21.0**2 - 9.0)]
+    rigid, *elastic = (
+        load_motion(
+            still(20.0),
+            15.0,
+            start=start,
+            velocity=[0.0, 0.0, 0.0],
+            suspension=Suspension(stiff, 0.1, hook=5000.0, sling=6.0),
+            mass=30000.0,
+        ).position
+        for stiff in (np.inf, 1e8, 8e8)
+    )
+    far, near = (np.abs(each - rigid).max() for each in elastic)
+    assert near < 0.2 * far
+    assert near < 0.03
+
+
+def test_hook_and_load_fall_together_and_are_caught_together():
+    time = np.arange(round(2.0 * RATE) + 1) / RATE
+    tip = still(2.0)
+    tip[:, 2] = np.where(time < 0.5, -7.5 * time**2, -1.875 - 7.5 * (time - 0.5))
+    hooked = Suspension(hook=500.0, sling=2.0)
+    made = load_motion(tip, 10.0, velocity=[0.0] * 3, suspension=hooked, mass=9500.0)
+    one = load_motion(tip, 10.0, velocity=[0.0] * 3)
+    assert made.hook is not None
+    np.testing.assert_allclose(made.hook[:, 2], one.position[:, 2], atol=1e-9)
+    np.testing.assert_allclose(made.position[:, 2], one.position[:, 2] - 2.0, atol=1e-9)
+    np.testing.assert_allclose(made.pull[1:], one.pull[1:], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("rope", "sling", "pulls"),
+    [
+        (10.01, 1.9, (0.001, 0.0)),  # slings slack: the hook alone, 10.01 - 10 u = 10
+        (9.9, 2.1, (0.0, 0.0125)),  # rope slack: 2.1 - (1 + 3) 2 w = 2
+        (9.9, 1.9, (0.0, 0.0)),
+        (10.01, 2.01, (0.007, 0.01)),  # 10 u - 6 w = 8 w - 10 u = 0.01
+    ],
+)
+def test_rope_and_slings_pull_where_they_are_taut(rope, sling, pulls):
+    numbers = Suspension(hook=1.0, sling=2.0).hanging(3.0, 10.0, RATE)
+    down = [Vector(0.0, 0.0, -each) for each in (rope, sling, 10.0, 2.0)]
+    found = hook_pulls(*down, 10.0, numbers)
+    assert found == pytest.approx(pulls, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Suspension(stiffness=0.0), "rope's stiffness is 0 N, but must be above 0"),
+        (lambda: Suspension(hook=500.0), "500 kg with slings of 0 m: both are above 0, or both 0"),
+        (lambda: Suspension(damping=-1.0), "suspension's damping is -1, but must be at least 0"),
+        (
+            lambda: load_motion(still(1.0), 3.0, suspension=Suspension(1e9), mass=100.0),
+            "100 kg on 3 m of rope with 1e.09 N bounce at 291 Hz, too fast for 512 samples",
+        ),
+        (
+            lambda: load_motion(
+                still(1.0), 3.0, start=[0, 0, -1], suspension=Suspension(hook=1.0, sling=2.0)
+            ),
+            "starts 1 m from the tip, but hangs on slings of 2 m",
+        ),
+    ],
+)
+def test_suspensions_that_make_no_sense_are_refused(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
 # --- kinematics -----------------------------------------------------------------------------------
 
 
@@ -242,3 +364,27 @@ def test_inverse_kinematics_return_to_the_same_shafts(boom_deg, slew_deg):
     assert found.slew + 0.1 == pytest.approx(radians(slew_deg), abs=1e-12)
     assert found.luff == pytest.approx((home.luff_rope - rope) / g.luff, abs=1e-10)
     assert hypot(tip.x - g.axis.x, tip.y - g.axis.y) == pytest.approx(2.5 + 36.0 * boom.cos)
+
+
+@pytest.mark.parametrize(("slew_deg", "boom_deg"), [(0.0, 20.0), (70.0, 45.0), (-130.0, 75.0)])
+def test_torques_of_the_rope_do_the_work_that_lifts_the_load(slew_deg, boom_deg):
+    crane = Crane.preset("tg3637")
+    g, pose = crane.geometry, Pose(radians(slew_deg), radians(boom_deg), 20.0)
+    home, n = crane.home(pose), np.array([0.3, -0.2, -0.9])
+    n, tension = n / np.linalg.norm(n), 3e5
+
+    def loss(hoist, slew, luff):
+        """What the tension loses for a load kept where it is: T times the rope's shortening."""
+        boom = boom_of(home.luff_rope - g.luff * luff, g)
+        tip = np.array(tip_of(home.slew + slew, boom, g))
+        length = rope_length(Shafts(hoist, slew, luff), g, home)
+        return -tension * (length + n @ tip)
+
+    boom = boom_of(home.luff_rope, g)
+    found = shaft_torques(Vector(*(tension * n)), home.slew, boom, tension, g)
+    step = 1e-4
+    for axis, torque in zip(("hoist", "slew", "luff"), found, strict=True):
+        angles = {each: step * (each == axis) for each in ("hoist", "slew", "luff")}
+        back = {each: -angle for each, angle in angles.items()}
+        work = loss(**angles) - loss(**back)
+        assert torque == pytest.approx(work / (2.0 * step), rel=1e-6, abs=1e-3)

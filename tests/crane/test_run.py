@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from swashplate.crane import Crane, Seaway, Stick, control
+from swashplate.crane import Crane, Seaway, Stick, Suspension, control
 from swashplate.crane.loop import INVERSE, VOLTS, inverse_of, voltage_for
 from swashplate.equations import Model, equation
 from swashplate.errors import DomainError, InputError
@@ -246,6 +246,68 @@ def test_position_of_the_load_is_lifted_by_luffing(crane):
     assert run.boom_deg[-1] == pytest.approx(53.5, abs=1e-3)
     shorter = 31.505 - 30.112  # luff ropes at 45 and 53.5 degrees, worked out by hand
     assert run.rope[-1] == pytest.approx(20.0 + 0.5 * shorter, abs=1e-3)
+
+
+# --- loaded drives, suspensions -------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def leaking(crane):
+    return crane.with_drive(
+        hoist=crane.hoist.replace(motor_leakage=1e-6), luff=crane.luff.replace(motor_leakage=1e-6)
+    )
+
+
+def test_loaded_hoist_lowers_faster_by_its_leakage(leaking):
+    stick = Stick.trapezoid(hoist=-1.0, duration=10.0, length=12.0)
+    plain, loaded = (
+        leaking.simulate(stick, actuation="volts", loaded=each, brake=False)
+        for each in (False, True)
+    )
+    n = 9 * 512
+    # 35 t on two falls of a drum of 0.4 m: 68646.55 N m; what that costs, by the steady map
+    assert loaded.load_torque[n, 0] == pytest.approx(68646.55, rel=1e-5)
+    assert plain.shaft_speed[n, 0] - loaded.shaft_speed[n, 0] == pytest.approx(0.06864655, rel=1e-5)
+    settled = leaking.hoist.replace(load_torque=68646.55).steady_speed(-10.0)
+    assert loaded.shaft_speed[n, 0] == pytest.approx(settled, abs=2e-6)
+    for axis in ("hoist", "slew", "luff"):
+        i = ("hoist", "slew", "luff").index(axis)
+        np.testing.assert_array_equal(loaded.drive(axis).shaft_speed, loaded.shaft_speed[:, i])
+    # the load hangs on the luff as well: m g (Δz/Δθ - κ r/n), luff ropes worked out by hand, a
+    # secant over 15.5 degrees
+    shorter, higher = 32.712 - 30.112, 36.0 * (np.sin(np.radians(53.5)) - np.sin(np.radians(38.0)))
+    mean = 35000.0 * G * (higher - 0.5 * shorter) / (shorter / (0.4 / 6.0))
+    assert loaded.load_torque[n, 2] == pytest.approx(mean, rel=0.015)
+
+
+@pytest.mark.interpreted
+def test_stepper_takes_the_samples_of_a_loaded_run_with_a_hook(leaking):
+    stick = Stick.trapezoid(hoist=0.5, luff=0.5, duration=0.6, start=0.1, ramp=0.2, length=0.8)
+    setup = {"loaded": True, "suspension": Suspension(6e7, hook=2000.0, sling=4.0)}
+    setup |= {"control": TIP | control.DelayedFeedback()}
+    ship = Seaway("ss3", seed=1).motion(411)
+    run = leaking.simulate(stick, sea=ship, **setup)
+    stepper = leaking.stepper(**setup)
+    made = [list(stepper.step(tuple(u), s).values()) for u, s in zip(run.stick, ship, strict=True)]
+    np.testing.assert_array_equal(np.array(made), run.out)
+    np.testing.assert_allclose(np.linalg.norm(run.load - run.hook, axis=1), 4.0, atol=1e-12)
+    # 37 t on 20 m of rope stretch it by 0.121 m
+    stretched = np.linalg.norm(run.hook - run.tip, axis=1) - run.rope
+    assert stretched.mean() == pytest.approx(0.121, abs=0.01)
+
+
+def test_loads_that_no_drive_can_take_are_refused(crane, leaking, slewed):
+    with refuse("No drive of tg3637 feels a load: give one a motor_leakage"):
+        crane.simulate(slewed, loaded=True)
+    with refuse("Ideal drives follow at once, whatever the load"):
+        leaking.simulate(slewed, loaded=True, actuation="ideal")
+    worn = crane.with_drive(hoist=crane.hoist.replace(motor_leakage=3e-6))
+    with refuse("The hoist of tg3637 gives way to 35000 kg on a rigid rope within a sample"):
+        worn.simulate(slewed, loaded=True)
+    run = worn.simulate(slewed, loaded=True, suspension=Suspension(6e7))
+    assert run.tension.max() < 1.1 * 35000.0 * G
+    with refuse("A run has no speed; its setup has control, actuation, slew_deg"):
+        crane.simulate(slewed, speed=2.0)
 
 
 # --- refusals -------------------------------------------------------------------------------------

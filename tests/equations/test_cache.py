@@ -317,6 +317,47 @@ def test_the_folder_is_tidied_once_a_day_and_use_counts(tmp_path: Path) -> None:
     assert own.exists()
 
 
+MADE_TWICE = """
+import sys
+from swashplate.equations import equation, kernel
+
+@equation
+def twice(x: float) -> float:
+    return 2.0 * x
+
+@equation
+def thrice(x: float) -> float:
+    return 3.0 * x
+
+def summed(of):
+    @kernel
+    def loop(n):
+        total = 0.0
+        for i in range(n):
+            total += of(float(i))
+        return total
+    return loop
+
+loops = [summed(twice), summed(thrice)]
+print([loop(4) for loop in loops], sum(sum(l.stats.cache_hits.values()) for l in loops))
+"""
+
+
+@pytest.mark.slow
+def test_kernels_around_compiled_functions_are_kept_apart(tmp_path: Path) -> None:
+    script = tmp_path / "made_twice.py"
+    script.write_text(MADE_TWICE, "utf-8")
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    said = [
+        subprocess.run(
+            [sys.executable, str(script)], capture_output=True, text=True, env=environment
+        ).stdout.split("]")
+        for _ in range(2)
+    ]
+    assert [each[0] for each in said] == ["[12.0, 18.0"] * 2
+    assert [int(each[1]) for each in said] == [0, 2]
+
+
 @pytest.mark.slow
 def test_a_function_that_moved_in_its_file_is_kept_once(tmp_path: Path) -> None:
     run(tmp_path)

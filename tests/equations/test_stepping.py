@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from swashplate import Drive
+from swashplate import Drive, Limit
 from swashplate.equations import Model, Tap, compiled_step, equation, kernel, simulate
 from swashplate.errors import DomainError, InputError
 
@@ -54,6 +54,18 @@ def test_step_takes_measured_inputs_and_begins_settled():
     out = marched(compiled, machine, np.stack([command, torque], axis=1))
     run = drive.simulate(command, load_torque=torque, start="steady")
     np.testing.assert_array_equal(out[:, 0], run.shaft_speed)
+
+
+def test_limits_of_the_pump_are_bits():
+    drive = Drive.preset("luff")
+    compiled = drive.compiled_step(("limits",))
+    out = marched(compiled, compiled.machine(), VOLTAGE[:, None])
+    run = drive.simulate(VOLTAGE)
+    names = (Limit.DEAD_ZONE, Limit.ORIFICE, Limit.SPOOL, Limit.SWASH_STOP, Limit.RELIEF)
+    acting = [(out[:, 0].astype(int) >> k) & 1 for k in range(5)]
+    for bits, name in zip(acting, names, strict=True):
+        np.testing.assert_array_equal(bits == 1, run.active(name))
+    assert np.any(acting[1])
 
 
 def test_copied_machines_go_on_apart():

@@ -18,7 +18,6 @@ from swashplate.identification.fitting import fit
 from swashplate.identification.resampling import (
     CrossValidation,
     Fold,
-    FoldEstimate,
     HeldRun,
     cross_validate,
     deal,
@@ -85,31 +84,15 @@ def test_too_few_runs_or_folds_are_refused() -> None:
         deal(runs, 1, 0)
 
 
-def test_the_jackknife_by_hand() -> None:
+def test_what_folds_lack_is_said() -> None:
     folds = tuple(
-        Fold(
-            number,
-            (f"run {number}",),
-            (FoldEstimate("card", "J", "A", value), FoldEstimate("card", "a", "1/s", 20.0)),
-            ("a",) if number < 2 else (),
-            (),
-            number != 1,
-            "",
-        )
-        for number, value in enumerate((1.0, 2.0, 3.0))
+        Fold(number, (f"run {number}",), ("a",) if number < 2 else (), (), number != 1, "")
+        for number in range(3)
     )
-    found = CrossValidation(0, 4, folds)
-    first, second = found.spreads
-    assert (first.mean, first.lowest, first.highest, first.folds) == (2.0, 1.0, 3.0, 3)
-    # sqrt(2/3 · (1 + 0 + 1))
-    assert first.error == pytest.approx(np.sqrt(4.0 / 3.0))
-    # where it is lost, an estimate means nothing
-    assert (second.folds, second.error) == (1, None)
-    said = " ".join(found.sentences())
+    said = " ".join(CrossValidation(0, 4, folds).sentences())
     assert "Interrupted: 3 of 4 folds were fitted." in said
     assert "Fold 1 (without run 0) loses a" in said
     assert "Fold 2 (without run 1) did not converge." in said
-    assert "J ±58 %" in said
 
 
 def test_measures_are_pooled_over_folds_by_hand() -> None:
@@ -118,7 +101,7 @@ def test_measures_are_pooled_over_folds_by_hand() -> None:
         HeldRun("a", "step", "y", "1", Measures(2, 0.5, float(first.std())), float(first.mean())),
         HeldRun("b", "sine", "y", "1", Measures(4, 2.0, float(second.std())), float(second.mean())),
     ]
-    folds = tuple(Fold(k, (run.run,), (), (), (run,), True, "") for k, run in enumerate(runs))
+    folds = tuple(Fold(k, (run.run,), (), (run,), True, "") for k, run in enumerate(runs))
     found = CrossValidation(0, 2, folds).measures["y"]
     assert found.samples == 6
     assert found.rmse == pytest.approx(np.sqrt((2 * 0.25 + 4 * 4.0) / 6))
@@ -169,15 +152,6 @@ def test_each_fold_is_predicted_by_a_fit_to_the_others(
     for run in fold.runs:
         if run.channel in predicted:
             assert run.measures == predicted[run.channel].measures
-    assert {each.name: each.value for each in fold.estimates}["Z10"] == alone.stages[1].values[
-        "Z10"
-    ]
-
-
-def test_estimates_hold_over_the_folds(found: CrossValidation) -> None:
-    spreads = {each.name: each for each in found.spreads}
-    assert spreads["J_plus"].mean == pytest.approx(0.26, rel=2e-3)
-    assert spreads["Z10"].mean == pytest.approx(13.0, rel=5e-3)
     assert found.measures["current"].fit_percent > 90.0
 
 
@@ -186,8 +160,6 @@ def test_a_fold_that_loses_an_unknown_says_so(found: CrossValidation) -> None:
     (fold,) = losing
     assert fold.lost == ("J_minus",)
     assert fold.held[0].endswith("-4_V")
-    spreads = {each.name: each for each in found.spreads}
-    assert spreads["J_minus"].folds == 3
     assert any("loses J_minus: only the held-out runs determine it" in s for s in found.sentences())
 
 

@@ -24,7 +24,6 @@ from swashplate.identification.experiment_design import (
     default_maneuvers,
     default_sensors,
     in_turn,
-    judge_sensors,
     measurable,
 )
 from swashplate.identification.fitting import fit, smooth
@@ -255,17 +254,6 @@ def test_what_is_known_counts_once() -> None:
     rest = known.candidate(maneuvers.step(4.0), [Sensor("shaft_speed", 1e6)])
     (found,) = advise(known.present, [rest], known.variables)
     assert found.gains[0].after == pytest.approx(0.2, rel=1e-6)
-
-
-def test_an_added_sensor_breaks_a_gauge() -> None:
-    """No speed tells the scale of the pressure; a pressure sensor does."""
-    known = bench(HOIST.parameters, setup("Z1", "Z8"), SMALL, free=["Z9"])
-    (pressure,) = assumed_sensors(HOIST, ["stroker_pressure"])
-    found = judge_sensors(known, [maneuvers.step(5.0)], [pressure, SPEED])
-    by_kind = {each.sensor.kind: each.advice for each in found}
-    assert by_kind["stroker_pressure"].ranks == 1
-    assert set(by_kind["stroker_pressure"].newly_determined) == {"Z1", "Z8", "Z9"}
-    assert by_kind["shaft_speed"].ranks == 0
 
 
 def test_residuals_of_a_fit_tell_the_noise() -> None:

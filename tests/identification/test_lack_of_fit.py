@@ -10,12 +10,12 @@ import pytest
 from swashplate import Campaign, Drive
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import Experiment
-from swashplate.identification.acceptance import Verdict, verdict
 from swashplate.identification.assessment import Assessment, assess
 from swashplate.identification.fitting import fit
 from swashplate.identification.lack_of_fit import clipped_channels, lack_of_fit
 from swashplate.identification.setup import load_setup
 from swashplate.identification.validation import predict
+from swashplate.identification.verdict import Verdict, verdict
 from swashplate.maneuvers import ramp, sine, step
 
 TESTS = {
@@ -132,6 +132,43 @@ def test_a_clipped_ammeter_is_found_with_the_limits_to_state(tmp_path: Path) -> 
     assert len(said) == 1
     assert "'current' stands at exactly 0.2 A" in said[0]
     assert ", 0.2] in its channel" in said[0]
+
+
+def test_a_counter_that_does_not_follow_is_no_stop_of_the_machine(tmp_path: Path) -> None:
+    def lose(columns: dict[str, np.ndarray]) -> None:
+        apart = np.diff(columns["time"])
+        rate = np.convolve(np.diff(columns["counts"]) / apart, np.ones(32) / 32.0, "same")
+        kept = np.cumsum(np.clip(rate, -5000.0, 5000.0) * apart)
+        columns["counts"] = np.floor(columns["counts"][0] + np.append(0.0, kept))
+
+    assessments, found = fitted(tmp_path, logs=lose)
+    assert found.grade == "Not usable"
+    assert "loss at the largest speeds of counts" in failed(found)
+    assert "counts does not follow the largest speeds" in found.headline
+    assert lack_of_fit(assessments).causes[0].lost
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("counts", "scale of counts, or of the fixed Z10, off"), ("current", "scale of current off")],
+)
+def test_a_scale_that_is_off_is_named_with_the_fixed_value_that_looks_like_it(
+    tmp_path: Path, name: str, said: str
+) -> None:
+    def off(columns: dict[str, np.ndarray]) -> None:
+        columns["current"] *= 1.03
+
+    # 3 % more counts are a shaft that is 3 % faster
+    faster = Drive.preset("slew").scale(Z10=1.03)
+    change = {"drive": faster} if name == "counts" else {"logs": off}
+    assessments, found = fitted(tmp_path, **change)  # type: ignore[arg-type]
+    assert found.grade == "Usable for prediction", found.headline
+    assert f"{said} by +" in found.headline
+    fault = lack_of_fit(assessments).fault(f"scale of {name}")
+    assert fault is not None
+    # one step from where the estimates have made up for a part of it
+    assert 2.0 < fault.size < 4.0
+    assert fault.hidden == (name == "counts")
 
 
 def test_a_run_of_another_machine_is_named(tmp_path: Path) -> None:

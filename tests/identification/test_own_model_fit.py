@@ -11,6 +11,7 @@ from swashplate import Campaign, Channel, Experiment, FileError, InputError
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.equations import Model, equation
 from swashplate.identification import (
+    Judged,
     ModelSetup,
     OwnModel,
     Unknown,
@@ -18,7 +19,6 @@ from swashplate.identification import (
     fit,
     load_fit,
     predict,
-    save_fit,
     verdict,
 )
 
@@ -128,12 +128,12 @@ def test_a_name_that_begins_like_a_sensors_zero_is_the_models() -> None:
 def test_a_fit_comes_back_with_its_model_alone(tmp_path: Path) -> None:
     tests, path = campaign(*RUNS), tmp_path / "fit.json"
     found = fit(servo, tests, FREE, noise=NOISE)
-    save_fit(found, RUNS, path)
+    Judged(tests, found, RUNS).store(path)
     with pytest.raises(InputError, match="give that, with --model"):
         load_fit(path, tests)
     with pytest.raises(InputError, match="another model, or of other bounds"):
         load_fit(path, tests, model=ModelSetup(servo, {**FREE, "lag": (0.1, 0.2, 3.0)}))
-    again = load_fit(path, tests, model=ModelSetup(servo, FREE, noise=NOISE)).fit
+    again = load_fit(path, tests, model=ModelSetup(servo, FREE, noise=NOISE)).result
     assert again.parameters.numbers == found.parameters.numbers
     assert assess(again.stages)[0].uncertainty.estimates == (
         assess(found.stages)[0].uncertainty.estimates

@@ -11,15 +11,15 @@ import pytest
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError, maneuvers
 from swashplate.campaign import rig
 from swashplate.identification.assessment import (
+    Judged,
     StageProfile,
     assess,
     fingerprint,
     load_fit,
-    save_fit,
 )
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profile import Point, Profile
-from swashplate.identification.resampling import CrossValidation, Fold, FoldEstimate, HeldRun
+from swashplate.identification.resampling import CrossValidation, Fold, HeldRun
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import StartResult
 from swashplate.identification.validation import Measures
@@ -71,18 +71,17 @@ def fitted(campaign: Campaign) -> Fit:
 
 @pytest.fixture
 def path(campaign: Campaign, fitted: Fit, tmp_path: Path) -> Path:
-    save_fit(fitted, campaign.experiments, tmp_path / "fit.json", campaign=campaign.path)
+    Judged(campaign, fitted, campaign.experiments).store(tmp_path / "fit.json")
     return tmp_path / "fit.json"
 
 
 def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit) -> None:
     stored = load_fit(path, campaign)
-    assert stored.axis == "hoist"
-    assert stored.experiments == campaign.experiments
-    assert stored.fit.setup == fitted.setup
-    assert stored.fit.nominal == fitted.nominal
-    assert stored.fit.parameters == fitted.parameters
-    for ours, theirs in zip(stored.fit.stages, fitted.stages, strict=True):
+    assert stored.runs == campaign.experiments
+    assert stored.result.setup == fitted.setup
+    assert stored.result.nominal == fitted.nominal
+    assert stored.result.parameters == fitted.parameters
+    for ours, theirs in zip(stored.result.stages, fitted.stages, strict=True):
         assert ours.stage == theirs.stage
         assert ours.starts == theirs.starts
         assert ours.values == theirs.values
@@ -97,7 +96,7 @@ def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit)
 
 
 def test_what_is_judged_of_it_is_the_same(path: Path, campaign: Campaign, fitted: Fit) -> None:
-    ours, theirs = (assess(each.stages) for each in (load_fit(path, campaign).fit, fitted))
+    ours, theirs = (assess(each.stages) for each in (load_fit(path, campaign).result, fitted))
     for one, other in zip(ours, theirs, strict=True):
         assert one.uncertainty.estimates == other.uncertainty.estimates
         assert one.identifiability.sentences() == other.identifiability.sentences()
@@ -109,17 +108,17 @@ def test_profiles_folds_and_notes_come_back(
     points = tuple(Point(x, 3.0 + x * x, np.array([x, 0.5])) for x in (-0.1, 0.0, 0.1))
     profile = Profile(0, 3.0, points, 1.0, -0.1, None, ("crossed", "bound"), points[0])
     held = HeldRun("a", "step +4 V", "current", "A", Measures(10, 0.1, 0.5), 0.2)
-    fold = Fold(0, ("a",), (FoldEstimate("card", "J", "A", 0.3),), ("J",), (held,), True, "")
+    fold = Fold(0, ("a",), ("J",), (held,), True, "")
     folds = CrossValidation(3, 2, (fold,))
     path = tmp_path / "fit.json"
-    save_fit(
-        fitted,
-        campaign.experiments,
-        path,
-        profiles=[StageProfile("card", profile)],
-        folds=folds,
-        notes={"seed": "3"},
+    kept = [StageProfile("card", profile)]
+    runs = campaign.experiments
+    Judged(campaign, fitted, runs, profiles=kept, folds=folds, notes={"seed": "3"}).store(path)
+    # as an earlier release wrote it, with the estimates of each fold
+    text = path.read_text("utf-8").replace(
+        '"lost":', '"estimates": [["card", "J", "A", 0.3]], "lost":'
     )
+    path.write_text(text, "utf-8")
     stored = load_fit(path, campaign)
     assert stored.folds == folds
     assert stored.notes == {"seed": "3"}

@@ -285,7 +285,7 @@ def stored_draws(
         raise InputError(
             f"{path} was fitted to {tests}, which is not there: say where the campaign is."
         )
-    fit = load_fit(path, Campaign.from_toml(tests)).fit
+    fit = load_fit(path, Campaign.from_toml(tests)).result
     if drive is not None:
         given, found = drive.parameters.numbers, fit.drive.parameters.numbers
         other = [name for name, value in found.items() if given[name] != value]

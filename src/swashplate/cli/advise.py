@@ -27,7 +27,7 @@ from swashplate.cli.words import (
     runs_to_fit,
 )
 from swashplate.errors import InputError
-from swashplate.tables import TABLE, write_text
+from swashplate.tables import TABLE
 
 if TYPE_CHECKING:
     from swashplate.campaign import ChannelKind
@@ -47,33 +47,26 @@ def excitation(
     axis: AxisName = None,
     setup: SetupWord = None,
     begin: StartWord = None,
-    write: Annotated[
-        Path | None,
-        option("Write a fit configuration with the proposal taken.", metavar="FILE"),
-    ] = None,
     out: TableFile = None,
 ) -> None:
     """Show before a fit which parameters the runs determine, and what to fix.
 
     Simulates the runs with the drive as it is: which thresholds and limits they
     reach, how much each parameter changes what was measured, and which can
-    change together without effect. Proposes a fit configuration in which all
-    are determined.
+    change together without effect: those are to be fixed, or tested further.
 
     For example:
       swashplate excitation virtual/campaign.toml
       swashplate excitation harbour/campaign.toml --setup mine.toml --from worn.toml
-      swashplate excitation harbour/campaign.toml --write fewer.toml --out runs.csv
-      swashplate fit harbour/campaign.toml --setup fewer.toml
+      swashplate excitation harbour/campaign.toml --out runs.csv
     """
     from swashplate.identification.data_checks import check_sound, refuse_unsound
-    from swashplate.identification.excitation import outlook, propose, proposed_setup
+    from swashplate.identification.excitation import outlook
     from swashplate.identification.fitting import smooth
-    from swashplate.identification.setup import setup_text
     from swashplate.identification.staging import setup_of
     from swashplate.identification.tables import outlook_rows, outlook_table
 
-    files = Outputs((write, None), (out, TABLE))
+    files = Outputs((out, TABLE))
     with working(f"Reading {path}"):
         campaign, chosen = campaign_of(path, axis)
         plan = setup_of(campaign, chosen, setup)
@@ -82,33 +75,22 @@ def excitation(
     with working("Simulating"):
         doubts = refuse_unsound(check_sound(runs, smooth(drive), plan, rank=False))
         looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
-        proposals = [propose(each) for each in looks]
-    comments = {each.stage.name: each.comments() for each in proposals}
-    proposed = setup_text(proposed_setup(plan, proposals), comments)
-    changed = any(each.changes for each in proposals)
-    files.write(write, "Set-up", lambda path: write_text(proposed, path))
     files.write(out, "Table", outlook_rows(looks).write)
     for sentence in doubts:
         say(f"! {sentence}")
     names = [each.name for each in runs]
-    for look, proposal in zip(looks, proposals, strict=True):
+    for look in looks:
         show(outlook_table(look, names))
         # what no run exercises is said with its reason
         verdict = replace(look.identifiability, unexcited=())
         for sentence in (*verdict.sentences(), *look.sentences()):
             say(f"- {sentence}")
-        for sentence in proposal.sentences():
-            say(f"* {sentence}")
     note("")
     for number, name in enumerate(names, start=1):
         note(f"run {number}: {name}")
     say(LEGEND)
-    if not changed:
+    if all(look.identifiability.complete for look in looks):
         note("The fit configuration can stay as it is.")
-    elif write is None and any(each.proposed is not None for each in proposals):
-        note("With the proposals (*) applied, the fit configuration is (--write FILE keeps it):")
-        note("")
-        note(proposed.rstrip())
     files.say()
 
 
@@ -133,14 +115,6 @@ def advise(
         list[str] | None,
         option("A test to judge instead of the usual ones. May be repeated.", metavar="MANEUVER"),
     ] = None,
-    sensor: Annotated[
-        list[str] | None,
-        option(
-            "A sensor to judge as an addition, such as swash_angle; by default all that the model "
-            "knows. May be repeated.",
-            metavar="KIND",
-        ),
-    ] = None,
     noise: Annotated[
         list[str] | None,
         option(
@@ -151,7 +125,7 @@ def advise(
     tests: Annotated[int, option("Tests in the plan.", min=0)] = 4,
     out: TableFile = None,
 ) -> None:
-    """Recommend the test, or added sensor, that determines each parameter best.
+    """Recommend the test that determines each parameter best.
 
     Ranks tests by the information that they would add to those made so far, at
     the drive's present values. Errors are standard errors from noise alone; a
@@ -165,16 +139,12 @@ def advise(
     """
     from swashplate.drive import Drive
     from swashplate.identification import tables
+    from swashplate.identification.experiment_design import advise as judged
     from swashplate.identification.experiment_design import (
-        ADDED,
-        assumed_sensors,
         best_for_each,
         default_maneuvers,
         in_turn,
-        judge_sensors,
-        measurable,
     )
-    from swashplate.identification.experiment_design import advise as judged
 
     files = Outputs((out, TABLE))
     with working("Judging tests"):
@@ -182,29 +152,19 @@ def advise(
         machine = Drive(bench.parameters)
         named = [maneuver_of(each, machine) for each in maneuver or []] or default_maneuvers()
         trials = list({each.name: each for each in named}.values())
-        had = {each.kind for each in bench.sensors}
-        asked = [_kind(each) for each in sensor or []]
-        kinds = [each for each in measurable(bench.stage.part, asked or ADDED) if each not in had]
-        own = {each.kind: each for each in _noises(noise or [])}
-        added = [own.get(each.kind, each) for each in assumed_sensors(machine, kinds)]
         at_hand = [bench.candidate(each, bench.sensors) for each in trials]
         ranked = judged(bench.present, at_hand, bench.variables)
         plan = in_turn(bench.present, at_hand, bench.variables, tests)
-        sensors = judge_sensors(bench, trials, added, beside=[each.candidate for each in plan])
-    files.write(out, "Table", tables.advice_rows(ranked, sensors).write)
-    show(tables.advice_table("Tests with the present sensors", ranked[:top]))
+    files.write(out, "Table", tables.advice_rows(ranked).write)
+    show(tables.advice_table("Tests", ranked[:top]))
     if plan:
         show(tables.advice_table("A plan, each test chosen in addition to those before it", plan))
         undetermined = [gain.name for gain in plan[-1].gains if not gain.after <= 1.0]
         if undetermined:
             say(f"- After these, {', '.join(undetermined)} would still not be known to 100 %.")
-    if sensors:
-        known = "what is known" if len(bench.present) else "the plan"
-        best = sorted(sensors, key=lambda each: each.advice.rank)
-        show(tables.advice_table(f"Sensors to add, beside {known}, where they tell most", best))
     show(tables.best_tests_table(ranked[0].gains, best_for_each(ranked)))
-    for each_sensor in (*bench.sensors, *added):
-        note(_described(each_sensor))
+    for sensor in bench.sensors:
+        note(_described(sensor))
     say(
         "Errors are standard errors in per cent of the value, from noise alone and at these values "
         "of the drive; '-' is not determined (100 % and more). 'better' is by how much what is "

@@ -56,12 +56,12 @@ from swashplate.tables import (
 if TYPE_CHECKING:
     from swashplate.campaign import Campaign
     from swashplate.drive import Drive
-    from swashplate.identification.acceptance import Verdict
-    from swashplate.identification.assessment import Judged, StoredFit
+    from swashplate.identification.assessment import Judged
     from swashplate.identification.fitting import Search
     from swashplate.identification.solving import Progress, StartResult
     from swashplate.identification.staging import Parameters
     from swashplate.identification.validation import RunQuality
+    from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
 INTERRUPTED = 130
@@ -198,7 +198,8 @@ def fit(
         raise typer.Exit(INTERRUPTED)
     wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, loss, require / 100.0)
     with working("Judging") as status:
-        found = judge_fit(campaign, chosen, runs, nominal, plan, result, wanted, status.update)
+        found = judge_fit(campaign, runs, nominal, plan, result, wanted, status.update)
+        found.verdict  # noqa: B018  computed here
     judged = perf_counter()
     lines = _written(found, out)
     lines += _shown(found, out, report=report, pdf=pdf)
@@ -398,8 +399,8 @@ def validate(
       swashplate validate hoist harbour/campaign.toml --role all --out validation
     """
     from swashplate.identification import tables
-    from swashplate.identification.acceptance import verdict
     from swashplate.identification.validation import predict, with_speeds
+    from swashplate.identification.verdict import verdict
 
     if out is not None:
         check_folder(out)
@@ -498,7 +499,6 @@ def report(
       swashplate report fitted virtual/campaign.toml --pdf report.pdf
     """
     from swashplate.campaign import Campaign
-    from swashplate.identification.assessment import judge_stored
     from swashplate.report.fit_report import shown_runs, write_samples
 
     if data is not None:
@@ -519,9 +519,9 @@ def report(
         campaign = Campaign.from_toml(path)
         if true is not None and not campaign.virtual:
             raise InputError(f"{path} is not virtual: nobody knows its truth, leave out --truth.")
-        stored = _stored(fitted, folder / STORED, campaign, model)
+        found = _stored(fitted, folder / STORED, campaign, model)
     with working("Judging"):
-        found = judge_stored(campaign, stored)
+        found.verdict  # noqa: B018  computed here
     place = made_folder(out or folder)
     for line in _shown(found, place, pdf=pdf, truth=true):
         note(line)
@@ -531,7 +531,7 @@ def report(
     say(found.verdict.headline)
 
 
-def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -> StoredFit:
+def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -> Judged:
     """The stored fit; of a drive that is named, the one beside it that found it."""
     from swashplate.identification.assessment import load_fit
     from swashplate.identification.own_model import ModelSetup
@@ -539,7 +539,7 @@ def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -
     own = None if model is None else ModelSetup.from_file(model)
     stored = load_fit(place, campaign, model=own)
     if fitted.suffix.lower() == ".toml":
-        given, numbers = parameters_of(str(fitted)).numbers, stored.fit.parameters.numbers
+        given, numbers = parameters_of(str(fitted)).numbers, stored.result.parameters.numbers
         other = [name for name, value in numbers.items() if given[name] != value]
         if other:
             raise InputError(
@@ -591,7 +591,8 @@ def demo(
         result = fit(start, runs, setup)
         seconds = perf_counter() - begun
         begin("computing intervals and verdict")
-        found = judge_fit(campaign, "hoist", runs, start, setup, result, Wanted(seed=seed))
+        found = judge_fit(campaign, runs, start, setup, result, Wanted(seed=seed))
+        found.verdict  # noqa: B018  computed here
         tables = [estimates_table(each, truth=truth.parameters) for each in found.assessments]
         begin("writing the report")
         lines = [*_written(found, out), *_shown(found, out, truth=truth.parameters)]

@@ -2,10 +2,12 @@ from . import control as control
 from .crane import Crane as Crane
 from .crane import CraneStepper as CraneStepper
 from .crane import Pose as Pose
+from .crane import Setup as Setup
 from .result import CraneRun as CraneRun
 from .result import limit_table as limit_table
 from .result import run_table as run_table
 from .rope import LoadMotion as LoadMotion
+from .rope import Suspension as Suspension
 from .rope import load_motion as load_motion
 from .sea import SEA_STATES as SEA_STATES
 from .sea import Seaway as Seaway

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from importlib.resources import files
-from math import cos, degrees, isfinite, radians, sin
+from math import cos, degrees, inf, isfinite, radians, sin
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, NamedTuple, get_args
+from typing import Annotated, Any, Literal, NamedTuple, TypedDict, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,9 +19,9 @@ from swashplate.analysis.capability import dead_zone
 from swashplate.analysis.compensation import InverseMap, inverse_map
 from swashplate.crane.control import Control, settings_of
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
-from swashplate.crane.loop import BOOM_OUT, DIRECT, FINE, ROPE_OUT, ROWS, Fixed, Loop
+from swashplate.crane.loop import BOOM_OUT, DIRECT, FINE, ROPE_OUT, Fixed, Loop
 from swashplate.crane.result import CraneRun
-from swashplate.crane.rope import AIR, Air, too_fast
+from swashplate.crane.rope import AIR, Air, Suspension, too_fast
 from swashplate.crane.sea import Seaway
 from swashplate.crane.stick import AXES, Stick
 from swashplate.documents import parse_toml, read_text, validated
@@ -33,7 +33,12 @@ from swashplate.units import to_si
 
 Array = NDArray[np.float64]
 Actuation = Literal["ideal", "volts", "inverse"]
+"""In the order of `loop.IDEAL` and the others."""
 
+ACTUATIONS = (*get_args(Actuation), "direct")
+QUICKEST = 0.4
+"""Largest part of a rope's pull by which a leaking drive may lower it within a sample: at 0.7 they
+would swing against each other from sample to sample."""
 RATE = 512.0
 """Samples a second of the loop: the packaged drives' own. [Hz]"""
 
@@ -103,6 +108,66 @@ class Pose(NamedTuple):
     slew: float
     boom: float
     rope: float
+
+
+class Setup(TypedDict, total=False):
+    """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`.
+
+    Attributes
+    ----------
+    control : Control, optional
+        Controller, of `swashplate.crane.control`; by default the stick's commands as they are.
+    actuation : {"inverse", "volts", "ideal", "direct"}
+        What makes speeds of wanted speeds: the real drives behind their inverse maps or behind
+        10 V for full speed, or drives that follow at once within their limits of speed. A stepper
+        also takes voltages, with "direct".
+    slew_deg, boom_deg, rope_m : float
+        Where it begins: slew from forward to starboard, boom's elevation, rope below the tip; by
+        default 0, 45 and 20.
+    load : float, optional
+        Its mass, by default the safe load. [kg]
+    suspension : Suspension, optional
+        Elastic rope, hook with slings; by default a point on a rigid rope.
+    loaded : bool
+        Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
+        which they take a sample later as their ``load_torque``. Off by default, as their tests were
+        without load; drives feel it by their ``motor_leakage`` and ``line_stiffness``. What the
+        boom weighs is not in it.
+    drag_area : float
+        C_d A of the load. [m²]
+    wind : (float, float)
+        Forward and to port. [m/s]
+    brake : bool
+        Whether a brake holds the hoist 0.3 s after its command has returned to the dead zone; on by
+        default.
+    """
+
+    control: Control | None
+    actuation: Actuation | Literal["direct"]
+    slew_deg: float
+    boom_deg: float
+    rope_m: float
+    load: float | None
+    suspension: Suspension
+    loaded: bool
+    drag_area: float
+    wind: tuple[float, float]
+    brake: bool
+
+
+DEFAULTS: Setup = {
+    "control": None,
+    "actuation": "inverse",
+    "slew_deg": 0.0,
+    "boom_deg": 45.0,
+    "rope_m": 20.0,
+    "load": None,
+    "suspension": Suspension(),
+    "loaded": False,
+    "drag_area": 0.0,
+    "wind": (0.0, 0.0),
+    "brake": True,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,19 +317,7 @@ class Crane:
         return (home.luff_rope - float(luff_rope(Boom(cos(target), sin(target)), g))) / g.luff
 
     def simulate(
-        self,
-        stick: Stick,
-        *,
-        sea: Seaway | ArrayLike | None = None,
-        control: Control | None = None,
-        actuation: Actuation = "inverse",
-        slew_deg: float = 0.0,
-        boom_deg: float = 45.0,
-        rope_m: float = 20.0,
-        load: float | None = None,
-        drag_area: float = 0.0,
-        wind: tuple[float, float] = (0.0, 0.0),
-        brake: bool = True,
+        self, stick: Stick, *, sea: Seaway | ArrayLike | None = None, **setup: Unpack[Setup]
     ) -> CraneRun:
         """Simulate the whole crane.
 
@@ -274,22 +327,9 @@ class Crane:
             What the operator asks for; its length is that of the run.
         sea : Seaway or (n, 6) array_like, optional
             A seaway, or the ship's motion at 512 Hz: surge, sway, heave [m], roll, pitch, yaw
-            [rad]; by default the ship is at rest.
-        control : Control, optional
-            Controller, of `swashplate.crane.control`; by default the stick's commands as they are.
-        actuation : {"inverse", "volts", "ideal"}
-            What makes speeds of wanted speeds: the real drives behind their inverse maps or behind
-            10 V for full speed, or drives that follow at once within their limits of speed.
-        slew_deg, boom_deg, rope_m : float
-            Where it begins: slew from forward to starboard, boom's elevation, rope below the tip.
-        load : float, optional
-            Its mass, by default the safe load. [kg]
-        drag_area : float
-            C_d A of the load. [m²]
-        wind : (float, float)
-            Forward and to port. [m/s]
-        brake : bool
-            Whether a brake holds the hoist 0.3 s after its command has returned to the dead zone.
+            [rad], as `ship_motion` reads it from a log; by default the ship is at rest.
+        **setup
+            Where it begins, what controls it, what hangs on it: see `Setup`.
 
         Raises
         ------
@@ -299,87 +339,87 @@ class Crane:
         DomainError
             If boom or rope meet a limit, or a drive leaves its domain.
         """
-        loop, pose, halves = self._loop(
-            control, actuation, Pose(radians(slew_deg), radians(boom_deg), rope_m),
-            load, drag_area, wind, brake,
-        )  # fmt: skip
+        how = DEFAULTS | setup
+        loop, pose, halves = self._loop(how)
         commands, end = stick.sample(self, pose, RATE)
         ship = _motion(sea, len(commands))
         out, ended = loop.take(commands, ship)
         if ended != FINE:
             raise self._stopped(loop, ended)
         return CraneRun(
-            self, commands, ship, out, RATE, pose, actuation, end, halves, self._mass(load)
-        )
+            self, commands, ship, out, RATE, pose, how["actuation"], end, halves, loop.fixed.mass,
+            loop.rows,
+        )  # fmt: skip
 
-    def stepper(
-        self,
-        *,
-        control: Control | None = None,
-        actuation: Actuation | Literal["direct"] = "inverse",
-        slew_deg: float = 0.0,
-        boom_deg: float = 45.0,
-        rope_m: float = 20.0,
-        load: float | None = None,
-        drag_area: float = 0.0,
-        wind: tuple[float, float] = (0.0, 0.0),
-        brake: bool = True,
-    ) -> CraneStepper:
+    def stepper(self, **setup: Unpack[Setup]) -> CraneStepper:
         """The crane one sample at a time, for loops that the user writes.
 
         Parameters are those of `simulate`; with ``actuation="direct"`` the commands are the drives'
         voltages. [V]
         """
-        loop, _, _ = self._loop(
-            control, actuation, Pose(radians(slew_deg), radians(boom_deg), rope_m),
-            load, drag_area, wind, brake,
-        )  # fmt: skip
-        return CraneStepper(self, loop)
+        return CraneStepper(self, self._loop(DEFAULTS | setup)[0])
 
-    def _mass(self, load: float | None) -> float:
-        mass = self.safe_load if load is None else load
-        if not (isfinite(mass) and mass > 0.0):
-            raise InputError(f"The load is {mass:g} kg, but must be above 0.")
-        return mass
-
-    def _loop(
-        self,
-        control: Control | None,
-        actuation: str,
-        pose: Pose,
-        load: float | None,
-        drag_area: float,
-        wind: tuple[float, float],
-        brake: bool,
-    ) -> tuple[Loop, Pose, int]:
-        known = (*get_args(Actuation), "direct")
-        if actuation not in known:
-            raise InputError(f"actuation is '{actuation}'; it is {', '.join(known[:-1])}.")
-        if not (isfinite(drag_area) and drag_area >= 0.0):
-            raise InputError(f"drag_area is {drag_area:g} m², but must be at least 0.")
+    def _loop(self, how: Setup) -> tuple[Loop, Pose, int]:
+        """The loop of a complete setup, where it begins, and half periods of its shaper."""
+        strange = [each for each in how if each not in DEFAULTS]
+        if strange:
+            raise InputError(f"A run has no {strange[0]}; its setup has {', '.join(DEFAULTS)}.")
+        pose = Pose(radians(how["slew_deg"]), radians(how["boom_deg"]), how["rope_m"])
+        actuation, area, control = how["actuation"], how["drag_area"], how["control"]
+        if actuation not in ACTUATIONS:
+            raise InputError(f"actuation is '{actuation}'; it is {', '.join(ACTUATIONS[:-1])}.")
+        if not (isfinite(area) and area >= 0.0):
+            raise InputError(f"drag_area is {area:g} m², but must be at least 0.")
+        load = self.safe_load if how["load"] is None else how["load"]
+        if not (isfinite(load) and load > 0.0):
+            raise InputError(f"The load is {load:g} kg, but must be above 0.")
+        suspension = how["suspension"]
         settings, law, halves = settings_of(control)
-        mode = {"ideal": 0, "volts": 1, "inverse": 2, "direct": DIRECT}[actuation]
+        mode = ACTUATIONS.index(actuation)
         if mode == DIRECT and control is not None:
             raise InputError("With direct actuation the voltages are given: leave control out.")
+        if how["loaded"]:
+            self._check_loaded(actuation, load + suspension.hook, suspension)
         edges = [dead_zone(self.hoist, way).outside for way in (-1.0, 1.0)]
         low, high = self.boom_limits
+        forward, port = how["wind"]
         fixed = Fixed(
             self.geometry,
             self.home(pose),
-            Air(
-                AIR * drag_area / (2.0 * self._mass(load)),
-                Vector(float(wind[0]), float(wind[1]), 0.0),
-            ),
+            Air(AIR * area / (2.0 * load), Vector(float(forward), float(port), 0.0)),
             settings,
             mode,
-            bool(brake),
+            bool(how["brake"]),
             (edges[0] or -FULL_VOLTAGE, edges[1] or FULL_VOLTAGE),
             (sin(low), sin(high)),
             self.rope_limits,
+            load + suspension.hook,
+            bool(how["loaded"]),
+            suspension.hanging(load, self.rope_limits[0], RATE),
         )
         drives = (self.hoist, self.slew, self.luff)
-        inverses = tuple(map(_inverse, drives))
-        return Loop(drives, inverses, fixed, law, RATE), pose, halves
+        return Loop(drives, tuple(map(_inverse, drives)), fixed, law, RATE), pose, halves
+
+    def _check_loaded(self, actuation: str, mass: float, suspension: Suspension) -> None:
+        """Refuse loads on drives that feel none, or that answer them faster than a sample."""
+        if actuation == "ideal":
+            raise InputError("Ideal drives follow at once, whatever the load: leave out 'loaded'.")
+        lost = {axis: _speed_lost(getattr(self, axis)) for axis in AXES}
+        if not any(lost.values()) and not any(_has_line(getattr(self, axis)) for axis in AXES):
+            raise InputError(
+                f"No drive of {self.name} feels a load: give one a motor_leakage or a "
+                "line_stiffness, as crane.hoist.replace(motor_leakage=1e-6), or leave out 'loaded'."
+            )
+        if suspension.stiffness < inf:
+            return
+        for axis, arm in (("hoist", self.geometry.hoist), ("luff", self.geometry.luff)):
+            answer = 0.5 * RATE * mass * arm * arm * lost[axis]
+            if answer > QUICKEST:
+                raise InputError(
+                    f"The {axis} of {self.name} gives way to {mass:g} kg on a rigid rope within a "
+                    f"sample, since its motor_leakage costs {lost[axis]:.3g} rad/s for each N m: "
+                    "take an elastic rope, suspension=Suspension(stiffness=6e7)."
+                )
 
     def _stopped(self, loop: Loop, ended: int) -> DomainError | InputError:
         """What has stopped a run."""
@@ -452,15 +492,50 @@ class CraneStepper:
         motion = np.zeros((1, 1)) if ship is None else np.array([ship], dtype=np.float64)
         if motion.shape not in ((1, 1), (1, 6)) or not np.isfinite(motion).all():
             raise InputError("The ship's motion is six finite numbers.")
-        out, ended = self._loop.take(commands, motion)
+        return dict(zip(self._loop.rows, self.take(commands, motion)[0].tolist(), strict=True))
+
+    def take(self, commands: Array, ship: Array) -> Array:
+        """Advance by many samples at once.
+
+        Parameters
+        ----------
+        commands : (n, 3) array
+            As of `step`.
+        ship : (n, 6) array
+            Motion of the ship [m], [rad]; (n, 1) if it does not move.
+
+        Returns
+        -------
+        (n, 24) array
+            Signals, a column for each that `step` returns.
+
+        Raises
+        ------
+        InputError, DomainError
+            As `Crane.simulate`.
+        """
+        out, ended = self._loop.take(commands, ship)
         if ended != FINE:
             raise self._crane._stopped(self._loop, ended)
-        return dict(zip(ROWS, out[0].tolist(), strict=True))
+        return out
 
 
 @lru_cache(maxsize=64)
 def _inverse(drive: Drive) -> InverseMap:
     return inverse_map(drive)
+
+
+@lru_cache(maxsize=64)
+def _speed_lost(drive: Drive) -> float:
+    """Speed that a drive loses at once for each N m of load. [rad/s/(N m)]"""
+    still, pulled = (
+        float(drive.simulate([0.0], load_torque=torque).shaft_speed[0]) for torque in (0.0, 1e5)
+    )
+    return (still - pulled) / 1e5
+
+
+def _has_line(drive: Drive) -> bool:
+    return "line" in drive.parameters.options
 
 
 def preset_text(name: str) -> str:

@@ -177,13 +177,47 @@ def shafts_for(x: float, y: float, now: Shafts, g: Geometry, home: Home) -> Shaf
 
 
 @equation
-def reach_rate(boom: Boom, g: Geometry) -> float:
-    """Loss of reach for each radian of the luff's shaft, -∂ρ/∂θ_l > 0. [m]
+def boom_rate(boom: Boom, g: Geometry) -> float:
+    """Rise of the boom for each radian of the luff's shaft, ∂β/∂θ_l > 0.
 
-    dℓ/dβ = -B D sin(γ - β)/ℓ and dρ/dβ = -B sin β.
+    dℓ/dβ = -B D sin(γ - β)/ℓ.
     """
     sine = g.sheave_sin * boom.cos - g.sheave_cos * boom.sin
-    return g.luff * boom.sin * luff_rope(boom, g) / (g.sheave * sine)
+    return g.luff * luff_rope(boom, g) / (g.boom * g.sheave * sine)
+
+
+@equation
+def reach_rate(boom: Boom, g: Geometry) -> float:
+    """Loss of reach for each radian of the luff's shaft, -∂ρ/∂θ_l = B sin β ∂β/∂θ_l. [m]"""
+    return g.boom * boom.sin * boom_rate(boom, g)
+
+
+@equation
+def shaft_torques(force: Vector, slew: float, boom: Boom, tension: float, g: Geometry) -> Shafts:
+    """Torques of the hoist rope on the three shafts, positive against positive speed. [N m]
+
+    Parameters
+    ----------
+    force : Vector
+        Of the rope on the tip, along the ship's axes. [N]
+    tension : float
+        Of the rope. [N]
+
+    Notes
+    -----
+    By virtual work C = -T ∂L/∂θ - F·∂p/∂θ for each shaft θ, where the rope L shortens by r_h/n_h
+    with the hoist's and lengthens by κ r_l/n_l with the luff's.
+    """
+    rise = boom_rate(boom, g)
+    reach, along = g.foot + g.boom * boom.cos, -g.boom * boom.sin * rise
+    c, s = cos(slew), sin(slew)
+    return Shafts(
+        tension * g.hoist,
+        reach * (force.x * s + force.y * c),
+        along * (force.y * s - force.x * c)
+        - force.z * g.boom * boom.cos * rise
+        - tension * g.coupling * g.luff,
+    )
 
 
 @equation

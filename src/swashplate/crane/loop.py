@@ -34,12 +34,24 @@ from swashplate.crane.kinematics import (
     reach_rate,
     rope_length,
     rotation,
+    shaft_torques,
     shafts_for,
     tip_of,
     to_inertial,
     to_ship,
 )
-from swashplate.crane.rope import GRAVITY, Air, first_step, rope_step
+from swashplate.crane.rope import (
+    GRAVITY,
+    Air,
+    Hanging,
+    Hung,
+    first_step,
+    hung_start,
+    hung_step,
+    moved,
+    rope_step,
+    size,
+)
 from swashplate.drive import Drive
 from swashplate.equations import Machine, compiled_step, equation, inlined, kernel
 from swashplate.equations.code import generating
@@ -55,8 +67,13 @@ ROWS = (
     *("shaft_hoist", "shaft_slew", "shaft_luff"),
     *("tip_x", "tip_y", "tip_z", "load_x", "load_y", "load_z"),
     *("pull", "rope", "wanted_x", "wanted_y", "boom_cos", "boom_sin"),
+    *("limits_hoist", "limits_slew", "limits_luff"),
 )
 """What the loop leaves of each sample."""
+TORQUES = ("torque_hoist", "torque_slew", "torque_luff")
+"""What it leaves besides where the load acts back on the drives: torques that they have taken."""
+HOOK = ("hook_x", "hook_y", "hook_z")
+"""What it leaves besides where there is a hook."""
 FINE, TOO_FAST, BOOM_OUT, ROPE_OUT = range(4)
 """How a pass ended."""
 BRAKE_WAITS, BRAKE_TAKES = 0.3, 0.2
@@ -92,6 +109,11 @@ class Fixed(NamedTuple):
     """Sines of the boom's limits."""
     ropes: tuple[float, float]
     """Limits of the rope. [m]"""
+    mass: float
+    """Of load and hook. [kg]"""
+    loaded: bool
+    """Whether the rope's tension loads the drives."""
+    hanging: Hanging
 
 
 class Plant(NamedTuple):
@@ -125,8 +147,9 @@ class State(NamedTuple):
     in_ship: Vector
     """Tip in the ship's frame."""
     tip: Vector
-    load: Vector
-    before: Vector
+    hung: Hung
+    torques: Shafts
+    """Of the rope on the shafts, of the last sample. [N m]"""
     still: float
     """Time for which the hoist's command has been within the dead zone. [s]"""
     brake: float
@@ -280,8 +303,13 @@ def _no_law(*_: Any) -> float:
 
 
 @generating
-def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[State, int]]:
-    """The compiled loop over given steps of three drives and of a law, None for no law."""
+def loop_of(
+    hoist: Any, slew: Any, luff: Any, law: Any, loaded: bool, hangs: bool, hooked: bool
+) -> Callable[..., tuple[State, int]]:
+    """The compiled loop over given steps of three drives and of a law, None for no law.
+
+    `loaded` drives feel the rope; a load that `hangs` has a suspension, perhaps with a hook.
+    """
     own = law is not None
     advance_law = law if own else inlined(_no_law)
 
@@ -294,14 +322,15 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
         memory, margins = plant.memory, plant.margins
         g, home, settings, actuation = fixed.geometry, fixed.home, fixed.settings, fixed.actuation
         moving = ship.shape[1] > 1
-        size = memory.shape[1] - 1
+        last = memory.shape[1] - 1
         seen = np.zeros(13)
         sample, shafts, speeds = state.sample, state.shafts, state.speeds
         operator, wish, aim = state.operator, state.wish, state.aim
         boom, rope, in_ship = state.boom, state.rope, state.in_ship
-        tip, load, before = state.tip, state.load, state.before
+        tip, hung, torques = state.tip, state.hung, state.torques
+        load, before = hung.load, hung.before
         still, brake = state.still, state.brake
-        volts, omega = np.zeros(3), np.zeros(3)
+        volts, omega, limits = np.zeros(3), np.zeros(3), np.zeros(3)
         r = Rotation(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
         shift = Vector(0.0, 0.0, 0.0)
         ended = FINE
@@ -313,7 +342,7 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
             # the stick's commands
             u = stick[m, 0], stick[m, 1], stick[m, 2]
             for i in range(3):
-                memory[i, sample & size] = u[i]
+                memory[i, sample & last] = u[i]
             if settings.joint[1] > 0.0:
                 u = (
                     shaped(memory, 0, sample, half, settings.joint),
@@ -330,13 +359,15 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                     operator = advanced(operator, wish, new, h)
                 wish = new
                 lead = tip_of(home.slew + operator.slew, boom_at(operator.luff, g, home), g)
-                memory[3, sample & size] = lead.x
-                memory[4, sample & size] = lead.y
+                memory[3, sample & last] = lead.x
+                memory[4, sample & last] = lead.y
                 path_x = shaped(memory, 3, sample, half, settings.tip)
                 path_y = shaped(memory, 4, sample, half, settings.tip)
                 swing_x, swing_y = load.x - tip.x, load.y - tip.y
-                memory[5, sample & size] = swing_x
-                memory[6, sample & size] = swing_y
+                if hooked:  # what the direction of the rope tells
+                    swing_x, swing_y = hung.hook.x - tip.x, hung.hook.y - tip.y
+                memory[5, sample & last] = swing_x
+                memory[6, sample & last] = swing_y
                 x, y = 0.0, 0.0
                 if settings.feedback > 0.0:
                     back = 2.0 * half * settings.delay
@@ -391,10 +422,15 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
             if actuation != IDEAL:
                 a, b, c = plant.drives
                 a.inputs[0], b.inputs[0], c.inputs[0] = volts[0], volts[1], volts[2]
+                if loaded:
+                    felt = torques.hoist, torques.slew, torques.luff
+                    a.inputs[1], b.inputs[1], c.inputs[1] = felt
+                    out[m, 24], out[m, 25], out[m, 26] = felt
                 margins[0] = min(margins[0], hoist(a))
                 margins[1] = min(margins[1], slew(b))
                 margins[2] = min(margins[2], luff(c))
                 omega[0], omega[1], omega[2] = a.outputs[0], b.outputs[0], c.outputs[0]
+                limits[0], limits[1], limits[2] = a.outputs[1], b.outputs[1], c.outputs[1]
                 if fixed.brake:
                     within_zone = fixed.slowest[0] < volts[0] < fixed.slowest[1]
                     still = still + h if within_zone else 0.0
@@ -407,7 +443,9 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                 shafts = advanced(shafts, speeds, turning, h)
             speeds = turning
             boom = boom_at(shafts.luff, g, home)
+            shorter = rope
             rope = rope_length(shafts, g, home)
+            shorter -= rope
             in_ship = tip_of(home.slew + shafts.slew, boom, g)
             following = to_inertial(r, in_ship, shift) if moving else in_ship
             if not (fixed.ropes[0] <= rope <= fixed.ropes[1]):
@@ -417,20 +455,37 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
                 ended = BOOM_OUT
                 break
             pull = GRAVITY
-            if sample == 0:
+            if hangs:
+                if sample == 0:
+                    hung = hung_start(following, Vector(0.0, 0.0, 0.0), rope, fixed.hanging, h)
+                else:
+                    square = h * h
+                    if sample == 1:
+                        square = 0.5 * square
+                        led = moved(following, -1.0, tip)
+                        led = Vector(led.x, led.y, led.z + shorter)
+                        hung = Hung(
+                            hung.load, moved(hung.load, -1.0, led), hung.hook,
+                            moved(hung.hook, -1.0, led), hung.pull, hung.stretch,
+                        )  # fmt: skip
+                    hung = hung_step(
+                        hung, tip, following, rope, fixed.hanging, fixed.air, h, square
+                    )
+                load, pull = hung.load, hung.pull
+            elif sample == 0:
                 load = Vector(following.x, following.y, following.z - rope)
                 before = load
             else:
                 if sample == 1:
-                    moved = Vector(following.x - tip.x, following.y - tip.y, following.z - tip.z)
-                    v = Vector(moved.x / h, moved.y / h, moved.z / h)
+                    led = moved(following, -1.0, tip)
+                    v = Vector(led.x / h, led.y / h, (led.z + shorter) / h)
                     made = first_step(load, v, tip, following, rope, fixed.air, h)
                 else:
                     made = rope_step(load, before, tip, following, rope, fixed.air, h)
                 before, load, pull = load, made.position, made.pull
-                if pull < 0.0:
-                    ended = TOO_FAST
-                    break
+            if pull < 0.0:
+                ended = TOO_FAST
+                break
             tip = following
             for i in range(3):
                 out[m, i], out[m, 3 + i] = volts[i], omega[i]
@@ -440,9 +495,23 @@ def loop_of(hoist: Any, slew: Any, luff: Any, law: Any) -> Callable[..., tuple[S
             out[m, 15], out[m, 16] = pull, rope
             out[m, 17], out[m, 18] = path_x, path_y
             out[m, 19], out[m, 20] = boom.cos, boom.sin
+            out[m, 21], out[m, 22], out[m, 23] = limits[0], limits[1], limits[2]
+            rope_end = hung.hook if hooked else load
+            if hooked:
+                k = out.shape[1] - 3
+                out[m, k], out[m, k + 1], out[m, k + 2] = rope_end.x, rope_end.y, rope_end.z
+            if loaded:
+                tension = fixed.mass * pull
+                rope_along = moved(rope_end, -1.0, tip)
+                force = moved(Vector(0.0, 0.0, 0.0), tension / size(rope_along), rope_along)
+                if moving:
+                    force = to_ship(r, force)
+                torques = shaft_torques(force, home.slew + shafts.slew, boom, tension, g)
             sample += 1
+        if not hangs:
+            hung = Hung(load, before, load, before, 0.0, 0.0)
         end = State(
-            sample, shafts, speeds, operator, wish, aim, boom, rope, in_ship, tip, load, before,
+            sample, shafts, speeds, operator, wish, aim, boom, rope, in_ship, tip, hung, torques,
             still, brake,
         )  # fmt: skip
         return end, ended
@@ -488,7 +557,9 @@ class Loop:
     ) -> None:
         self.fixed, self.rate, self._law = fixed, rate, law
         self._h = 1.0 / rate
-        self._steps = [drive.compiled_step(rate=rate) for drive in drives]
+        given = ("voltage", "load_torque") if fixed.loaded else ("voltage",)
+        left = ("shaft_speed", "limits")
+        self._steps = [drive.compiled_step(left, inputs=given, rate=rate) for drive in drives]
         machines = [each.machine() for each in self._steps]
         own, picks = machines[0], np.zeros(0, dtype=np.int64)
         if law is not None:
@@ -496,13 +567,21 @@ class Loop:
             self._steps.append(compiled_step(law.model, law.values, seen, GIVES, rate))
             own = self._steps[3].machine()
             picks = np.array([SEEN.index(each) for each in seen], dtype=np.int64)
-        steps = [each.step for each in self._steps]
-        self._loop = loop_of(*steps, *[None] * (4 - len(steps)))
+        hoist_step, slew_step, luff_step = (each.step for each in self._steps[:3])
+        law_step = self._steps[3].step if law is not None else None
+        hooked, elastic = fixed.hanging.sling > 0.0, fixed.hanging.stiffness > 0.0
+        self._loop = loop_of(
+            hoist_step, slew_step, luff_step, law_step, fixed.loaded, hooked or elastic, hooked
+        )
+        self.rows = ROWS + (TORQUES if fixed.loaded else ()) + (HOOK if hooked else ())
         g, home = fixed.geometry, fixed.home
         zero, boom = Shafts(0.0, 0.0, 0.0), boom_at(0.0, g, home)
         tip = tip_of(home.slew, boom, g)
+        weight = fixed.mass * GRAVITY
+        torques = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
         self.state = State(
-            0, zero, zero, zero, zero, zero, boom, home.rope, tip, tip, tip, tip, 0.0, 0.0
+            0, zero, zero, zero, zero, zero, boom, home.rope, tip, tip,
+            Hung(tip, tip, tip, tip, 0.0, 0.0), torques, 0.0, 0.0,
         )  # fmt: skip
         longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * rate + 4.0
         memory = np.zeros((7, 1 << int(longest).bit_length()))
@@ -529,8 +608,8 @@ class Loop:
 
         Returns
         -------
-        out : (n, 21) array
-            Columns as in `ROWS`.
+        out : (n, 24) array
+            Columns as in `rows`.
         ended : int
             `FINE`, or why it ended at the state's sample.
 
@@ -539,7 +618,7 @@ class Loop:
         DomainError
             If a drive or a law leaves its domain.
         """
-        out = np.empty((len(stick), len(ROWS)))
+        out = np.empty((len(stick), len(self.rows)))
         plant = self._plant
         self.state, ended = self._loop(self._h, self.fixed, self.state, plant, stick, ship, out)
         machines = (*plant.drives, plant.law)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.crane.loop import ROWS
+from swashplate.crane.loop import HOOK, ROWS, TORQUES
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.stick import AXES
 from swashplate.errors import InputError
@@ -50,7 +50,9 @@ class CraneRun(Tabular):
     halves: int
     """Half periods of the load that the shaper takes."""
     mass: float
-    """Of the load. [kg]"""
+    """Of the load and its hook. [kg]"""
+    rows: tuple[str, ...] = field(default=ROWS, repr=False)
+    """Columns of `out`."""
 
     figure = "plot_crane"
 
@@ -61,7 +63,7 @@ class CraneRun(Tabular):
         )
 
     def _rows(self, *names: str) -> Array:
-        made = self.out[:, [ROWS.index(name) for name in names]]
+        made = self.out[:, [self.rows.index(name) for name in names]]
         made.flags.writeable = False
         return made if len(names) > 1 else made[:, 0]
 
@@ -109,6 +111,21 @@ class CraneRun(Tabular):
     def tension(self) -> Array:
         """(n,) tension of the rope, 0 where it is slack. [N]"""
         return self.mass * self._rows("pull")
+
+    @cached_property
+    def load_torque(self) -> Array:
+        """(n, 3) torques of the rope that the drives took, zero unless they are loaded. [N m]"""
+        return self._rows(*TORQUES) if TORQUES[0] in self.rows else np.zeros((len(self.out), 3))
+
+    @cached_property
+    def hook(self) -> Array:
+        """(n, 3) hook, or the load where there is none. [m]"""
+        return self._rows(*HOOK) if HOOK[0] in self.rows else self.load
+
+    @property
+    def stretch(self) -> Array:
+        """(n,) what the tension has added to the rope's length. [m]"""
+        return np.asarray(np.linalg.norm(self.hook - self.tip, axis=1) - self.rope)
 
     @cached_property
     def slack(self) -> NDArray[np.bool_]:
@@ -173,7 +190,8 @@ class CraneRun(Tabular):
         if axis not in self._drives:
             found = getattr(self.crane, axis)
             volts = np.ascontiguousarray(self.voltage[:, AXES.index(axis)])
-            self._drives[axis] = found.simulate(volts, self.rate)
+            torque = self.load_torque[:, AXES.index(axis)] if TORQUES[0] in self.rows else None
+            self._drives[axis] = found.simulate(volts, self.rate, load_torque=torque)
         return self._drives[axis]
 
     @cached_property
@@ -196,7 +214,7 @@ class CraneRun(Tabular):
 
         columns = {"time": self.time}
         columns |= {f"stick_{axis}": self.stick[:, i] for i, axis in enumerate(AXES)}
-        columns |= {name: self.out[:, i] for i, name in enumerate(ROWS)}
+        columns |= {name: self.out[:, i] for i, name in enumerate(self.rows)}
         columns["swing"] = np.radians(self.swing_deg)
         return pl.DataFrame(columns)
 

@@ -4,11 +4,16 @@ The step needs nothing but positions of the boom's tip: no angles, which are sin
 lies level, and no accelerations of the tip, which drives with jumps do not have. The rope's pull is
 the multiplier that puts the load back on the sphere around the new tip; it follows from a quadratic
 in closed form, is zero where the rope is slack, and there is no drift.
+
+Two options (`Suspension`) leave the single multiplier: an elastic rope, whose pull follows from its
+stretch, and a hook with the load on slings below it, a double pendulum with a multiplier for each
+of its two quadratics.
 """
 
 from __future__ import annotations
 
-from math import sqrt
+from dataclasses import dataclass
+from math import inf, isfinite, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.crane.kinematics import Vector
 from swashplate.equations import equation, kernel
 from swashplate.errors import InputError
+from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
@@ -24,6 +30,8 @@ GRAVITY = 9.80665
 """Standard acceleration of free fall. [m/s²]"""
 AIR = 1.225
 """Density of air at 15 °C and sea level. [kg/m³]"""
+FASTEST = 0.3
+"""Angle of an elastic bounce over one sample beyond which it is not computed. [rad]"""
 TOO_FAST = -1.0
 """Pull that says that the tip moves through the rope's length within a step."""
 
@@ -55,7 +63,40 @@ def air_drag(vx: float, vy: float, vz: float, air: Air) -> Vector:
 
 
 @equation
-def held(free: Vector, along: Vector, tip: Vector, length: float, pulls: float) -> Load:
+def dot(a: Vector, b: Vector) -> float:
+    """Scalar product."""
+    return a.x * b.x + a.y * b.y + a.z * b.z
+
+
+@equation
+def size(a: Vector) -> float:
+    """Length of a vector."""
+    return sqrt(dot(a, a))
+
+
+@equation
+def moved(a: Vector, share: float, b: Vector) -> Vector:
+    """The vector a + share b."""
+    return Vector(a.x + share * b.x, a.y + share * b.y, a.z + share * b.z)
+
+
+@equation
+def multiplier_of(free: Vector, along: Vector, length: float) -> float:
+    """Multiplier μ ≥ 0 that leaves |e - μ d| at most L; below 0 if none does.
+
+    |e - μ d| = L is a quadratic in μ; its small root, written so that nothing cancels, is
+    μ = o/(e·d + √((e·d)² - d·d o)) with o = e·e - L².
+    """
+    o = dot(free, free) - length * length
+    ed = dot(free, along)
+    root = ed * ed - dot(along, along) * o
+    bad = o > 0.0 and (root < 0.0 or ed <= 0.0)
+    taut = o > 0.0 and not bad
+    return TOO_FAST if bad else o / (ed + sqrt(root)) if taut else 0.0
+
+
+@equation
+def constrained(free: Vector, along: Vector, tip: Vector, length: float, pulls: float) -> Load:
     """The load on or within the sphere around its tip.
 
     Parameters
@@ -68,25 +109,15 @@ def held(free: Vector, along: Vector, tip: Vector, length: float, pulls: float) 
         p and L at the step's end. [m]
     pulls : float
         What the pull is for each μ |d|: 1/h², 2/h² in the first step. [1/s²]
-
-    Notes
-    -----
-    |e - μ d| = L is a quadratic in μ; its small root, written so that nothing cancels, is
-    μ = o/(e·d + √((e·d)² - d·d o)) with o = e·e - L².
     """
-    o = free.x * free.x + free.y * free.y + free.z * free.z - length * length
-    ed = free.x * along.x + free.y * along.y + free.z * along.z
-    dd = along.x * along.x + along.y * along.y + along.z * along.z
-    root = ed * ed - dd * o
-    bad = o > 0.0 and (root < 0.0 or ed <= 0.0)
-    taut = o > 0.0 and not bad
-    multiplier = o / (ed + sqrt(root)) if taut else 0.0
+    multiplier = multiplier_of(free, along, length)
+    bad = multiplier < 0.0
     position = Vector(
         tip.x + free.x - multiplier * along.x,
         tip.y + free.y - multiplier * along.y,
         tip.z + free.z - multiplier * along.z,
     )
-    return Load(position, TOO_FAST if bad else multiplier * sqrt(dd) * pulls)
+    return Load(position, TOO_FAST if bad else multiplier * size(along) * pulls)
 
 
 @equation
@@ -117,7 +148,7 @@ def rope_step(
         now.z + dz + h * h * (drag.z - GRAVITY) - following.z,
     )
     along = Vector(now.x - tip.x, now.y - tip.y, now.z - tip.z)
-    return held(free, along, following, length, 1.0 / (h * h))
+    return constrained(free, along, following, length, 1.0 / (h * h))
 
 
 @equation
@@ -132,7 +163,216 @@ def first_step(
         start.z + h * v.z + 0.5 * h * h * (drag.z - GRAVITY) - following.z,
     )
     along = Vector(start.x - tip.x, start.y - tip.y, start.z - tip.z)
-    return held(free, along, following, length, 2.0 / (h * h))
+    return constrained(free, along, following, length, 2.0 / (h * h))
+
+
+# --- elastic rope, hook and slings ----------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Suspension(Result):
+    """How the load hangs: elastic rope, hook with slings; by default neither.
+
+    Attributes
+    ----------
+    stiffness : float
+        EA, force for a strain of one of the rope's parts together; infinite for a rigid rope. What
+        lies between the tip and the drum does not stretch. [N]
+    damping : float
+        Damping ratio of the load's bounce on the elastic rope.
+    hook : float
+        Mass of the hook block; 0 for a load that hangs on the rope itself. [kg]
+    sling : float
+        From the hook to the load. [m]
+
+    Raises
+    ------
+    InputError
+        For numbers without sense, and a hook without slings.
+    """
+
+    stiffness: float = inf
+    damping: float = 0.02
+    hook: float = 0.0
+    sling: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.stiffness > 0.0:
+            raise InputError(f"The rope's stiffness is {self.stiffness:g} N, but must be above 0.")
+        for name in ("damping", "hook", "sling"):
+            value = getattr(self, name)
+            if not (isfinite(value) and value >= 0.0):
+                raise InputError(f"The suspension's {name} is {value:g}, but must be at least 0.")
+        if (self.hook > 0.0) != (self.sling > 0.0):
+            raise InputError(
+                f"A hook of {self.hook:g} kg with slings of {self.sling:g} m: both are above 0, or "
+                "both 0 for a load on the rope itself."
+            )
+
+    def hanging(self, load: float, shortest: float, rate: float) -> Hanging:
+        """Numbers of the suspension with a load.
+
+        Parameters
+        ----------
+        load : float
+            Mass. [kg]
+        shortest : float
+            Rope at its shortest, on which the load bounces fastest. [m]
+        rate : float
+            Samples a second. [Hz]
+
+        Raises
+        ------
+        InputError
+            If the load bounces too fast for the rate.
+        """
+        mass = load + self.hook
+        pulls = 0.0 if self.stiffness == inf else self.stiffness / mass
+        ratio = load / self.hook if self.hook > 0.0 else 0.0
+        fastest = sqrt(pulls * (1.0 + ratio) / shortest)
+        if fastest > FASTEST * rate:
+            raise InputError(
+                f"{self.hook or load:g} kg on {shortest:g} m of rope with {self.stiffness:g} N "
+                f"bounce at {fastest / (2.0 * pi):.3g} Hz, too fast for {rate:g} samples a second: "
+                "take a rigid rope."
+            )
+        return Hanging(pulls, self.damping, self.sling, ratio)
+
+
+class Hanging(NamedTuple):
+    """Numbers of a `Suspension` with its load."""
+
+    stiffness: float
+    """EA for each kilogram of load and hook; 0 for a rigid rope. [N/kg]"""
+    damping: float
+    sling: float
+    """[m]; 0 for a load on the rope itself."""
+    ratio: float
+    """q, mass of the load over that of the hook."""
+
+
+class Hung(NamedTuple):
+    """Load and hook after a step."""
+
+    load: Vector
+    before: Vector
+    """Load one step earlier. [m]"""
+    hook: Vector
+    """Where the rope ends: the hook, or the load without one. [m]"""
+    hook_before: Vector
+    pull: float
+    """Tension of the rope for each kilogram of load and hook. [N/kg]"""
+    stretch: float
+    """[m]"""
+
+
+@equation
+def coasting(now: Vector, before: Vector, square: float, a: Vector) -> Vector:
+    """Where a body is one step later under an acceleration, 2 x - x' + h² a. [m]"""
+    return moved(moved(now, 1.0, moved(now, -1.0, before)), square, a)
+
+
+@equation
+def elastic_pull(stretch: float, before: float, length: float, s: Hanging, h: float) -> float:
+    """Pull of a stretched rope, EA ε + 2 ζ √(EA m/L) ε̇ L, never below 0. [N/kg]"""
+    rate = 2.0 * s.damping * sqrt(s.stiffness / length) * (stretch - before) / h
+    return max(s.stiffness * stretch / length + rate, 0.0) if stretch > 0.0 else 0.0
+
+
+@equation
+def both_taut(
+    rope: Vector, sling: Vector, d: Vector, b: Vector, length: float, s: Hanging
+) -> tuple[float, float]:
+    """Multipliers u of the rope and w of the slings where both are taut, by Newton's method.
+
+    Parameters
+    ----------
+    rope, sling : Vector
+        Without pulls, from the new tip to the hook, and from the hook to the load. [m]
+    d, b : Vector
+        The same at the step's beginning, along which rope and slings pull. [m]
+
+    Notes
+    -----
+    |rope - u d + q w b| = L and |sling + u d - (1 + q) w b| = l, with q the ratio of masses.
+    """
+    u, w = 0.0, 0.0
+    for _ in range(4):
+        one = moved(moved(rope, -u, d), s.ratio * w, b)
+        two = moved(moved(sling, u, d), -(1.0 + s.ratio) * w, b)
+        f, g = dot(one, one) - length * length, dot(two, two) - s.sling * s.sling
+        f_u, f_w = -2.0 * dot(one, d), 2.0 * s.ratio * dot(one, b)
+        g_u, g_w = 2.0 * dot(two, d), -2.0 * (1.0 + s.ratio) * dot(two, b)
+        area = f_u * g_w - f_w * g_u
+        u, w = u - (f * g_w - f_w * g) / area, w - (f_u * g - f * g_u) / area
+    return u, w
+
+
+@equation
+def hook_pulls(
+    rope: Vector, sling: Vector, d: Vector, b: Vector, length: float, s: Hanging
+) -> tuple[float, float]:
+    """Multipliers as of `both_taut`, each 0 where rope or slings are slack; below 0 if none fit."""
+    u, w = both_taut(rope, sling, d, b, length, s)
+    if u >= 0.0 and w >= 0.0:
+        return u, w
+    u = multiplier_of(rope, d, length)
+    beyond = size(moved(sling, u, d)) - s.sling
+    if u < 0.0 or beyond <= 0.0:
+        return u, 0.0
+    w = multiplier_of(sling, b, s.sling) / (1.0 + s.ratio)
+    return 0.0, w
+
+
+@equation
+def hung_step(
+    now: Hung,
+    tip: Vector,
+    following: Vector,
+    length: float,
+    s: Hanging,
+    air: Air,
+    h: float,
+    square: float,
+) -> Hung:
+    """Load and hook one step later; arguments as of `rope_step`, and h², half of it at first.
+
+    The elastic rope pulls by its stretch at n, so that the step stays explicit and, undamped,
+    symplectic; a rigid one and the slings by their multipliers.
+    """
+    weight, still = Vector(0.0, 0.0, -GRAVITY), Vector(0.0, 0.0, 0.0)
+    v = moved(now.load, -1.0, now.before)
+    drag = air_drag(v.x / h, v.y / h, v.z / h, air) if air.drag > 0.0 else still
+    load = coasting(now.load, now.before, square, moved(weight, 1.0, drag))
+    hooked, elastic = s.sling > 0.0, s.stiffness > 0.0
+    hook = coasting(now.hook, now.hook_before, square, weight) if hooked else load
+    d, b = moved(now.hook, -1.0, tip), moved(now.load, -1.0, now.hook)
+    if elastic:
+        hook = moved(hook, -square * now.pull * (1.0 + s.ratio) / size(d), d)
+    rope, sling = moved(hook, -1.0, following), moved(load, -1.0, hook)
+    u, w = 0.0, 0.0
+    if hooked and elastic:
+        w = multiplier_of(sling, b, s.sling) / (1.0 + s.ratio)
+    elif hooked:
+        u, w = hook_pulls(rope, sling, d, b, length, s)
+    elif not elastic:
+        u = multiplier_of(rope, d, length)
+    hook = moved(moved(hook, -u, d), s.ratio * w, b)
+    load = moved(load, -w, b) if hooked else hook
+    stretch = size(moved(hook, -1.0, following)) - length
+    pull = u * size(d) / (square * (1.0 + s.ratio))
+    if elastic:
+        pull = elastic_pull(stretch, now.stretch, length, s, h)
+    return Hung(load, now.load, hook, now.hook, TOO_FAST if u < 0.0 or w < 0.0 else pull, stretch)
+
+
+@equation
+def hung_start(tip: Vector, v: Vector, length: float, s: Hanging, h: float) -> Hung:
+    """Load and hook that hang below a tip and move with it at a velocity. [m/s]"""
+    stretch = GRAVITY * length / s.stiffness if s.stiffness > 0.0 else 0.0
+    hook = moved(tip, -(length + stretch), Vector(0.0, 0.0, 1.0))
+    load = moved(hook, -s.sling, Vector(0.0, 0.0, 1.0))
+    return Hung(load, moved(load, -h, v), hook, moved(hook, -h, v), GRAVITY, stretch)
 
 
 # --- march ----------------------------------------------------------------------------------------
@@ -160,13 +400,36 @@ def _march(
     return 0
 
 
+@kernel
+def _march_hung(
+    tip: Array, length: Array, start: Hung, s: Hanging, air: Air, h: float, out: Array
+) -> int:
+    """Fill load, hook and pull behind the first sample; the sample that failed, or 0."""
+    now, at = start, Vector(tip[0, 0], tip[0, 1], tip[0, 2])
+    for n in range(tip.shape[0]):
+        if n > 0:
+            following = Vector(tip[n, 0], tip[n, 1], tip[n, 2])
+            square = 0.5 * h * h if n == 1 else h * h
+            now = hung_step(now, at, following, length[n], s, air, h, square)
+            at = following
+            if now.pull < 0.0:
+                return n
+        out[n, 0], out[n, 1], out[n, 2] = now.load.x, now.load.y, now.load.z
+        out[n, 3], out[n, 4], out[n, 5] = now.hook.x, now.hook.y, now.hook.z
+        out[n, 6] = now.pull
+    return 0
+
+
 class LoadMotion(NamedTuple):
     """Path of a load."""
 
     position: Array
     """(n, 3), as the tip's. [m]"""
     pull: Array
-    """(n,) tension for each kilogram of load over the step that ends here; 0 is slack. [N/kg]"""
+    """(n,) tension for each kilogram of load and hook over the step that ends here; 0 is slack.
+    [N/kg]"""
+    hook: Array | None = None
+    """(n, 3) the hook, if there is one. [m]"""
 
 
 def load_motion(
@@ -178,6 +441,8 @@ def load_motion(
     velocity: ArrayLike | None = None,
     drag: float = 0.0,
     wind: ArrayLike = (0.0, 0.0, 0.0),
+    suspension: Suspension | None = None,
+    mass: float = 1.0,
 ) -> LoadMotion:
     """Path of a load whose rope's upper end moves along a given path.
 
@@ -195,6 +460,10 @@ def load_motion(
         ρ C_d A/(2 m). [1/m]
     wind : (3,) array_like
         Velocity of the air. [m/s]
+    suspension : Suspension, optional
+        Elastic rope, hook with slings; a hook starts straight between tip and load.
+    mass : float
+        Of the load, which counts with a suspension. [kg]
 
     Raises
     ------
@@ -214,11 +483,50 @@ def load_motion(
     slope = (4.0 * path[1] - 3.0 * path[0] - path[min(2, len(path) - 1)]) * rate / 2.0
     v = slope if velocity is None else np.asarray(velocity, dtype=np.float64)
     air = Air(float(drag), Vector(*map(float, np.asarray(wind))))
+    if suspension is not None:
+        return _hung(path, rope, Vector(*map(float, v)), air, rate, start, suspension, mass)
     failed = _march(path, rope, Vector(*map(float, v)), air, 1.0 / rate, load, pull)
     if failed:
         raise InputError(too_fast(float(rope[failed]), failed / rate, rate))
     pull[0] = pull[1]
     return LoadMotion(load, pull)
+
+
+def _hung(
+    path: Array,
+    rope: Array,
+    v: Vector,
+    air: Air,
+    rate: float,
+    start: ArrayLike | None,
+    suspension: Suspension,
+    mass: float,
+) -> LoadMotion:
+    """Path of a load in a suspension."""
+    if not (isfinite(mass) and mass > 0.0):
+        raise InputError(f"The load is {mass:g} kg, but must be above 0.")
+    s, h = suspension.hanging(mass, float(rope.min()), rate), 1.0 / rate
+    tip = Vector(*path[0].tolist())
+    now = hung_start(tip, v, float(rope[0]), s, h)
+    if start is not None:
+        load = np.asarray(start, dtype=np.float64)
+        line = load - path[0]
+        far = float(np.linalg.norm(line))
+        if not far > s.sling:
+            raise InputError(
+                f"The load starts {far:g} m from the tip, but hangs on slings of {s.sling:g} m."
+            )
+        hook = load - s.sling / far * line
+        back = np.array(v) * h
+        a, b, c, d = (Vector(*each.tolist()) for each in (load, load - back, hook, hook - back))
+        stretch = far - s.sling - float(rope[0])
+        pull = float(elastic_pull(stretch, stretch, float(rope[0]), s, h))
+        now = Hung(a, b, c, d, pull if s.stiffness > 0.0 else GRAVITY, stretch)
+    out = np.empty((len(path), 7))
+    failed = _march_hung(path, rope, now, s, air, h, out)
+    if failed:
+        raise InputError(too_fast(float(rope[failed]), failed / rate, rate))
+    return LoadMotion(out[:, :3], out[:, 6], out[:, 3:6] if s.sling > 0.0 else None)
 
 
 def too_fast(length: float, time: float, rate: float) -> str:

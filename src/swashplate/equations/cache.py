@@ -42,10 +42,19 @@ UNUSED = 60.0 * DAY
 """Time after which a generated module that nobody used is removed. [s]"""
 LARGEST = 1_000_000_000
 """Size that all generated modules may have with their machine code. [bytes]"""
+MOST_CLOSURES = 48
+"""Functions made by one function of which machine code is kept."""
 DOCSTRING = re.compile(r'^ *""".*?"""\n', re.MULTILINE | re.DOTALL)
 
 
 # --- kernels --------------------------------------------------------------------------------------
+
+
+def _modified(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except FileNotFoundError:  # another worker was quicker
+        return 0.0
 
 
 class _KernelCacheImpl(CompileResultCacheImpl):
@@ -71,7 +80,11 @@ class _Index(IndexDataCacheFile):
         """Remove what was kept of the same function when it stood on another line of its file."""
         function, _, rest = self._index_name.rpartition("-")
         line, _, version = rest.partition(".")
-        if "locals" in function:  # such a name may stand for several functions
+        if "locals" in function:  # such a name stands for several functions: the latest stay
+            old = sorted(Path(self._cache_path).glob(f"{escape(function)}-*.nbi"), key=_modified)
+            for path in old[:-MOST_CLOSURES]:
+                for each in path.parent.glob(f"{escape(path.stem)}.*"):
+                    each.unlink(missing_ok=True)
             return
         for path in Path(self._cache_path).glob(
             f"{escape(function)}-*.{version.partition('.')[0]}.*"
@@ -121,7 +134,15 @@ class _KernelCache(FunctionCache):
     @cached_property
     def _cache_file(self) -> _Index:  # type: ignore[override]
         stamp = f"{closure_hash(self._py_func)} {numba_version}"
-        return _Index(self._cache_path, self._impl.filename_base, stamp)  # type: ignore[no-untyped-call]
+        base = self._impl.filename_base
+        if "locals" in base:  # one of several functions of this name, which do not displace another
+            base = f"{base}.{hash_of({'': stamp})[:12]}"
+        return _Index(self._cache_path, base, stamp)  # type: ignore[no-untyped-call]
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        # the stamp says what a closure holds; Numba's own key has a compiled function's number of
+        # this session
+        return sig, codegen.magic_tuple()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:

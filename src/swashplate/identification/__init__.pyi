@@ -1,12 +1,9 @@
-from .acceptance import Verdict as Verdict
-from .acceptance import verdict as verdict
 from .assessment import Assessment as Assessment
 from .assessment import Judged as Judged
 from .assessment import Wanted as Wanted
 from .assessment import assess as assess
 from .assessment import judge_fit as judge_fit
 from .assessment import load_fit as load_fit
-from .assessment import save_fit as save_fit
 from .drive_model import DriveModel as DriveModel
 from .excitation import Outlook as Outlook
 from .excitation import outlook as outlook
@@ -35,7 +32,6 @@ from .resampling import cross_validate as cross_validate
 from .setup import Setup as Setup
 from .setup import Stage as Stage
 from .setup import load_setup as load_setup
-from .setup import setup_text as setup_text
 from .solving import Solution as Solution
 from .solving import sobol_starts as sobol_starts
 from .solving import solve as solve
@@ -44,3 +40,5 @@ from .unknowns import Prior as Prior
 from .unknowns import Unknown as Unknown
 from .unknowns import Unknowns as Unknowns
 from .validation import predict as predict
+from .verdict import Verdict as Verdict
+from .verdict import verdict as verdict

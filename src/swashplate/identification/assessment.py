@@ -20,7 +20,7 @@ from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
 from swashplate.errors import FileError, InputError
-from swashplate.identification.acceptance import Verdict, verdict
+from swashplate.identification.acceptance import REQUIRED
 from swashplate.identification.fitting import Fit, StageFit, smooth
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import (
@@ -47,6 +47,7 @@ from swashplate.identification.solving import Solution, StartResult
 from swashplate.identification.staging import Parameters, stage_problem, with_estimates
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict, run_qualities
+from swashplate.identification.verdict import LIMITS, Verdict, verdict
 from swashplate.parameters.definitions import find
 from swashplate.parameters.files import dump_set, read_set
 from swashplate.parameters.parameter_set import Motion, ParameterSet
@@ -61,9 +62,6 @@ if TYPE_CHECKING:
     from swashplate.tables import Table
 
 Array = NDArray[np.float64]
-
-LIMITS = ("Z13", "Z14", "Z15", "Z16")
-"""Parameters that limit something: stops, strokes, relief, orifices."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +127,7 @@ class Assessment(Result):
             return found
         half, fit = reach(found.own, found.level), released(self.linearised)
         unknowns = enumerate(self.stage.problem.unknowns)
-        limits = [number for number, each in unknowns if each.targets[0].startswith(LIMITS)]
+        limits = [number for number, each in unknowns if each.targets[0].startswith(tuple(LIMITS))]
         ends = checked_ends(self.stage.problem, self._vector, fit, half, limits)
         return replace(found, ends=ends)
 
@@ -158,26 +156,44 @@ class Wanted:
     seed: int = 0
     executor: Executor | None = None
     loss: Loss = "linear"
-    required: float = 0.1
+    required: float = REQUIRED
     """Largest error of held-out runs over their range."""
 
 
 @dataclass(frozen=True, eq=False)
 class Judged(Result):
-    """A fit and all that was found out about it."""
+    """A fit, just made or stored, and all that is found out about it."""
 
     campaign: Campaign
     result: Fit
     runs: Sequence[Experiment]
-    assessments: Sequence[Assessment]
-    predicted: Sequence[RunQuality]
-    verdict: Verdict
+    """Those that were fitted."""
     bootstraps: Mapping[str, Bootstrap] = field(default_factory=dict)
     """By stage."""
     profiles: Sequence[StageProfile] = ()
     folds: CrossValidation | None = None
     notes: Mapping[str, str] = field(default_factory=dict)
     """Versions, seed, campaign."""
+    required: float = REQUIRED
+    """Largest error of held-out runs over their range."""
+
+    @property
+    def assessments(self) -> tuple[Assessment, ...]:
+        """Of each stage."""
+        return self.result.assessments
+
+    @cached_property
+    def predicted(self) -> tuple[RunQuality, ...]:
+        """Runs of the axis that were held out, predicted."""
+        names = {each.name for each in self.runs}
+        held = self.campaign.select(axis=self.runs[0].axis, role="validate")
+        return predict(self.result.parameters, [each for each in held if each.name not in names])
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """What it can be used for."""
+        planned = [each.name for each in self.result.setup.stages]
+        return verdict(self.assessments, self.predicted, planned=planned, required=self.required)
 
     def tables(self) -> list[Table]:
         """Criteria of the verdict, then the fit's tables and the errors of held-out runs."""
@@ -199,17 +215,39 @@ class Judged(Result):
         stage = next(each for each in self.result.stages if each.stage.name == profile.stage)
         return stage.problem.unknowns.names[profile.profile.index]
 
-    def store(self, path: Path) -> None:
-        """Write what `load_fit` reads and the report can be made from again."""
-        save_fit(
-            self.result,
-            self.runs,
-            path,
-            campaign=self.campaign.path,
-            profiles=self.profiles,
-            folds=self.folds,
-            notes=self.notes,
+    def store(self, path: str | Path) -> None:
+        """Write what `load_fit` reads and the report can be made from again, whole or not at all.
+
+        Samples stay in the campaign; a fingerprint of each run is stored.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be written.
+        """
+        stages = tuple(
+            StoredStage(
+                name=each.stage.name,
+                unknowns=each.problem.unknowns.items,
+                solution=each.solution,
+                starts=each.starts,
+            )
+            for each in self.result.stages
         )
+        start = self.result.nominal
+        content = FitFile(
+            swashplate=__version__,
+            axis=self.runs[0].axis,
+            campaign=str(self.campaign.path),
+            runs={each.name: fingerprint(each) for each in self.runs},
+            nominal=dict(start.numbers) if isinstance(start, ModelParameters) else dump_set(start),
+            setup=self.result.setup,
+            stages=stages,
+            profiles=tuple(self.profiles),
+            folds=self.folds,
+            notes=dict(self.notes),
+        )
+        write_text(content.model_dump_json(indent=1, by_alias=True) + "\n", path)
 
     def fitted_set(self) -> ParameterSet:
         """The fitted set, where each number says whether it was fitted or fixed, and its source.
@@ -277,7 +315,6 @@ def _ends(estimate: Estimate) -> str:
 
 def judge_fit(
     campaign: Campaign,
-    axis: str,
     runs: Sequence[Experiment],
     nominal: Parameters,
     plan: Setup,
@@ -285,11 +322,11 @@ def judge_fit(
     wanted: Wanted,
     watch: Callable[[str], None] = lambda _: None,
 ) -> Judged:
-    """Assess a fit, predict the runs held out, and compute what else was asked for.
+    """A fit with what was asked for besides: folds, bootstrap, profiles.
 
     Parameters
     ----------
-    campaign, axis, runs, nominal, plan :
+    campaign, runs, nominal, plan :
         What was fitted, from where, and how.
     result : Fit
         What was found.
@@ -303,11 +340,8 @@ def judge_fit(
     InputError
         If a profile of an unknown is wanted that there is not.
     """
-    assessments = assess(result.stages)
+    assessments = result.assessments
     _check(wanted.profiles, assessments)
-    predicted = predict(result.parameters, campaign.select(axis=axis, role="validate"))
-    planned = [each.name for each in result.setup.stages]
-    judged = verdict(assessments, predicted, planned=planned, required=wanted.required)
     folds, bootstraps, profiles = None, {}, []
     if wanted.folds:
         folds = cross_validate(
@@ -330,38 +364,8 @@ def judge_fit(
         )
     for each in assessments if wanted.profiles else ():
         profiles += _profiles(each, wanted, watch)
-    return Judged(
-        campaign,
-        result,
-        runs,
-        assessments,
-        predicted,
-        judged,
-        bootstraps,
-        profiles,
-        folds,
-        {**versions(), "seed": str(wanted.seed), "campaign": str(campaign.path)},
-    )
-
-
-def judge_stored(campaign: Campaign, stored: StoredFit) -> Judged:
-    """Assess a fit that was stored once more; nothing is fitted."""
-    assessments = assess(stored.fit.stages)
-    names = {each.name for each in stored.experiments}
-    runs = campaign.select(axis=stored.axis, role="validate")
-    predicted = predict(stored.fit.parameters, [each for each in runs if each.name not in names])
-    planned = [each.name for each in stored.fit.setup.stages]
-    return Judged(
-        campaign,
-        stored.fit,
-        stored.experiments,
-        assessments,
-        predicted,
-        verdict(assessments, predicted, planned=planned),
-        profiles=stored.profiles,
-        folds=stored.folds,
-        notes=stored.notes or {},
-    )
+    notes = {**versions(), "seed": str(wanted.seed), "campaign": str(campaign.path)}
+    return Judged(campaign, result, runs, bootstraps, profiles, folds, notes, wanted.required)
 
 
 def versions() -> dict[str, str]:
@@ -433,91 +437,19 @@ class FitFile(Entry):
     notes: dict[str, str]
 
 
-@dataclass(frozen=True, eq=False)
-class StoredFit(Result):
-    """A fit as it was, and what was computed with it."""
-
-    fit: Fit
-    axis: str
-    experiments: tuple[Experiment, ...]
-    """That were fitted."""
-    profiles: tuple[StageProfile, ...] = ()
-    folds: CrossValidation | None = None
-    notes: Mapping[str, str] | None = None
-    """Versions, seed, command."""
-
-
-def save_fit(
-    fit: Fit,
-    experiments: Sequence[Experiment],
-    path: str | Path,
-    *,
-    campaign: str | Path = "",
-    profiles: Sequence[StageProfile] = (),
-    folds: CrossValidation | None = None,
-    notes: Mapping[str, str] | None = None,
-) -> None:
-    """Store a fit as JSON, whole or not at all.
-
-    Parameters
-    ----------
-    fit : Fit
-        What was found.
-    experiments : sequence of Experiment
-        The runs that it was fitted to, as given to `fitting.fit`. Their samples stay in the
-        campaign; a fingerprint of each is stored.
-    path : path
-        ``fitted/fit.json``.
-    campaign : path
-        The campaign's file, for people.
-    profiles, folds :
-        What was computed besides, if anything.
-    notes : mapping of str to str, optional
-        What belongs to the report: versions, seed, command.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be written.
-    """
-    stages = tuple(
-        StoredStage(
-            name=each.stage.name,
-            unknowns=each.problem.unknowns.items,
-            solution=each.solution,
-            starts=each.starts,
-        )
-        for each in fit.stages
-    )
-    start = fit.nominal
-    content = FitFile(
-        swashplate=__version__,
-        axis=experiments[0].axis,
-        campaign=str(campaign),
-        runs={each.name: fingerprint(each) for each in experiments},
-        nominal=dict(start.numbers) if isinstance(start, ModelParameters) else dump_set(start),
-        setup=fit.setup,
-        stages=stages,
-        profiles=tuple(profiles),
-        folds=folds,
-        notes=dict(notes or {}),
-    )
-    write_text(content.model_dump_json(indent=1, by_alias=True) + "\n", path)
-
-
 def load_fit(
     path: str | Path,
     campaign: Campaign,
     *,
     model: ModelSetup | None = None,
     threads: int | None = None,
-) -> StoredFit:
+) -> Judged:
     """A stored fit with its campaign, without fitting again.
 
     Parameters
     ----------
     path : path
-        What `save_fit` wrote.
+        What `Judged.store` wrote.
     campaign : Campaign
         The tests that were fitted.
     model : ModelSetup, optional
@@ -566,13 +498,14 @@ def load_fit(
         problem = replace(problem, unknowns=Unknowns(theirs))
         parameters = with_estimates(parameters, problem, entry.solution.vector)
         stages.append(StageFit(stage, problem, entry.solution, parameters, entry.starts))
-    return StoredFit(
-        Fit(file.setup, nominal, tuple(stages)),
-        file.axis,
+    found = Fit(file.setup, nominal, tuple(stages))
+    return Judged(
+        campaign,
+        found,
         experiments,
-        file.profiles,
-        file.folds,
-        file.notes,
+        profiles=file.profiles,
+        folds=file.folds,
+        notes=file.notes,
     )
 
 

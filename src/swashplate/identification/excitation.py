@@ -1,4 +1,4 @@
-"""What the runs can tell, known before a fit: which run tells of which unknown, what to fix."""
+"""What the runs can tell, known before a fit: which run tells of which unknown."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import exp, isfinite
-from textwrap import wrap
 from typing import Literal
 
 import numpy as np
@@ -15,14 +14,9 @@ from numpy.typing import NDArray
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel, Forces, current_record, voltage_record
-from swashplate.identification.identifiability import (
-    NAMED,
-    Identifiability,
-    identifiability,
-    listed,
-)
+from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.problem import LinearisedFit, Problem, linearised_fit
-from swashplate.identification.setup import Free, GivenForces, Setup, Stage
+from swashplate.identification.setup import Stage
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.unknowns import Unknown
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, OWN, REFINEMENTS
@@ -30,6 +24,7 @@ from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set
 from swashplate.results import Result
 from swashplate.simulation.result import Limit, Simulation
 from swashplate.simulation.run import simulate_drive, simulate_pump
+from swashplate.tables import listed
 
 Array = NDArray[np.float64]
 
@@ -181,51 +176,6 @@ MOST = 0.2
 """Share of a run's information from which it is one of those that tell most."""
 
 
-def _alone(name: str, share: Array, runs: Sequence[str]) -> list[str]:
-    """A sentence on an unknown that rests on one run."""
-    most = int(np.argmax(share))
-    if len(runs) < 2 or share[most] < ALONE:
-        return []
-    return [f"{name}: {100.0 * share[most]:.0f} % of its information is from {runs[most]} alone."]
-
-
-@dataclass(frozen=True, eq=False)
-class Excitation(Result):
-    """How much each run moves with each unknown."""
-
-    runs: tuple[str, ...]
-    """Experiment and channel of each row."""
-    names: tuple[str, ...]
-    """Unknown of each column."""
-    sensitivity: Array
-    """(runs, K) root mean square change of the weighted residual for 1 % of the unknown."""
-    share: Array
-    """(runs, K) part of an unknown's information (its squared derivatives) from each run; columns
-    add up to 1, or are 0 where no run tells anything."""
-
-    def sentences(self) -> tuple[str, ...]:
-        """What rests on nothing, and what on one run alone."""
-        said = []
-        for name, share in zip(self.names, self.share.T, strict=True):
-            said += _alone(name, share, self.runs)
-            if not share.any():
-                said.append(f"{name}: no run depends on it.")
-        return tuple(said)
-
-
-def excitation(fit: LinearisedFit) -> Excitation:
-    """The table of a fit."""
-    squares = np.array([np.sum(run.jacobian**2, axis=0) for run in fit.runs])
-    samples = np.array([float(run.time.size) for run in fit.runs])
-    total = squares.sum(axis=0)
-    return Excitation(
-        tuple(run.label for run in fit.runs),
-        fit.variables.names,
-        0.01 * np.sqrt(squares / samples[:, None]),
-        np.divide(squares, total, out=np.zeros_like(squares), where=total > 0.0),
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class Outlook(Result):
     """What the runs can tell of a stage's unknowns, at the nominal values: known before a fit."""
@@ -267,10 +217,11 @@ class Outlook(Result):
     def shares(self) -> Array:
         """(runs, K) part of what is known of an unknown from each run, its channels together."""
         runs = list(self.simulations)
-        shares = np.zeros((len(runs), len(self.linearised.variables.names)))
-        found = excitation(self.linearised).share
-        for run, share in zip(self.linearised.runs, found, strict=True):
-            shares[runs.index(run.name)] += share
+        squares = np.zeros((len(runs), self.linearised.variables.count))
+        for run in self.linearised.runs:
+            squares[runs.index(run.name)] += np.sum(run.jacobian**2, axis=0)
+        total = squares.sum(axis=0)
+        shares: Array = np.divide(squares, total, out=np.zeros_like(squares), where=total > 0.0)
         return shares
 
     def effect(self, name: str) -> float:
@@ -305,9 +256,15 @@ class Outlook(Result):
             f"{listed(names)} need{'s' if len(names) == 1 else ''} {why}."
             for why, names in groups.items()
         ]
-        for name in self.names:
+        runs = list(self.simulations)
+        for name in self.names if len(runs) > 1 else ():
             share = self.shares[:, self.linearised.variables.index(name)]
-            said += _alone(name, share, list(self.simulations))
+            most = int(np.argmax(share))
+            if share[most] >= ALONE:
+                said.append(
+                    f"{name}: {100.0 * share[most]:.0f} % of its information is from {runs[most]} "
+                    "alone."
+                )
         return tuple(said)
 
     def _missing(self, name: str) -> str:
@@ -319,7 +276,9 @@ class Outlook(Result):
         need = need if side is None else f"{need} ({side})"
         having = [run for run, s in zip(self.simulations, self._seconds(name), strict=True) if s]
         if not having:
-            return f"{need}, which no run has"
+            forces = name.startswith("force_")
+            instead = "ask for forces at smaller currents" if forces else "fix it"
+            return f"{need}, which no run has: {instead}, or add a test that has it"
         return f"{need}: {having[0]} meets it, but shows it in no sample that is used"
 
     def _seconds(self, name: str) -> Array:
@@ -356,148 +315,3 @@ def outlook(
     seconds = activation(simulations, parameters, problem.unknowns.items, model.forces)
     fit = linearised_fit(problem, problem.start)
     return Outlook(stage, problem, simulations, fit, seconds)
-
-
-ROOM = 0.98
-"""Part of the largest tested current at which the outermost force is asked for."""
-IDLE = "no run exercises it"
-COMMENT = 96
-"""Letters in a line of a comment."""
-
-
-@dataclass(frozen=True)
-class Proposal(Result):
-    """What to change in one stage so that the runs determine all that is free."""
-
-    stage: Stage
-    """As it was."""
-    proposed: Stage | None
-    """As it could be; None if nothing of it can be determined."""
-    fixed: Mapping[str, str]
-    """Unknowns to fix, each with the reason."""
-    notes: tuple[str, ...] = ()
-    """What else is changed, or cannot be."""
-
-    @property
-    def changes(self) -> bool:
-        """Whether anything is to be changed."""
-        return self.proposed != self.stage
-
-    def sentences(self) -> tuple[str, ...]:
-        """The offer in words."""
-        said = [f"Fix {', '.join(names)}: {reason}." for names, reason in self._by_reason()]
-        if self.proposed is None:
-            said.append(f"Nothing is then left of the stage '{self.stage.name}'.")
-        return (*said, *self.notes)
-
-    def comments(self) -> tuple[str, ...]:
-        """What is fixed, as lines for the file."""
-        return tuple(
-            line
-            for names, reason in self._by_reason()
-            for line in wrap(
-                f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} fixed: {reason}", COMMENT
-            )
-        )
-
-    def _by_reason(self) -> list[tuple[list[str], str]]:
-        reasons: dict[str, list[str]] = {}
-        for name, reason in self.fixed.items():
-            reasons.setdefault(reason, []).append(name)
-        return [
-            (names, "no run exercises them" if reason == IDLE and len(names) > 1 else reason)
-            for reason, names in reasons.items()
-        ]
-
-
-def propose(outlook: Outlook) -> Proposal:
-    """What to fix in one stage, or to ask for instead, from what the runs cannot tell."""
-    verdict = outlook.identifiability
-    reasons = dict.fromkeys(verdict.unexcited, IDLE)
-    for direction in verdict.null:
-        others = [name for name in direction.changes if name != direction.fix]
-        more = f" and {len(others) - NAMED} others" if len(others) > NAMED else ""
-        told = f"the runs cannot distinguish it from {', '.join(others[:NAMED])}{more}"
-        reasons[direction.fix] = told if direction.gauge is None else direction.gauge.determined
-    notes = [f"{name} belongs to one run and stays free." for name in reasons if "(" in name]
-    reasons = {name: why for name, why in reasons.items() if "(" not in name}
-    stage = outlook.stage
-    forces, of_forces, said = _forces(outlook, reasons)
-    for name in of_forces:
-        del reasons[name]
-    free = _without(stage.free, tuple(reasons))
-    changed = stage.model_copy(update={"free": free, "forces": forces}) if free else None
-    return Proposal(stage, changed, reasons, (*notes, *said))
-
-
-def _without(free: Mapping[str, Free], fixed: Sequence[str]) -> dict[str, Free]:
-    """Entries of a stage without some unknowns; a direction alone where the other one is fixed."""
-    kept: dict[str, Free] = {}
-    for name, entry in free.items():
-        if name in fixed:
-            continue
-        columns = CATALOGUE[name].columns if name in CATALOGUE else (name,)
-        left = [column for column in columns if column not in fixed]
-        if entry.tied or len(left) == len(columns):
-            kept[name] = entry
-        else:
-            kept |= dict.fromkeys(left, entry)
-    return kept
-
-
-def _forces(
-    outlook: Outlook, reasons: Mapping[str, str]
-) -> tuple[GivenForces | None, list[str], list[str]]:
-    """Forces within the tested currents; names of forces among the reasons, and what to say."""
-    given = outlook.stage.forces
-    if given is None:
-        return None, [], []
-    known = Forces(given.plus, given.minus).names
-    concerned = [name for name in reasons if name in known]
-    changes: dict[str, tuple[float, ...]] = {}
-    notes = []
-    for side, sign in (("plus", 1.0), ("minus", -1.0)):
-        names = [name for name in concerned if f"_{side}_" in name]
-        currents = getattr(given, side)
-        largest = max(
-            float(np.max(sign * each.current, initial=0.0)) - each.pump.Z17
-            for each in outlook.simulations.values()
-        )
-        outermost = outlook.seconds[:, outlook.names.index(f"force_{side}_{len(currents)}")]
-        if largest <= 0.0 and names:
-            notes.append(
-                f"{', '.join(names)} cannot be left out of [stages.forces]: without a current "
-                f"beyond Z17 ({side}) they stay at their nominal values, and do no harm."
-            )
-        elif largest > 0.0 and not outermost.any():
-            factor = ROOM * largest / currents[-1]
-            changes[side] = tuple(float(f"{factor * current:.3g}") for current in currents)
-            asked = ", ".join(f"{current:g}" for current in changes[side])
-            notes.append(
-                f"Ask for the {side} forces at {asked} A: no run goes further than {largest:.3g} A "
-                "beyond Z17."
-            )
-        elif names:
-            notes.append(
-                f"{', '.join(names)} cannot be fixed alone in [stages.forces]: add a run that "
-                f"dwells at more levels between {currents[0]:g} and {currents[-1]:g} A ({side})."
-            )
-    return given.model_copy(update=changes), concerned, notes
-
-
-def proposed_setup(setup: Setup, proposals: Sequence[Proposal]) -> Setup:
-    """A set-up with all proposals taken; stages of which nothing is left are left out.
-
-    Raises
-    ------
-    InputError
-        If nothing is left at all.
-    """
-    stages = tuple(each.proposed for each in proposals if each.proposed is not None)
-    if not stages:
-        raise InputError(
-            "The runs determine none of the parameters, so that there is no fit configuration to "
-            "propose: test "
-            "what exercises them first."
-        )
-    return setup.model_copy(update={"stages": stages})

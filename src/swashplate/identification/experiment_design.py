@@ -1,4 +1,4 @@
-"""Design of experiments: which further test or sensor tells most, by Fisher information."""
+"""Design of experiments: which further test tells most, by Fisher information."""
 
 from __future__ import annotations
 
@@ -42,15 +42,6 @@ TRANSDUCER = 0.005
 """Noise that is assumed of a sensor, over the largest value that the drive makes it read. [1]"""
 MEMORY = 0.1
 """Time over which errors of a measurement are assumed to stay correlated. [s]"""
-ADDED: tuple[ChannelKind, ...] = (
-    "current_plus",
-    "current_minus",
-    "spool_position",
-    "stroker_pressure",
-    "swash_angle",
-    "shaft_speed",
-)
-"""Sensors that could be added."""
 
 
 class Sensor(NamedTuple):
@@ -478,46 +469,6 @@ def default_maneuvers() -> tuple[Maneuver, ...]:
             for volts in (4.0, 9.0)
         ),
     )
-
-
-class SensorAdvice(NamedTuple):
-    """A sensor that could be added to a test."""
-
-    def __repr__(self) -> str:
-        return short(self)
-
-    sensor: Sensor
-    maneuver: str
-    """The test in which it would tell most."""
-    advice: Advice
-    """What it would add to that test with the sensors at hand."""
-
-
-def judge_sensors(
-    bench: Bench,
-    maneuvers: Sequence[Maneuver],
-    added: Sequence[Sensor],
-    *,
-    beside: Sequence[str] = (),
-) -> tuple[SensorAdvice, ...]:
-    """For each sensor, one by one, the test in which it tells most, and what it adds there.
-
-    `beside` are names of maneuvers that count as made where the bench has no tests yet.
-    """
-    known = [bench.present]
-    if not len(bench.present):
-        made = [each for each in maneuvers if each.name in beside]
-        known += [bench.candidate(each, bench.sensors).rows for each in made]
-    found = []
-    for sensor in added:
-        judged = []
-        for maneuver in maneuvers:
-            without = bench.candidate(maneuver, bench.sensors).rows
-            more = Candidate(sensor.kind, bench.rows(maneuver, sensor), duration=maneuver.length)
-            (advice,) = advise(np.vstack([*known, without]), [more], bench.variables)
-            judged.append(SensorAdvice(sensor, maneuver.name, advice))
-        found.append(min(judged, key=lambda each: each.advice.rank))
-    return tuple(found)
 
 
 def in_turn(

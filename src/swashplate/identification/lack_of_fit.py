@@ -16,6 +16,7 @@ from swashplate.identification.drive_model import CURRENTS, DriveModel
 from swashplate.identification.model import linearised, simulated
 from swashplate.identification.problem import TOLERANCE, triangular_factor
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
+from swashplate.tables import listed
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Assessment
@@ -25,6 +26,11 @@ Array = NDArray[np.float64]
 
 EXPLAINS = 0.2
 """Part of the residuals' squares from which a fault is named as a likely cause."""
+
+SIGNIFICANT = 10.0
+"""Standard errors from which a fault's size is taken for one. They are those of one step and of
+independent samples: in sound campaigns sizes reach 13 of them, but no third of what is plausible.
+"""
 
 SAME_DIRECTION = 1e-6
 """Part of a fault's effect outside the estimates' below which both are the same: derivatives are
@@ -48,9 +54,21 @@ FAR = 100.0
 UNTOLD = 1e-4
 """Part of a fixed parameter's effect outside the estimates' below which it is a unit of them."""
 
+LOSS = "loss at the largest speeds of "
+"""What the name of a counter's fault begins with, that it does not follow the largest speeds."""
+
 UNCERTAIN = "fixed: "
 """What the name of a fixed parameter with a standard uncertainty begins with: an estimate that its
 value, as a measurement, is part of."""
+
+FIXED_OFF = 0.1
+"""Standard deviation by which a fixed parameter without a stated one may be off. [1]"""
+
+FASTEST = 0.99
+"""Part of the largest measured speed beyond which a counter is asked whether it follows."""
+
+WINDOW = 0.0625
+"""Time over which that speed is taken. [s]"""
 
 DWELLS = 0.1
 """Time for which a noisy channel stands at its very largest value only if it is clipped. [s]"""
@@ -75,24 +93,62 @@ class Fault:
     """Estimates that make up for it, the largest effect first."""
     plausible: float = inf
     """Size that occurs without notice; inf for what is no fault of an instrument. [unit]"""
+    with_fixed: float = 0.0
+    """Standard error of the size if each fixed parameter may be off by 10 %. [unit]"""
+    fixed: tuple[str, ...] = ()
+    """Fixed parameters that then make up for it, the largest effect first."""
+
+    @property
+    def told(self) -> bool:
+        """Whether the logs tell one of plausible size from other estimates."""
+        return self.outside > SAME_DIRECTION and 2.0 * self.standard_error < self.plausible
 
     @property
     def hidden(self) -> bool:
-        """Whether the logs cannot tell it: one of plausible size passes as other estimates."""
-        told = self.outside > SAME_DIRECTION and 2.0 * self.standard_error < self.plausible
+        """Whether one of plausible size passes as other estimates, or as other fixed values."""
+        told = self.told and 2.0 * self.with_fixed < self.plausible
         return isfinite(self.plausible) and not told
+
+    @property
+    def significant(self) -> bool:
+        """Whether its size is told from none."""
+        return abs(self.size) > SIGNIFICANT * self.standard_error
+
+    @property
+    def explains(self) -> bool:
+        """Whether it explains a large part of the residuals."""
+        return self.share > EXPLAINS
+
+    @property
+    def words(self) -> str:
+        """Its name, and the fixed parameters that might be wrong in its place."""
+        either = self.told and self.hidden and self.fixed
+        return f"{self.name}, or of the fixed {listed(self.fixed)}," if either else self.name
+
+    @property
+    def near(self) -> bool:
+        """Whether one step says how large it is, or it has no size of its own."""
+        return self.unit != "%" or self.name == "tau" or self.lost or abs(self.size) <= FAR
+
+    @property
+    def lost(self) -> bool:
+        """Whether it is a counter that does not follow."""
+        return self.name.startswith(LOSS)
 
     @property
     def cause(self) -> str:
         """It as a likely cause, in words."""
-        return (
-            f"{self.name} by {self.size:+.3g} {self.unit} "
-            f"(explains {100.0 * self.share:.0f} % of the remaining residuals)"
-        )
+        size = "" if self.lost else f" by {self.size:+.3g} {self.unit}"
+        return f"{self.name}{size} (explains {100.0 * self.share:.0f} % of the remaining residuals)"
 
     @property
     def assumption(self) -> str:
         """It as an assumption, in words."""
+        if self.told:
+            below = ""
+            if isfinite(self.with_fixed):
+                below = f" below {2.0 * self.with_fixed:.2g} {self.unit}"
+            return f"{self.name}: an error{below} can be one of the fixed {listed(self.fixed)}"
         if isfinite(self.standard_error):
             return (
                 f"{self.name}: an error below {2.0 * self.standard_error:.2g} {self.unit} is not "
@@ -142,10 +198,7 @@ class LackOfFit:
     @property
     def causes(self) -> tuple[Fault, ...]:
         """Faults that explain a large part of the residuals, the likeliest first; three at most."""
-        likely = (each for each in self.faults if each.share >= EXPLAINS)
-        return tuple(e for e in likely if e.unit != "%" or e.name == "tau" or abs(e.size) <= FAR)[
-            :3
-        ]
+        return tuple(each for each in self.faults if each.explains and each.near)[:3]
 
     @property
     def assumed(self) -> tuple[Fault, ...]:
@@ -201,6 +254,9 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
     triangle = np.eye(len(places) + 1)[uncertain]
     triangle = triangular_factor(np.vstack([triangle, *(each.factor(places) for each in blocks)]))
     basis, inverse = _span(triangle[:, :count])
+    known, steps = count + len(constants), np.eye(len(places) + 1)[count : count + len(constants)]
+    open_fixed = triangular_factor(np.vstack([steps / FIXED_OFF, triangle]))
+    wider, instead = _span(open_fixed[:, :known])
     shift = inverse @ triangle[:, -1]
     left = triangle[:, -1] - basis @ (basis.T @ triangle[:, -1])
     squares = float(left @ left)
@@ -221,6 +277,10 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
         effect = np.abs(change) * np.linalg.norm(triangle[:, :count], axis=0)
         order = [int(k) for k in np.argsort(-effect)[:4] if effect[k] > 0.01 * length]
         factor, unit, plausible = meanings[name]
+        free = open_fixed[:, places[name]]
+        left_over = float(np.linalg.norm(free - wider @ (wider.T @ free)))
+        moved = np.abs((instead @ free)[count:]) * np.linalg.norm(triangle[:, count:known], axis=0)
+        fixed = [constants[k] for k in np.argsort(-moved)[:3] if moved[k] > 0.1 * moved.max()]
         found.append(
             Fault(
                 name,
@@ -231,6 +291,8 @@ def lack_of_fit(assessments: Sequence[Assessment]) -> LackOfFit:
                 along / length,
                 tuple(dict.fromkeys(names[k].split(": ")[1] for k in order)),
                 plausible,
+                factor * deviation / left_over if left_over > SAME_DIRECTION * length else inf,
+                tuple(dict.fromkeys(COLUMNS.get(each, each) for each in fixed)),
             )
         )
     twins = [twin for each in assessments for twin in _late_commands(each)][:1]
@@ -379,6 +441,7 @@ class _StageBlocks:
         made = []
         runs = {(run.name, run.channel): run for run in self.assessment.linearised.runs}
         free = self.assessment.linearised.variables.free
+        fastest = {name: self._fastest(name) for name in self.problem.channels}
         for number, experiment in enumerate(self.problem.experiments):
             outputs = self.problem.outputs(self.vector, number)
             by_others = self._by_others(number)
@@ -407,7 +470,7 @@ class _StageBlocks:
                         )
                 place = number / max(len(self.problem.experiments) - 1, 1) - 0.5
                 faults = {
-                    **_instrument_faults(experiment, experiment[name], outputs[name], place),
+                    **_instrument_faults(experiment, name, outputs[name], place, fastest[name]),
                     **commanded.get(name, {}),
                 }
                 made.append(
@@ -426,6 +489,18 @@ class _StageBlocks:
                     )
                 )
         return made
+
+    def _fastest(self, name: str) -> float:
+        """Largest measured rate of a position in any run, over short windows; 0 of others."""
+        rates = [0.0]
+        for each in self.problem.experiments:
+            if name in each.channels and each[name].is_position:
+                time, values = each[name].time[each[name].used], each[name].values[each[name].used]
+                if time.size > 1:
+                    width = max(round(WINDOW / float(np.median(np.diff(time)))), 1)
+                    moved = np.abs(values[width:] - values[:-width])
+                    rates.append(float((moved / (time[width:] - time[:-width])).max(initial=0.0)))
+        return max(rates)
 
     def _by_others(self, number: int) -> dict[str, dict[str, Array]]:
         """By channel, (m,) derivatives by earlier stages' estimates and fixed parameters."""
@@ -479,13 +554,15 @@ class _StageBlocks:
 
 
 def _instrument_faults(
-    experiment: Experiment, channel: Channel, output: Array, place: float
+    experiment: Experiment, name: str, output: Array, place: float, fastest: float
 ) -> dict[str, tuple[Array, tuple[float, str, float]]]:
     """Effects (m,) of faults on a channel's reading, with factor, unit and plausible size.
 
-    `place` is that of the run in the campaign, from -1/2 to 1/2.
+    `place` is that of the run in the campaign, from -1/2 to 1/2; `fastest` the largest rate of a
+    position that was measured in any run.
     """
-    name, time = channel.name, channel.time
+    channel = experiment[name]
+    time = channel.time
     slope = np.gradient(output, time) if time.size > 2 else np.zeros_like(output)
     about = output - output[0] if channel.is_position else output
     made = {
@@ -506,6 +583,8 @@ def _instrument_faults(
         step = np.diff(time, prepend=time[:1])
         way, lost = np.cumsum(way * step), time - time[0]
         unit = f"{unit}/s"
+        beyond = np.sign(slope) * np.maximum(np.abs(slope) - FASTEST * fastest, 0.0)
+        made[f"{LOSS}{name}"] = (-np.cumsum(beyond * step), (100.0, "%", inf))
     return {
         **made,
         f"load or leakage, as a loss of {name},": (-lost, (factor, unit, inf)),

@@ -33,9 +33,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-VARIES = 0.1
-"""Jackknife error over the estimate from which an unknown is said to depend on the runs."""
-
 
 class HeldRun(NamedTuple):
     """How well one channel of a run is predicted by a fit that did not see it."""
@@ -62,45 +59,23 @@ class HeldRun(NamedTuple):
         )
 
 
-class FoldEstimate(NamedTuple):
-    """An unknown as one fold's fit found it."""
-
-    stage: str
-    name: str
-    unit: str
-    value: float
-
-
 @dataclass(frozen=True)
 class Fold(Result):
     """One part of the runs, and the fit to the others."""
+
+    # files of earlier releases hold estimates of each fold as well
+    __pydantic_config__ = {"extra": "ignore"}  # noqa: RUF012
 
     number: int
     """From 0."""
     held: tuple[str, ...]
     """Names of the runs that were held out."""
-    estimates: tuple[FoldEstimate, ...]
     lost: tuple[str, ...]
-    """Unknowns that only the runs held out tell of: their estimates here mean nothing."""
+    """Unknowns that only the runs held out tell of: this fold's fit does not determine them."""
     runs: tuple[HeldRun, ...]
     converged: bool
     failure: str
     """Why there is no fit, or empty."""
-
-
-class Spread(NamedTuple):
-    """How an estimate varies with the runs it comes from."""
-
-    stage: str
-    name: str
-    unit: str
-    folds: int
-    """That tell of it."""
-    mean: float
-    lowest: float
-    highest: float
-    error: float | None
-    """Delete-a-group jackknife standard error; None from less than 2 folds."""
 
 
 @dataclass(frozen=True)
@@ -126,30 +101,6 @@ class CrossValidation(Result):
         """SI unit of each channel."""
         return {run.channel: run.unit for fold in self.folds for run in fold.runs}
 
-    @property
-    def spreads(self) -> tuple[Spread, ...]:
-        """How each unknown varies over the folds that tell of it.
-
-        Notes
-        -----
-        The jackknife's error √((k-1)/k Σ(θ_i - mean)²) holds for any colour of the noise and takes
-        in that the model is not exact; from a few folds it is itself known to a third or so.
-        """
-        found: dict[tuple[str, str, str], list[float]] = {}
-        for fold in self.folds:
-            for each in fold.estimates:
-                values = found.setdefault(each[:3], [])
-                if each.name not in fold.lost:
-                    values.append(each.value)
-        made = []
-        for key, values in found.items():
-            told, error = np.array(values or [np.nan]), None
-            if len(values) > 1:
-                error = float(np.sqrt((told.size - 1) * told.var()))
-            ends = float(told.mean()), float(told.min()), float(told.max())
-            made.append(Spread(*key, len(values), *ends, error))
-        return tuple(made)
-
     def sentences(self) -> tuple[str, ...]:
         """What must be known besides the numbers."""
         said = []
@@ -167,16 +118,6 @@ class CrossValidation(Result):
                     f"determine {'them' if len(fold.lost) > 1 else 'it'}, so their prediction is "
                     "not reliable."
                 )
-        varying = [
-            f"{each.name} ±{100.0 * each.error / abs(each.mean):.2g} %"
-            for each in self.spreads
-            if each.error is not None and each.error > VARIES * abs(each.mean) > 0.0
-        ]
-        if varying:
-            said.append(
-                f"Estimates that depend on which runs they come from (jackknife standard error "
-                f"beyond {100.0 * VARIES:.0f} %): {', '.join(varying)}."
-            )
         return tuple(said)
 
 
@@ -304,15 +245,9 @@ def _fold(
             raise KeyboardInterrupt
         runs = tuple(HeldRun.of(each) for each in with_speeds(predict(result.parameters, held)))
     except (InputError, DomainError) as error:
-        return Fold(number, names, (), (), (), False, str(error))
-    estimates = tuple(
-        FoldEstimate(each.stage.name, unknown.name, unknown.unit, each.values[unknown.name])
-        for each in result.stages
-        for unknown in each.problem.unknowns
-        if unknown.run is None
-    )
+        return Fold(number, names, (), (), False, str(error))
     converged = all(each.solution.converged for each in result.stages)
-    return Fold(number, names, estimates, _lost(result, held, threads), runs, converged, "")
+    return Fold(number, names, _lost(result, held, threads), runs, converged, "")
 
 
 def _lost(result: Fit, held: Sequence[Experiment], threads: int | None) -> tuple[str, ...]:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 
@@ -14,9 +13,6 @@ from swashplate.campaign.schema import NotNegative, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.errors import ParameterError
 from swashplate.results import short
-
-if TYPE_CHECKING:
-    from tomlkit.items import InlineTable
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
@@ -263,46 +259,13 @@ def load_setup(name: str | Path) -> Setup:
     return validated(parse_toml(text, f"{name}.toml"), Setup, f"{name}.toml")
 
 
-def setup_text(setup: Setup, comments: Mapping[str, Sequence[str]] | None = None) -> str:
-    """A set-up as TOML, with comments.
+def setup_text(setup: Setup) -> str:
+    """A fit configuration as TOML that `load_setup` reads as an equal one."""
+    from tomlkit import dumps, inline_table
 
-    Parameters
-    ----------
-    setup : Setup
-        What to write; `setup.load_setup` reads an equal one.
-    comments : mapping of str to sequence of str, optional
-        Lines to stand beneath a stage's free parameters, by its name.
-    """
-    from tomlkit import aot, comment, document, inline_table, table
-
-    def inline(content: Mapping[str, Any]) -> InlineTable:
-        made = inline_table()
-        made.update(content)
-        return made
-
-    text, stages = document(), aot()
-    if setup.title:
-        text.add("title", setup.title)
-    if setup.standard_uncertainty:
-        text.add("standard_uncertainty", inline(setup.standard_uncertainty))
-    for stage in setup.stages:
-        content = stage.model_dump(mode="json", by_alias=True, exclude_defaults=True)
-        made = table()
-        for key in ("name", "part", "current", "channels"):
-            if key in content:
-                made.add(key, content[key])
-        free = table()
-        for name, entry in content["free"].items():
-            free.add(name, inline(entry))
-        for line in (comments or {}).get(stage.name, ()):
-            free.add(comment(line))
-        made.add("free", free)
-        for key in ("forces", "weights"):
-            if key in content:
-                part = table()
-                for name, value in content[key].items():
-                    part.add(name, value)
-                made.add(key, part)
-        stages.append(made)
-    text.add("stages", stages)
-    return text.as_string()
+    content = setup.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+    for stage in content["stages"]:
+        for name, entry in stage["free"].items():
+            stage["free"][name] = inline_table()
+            stage["free"][name].update(entry)
+    return dumps(content)

@@ -13,7 +13,7 @@ import numpy as np
 
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.experiment_design import Advice, Gain, SensorAdvice
+from swashplate.identification.experiment_design import Advice, Gain
 from swashplate.identification.identifiability import GAUGES, SCALES, moved_columns, true_values
 from swashplate.identification.intervals import Estimate
 from swashplate.identification.own_model import ModelParameters
@@ -36,13 +36,13 @@ from swashplate.units import chosen_unit, display_unit
 
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Channel, Experiment
-    from swashplate.identification.acceptance import Verdict
     from swashplate.identification.assessment import Assessment
     from swashplate.identification.excitation import Outlook
     from swashplate.identification.fitting import Fit, StageFit
     from swashplate.identification.resampling import Bootstrap, CrossValidation
     from swashplate.identification.unknowns import Unknown
     from swashplate.identification.validation import Measures, RunQuality
+    from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
 # --- estimates ------------------------------------------------------------------------------------
@@ -62,7 +62,7 @@ def estimates_table(
     assessment : Assessment
         Of the stage.
     truth : ParameterSet, optional
-        Of virtual tests, in the scales that the fit kept fixed, see `in_the_fits_scales`.
+        Of virtual tests: what was simulated.
     bootstrap : Bootstrap, optional
         Whose intervals stand beside.
     own : bool
@@ -425,7 +425,7 @@ def criteria_table(verdict: Verdict) -> Table:
 
 
 def folds_tables(found: CrossValidation, assessments: Sequence[Assessment]) -> list[Table]:
-    """Errors held out beside those of the fit to all runs, the folds, and the estimates' spread."""
+    """Errors held out beside those of the fit to all runs, and the folds."""
     whole = pooled(with_speeds(each for stage in assessments for each in stage.runs))
     held_out = Table(
         "Cross-validation: each part predicted by a fit to the others",
@@ -456,45 +456,7 @@ def folds_tables(found: CrossValidation, assessments: Sequence[Assessment]) -> l
             for name, each in measured.items()
         )
         folds.add(fold.number + 1, ", ".join(fold.held), state, ", ".join(fits) or NONE)
-    return [held_out, folds, _spreads(found, assessments)]
-
-
-def _spreads(found: CrossValidation, assessments: Sequence[Assessment]) -> Table:
-    errors = ("jackknife", "quoted")
-    made = Table(
-        "Estimates over the folds",
-        (
-            Column("parameter"),
-            UNIT,
-            Column("all runs", ".5g"),
-            *(Column(each, none=NONE) for each in errors),
-            Column("lowest", ".5g"),
-            Column("highest", ".5g"),
-            Column("folds", "d", "1"),
-        ),
-        si=True,
-    )
-    values = {
-        (each.stage.stage.name, name): value
-        for each in assessments
-        for name, value in each.stage.values.items()
-    }
-    quoted = {
-        (each.stage.stage.name, one.name): one.standard_error
-        for each in assessments
-        for one in _intervals(each)[1]
-        if one is not None
-    }
-    for each in found.spreads:
-        key = (each.stage, each.name)
-        value = values.get(key, each.mean)
-        shares = (
-            Cell(error, f"±{percent(error, value)}") if error is not None else None
-            for error in (each.error, quoted.get(key))
-        )
-        ends = (each.lowest, each.highest, each.folds)
-        made.add(each.name, value, *shares, *ends, unit=each.unit)
-    return made
+    return [held_out, folds]
 
 
 # --- information of runs and of tests to come -----------------------------------------------------
@@ -537,70 +499,34 @@ def outlook_rows(looks: Sequence[Outlook]) -> Table:
     return made
 
 
-def excitation_table(assessment: Assessment) -> tuple[Table, list[str]]:
-    """Share of each unknown's information by run, at the optimum, and sentences on it."""
-    from swashplate.identification.excitation import excitation
-
-    fit = assessment.linearised
-    found = excitation(fit)
-    unknowns = assessment.stage.problem.unknowns
-    samples = np.array([run.time.size for run in fit.runs], dtype=np.float64)
-    # rows of one channel need not name it
-    several = len({run.channel for run in fit.runs}) > 1
-    runs = [run.label if several else run.name for run in fit.runs]
-    heads = (Column(run, ".0f", shade=True) for run in runs)
-    made = Table(
-        f"Stage {assessment.stage.stage.name}",
-        (Column("parameter"), Column("change for 1 %", ".2g"), *heads),
-    )
-    for k, unknown in enumerate(unknowns):
-        if unknown.run is not None:
-            continue
-        share = found.share[:, k]
-        change = float(np.sqrt(samples @ found.sensitivity[:, k] ** 2 / samples.sum()))
-        cells = (Cell(float(p), f"{100.0 * p:.0f}" if p >= 0.005 else "") for p in share)
-        alone = len(runs) > 1 and float(share.max(initial=0.0)) >= 0.9
-        made.add(found.names[k], change, *cells, look=alone or not share.any())
-    own = [f"{found.names[k]}:" for k, each in enumerate(unknowns) if each.run is not None]
-    return made, [words for words in found.sentences() if not words.startswith(tuple(own))]
-
-
 NAMED = 4
 """Unknowns that a row of advice names."""
 WORTH = 1e-3
 """Relative gain below which none is shown."""
 
 
-def advice_table(title: str, judged: Sequence[Advice | SensorAdvice]) -> Table:
-    """Tests, or sensors to add and the test that they tell most in, in the order given."""
-    rows: list[tuple[str, str, Advice]] = []
-    for each in judged:
-        if isinstance(each, SensorAdvice):
-            rows.append((each.sensor.kind, each.maneuver, each.advice))
-        else:
-            rows.append(("", each.candidate, each))
-    new = any(advice.newly_determined for _, _, advice in rows)
-    sensors = any(sensor for sensor, _, _ in rows)
+def advice_table(title: str, judged: Sequence[Advice]) -> Table:
+    """Tests in the order given, and what each would tell."""
+    new = any(each.newly_determined for each in judged)
     made = Table(
         title,
         (
-            Column("sensor", of="tpf" if sensors else ""),
             Column("test", wrap=not new),
-            Column("s", "g", of="" if sensors else "tpf"),
+            Column("s", "g"),
             Column("first to determine", wrap=True, of="tpf" if new else ""),
             Column("gains most"),
             Column("better", "s"),
         ),
     )
-    for sensor, test, advice in rows:
-        first = ", ".join(advice.newly_determined[:NAMED])
-        more = len(advice.newly_determined) - NAMED
+    for each in judged:
+        first = ", ".join(each.newly_determined[:NAMED])
+        more = len(each.newly_determined) - NAMED
         first = f"{first} + {more}" if more > 0 else first
-        best, times = advice.best, f"{advice.d_gain:.2f}x" if advice.d_gain > 1.0 + WORTH else ""
+        best, times = each.best, f"{each.d_gain:.2f}x" if each.d_gain > 1.0 + WORTH else ""
         gained = (
             "" if best is None else f"{best.name} {_error(best.before)} to {_error(best.after)}"
         )
-        made.add(sensor, test, advice.duration, first, gained, times)
+        made.add(each.candidate, each.duration, first, gained, times)
     return made
 
 
@@ -620,18 +546,16 @@ def _error(error: float) -> str:
     return f"{100.0 * error:.2g} %" if error <= 1.0 else "-"
 
 
-def advice_rows(ranked: Sequence[Advice], sensors: Sequence[SensorAdvice]) -> Table:
-    """All that was judged for a file, a row for each test, sensor and unknown."""
+def advice_rows(ranked: Sequence[Advice]) -> Table:
+    """All that was judged for a file, a row for each test and unknown."""
     heads = ("relative error before", "relative error after", "first to determine", "D-gain")
-    start = ("test", "added sensor", "duration", "parameter")
-    made = Table("", tuple(map(Column, (*start, *heads))))
-    judged = [("", each.candidate, each) for each in ranked]
-    judged += [(each.sensor.kind, each.maneuver, each.advice) for each in sensors]
-    for kind, test, advice in judged:
+    made = Table("", tuple(map(Column, ("test", "duration", "parameter", *heads))))
+    for advice in ranked:
         for gain in advice.gains:
             errors = (e if isfinite(e) else None for e in (gain.before, gain.after))
             first = gain.name in advice.newly_determined
-            made.add(test, kind, advice.duration, gain.name, *errors, first, advice.d_gain)
+            cells = (advice.duration, gain.name, *errors, first, advice.d_gain)
+            made.add(advice.candidate, *cells)
     return made
 
 

@@ -105,7 +105,8 @@ class CompiledStep:
         self, instance: Instance, inputs: Sequence[str], stored: Sequence[Stored], h: float
     ) -> None:
         self._instance, self._h = instance, h
-        self.inputs, self.outputs = tuple(inputs), tuple(each.path for each in stored)
+        self.inputs = tuple(inputs)
+        self.outputs = tuple(each.path or each.kind for each in stored)
         instance.check_inputs(self.inputs)
         self._prepare, self.step, self._count = _kernels(
             instance.model, self.inputs, instance.options, tuple(stored)
@@ -187,6 +188,7 @@ def compiled_step(
         As in `simulate`.
     inputs, outputs : sequence of str
         Signals that the loop gives and takes; inputs with a default parameter may be left out.
+        ``"limits"`` as an output are the acting limits of the last part that has any, a bit each.
     rate : float
         Samples a second. [Hz]
 
@@ -202,7 +204,7 @@ def compiled_step(
 
 
 def stored_of(model: Model, outputs: Sequence[str]) -> tuple[Stored, ...]:
-    """Where the outputs of a step come from.
+    """Where the outputs of a step come from; ``"limits"`` of the last part that has any.
 
     Raises
     ------
@@ -210,7 +212,11 @@ def stored_of(model: Model, outputs: Sequence[str]) -> tuple[Stored, ...]:
         For signals that the model does not have, and integrals, which a loop adds up itself.
     """
     found = []
+    limited = [i for i, part in enumerate(model.parts) if part.limits is not None]
     for output in outputs:
+        if output == "limits" and limited:
+            found.append(Stored(limited[-1], "limits"))
+            continue
         stored, integral = output_of(model, output)
         if integral:
             raise InputError(

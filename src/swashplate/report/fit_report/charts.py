@@ -8,13 +8,13 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from swashplate.identification.acceptance import SAME
 from swashplate.identification.identifiability import Identifiability
 from swashplate.identification.noise import Covariance
 from swashplate.identification.profile import Profile
 from swashplate.identification.solving import StartResult
 from swashplate.identification.unknowns import Unknown
 from swashplate.identification.validation import ResidualTest
+from swashplate.identification.verdict import SAME
 from swashplate.report.lines import thinned
 from swashplate.report.style import BLUE, VERMILION
 

@@ -16,15 +16,15 @@ from swashplate.campaign import Campaign, examine, quality_table
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
-from swashplate.identification.acceptance import Statement, Verdict, percent, starts_of, verdict
+from swashplate.identification.acceptance import percent
 from swashplate.identification.assessment import Assessment, StageProfile, assess, motion_of
 from swashplate.identification.fitting import Fit, StageFit
-from swashplate.identification.identifiability import in_the_fits_scales
 from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.resampling import CrossValidation
 from swashplate.identification.solving import StartResult
 from swashplate.identification.staging import Parameters
 from swashplate.identification.validation import RunQuality, pooled
+from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
 from swashplate.report.fit_report.live import can_run, live_page
@@ -107,7 +107,7 @@ def write_fit_report(
         raise InputError("The report needs one assessment for each stage of the fit, in order.")
     if judged is None:
         planned = [each.name for each in fit.setup.stages]
-        judged = verdict(assessed, validation, starts=starts, planned=planned)
+        judged = verdict(assessed, validation, planned=planned)
     several = starts_of(assessed, starts)
     runs = shown_runs(assessed, validation)
     held_out = sum(run.validates for run in runs)
@@ -133,7 +133,6 @@ def write_fit_report(
             _starts_section(several),
             _folds_section(folds, assessed),
             shared[2],
-            _excitation_section(assessed),
             _verdict_section(judged, assessed, runs, head["findings"]),
             shared[3],
             _setup_section(campaign, fit.nominal, fit.setup.title, notes, fit.stages),
@@ -412,17 +411,13 @@ def _verdict_section(
         "Agreement": quality_sentences(_qualities(runs, "fit" if assessments else None)),
         "Validation": quality_sentences(_qualities(runs, "validate")),
     }
-    said = [
-        each._replace(sentences=(*measured.get(each.subject, ()), *each.sentences))
-        for each in judged.statements
-    ]
-    if judged.validity:
-        said.append(Statement("Range of validity", "plain", (judged.validity,)))
-    if judged.assumed:
-        said.append(Statement("Assumed, cannot be checked", "plain", judged.assumed))
+    said = [(subject, "plain", words) for subject, words in measured.items()]
+    said.append(("Remarks", "look", judged.sentences))
+    said.append(("Range of validity", "plain", (judged.validity,) if judged.validity else ()))
+    said.append(("Assumed, cannot be checked", "plain", judged.assumed))
     if findings:
         words = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
-        said.append(Statement("Data", "look", (words,)))
+        said.append(("Data", "look", (words,)))
     blocks = [Block("terms", said, "verdict")]
     if judged.criteria:
         made = tables.criteria_table(judged)
@@ -449,8 +444,7 @@ def quality_sentences(qualities: Sequence[RunQuality]) -> tuple[str, ...]:
 def _parameter_section(
     fit: Fit, assessments: Sequence[Assessment], truth: ParameterSet | None
 ) -> Section:
-    scaled = None if truth is None else in_the_fits_scales(truth, fit)
-    made = [tables.estimates_table(each, truth=scaled) for each in assessments]
+    made = [tables.estimates_table(each, truth=truth) for each in assessments]
     words = (
         "Change is from the nominal value. Intervals are for residuals that are correlated over "
         "time. A parameter at a bound has no symmetric interval. Parameter files have SI units."
@@ -460,10 +454,8 @@ def _parameter_section(
         inside, counted = tables.truth_count(made)
         blocks.append(
             text(
-                "Truth is what was simulated, in the scales that the fit kept fixed: it was moved "
-                "to the fixed values along those directions that the tests do not determine. Other "
-                "fixed parameters that are not true shift the estimates, and no interval covers "
-                f"that. {inside} of {counted} intervals contain it."
+                "Truth is what was simulated. Fixed parameters that are not true shift the "
+                f"estimates. {inside} of {counted} intervals contain it."
             )
         )
     for table, each in zip(made, assessments, strict=True):
@@ -476,23 +468,6 @@ def _parameter_section(
     if fixed.rows:
         blocks += [Block("heading", fixed.title, "h3"), Block("table", fixed, "held")]
     return Section("parameters", "Parameters", blocks)
-
-
-def _excitation_section(assessments: Sequence[Assessment]) -> Section:
-    words = (
-        "Per cent of the information on a parameter (its squared derivatives) that comes from each "
-        "run, at the optimum. A row with one dark cell rests on one run."
-    )
-    blocks = [text(words)]
-    for each in assessments:
-        table, said = tables.excitation_table(each)
-        blocks += [Block("heading", table.title, "h3"), Block("table", table, "excitation")]
-        blocks += listed_block(said)
-    last = (
-        "The change for 1 % is the root mean square of the change of the weighted residuals, in "
-        "units of each channel's noise."
-    )
-    return Section("excitation", "Information per run", [*blocks, text(last, "remark")])
 
 
 def _identifiability_section(assessments: Sequence[Assessment]) -> Section:
@@ -586,21 +561,16 @@ def _stage(fit: Fit, name: str) -> StageFit:
 def _folds_section(folds: CrossValidation | None, assessments: Sequence[Assessment]) -> Section:
     if folds is None:
         return Section("folds", "Cross-validation", [])
-    held_out, parts, spreads = tables.folds_tables(folds, assessments)
+    held_out, parts = tables.folds_tables(folds, assessments)
     words = (
         f"The runs were dealt into {folds.planned} folds, kinds of test and directions apart (seed "
         f"{folds.seed}). Each fold was predicted from the command alone by a fit to the others "
         "that began at the nominal values."
-    )
-    note = (
-        "The jackknife's standard error takes in that the model is not exact; from a few folds it "
-        "is itself known to a third or so."
     )
     blocks = [
         text(words),
         *(text(each, "remark") for each in folds.sentences()),
         Block("table", held_out, "held-out"),
         Block("table", parts, "folds"),
-        Block("details", [text(note, "remark"), Block("table", spreads, "spreads")], spreads.title),
     ]
     return Section("folds", "Cross-validation", blocks)

@@ -14,18 +14,10 @@ from swashplate.analysis import dead_zone, drives, limit_shares
 from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
-from swashplate.identification.acceptance import (
-    CARRIES_OVER,
-    POOR,
-    Grade,
-    Verdict,
-    following,
-    percent,
-    range_of,
-    weak_unknowns,
-)
+from swashplate.identification.acceptance import POOR, following, percent, range_of
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.validation import Measures, RunQuality, pooled
+from swashplate.identification.verdict import CARRIES_OVER, Grade, Verdict, weak_unknowns
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.fit_report.page import Block, Section, listed_block, text
 from swashplate.report.fit_report.runs import ShownRun
