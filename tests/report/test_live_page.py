@@ -12,6 +12,10 @@ import numpy as np
 import pytest
 
 from swashplate import Drive
+from swashplate.campaign import Campaign, rig
+from swashplate.errors import InputError
+from swashplate.identification import predict
+from swashplate.identification.validation import with_speeds
 from swashplate.maneuvers import parse
 from swashplate.report.fit_report import write_live_page
 
@@ -26,7 +30,8 @@ const wait = setInterval(() => {
   clearInterval(wait);
   const acting = [...live.latest.limits];
   const { limits } = JSON.parse(document.getElementById("live").textContent);
-  const made = { first: [...live.latest.signals.shaft_speed] };
+  const made = { first: [...live.latest.signals.shaft_speed], before: live.latest.errors };
+  made.channels = live.figure.showing.shown.map((each) => each.name);
   const acts = (bit) => acting.map((each) => (each & bit ? 1 : 0));
   made.limits = Object.fromEntries(limits.map(([bit, name]) => [name, acts(bit)]));
   act("Orifice", 0.75);
@@ -85,3 +90,43 @@ def test_a_slider_gives_what_python_gives(tmp_path: Path) -> None:
     )
     assert line is not None, made["toml"]
     np.testing.assert_allclose([float(line[1]), float(line[2])], changed, rtol=1e-15)
+
+
+@pytest.fixture(scope="module")
+def tests(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    """Virtual tests of the hoist."""
+    folder = tmp_path_factory.mktemp("tests")
+    maneuvers = [parse("step:6,length=6"), parse("sine:5,0.2,length=10")]
+    return Campaign.from_toml(rig.write(rig.run(Drive.preset("hoist"), maneuvers, seed=4), folder))
+
+
+def test_errors_are_those_of_the_prediction(tests: Campaign, tmp_path: Path) -> None:
+    page, drive = tmp_path / "live.html", Drive.preset("hoist").scale(Z10=1.02)
+    assert write_live_page(drive, page, campaign=tests) == ()
+    made = acted(page, tmp_path)
+    found = {q.channel: q.measures for q in with_speeds(predict(drive, [tests[0]]))}
+    shown = dict(zip(made["channels"], made["before"], strict=True))
+    assert set(shown) == set(found) - {"counts"}
+    for name, errors in shown.items():
+        # what was measured is rounded to 1/65,535 of its range on the page
+        assert errors["rmse"] == pytest.approx(found[name].rmse, rel=1e-3), name
+        assert errors["fit"] == pytest.approx(found[name].fit_percent, abs=0.01), name
+    assert made["errors"][-1]["rmse"] > 1.5 * made["before"][-1]["rmse"]
+
+
+def test_what_cannot_be_shown_is_refused(tests: Campaign, tmp_path: Path) -> None:
+    drive, page = Drive.preset("hoist"), tmp_path / "live.html"
+    with pytest.raises(InputError, match="needs the runs of a campaign, or a command"):
+        write_live_page(drive, page)
+    with pytest.raises(InputError, match="no axis 'slew'"):
+        write_live_page(drive, page, campaign=tests, axis="slew")
+    assert not page.exists()
+
+
+def test_the_page_is_small_and_asks_for_nothing(tests: Campaign, tmp_path: Path) -> None:
+    page = tmp_path / "live.html"
+    write_live_page(Drive.preset("hoist"), page, command=parse("step:9"))
+    text = page.read_text("utf-8")
+    content = json.loads(re.search(r'id="live">(.*?)</script>', text)[1])
+    assert len(text) - len(content["wasm"]) < 60_000
+    assert not re.search(r"""(src|href)=["'](?!data:|#)|url\(|fetch\(|XMLHttpRequest|import\(""", text)

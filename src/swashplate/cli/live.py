@@ -11,6 +11,7 @@ from swashplate.cli.words import campaign_of, drive_file, maneuver_of
 from swashplate.errors import InputError
 from swashplate.tables import PAGE, check_place, ending
 
+
 def live(
     drive: DriveChoice,
     path: Annotated[

@@ -320,7 +320,7 @@ def _live_section(drive: Parameters, campaign: Campaign, runs: Sequence[ShownRun
     blocks: list[Block] = []
     if isinstance(drive, ParameterSet):
         out = [run for run in runs if run.validates] or list(runs)
-        worst = max(out, key=lambda run: run_error(run)).experiment
+        worst = max(out, key=lambda run: run_error(run, runs)).experiment
         if can_run(drive, worst):
             made = live_page(drive, [worst], campaign.title, campaign.virtual, "drive.toml")
             words = f"Sliders for every parameter beside {worst.name}"
