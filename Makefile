@@ -11,9 +11,11 @@ STAMP := .venv/.installed
 export PIP_CONSTRAINT := constraints.txt
 export PIP_BUILD_CONSTRAINT := constraints.txt
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# Byte code is kept whatever the shell says: tests and commands start many processes.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test test-slow golden lint docs figures reproduce bench cluster fuzz tools browser calibration coverage dist \
+.PHONY: help .venv demo test test-slow golden lint docs figures reproduce bench cluster fuzz tools browser calibration coverage dist binaries \
   format clean
 
 help: ## list the targets
@@ -92,6 +94,10 @@ dist: $(STAMP) ## build wheel and sdist, and run the demo from the wheel in an e
 	@$(PYTHON) -m venv build/clean
 	@build/clean/bin/pip install -qq -c constraints.txt dist/*.whl
 	@cd build && clean/bin/swashplate demo --out clean/demo
+
+binaries: $(STAMP) ## compile the libraries that FMUs carry, run them, write their manifest
+	@$(BIN)/pip install -qq -c constraints.txt -e '.[binaries]'
+	@$(BIN)/python tools/build_binaries.py
 
 tools: ## make sure that there is a C compiler, for bench
 	@if command -v cc >/dev/null; then :; \

@@ -269,6 +269,11 @@ def listed(words: Sequence[str]) -> str:
     return " and ".join([*([", ".join(words[:-1])] if words[:-1] else []), *words[-1:]])
 
 
+def ended(words: str) -> str:
+    """Words with a stop at their end, unless they ask."""
+    return words if words.endswith("?") else f"{words}."
+
+
 def count(number: int, what: str, several: str = "") -> str:
     """``1 run``, ``13 runs``, ``110,605 samples``."""
     return f"{number:,} {what if number == 1 else several or what + 's'}"
@@ -401,6 +406,15 @@ def _of_the_disk(error: BaseException) -> str | None:
     if isinstance(before, OSError):
         return before.strerror or str(before)
     return None if before is None else _of_the_disk(before)
+
+
+def write_bytes(content: bytes, path: str | Path) -> None:
+    """Write bytes, whole or not at all."""
+
+    def write(beside: Path) -> None:
+        beside.write_bytes(content)
+
+    write_whole(path, write)
 
 
 def write_text(text: str, path: str | Path) -> None:

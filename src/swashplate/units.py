@@ -124,6 +124,34 @@ def scaling(unit: str, si: str, what: str) -> tuple[float, float]:
     return to_si(1.0, unit, si, what) - zero, zero
 
 
+_BASE = {
+    "kilogram": "kg",
+    "meter": "m",
+    "second": "s",
+    "ampere": "A",
+    "kelvin": "K",
+    "mole": "mol",
+    "candela": "cd",
+    "radian": "rad",
+}
+"""Symbols of the base units, by Pint's names."""
+
+
+@cache
+def si_exponents(unit: str) -> dict[str, int] | None:
+    """Exponents of the base units that an SI unit is made of, ``"N m"`` → kg 1, m 2, s -2.
+
+    None where one is a fraction, as of √Pa.
+    """
+    base = _registry().parse_units(_written_out(unit).replace("^", "**"))
+    factor, root = _registry().get_base_units(base)
+    powers = {str(name): float(power) for name, power in root._units.items()}
+    if factor != 1.0 or not all(power.is_integer() for power in powers.values()):
+        return None
+    found = {_BASE[name]: int(power) for name, power in powers.items()}
+    return {name: found[name] for name in _BASE.values() if name in found}
+
+
 # --- units that people read -----------------------------------------------------------------------
 
 

@@ -6,6 +6,8 @@ A page is run from top to bottom in an empty folder:
   begins with ``# name.py`` is that file, too;
 - ``console`` blocks line by line: ``$ swashplate ...`` is run, 80 columns wide, and the lines below
   it must be what it printed, ``...`` standing for lines left out;
+- ``$ cc ...`` and ``$ ./program`` are run where there is a compiler;
+- ``c`` blocks begin with ``/* name.c */`` and are that file;
 - ``toml`` and ``csv`` blocks that begin with ``# name`` are that file; campaigns and fit
   configurations are valid, other ``toml`` is a fragment;
 - ``diff`` blocks change a file: ``--- name``, then lines kept, taken out and put in;
@@ -20,12 +22,14 @@ import io
 import linecache
 import re
 import shlex
+import subprocess
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from shutil import which
 
 import pytest
 from typer.testing import CliRunner
@@ -146,6 +150,12 @@ def run_command(command: str, shown: str) -> None:
         run_swashplate(command, words, shown)
     elif program == "make":
         assert set(words) <= TARGETS, command
+    elif program == "cc" or program.startswith("./"):
+        if which("cc") is None:
+            return
+        done = subprocess.run([program, *words], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        check_shown(shown, done.stdout, command)
     else:
         known = any(re.fullmatch(each, command) for each in NOT_RUN)
         assert known, f"this cannot be run here: {command}"
@@ -167,7 +177,7 @@ def write_file(language: str, content: str) -> None:
         kind = CampaignFile if "axes" in found else Setup if "stages" in found else None
         if kind is not None and "title" in found:
             validated(found, kind, "page")
-    named = re.match(r"# (\S+\.\w+)\n", content)
+    named = re.match(r"(?:# |/\* )(\S+\.\w+)(?: \*/)?\n", content)
     assert named or language == "toml", f"which file is this?\n{content}"
     if named:
         Path(named[1]).parent.mkdir(parents=True, exist_ok=True)
@@ -214,7 +224,7 @@ def test_a_page_does_what_it_shows(
                 printed = out.getvalue()
             case "console":
                 run_console(content)
-            case "toml" | "csv":
+            case "toml" | "csv" | "c":
                 write_file(language, content)
             case "diff":
                 change_file(content)

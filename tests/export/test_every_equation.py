@@ -9,7 +9,7 @@ import importlib
 import inspect
 import pkgutil
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from tests.equations import test_constructs
@@ -17,6 +17,7 @@ from tests.export.twins import InC, flagged
 
 import swashplate.equations
 import swashplate.models
+from swashplate.equations import equation
 from swashplate.equations.c_source import Unit
 from swashplate.equations.equation import is_function
 from swashplate.equations.syntax import plain
@@ -48,9 +49,71 @@ def packaged() -> dict[str, Any]:
 REFUSED = ("rubbing", "rubbed")
 """Constructs of which there are none in C: an option that is a tuple of numbers, or None."""
 CONSTRUCTS = equations_of(vars(test_constructs))
+
+
+# --- what is read otherwise in C ------------------------------------------------------------------
+
+
+class Register(NamedTuple):
+    double: float
+    short: float = 2.0
+
+
+@equation
+def promoted(x: float) -> float:
+    total = 0
+    for i in range(4):
+        total = total + i * x
+    return total / 3
+
+
+@equation
+def swapped(x: float, y: float) -> tuple[float, float]:
+    a, b = x, y
+    for _ in range(3):
+        a, b = b, a + b
+    return a, b
+
+
+@equation
+def keywords(double: float, register: Register, ω: float) -> Register:
+    exp = double - -ω
+    index, time = register.short, -(-register.double)  # noqa: B002
+    return Register(short=exp * index, double=(1.0 + exp * exp) ** -3 - time**0)
+
+
+@equation
+def larger(one: Register, two: Register) -> float:
+    return one.double if not one.short <= two.short else two.double
+
+
+@equation
+def ways(x: float, y: float, p: Register) -> float:
+    if x < y < p.double or x != x:
+        found = -0.0
+    elif larger(keywords(x, p, y), p) > 0.0 and (x > 0.0) != (y > 0.0):
+        found = 1.0 if x > 0.0 else (2.0 if y > 1.0 else -x)
+    else:
+        p_next = keywords(y, p, x)
+        found = larger(p_next if x > y else p, p)
+    return min(found, x, y) - max(y, 0, x)
+
+
+@equation
+def turned(p: Register, x: float) -> Register:
+    for i in range(2):
+        p = Register(p.short + i, p.double * x)
+    values = (x, p.double, p.short)
+    total = values[-1]
+    for i in range(3):
+        total += values[i]
+    return Register(total, values[0])
+
+
 SETS = {
     "packaged": packaged(),
     "constructs": {name: each for name, each in CONSTRUCTS.items() if name not in REFUSED},
+    "own": equations_of(globals()),
 }
 CASES = [
     pytest.param(word, key, on, id=f"{key}-{'on' if on else 'off'}")

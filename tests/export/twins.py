@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.equations.c_source import Kind, Unit, fields_of
+from swashplate.equations.c_source import Kind, Unit, c_name, fields_of
 from swashplate.equations.marching.run import module
 from swashplate.equations.syntax import parsed, plain
 
@@ -50,7 +50,7 @@ def out_c(unit: Unit, kind: Kind, text: str) -> Iterator[str]:
     """The scalars of a value in C."""
     if kind.word == "struct":
         for name, hint in fields_of(kind.cls):
-            yield from out_c(unit, unit.kind(hint, ""), f"{text}.{name}")
+            yield from out_c(unit, unit.kind(hint, ""), f"{text}.{c_name(name)}")
     elif kind.word == "tuple":
         for i, item in enumerate(kind.items):
             array = all(each.word in ("double", "int") for each in kind.items)
@@ -182,7 +182,11 @@ class InC:
         given = rows(twin.columns, on, self.numbers[key])
         wanted, found = np.empty((CALLS, twin.width)), np.empty((CALLS, twin.width))
         made = module(f"twin_{key.replace('.', '_')}", twin.text, twin.names)
-        made["rows_of"](given, wanted)
+        try:
+            made["rows_of"](given, wanted)
+        except ZeroDivisionError:  # 0 to a negative power, where C goes on with infinity
+            given[given == 0.0] = 1.0
+            made["rows_of"](given, wanted)
         call = getattr(library, f"call_{self.numbers[key]}")
         double = ctypes.POINTER(ctypes.c_double)
         for i in range(CALLS):

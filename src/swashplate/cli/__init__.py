@@ -55,6 +55,7 @@ Examples:
   swashplate whatif hoist --scale orifice=1.5 --maneuver step:9
   swashplate full-order hoist step:9                  is one state enough
   swashplate crane run tg3637 --slew 1 --until slew_deg=45
+  swashplate export hoist --fmu hoist.fmu             for other programs
   swashplate demo                                     everything at once
 
 Files are written in SI, whole or not at all. What is wrong is said in one
@@ -91,6 +92,7 @@ COMMANDS = {
         "full-order": "full_order.full_order",
         "crane": "crane.app",
     },
+    "Export": {"export": "export.export"},
     "This installation": {"doctor": "doctor.doctor"},
 }
 """Where each command stands, by the panel of the help that lists it."""

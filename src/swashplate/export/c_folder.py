@@ -235,6 +235,9 @@ int main(void)
     "CMakeLists.txt": """\
 cmake_minimum_required(VERSION 3.10)
 project(@name@ C)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
 
 add_library(@file@ STATIC @file@.c)
 set_target_properties(@file@ PROPERTIES C_STANDARD 99 C_EXTENSIONS OFF)
@@ -260,7 +263,7 @@ example.
 
 or, without CMake,
 
-    cc -std=c99 -O2 -ffp-contract=off main.c @file@.c -lm -o example
+    cc -std=c99 -O3 -ffp-contract=off main.c @file@.c -lm -o example
 
 Keep `-ffp-contract=off` (gcc and clang) or `/fp:precise` (MSVC): fused operations change the last
 digits. `-D@P@_LINE=64` shortens the delay line, and with it the

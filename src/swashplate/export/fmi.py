@@ -1,0 +1,525 @@
+"""FMU of a drive, FMI 2.0 or 3.0 for co-simulation: what it declares, carries and promises.
+
+Inside, the drive runs on its own grid of samples, whatever the master's steps are. The library is
+the package's own; the drive's numbers are a resource that it reads.
+"""
+
+from __future__ import annotations
+
+import warnings
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.__about__ import __version__
+from swashplate.errors import FileError, InputError
+from swashplate.export.c_folder import exported_drive, feedthrough, values_of
+from swashplate.export.libraries import (
+    NAME,
+    Platform,
+    chosen_platforms,
+    compiled,
+    layout_of,
+    library_sources,
+    manifest,
+    packaged,
+)
+from swashplate.export.variables import LONGEST_STEP, NONE, TIME, Variable, variables
+from swashplate.results import Result
+from swashplate.simulation.instance import check_filter_stability
+from swashplate.tables import UNIT, Column, Table, write_bytes
+from swashplate.units import si_exponents, to_si
+
+if TYPE_CHECKING:
+    from swashplate.drive import Drive
+
+Version = Literal["2.0", "3.0"]
+Array = NDArray[np.float64]
+
+LATE = 1.5
+"""Steps that a delay must have, so that no output depends on the voltage of its instant."""
+MAGIC, RESOURCE_VERSION, TOKEN_LENGTH = b"SWPDRIVE", 1, 64
+LONGEST_LINE = 1020
+"""Steps that the delay line of the libraries can hold."""
+DISPLAYED = {"rad": ("deg",), "rad/s": ("deg/s", "rpm"), "Pa": ("bar",), "m": ("mm",), "s": ("ms",)}
+"""Units that people read, offered beside SI ones."""
+_EARLIEST = (1980, 1, 1, 0, 0, 0)
+
+
+def fmu(
+    drive: Drive,
+    path: str | Path,
+    *,
+    fmi: Version = "2.0",
+    step: float = LONGEST_STEP,
+    platforms: Sequence[str] | None = None,
+) -> Path:
+    """Write a drive as an FMU for co-simulation.
+
+    Parameters
+    ----------
+    drive : Drive
+        Whose numbers and forms are the start values. One with an equation of its own is compiled,
+        which needs a compiler (extra ``binaries``).
+    path : path
+        The file, ``.fmu``; an older one is replaced.
+    fmi : {"2.0", "3.0"}
+        Version of the standard.
+    step : float
+        Step of the drive's own grid, at most 1/512 s; the master's step may be any. [s]
+    platforms : sequence of str, optional
+        Of ``"linux64"``, ``"aarch64-linux"``, ``"win64"`` and ``"darwin64"``; by default all.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        For an option that there is not, a step that the card's filter does not allow, or a delay
+        that is longer than the library's line.
+    FileError
+        If the file cannot be written.
+
+    Warns
+    -----
+    UserWarning
+        Where the delay is shorter than 1.5 steps, so that outputs depend on the voltage of their
+        own instant, and a master that does not set it before it reads them is a sample behind;
+        where the recursion of the card's filter was converted to another step.
+    """
+    if fmi not in ("2.0", "3.0"):
+        raise InputError(f"fmi is '{fmi}'; it is '2.0' or '3.0'.")
+    if Path(path).suffix.lower() != ".fmu":
+        raise InputError(f"{path} must end in .fmu, as importers know it.")
+    chosen = chosen_platforms(platforms)
+    exported = exportable(drive, step)
+    content = packed(exported, fmi, step, chosen)
+    write_bytes(content, path)
+    return Path(path)
+
+
+def exportable(drive: Drive, step: float) -> Drive:
+    """The drive as it can run at a step: a recursion for another rate becomes its equation.
+
+    Raises
+    ------
+    InputError
+        For a step out of range, or one that the filter or the delay line does not allow.
+    """
+    if not 0.0 < step <= LONGEST_STEP:
+        raise InputError(
+            f"The step is {step:g} s, but must be above 0 and at most 1/512 s; the master's steps "
+            "may be longer."
+        )
+    rate = drive.parameters.rate
+    if rate is not None and abs(rate * step - 1.0) > 1e-9:
+        drive = drive.at_every_rate()
+        warnings.warn(
+            f"{drive.name}: the card's filter is a recursion for {rate:g} Hz; for a step of "
+            f"{step:g} s the differential equation with the same poles takes its place.",
+            stacklevel=3,
+        )
+    check_filter_stability(drive.parameters, step)
+    delay = drive.parameters.numbers["tau"]
+    if delay > LONGEST_LINE * step:
+        raise InputError(
+            f"{drive.name}: tau is {delay:g} s, but the library's line holds {LONGEST_LINE} steps, "
+            f"{LONGEST_LINE * step:g} s; choose a step of {delay / LONGEST_LINE:.3g} s or more."
+        )
+    if is_late(delay, step):
+        shorter = f"choose a step of {delay / LATE:.3g} s or less" if delay > 0.0 else ""
+        advice = shorter or "a master that sets inputs before it reads outputs gets them exactly"
+        warnings.warn(
+            f"{drive.name}: tau is {delay:g} s, below 1.5 steps of {step:g} s, so that outputs "
+            f"depend on the voltage of their own instant and may be a sample late; {advice}.",
+            stacklevel=3,
+        )
+    return drive
+
+
+def is_late(delay: float, step: float) -> bool:
+    """Whether outputs depend on the voltage of their own instant."""
+    return delay < LATE * step * (1.0 - 1e-12)
+
+
+def packed(drive: Drive, fmi: Version, step: float, platforms: Iterable[Platform]) -> bytes:
+    """The file's content: the same bytes for the same drive and options."""
+    own = bool(drive.parameters.equations)
+    texts = library_sources(drive if own else None)
+    table = table_of(drive, step)
+    numbers = finite_values(drive, step)
+    layout = layout_of({name: texts[name] for name in ("swashplate_drive.c", "swashplate_drive.h")})
+    token = _token(fmi, texts, numbers, table)
+    units = _units(fmi)
+    described = description(drive, table, fmi, step, token)
+    members = {
+        "modelDescription.xml": described,
+        "resources/drive.bin": resource(numbers, layout, token),
+    }
+    kept = [name for name in texts if name not in ("fmi2.c", "fmi3.c", "wasm.c") or name in units]
+    members |= {f"sources/{name}": texts[name].encode() for name in kept}
+    if fmi == "3.0":
+        members["sources/buildDescription.xml"] = _build_description(units)
+    for each in platforms:
+        content = compiled(texts, each) if own else packaged(each.library)
+        for folder in each.fmi2 if fmi == "2.0" else each.fmi3:
+            members[f"binaries/{folder}/{NAME}{each.ending}"] = content
+    return _zipped(members)
+
+
+def finite_values(drive: Drive, step: float) -> Array:
+    """Numbers of the library's `swp_init`, infinity as 1e30, as modelDescription.xml has it."""
+    values = values_of(drive, step)
+    return np.where(np.isinf(values), np.copysign(NONE, values), values)
+
+
+def table_of(drive: Drive, step: float) -> tuple[Variable, ...]:
+    """Every variable of a drive at a step [s]."""
+    return variables(exported_drive(drive), drive.parameters, step, direct(drive, step))
+
+
+def direct(drive: Drive, step: float) -> dict[str, set[str]]:
+    """By output, the inputs that it depends on at the same instant."""
+    at_once = {"voltage"} if is_late(drive.parameters.numbers["tau"], step) else set[str]()
+    own = bool(drive.parameters.equations)
+    read = feedthrough(drive) if own else manifest()["feedthrough"]
+    return {name: {*inputs, *at_once} for name, inputs in read.items()}
+
+
+def resource(numbers: Array, layout: int, token: str) -> bytes:
+    """``drive.bin``: magic, version, count, layout, token, then little-endian doubles."""
+    head = MAGIC + RESOURCE_VERSION.to_bytes(4, "little") + len(numbers).to_bytes(4, "little")
+    head += layout.to_bytes(8, "little") + token.encode().ljust(TOKEN_LENGTH, b"\0")
+    return head + numbers.astype("<f8").tobytes()
+
+
+def _token(
+    fmi: Version, texts: Mapping[str, str], numbers: Array, table: Sequence[Variable]
+) -> str:
+    """GUID made of the sources, the numbers and the variables."""
+    made = sha256(f"{fmi} {__version__}".encode())
+    for name in sorted(texts):
+        made.update(texts[name].encode())
+    made.update(numbers.astype("<f8").tobytes())
+    made.update(repr([(each.name, each.reference, each.start) for each in table]).encode())
+    h = made.hexdigest()
+    return f"{{{h[:8]}-{h[8:12]}-{h[12:16]}-{h[16:20]}-{h[20:32]}}}"
+
+
+def _zipped(members: Mapping[str, bytes]) -> bytes:
+    """A zip whose bytes depend on its content alone, the description first."""
+    target = BytesIO()
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as made:
+        for name in sorted(members, key=lambda each: (each != "modelDescription.xml", each)):
+            entry = zipfile.ZipInfo(name, _EARLIEST)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = 3
+            entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+            made.writestr(entry, members[name])
+    return target.getvalue()
+
+
+def _xml(root: ET.Element) -> bytes:
+    """A document's bytes."""
+    ET.indent(root)
+    text = ET.tostring(root, "unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
+
+
+# --- modelDescription.xml -------------------------------------------------------------------------
+
+
+def description(
+    drive: Drive, table: Sequence[Variable], fmi: Version, step: float, token: str
+) -> bytes:
+    """``modelDescription.xml``."""
+    root = ET.Element("fmiModelDescription", _head(drive, table, fmi, step, token))
+    steps = {"canHandleVariableCommunicationStepSize": "true", "modelIdentifier": NAME}
+    if fmi == "2.0":
+        slave = ET.SubElement(
+            root,
+            "CoSimulation",
+            {
+                **steps,
+                "canInterpolateInputs": "true",
+                "canGetAndSetFMUstate": "true",
+                "canSerializeFMUstate": "true",
+                "canNotUseMemoryManagementFunctions": "true",
+            },
+        )
+        listed = ET.SubElement(slave, "SourceFiles")
+        for name in _units(fmi):
+            ET.SubElement(listed, "File", {"name": name})
+    else:
+        ET.SubElement(
+            root,
+            "CoSimulation",
+            {
+                **steps,
+                "fixedInternalStepSize": repr(step),
+                "canGetAndSetFMUState": "true",
+                "canSerializeFMUState": "true",
+            },
+        )
+    _add_units(root, table)
+    categories = ET.SubElement(root, "LogCategories")
+    for name in ("logStatusWarning", "logStatusDiscard", "logStatusError"):
+        ET.SubElement(categories, "Category", {"name": name})
+    ET.SubElement(
+        root, "DefaultExperiment", {"startTime": "0", "stopTime": "10", "stepSize": repr(step)}
+    )
+    listed = ET.SubElement(root, "ModelVariables")
+    for each in table:
+        (_variable2 if fmi == "2.0" else _variable3)(listed, each)
+    structure = ET.SubElement(root, "ModelStructure")
+    if fmi == "2.0":
+        _structure2(structure, table)
+    else:
+        clock = {"name": "time", "valueReference": str(TIME), "causality": "independent"}
+        ET.SubElement(listed, "Float64", {**clock, "variability": "continuous", "unit": "s"})
+        _structure3(structure, table)
+    return _xml(root)
+
+
+def _head(
+    drive: Drive, table: Sequence[Variable], fmi: Version, step: float, token: str
+) -> dict[str, str]:
+    words = f"{drive.parameters.title}. Own steps of {step:g} s."
+    read = sorted({name for each in table for name in each.feedthrough})
+    if read:
+        words += (
+            f" Some outputs depend on {', '.join(read)} at the same instant: a master that reads "
+            "them before it has set that input sees them one step late."
+        )
+    named = "guid" if fmi == "2.0" else "instantiationToken"
+    return {
+        "fmiVersion": fmi,
+        "modelName": drive.name,
+        named: token,
+        "description": words,
+        "generationTool": f"swashplate {__version__}",
+        "variableNamingConvention": "structured",
+    }
+
+
+def _attributes(each: Variable) -> dict[str, str]:
+    made = {
+        "name": each.name,
+        "valueReference": str(each.reference),
+        "description": each.description,
+        "causality": each.causality,
+        "variability": each.variability,
+    }
+    if each.causality == "parameter":
+        made["initial"] = "exact"
+    return made
+
+
+def _number(each: Variable) -> dict[str, str]:
+    made = {"unit": each.unit} if each.unit != "1" else {}
+    if each.unit in DISPLAYED:
+        made["displayUnit"] = DISPLAYED[each.unit][0]
+    if each.lower is not None:
+        made["min"] = repr(each.lower)
+    if each.upper is not None:
+        made["max"] = repr(each.upper)
+    if each.start is not None:
+        made["start"] = repr(each.start)
+    return made
+
+
+def _variable2(listed: ET.Element, each: Variable) -> None:
+    made = ET.SubElement(listed, "ScalarVariable", _attributes(each))
+    if isinstance(each.start, bool):
+        ET.SubElement(made, "Boolean", {"start": str(each.start).lower()})
+    else:
+        ET.SubElement(made, "Real", _number(each))
+
+
+def _variable3(listed: ET.Element, each: Variable) -> None:
+    if isinstance(each.start, bool):
+        start = {"start": str(each.start).lower()}
+        ET.SubElement(listed, "Boolean", {**_attributes(each), **start})
+    else:
+        ET.SubElement(listed, "Float64", {**_attributes(each), **_number(each)})
+
+
+def _structure2(structure: ET.Element, table: Sequence[Variable]) -> None:
+    places = {each.name: i for i, each in enumerate(table, 1)}
+    outputs = [each for each in table if each.causality == "output"]
+    listed = ET.SubElement(structure, "Outputs")
+    for each in outputs:
+        read = sorted(places[name] for name in each.feedthrough)
+        ET.SubElement(
+            listed,
+            "Unknown",
+            {
+                "index": str(places[each.name]),
+                "dependencies": " ".join(map(str, read)),
+                "dependenciesKind": " ".join("dependent" for _ in read),
+            },
+        )
+    listed = ET.SubElement(structure, "InitialUnknowns")
+    for each in outputs:
+        ET.SubElement(listed, "Unknown", {"index": str(places[each.name])})
+
+
+def _structure3(structure: ET.Element, table: Sequence[Variable]) -> None:
+    references = {each.name: each.reference for each in table}
+    outputs = [each for each in table if each.causality == "output"]
+    for each in outputs:
+        read = sorted(references[name] for name in each.feedthrough)
+        ET.SubElement(
+            structure,
+            "Output",
+            {
+                "valueReference": str(each.reference),
+                "dependencies": " ".join(map(str, read)),
+                "dependenciesKind": " ".join("dependent" for _ in read),
+            },
+        )
+    for each in outputs:
+        ET.SubElement(structure, "InitialUnknown", {"valueReference": str(each.reference)})
+
+
+def _units(fmi: Version) -> tuple[str, ...]:
+    """Sources that are compiled, of one version of the standard."""
+    return ("swashplate_drive.c", "fmi.c", "fmi2.c" if fmi == "2.0" else "fmi3.c")
+
+
+def _build_description(units: Sequence[str]) -> bytes:
+    root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
+    configuration = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": NAME})
+    sources = ET.SubElement(
+        configuration,
+        "SourceFileSet",
+        {"language": "C11", "compilerOptions": "-ffp-contract=off"},
+    )
+    for name in units:
+        ET.SubElement(sources, "SourceFile", {"name": name})
+    return _xml(root)
+
+
+def _add_units(root: ET.Element, table: Sequence[Variable]) -> None:
+    definitions = ET.SubElement(root, "UnitDefinitions")
+    for unit in sorted({each.unit for each in table if each.unit != "1"} | {"s"}):
+        made = ET.SubElement(definitions, "Unit", {"name": unit})
+        exponents = si_exponents(unit)
+        if exponents is not None:  # FMI cannot say fractions
+            ET.SubElement(made, "BaseUnit", {name: str(n) for name, n in exponents.items()})
+        for shown in DISPLAYED.get(unit, ()):
+            factor = 1.0 / to_si(1.0, shown, unit, "a display unit")
+            ET.SubElement(made, "DisplayUnit", {"name": shown, "factor": repr(factor)})
+
+
+# --- comparison -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Comparison(Result):
+    """An FMU's outputs beside those of the drive, sample by sample."""
+
+    name: str
+    """Name of the drive."""
+    samples: int
+    differences: Mapping[str, float]
+    """Largest difference of each output, SI."""
+    units: Mapping[str, str]
+    """SI unit of each output."""
+
+    @property
+    def equal(self) -> bool:
+        """Whether every number is equal to the last bit."""
+        return not any(self.differences.values())
+
+    def tables(self) -> list[Table]:
+        """Largest difference of each output."""
+        columns = (Column("output"), Column("largest difference", ".3g"), UNIT)
+        made = Table(f"FMU of {self.name} against the drive, {self.samples} samples", columns)
+        for name, difference in self.differences.items():
+            made.add(name, difference, unit=self.units[name], look=difference != 0.0)
+        return [made]
+
+
+def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> Comparison:
+    """Run an FMU with FMPy and compare it with the drive, at the FMU's own step.
+
+    Parameters
+    ----------
+    path : path
+        The FMU.
+    drive : Drive
+        That it was made of.
+    voltage : (n,) array_like
+        Command at each step of the FMU. [V]
+
+    Returns
+    -------
+    Comparison
+        Largest differences, 0 where the FMU's numbers are the drive's.
+
+    Raises
+    ------
+    InputError
+        If FMPy is not installed, the command is none, or the FMU fails.
+    FileError
+        If the file is no FMU.
+    """
+    try:
+        import fmpy
+    except ImportError:
+        raise InputError(
+            "Comparing needs FMPy: install the extra fmu (pip install 'swashplate[fmu]')."
+        ) from None
+    command = np.asarray(voltage, dtype=np.float64)
+    if command.ndim != 1 or command.size < 2:
+        raise InputError("A command to compare by needs at least two samples.")
+    step = _step_of(Path(path), fmpy)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # said when it was exported
+        chosen = exportable(drive, step)
+    run = chosen.simulate(command, 1.0 / step, interpolation="previous")
+    table = table_of(chosen, step)
+    inputs = {each.name: each.start for each in table if each.causality == "input"}
+    columns = {"time": np.arange(command.size) * step, **inputs, "voltage": command}
+    signals = np.empty(command.size, [(name, np.float64) for name in columns])
+    for name, values in columns.items():
+        signals[name] = values
+    names = [name for name in run.names if name not in ("time", "voltage")]
+    try:
+        found = fmpy.simulate_fmu(
+            str(path),
+            start_time=0.0,
+            stop_time=float(signals["time"][-1]),
+            output_interval=step,
+            input=signals,
+            output=names,
+        )
+    except Exception as error:
+        raise InputError(f"{path} fails: {error}") from None
+    if len(found) != command.size:
+        raise InputError(f"{path} gave {len(found)} samples for a command of {command.size}.")
+    differences = {name: float(np.abs(found[name] - run[name]).max()) for name in names}
+    units = {each.name: each.unit for each in table}
+    return Comparison(chosen.name, command.size, differences, units)
+
+
+def _step_of(path: Path, fmpy: Any) -> float:
+    """The own step that an FMU declares. [s]"""
+    try:
+        described = fmpy.read_model_description(str(path), validate=False)
+        (found,) = [each for each in described.modelVariables if each.name == "step"]
+        return float(found.start)
+    except Exception:
+        raise FileError(f"{path} is no FMU of swashplate.") from None
