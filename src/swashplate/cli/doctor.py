@@ -19,7 +19,6 @@ LIBRARIES = ("numpy", "scipy", "numba", "polars", "pydantic", "matplotlib", "jin
 
 
 EXTRAS = {
-    "control": ("control", "linear models as python-control's StateSpace"),
     "dask": ("distributed", "fit --dask: many starts on a cluster"),
     "mdf": ("asammdf", "logs in ASAM MDF 4 (.mf4)"),
     "tdms": ("npTDMS", "logs in National Instruments' TDMS"),
