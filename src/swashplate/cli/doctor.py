@@ -20,7 +20,6 @@ LIBRARIES = ("numpy", "scipy", "numba", "polars", "pydantic", "matplotlib", "jin
 
 EXTRAS = {
     "binaries": ("ziglang", "exports of equations of one's own for every platform"),
-    "control": ("control", "linear models as python-control's StateSpace"),
     "dask": ("distributed", "fit --dask: many starts on a cluster"),
     "fmu": ("fmpy", "an FMU compared with the drive, export.compare"),
     "mdf": ("asammdf", "logs in ASAM MDF 4 (.mf4)"),
