@@ -23,7 +23,7 @@ from swashplate.report.fit_report import write_fit_report
 ROUNDS = 5
 REFITS = 1000
 FIT, REPORT, REFITTED = 2.0, 3.0, 300.0
-MARCHED, SOLVED, STUDIED = 0.1, 5.0, 5.0
+MARCHED, STUDIED = 0.1, 5.0
 """Targets. [s]"""
 
 
@@ -61,14 +61,12 @@ def fit_study_rows() -> Iterator[Row]:
 
 
 def full_order_rows() -> Iterator[Row]:
-    """30 s of the five-state model, by the compiled march and by SciPy's Radau."""
+    """30 s of the five-state model, by the compiled march."""
     hoist = FullOrderDrive.preset("hoist")
     command = maneuvers.sine(6.5, 0.1, length=30.0).sample(512.0)
     current = hoist.drive.simulate(command).current
-    march = _median_of(9, lambda: hoist.simulate_current(current, method="march"))
+    march = _median_of(9, lambda: hoist.simulate_current(current))
     yield _limited("full-order model, compiled march", march, MARCHED)
-    radau = _median_of(3, lambda: hoist.simulate_current(current, method="radau"))
-    yield _limited("full-order model, SciPy Radau", radau, SOLVED)
 
 
 def _limited(what: str, found: float, limit: float) -> Row:

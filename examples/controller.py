@@ -97,7 +97,7 @@ class Controller(NamedTuple):
 def margin(controller):
     """Further delay that the linear loop bears, 0 if it is unstable already. [s]"""
     try:
-        return model.delay_margin(controller.response)
+        return model.margins(controller.response).delay_margin
     except DomainError:
         return 0.0
 

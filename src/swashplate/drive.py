@@ -133,8 +133,8 @@ class Drive(Result):
         Parameters
         ----------
         old : equation
-            Of `swashplate.models.card`, `swashplate.models.displacement_control`,
-            `swashplate.models.pump` or `swashplate.models.refinements`.
+            Of `swashplate.models.channel`, `swashplate.models.card`, `swashplate.models.pump`,
+            `swashplate.models.displacement_control` or `swashplate.models.refinements`.
         new : equation
             The same arguments, and behind them, by name, any of `parameters`.
         parameters : class of named tuples, optional

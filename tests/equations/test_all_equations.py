@@ -25,6 +25,7 @@ from swashplate.equations.equation import interpreted, is_function
 from swashplate.equations.model import Window
 from swashplate.equations.syntax import plain
 from swashplate.models import card, full_order, machine, pump
+from swashplate.models import channel as single
 from swashplate.models import displacement_control as control
 
 POINTS, FEWER = 100, 30
@@ -106,9 +107,9 @@ RANGES = {
 OWN_RANGES: dict[str, dict[str, tuple[float, float]]] = {
     "refinements.held_back": {"before": (-3e-5, 3e-5), "width": (1e-6, 1e-5)},
     "refinements.magnetising_current": {"current": (0.0, 0.02), "previous": (0.0, 0.02)},
-    "card.remaining_decay": {"previous": (0.25, 0.3), "fallen": (0.0, 0.05)},
-    "card.taken_over": {"previous": (0.0, 0.1), "target": (0.6, 0.8)},
-    "card.current_acceleration": {"rate": (-0.05, 0.05)},
+    "single.remaining_decay": {"previous": (0.25, 0.3), "fallen": (0.0, 0.05)},
+    "single.taken_over": {"previous": (0.0, 0.1), "target": (0.6, 0.8)},
+    "single.current_acceleration": {"rate": (-0.05, 0.05)},
     "library.arctangent": {"tangent": (-4.0, 4.0)},
     "machine.mixture_modulus": {"pressure": (2e5, 1e7)},
     "full_order.stopped": {"position": (-1.0, 1.0), "lower": (-0.5, -0.2), "upper": (0.2, 0.5)},
@@ -144,20 +145,20 @@ class Draw:
             return H
         if name in ("direction", "sign"):
             return self.random.choice([1.0, -1.0])
-        if name in control.Pump._fields or name in card.Channel._fields:
+        if name in control.Pump._fields or name in single.Channel._fields:
             return self.parameter(name)
         raise AssertionError(f"{self.name}: say in RANGES what '{name}' can be")
 
     def flags(self, kind: Any) -> Any:
         return kind(*(self.random.choice([None, True]) for _ in kind._fields))
 
-    def channel(self) -> card.Channel:
-        return card.Channel(*(self.parameter(name) for name in card.Channel._fields))
+    def channel(self) -> single.Channel:
+        return single.Channel(*(self.parameter(name) for name in single.Channel._fields))
 
-    def filter(self) -> card.Filter:
+    def filter(self) -> single.Filter:
         now = self.uniform(0.0, 0.7)
         before = now + self.uniform(-0.01, 0.01)
-        return card.Filter(now, before, max(now + self.uniform(-0.02, 0.02), 1e-3))
+        return single.Filter(now, before, max(now + self.uniform(-0.02, 0.02), 1e-3))
 
     def window(self) -> Window:
         middle = self.uniform(*VOLTS) * self.random.choice([1.0, 0.1])
@@ -196,7 +197,7 @@ class Draw:
     def parameters(self, kind: Any) -> Any:
         if kind is card.Card:
             return card.Card(self.channel(), self.channel(), 0.014)
-        if kind is card.Channel:
+        if kind is single.Channel:
             return self.channel()
         if kind is machine.Machine:
             return self.machine()
@@ -215,20 +216,20 @@ class Draw:
             return self.random.choice([None, True])
         if kind is Window:
             return self.window()
-        if kind is card.CardInputs:
-            return card.CardInputs(self.window(), self.window())
-        if kind is card.Filter:
+        if kind is single.CardInputs:
+            return single.CardInputs(self.window(), self.window())
+        if kind is single.Filter:
             return self.filter()
         if kind is card.CardState:
             return card.CardState(self.filter(), self.filter())
         if kind is card.CardConstants:
-            options = known.get("options") or self.flags(card.CardOptions)
+            options = known.get("options") or self.flags(single.CardOptions)
             return interpreted(card.card_constants)(p, H, options)
-        if kind is card.ChannelConstants:
-            channel = p if isinstance(p, card.Channel) else self.channel()
-            options = known.get("options") or card.CardOptions(exact=True)
-            return interpreted(card.channel_constants)(channel, H, options)
-        if kind is card.ChannelSignals:
+        if kind is single.ChannelConstants:
+            channel = p if isinstance(p, single.Channel) else self.channel()
+            options = known.get("options") or single.CardOptions(exact=True)
+            return interpreted(single.channel_constants)(channel, H, options)
+        if kind is single.ChannelSignals:
             return kind(*(self.uniform(*AMPERES) for _ in kind._fields))
         if kind is card.CardSignals:
             return kind(*(self.uniform(*AMPERES) for _ in kind._fields))
@@ -505,6 +506,7 @@ def test_partials_are_those_of_differences(name: str) -> None:
 
 def test_no_equation_is_missed() -> None:
     """Those that the models name, and the library's, are among what was found."""
-    for package in ("card", "pump", "refinements", "machine", "full_order", "library", "model"):
+    modules = "channel card pump refinements machine full_order library model"
+    for package in modules.split():
         assert any(name.startswith(f"{package}.") for name in EQUATIONS), package
     assert len(EQUATIONS) > 100

@@ -13,8 +13,9 @@ from swashplate.equations.code import FUNCTIONS
 from swashplate.equations.equation import is_function
 from swashplate.equations.syntax import plain
 from swashplate.models import card, pump
+from swashplate.models import channel as single
 from swashplate.models import displacement_control as control
-from swashplate.models.card import CardOptions
+from swashplate.models.channel import CardOptions
 from swashplate.models.displacement_control import Pump, PumpOptions
 
 OPTIONS: dict[str, Any] = dict.fromkeys(("literal", "split", "steep", "symmetric"))
@@ -26,8 +27,8 @@ CASES = [
     (control.solenoid_force, ("current", "p.Z17", "p.Z19_plus", "p.Z22_minus"), None),
     (control.leaky_step, ("pressure", "opening", "Z6", "Z7", "Z8", "Z9"), None),
     (control.pressure_rate, ("pressure", "opening", "Z6", "Z8", "Z9"), None),
-    (card.limited_current, ("target", "previous", "p.lim1", "p.lim2", "decay"), None),
-    (card.filtered_current, ("now", "before", "steady", "p"), None),
+    (single.limited_current, ("target", "previous", "p.lim1", "p.lim2", "decay"), None),
+    (single.filtered_current, ("now", "before", "steady", "p"), None),
     (card.card_sample, ("state", "p"), CardOptions()),
     (library.interpolated, ("newer", "fraction"), None),
 ]

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from swashplate.equations.c_source import Unit
-from swashplate.models import card, displacement_control
+from swashplate.models import channel, displacement_control
 
 GOLDEN = Path(__file__).parent / "golden.c"
 
@@ -11,7 +11,7 @@ GOLDEN = Path(__file__).parent / "golden.c"
 def test_three_functions_read_as_they_were_reviewed() -> None:
     unit = Unit("swp_")
     for equation in (
-        card.limited_current,
+        channel.limited_current,
         displacement_control.pressure_limits,
         displacement_control.solenoid_force,
     ):

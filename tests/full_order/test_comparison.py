@@ -1,7 +1,5 @@
 """One state against five: one as the limit of the other, differences, lags, and tables."""
 
-from dataclasses import replace
-from math import pi
 from pathlib import Path
 
 import numpy as np
@@ -86,25 +84,6 @@ def compared() -> Comparison:
     return compare(hoist, hoist.drive.simulate(step))
 
 
-def test_the_lag_is_that_of_the_spool() -> None:
-    """Small motions: the spool's lag T = 2 ζ/ω turns 1/(1 + jωτ) into 1/(1 + jωτ(1 + jωT)).
-
-    To first order in T the speed then comes T ω²τ²/(1 + ω²τ²) later, and that explains the share
-    ω²τ²/(1 + ω²τ²) of the difference; the rest is a gain.
-    """
-    hoist = FullOrderDrive.preset("hoist")
-    omega, time = 2.0 * pi * 3.0, np.arange(3073) / 512.0
-    small = 0.45 + 0.01 * np.sin(omega * time)
-    run = hoist.drive.simulate_current(small, start="steady")
-    lag = compare(hoist, run, start="steady").lag
-    assert lag is not None
-    squared = (omega * 0.1214) ** 2  # τ of the reduced model, model.md section 9
-    expected = 2.0 * 0.3 / (2.0 * pi * 40.0) * squared / (1.0 + squared)
-    # first order in ωT = 0.045, and the coupled spool has ζ = 0.286 in place of 0.3
-    assert lag.time == pytest.approx(expected, rel=0.1)
-    assert 0.5 < lag.share < squared / (1.0 + squared)
-
-
 def test_the_difference_is_that_of_the_speeds(compared: Comparison) -> None:
     error = compared.reduced_speed - compared.full.shaft_speed
     difference = compared.difference
@@ -113,25 +92,11 @@ def test_the_difference_is_that_of_the_speeds(compared: Comparison) -> None:
     assert difference.within == 0.01  # docs/full-order.md: 0.56 %
 
 
-def test_a_speed_that_comes_earlier_by_3_ms_is_told(compared: Comparison) -> None:
-    hoist = FullOrderDrive.preset("hoist")
-    time = np.arange(2049) / 512.0
-    amplitude, omega = 0.2, 2.0 * pi * 0.5
-    run = hoist.simulate_current(0.4 + amplitude * np.sin(omega * time), start="steady")
-    earlier = np.interp(time + 3e-3, time, run.shaft_speed)
-    made = replace(compared, full=run, reduced_speed=earlier)
-    lag = made.lag
-    assert lag is not None
-    assert lag.time == pytest.approx(3e-3, rel=0.01)
-    assert lag.share > 0.98
-
-
 def test_without_motion_there_is_nothing_to_tell() -> None:
     slew = Drive.preset("slew").replace(Z17=5.0)  # a dead zone that no current leaves
     full = FullOrderDrive.from_drive(slew)
     found = compare(full, slew.simulate(maneuvers.step(2.0).sample()))
     assert not found.difference.moves
-    assert found.lag is None
     begun: list[str] = []
     table = validity(full, begin=begun.append).to_polars()
     assert begun == [title for title, _ in TABLE_MANEUVERS]

@@ -411,8 +411,6 @@ def linear(axis: str, variant: str, chosen: Changes, inputs: Inputs) -> Outputs:
         response = each.response(inputs["frequencies"])
         for output, row in zip(each.outputs, response, strict=True):
             found[f"{name}response of {output}"] = real(row)
-    numerator, denominator = model.transfer_function()
-    found["numerator"], found["denominator"] = each_alone(numerator), each_alone(denominator)
     return found
 
 

@@ -1,7 +1,6 @@
-"""Models as SciPy's and python-control's objects, as polynomials and as files."""
+"""Models as SciPy's objects and as files."""
 
 import json
-import sys
 import tomllib
 from pathlib import Path
 
@@ -10,8 +9,6 @@ import pytest
 import scipy.signal
 
 from swashplate import Drive, FileError, InputError
-
-control = pytest.importorskip("control", reason="python-control is not installed")
 
 F = np.geomspace(0.01, 20.0, 30)
 OUTPUTS = ("shaft_speed", "stroker_pressure", "current")
@@ -31,81 +28,33 @@ def of_scipy(system: scipy.signal.StateSpace, f: np.ndarray, row: int) -> np.nda
 
 def test_without_delay(hoist: Drive) -> None:
     model = hoist.linearize(current=0.45, outputs=OUTPUTS[:2])
-    expected = model.response(F)
-    system, states = model.to_scipy(), model.to_control()
+    expected, system = model.response(F), model.to_scipy()
     assert system.dt is None
-    assert states.state_labels == ["stroker_pressure"]
-    assert states.output_labels == list(OUTPUTS[:2])
-    assert states.input_labels == ["current"]
     for row in range(2):
         np.testing.assert_allclose(of_scipy(system, F, row), expected[row], rtol=1e-9)
-        np.testing.assert_allclose(states(2j * np.pi * F)[row, 0], expected[row], rtol=1e-9)
-    np.testing.assert_allclose(control.poles(states), model.poles)
-    np.testing.assert_allclose(control.dcgain(states)[:, 0], model.gains)
+    late = hoist.linearize(4.0)
+    without = late.response(F)[0] * np.exp(2j * np.pi * F * 0.014)
+    np.testing.assert_allclose(of_scipy(late.to_scipy(without_delay=True), F, 0), without)
+    with pytest.raises(InputError, match="has a delay of 0.014 s, which no state space holds"):
+        late.to_scipy()
 
 
 @pytest.mark.parametrize("rate", [100.0, 512.0])
 def test_a_sampled_model_is_exact(axis: Drive, rate: float) -> None:
     model = axis.linearize(2.0, outputs=OUTPUTS).discrete(1.0 / rate)
-    expected = model.response(F)
-    system, states = model.to_scipy(), model.to_control()
-    assert system.dt == states.dt == 1.0 / rate
-    assert len(states.state_labels) == system.A.shape[0]
-    z = np.exp(2j * np.pi * F / rate)
+    expected, system = model.response(F), model.to_scipy()
+    assert system.dt == 1.0 / rate
     for row in range(3):
         np.testing.assert_allclose(of_scipy(system, F, row), expected[row], rtol=1e-8)
-        np.testing.assert_allclose(states(z)[row, 0], expected[row], rtol=1e-8)
 
 
-def test_python_control_marches_like_the_simulation(hoist: Drive) -> None:
-    model = hoist.linearize(4.0).discrete(1.0 / 512.0)
+def test_scipy_marches_like_the_simulation(hoist: Drive) -> None:
+    system = hoist.linearize(4.0).discrete(1.0 / 512.0).to_scipy()
     u = 1e-5 * np.minimum(np.arange(400) / 50.0, 1.0)
     run = hoist.simulate(4.0 + u, start="steady")
-    _, answer = control.forced_response(model.to_control(), inputs=u)
+    _, answer, _ = scipy.signal.dlsim(system, u)
     moved = run.shaft_speed - run.shaft_speed[0]
-    np.testing.assert_allclose(answer, moved, rtol=0.0, atol=1e-4 * np.abs(moved).max())
-
-
-def test_a_delay_left_out_or_approximated(hoist: Drive) -> None:
-    model = hoist.linearize(4.0)
-    without = model.response(F)[0] * np.exp(2j * np.pi * F * 0.014)
-    np.testing.assert_allclose(of_scipy(model.to_scipy(without_delay=True), F, 0), without)
-    plain = model.to_control(without_delay=True)
-    np.testing.assert_allclose(plain(2j * np.pi * F), without)
-    together = plain * control.tf(*control.pade(model.delay, 5))  # as the documentation says
-    np.testing.assert_allclose(together(2j * np.pi * F), model.response(F)[0], rtol=1e-6)
-    numerator, denominator = model.transfer_function()
-    np.testing.assert_allclose(
-        np.polyval(numerator, 2j * np.pi * F) / np.polyval(denominator, 2j * np.pi * F), without
-    )
-    # gain ω²/τ over three poles, no zero
-    assert numerator.shape == (1,)
-    assert denominator[0] == 1.0
-
-
-def test_zeros_where_there_are(hoist: Drive) -> None:
-    loaded = hoist.replace(Z12=0.2).linearize(current=0.45)
-    numerator, denominator = loaded.transfer_function()
-    assert numerator.size == denominator.size == 2
-    np.testing.assert_allclose(
-        np.polyval(numerator, 2j * np.pi * F) / np.polyval(denominator, 2j * np.pi * F),
-        loaded.response(F)[0],
-    )
-    still = hoist.linearize(current=0.45, outputs=["shaft_speed", "solenoid_force"])
-    numerator, _ = still.transfer_function("solenoid_force")
-    assert numerator.size == 2  # the pump's pole cancels
-
-
-def test_refusals(hoist: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
-    model = hoist.linearize(4.0)
-    for export in (model.to_scipy, model.to_control):
-        with pytest.raises(InputError, match="has a delay of 0.014 s, which no state space holds"):
-            export()
-    with pytest.raises(InputError, match="has no output 'torque'"):
-        model.transfer_function("torque")
-    monkeypatch.setitem(sys.modules, "control", None)
-    with pytest.raises(InputError, match="not installed: pip install"):
-        model.to_control(without_delay=True)
+    np.testing.assert_allclose(answer[:, 0], moved, rtol=0.0, atol=1e-4 * np.abs(moved).max())
 
 
 @pytest.mark.parametrize("ending", ["toml", "json"])

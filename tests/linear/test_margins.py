@@ -37,7 +37,7 @@ def test_the_delay_margin_brings_the_loop_to_its_edge(hoist: Drive) -> None:
     h = 1.0 / 2048.0
     model = hoist.linearize(4.0).discrete(h)
     gain = 0.5 * model.largest_gain
-    whole = int(model.delay_margin(gain) / h)
+    whole = int(model.margins(gain).delay_margin / h)
     assert whole > 50
     assert radius(model, gain, whole) < 1.0 < radius(model, gain, whole + 1)
 
@@ -47,7 +47,9 @@ def test_margins_of_the_continuous_model_are_the_sampled_one_s_limit(hoist: Driv
     fine = model.discrete(1e-5)
     assert fine.largest_gain == pytest.approx(model.largest_gain, rel=1e-3)
     assert fine.bandwidth == pytest.approx(model.bandwidth, rel=1e-3)
-    assert fine.delay_margin(5.0) == pytest.approx(model.delay_margin(5.0), rel=1e-3)
+    assert fine.margins(5.0).delay_margin == pytest.approx(
+        model.margins(5.0).delay_margin, rel=1e-3
+    )
 
 
 def test_a_first_order_lag(hoist: Drive) -> None:

@@ -294,27 +294,6 @@ def test_each_input_by_itself(hoist: Drive) -> None:
     assert together.response(0.0, "pump_speed")[0] == pytest.approx(
         together.operating_point.shaft_speed + 1e-6 * 3e4
     )
-    numerator, denominator = together.transfer_function(input="load_torque")
-    s = 2j * np.pi * 3.0
-    np.testing.assert_allclose(
-        np.polyval(numerator, s) / np.polyval(denominator, s),
-        together.response(3.0, "load_torque")[0],
-    )
-
-
-def test_several_inputs_in_other_tools(hoist: Drive) -> None:
-    control = pytest.importorskip("control", reason="python-control is not installed")
-    inputs = ("voltage", "load_torque")
-    model = hoist.replace(**LINE).linearize(4.0, input=inputs)
-    for each, point in ((model, 2j * np.pi), (model.discrete(0.01), np.exp(0.02j * np.pi))):
-        system = each.to_control(without_delay=True)
-        assert system.input_labels == list(inputs)
-        for k, name in enumerate(inputs):
-            exact = each.response(1.0, name)[0]
-            if k == 0 and each.sample_time is None:
-                exact *= np.exp(2j * np.pi * each.delay)
-            np.testing.assert_allclose(system(point)[0, k], exact, rtol=1e-6)
-    assert control.poles(model.to_control(without_delay=True)).size == 5
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,8 @@
 import pytest
 
 from swashplate import Drive
-from swashplate.models.card import Card, Channel
+from swashplate.models.card import Card
+from swashplate.models.channel import Channel
 from swashplate.models.displacement_control import Pump
 
 

@@ -15,11 +15,12 @@ from scipy.optimize import brentq, least_squares
 from swashplate import Drive
 from swashplate.equations.model import Window
 from swashplate.models import card
-from swashplate.models.card import Channel, ChannelConstants, Filter
+from swashplate.models import channel as single
+from swashplate.models.channel import Channel, ChannelConstants, Filter
 from swashplate.simulation.instance import step_limit
 
 Array = NDArray[np.float64]
-EXACT = card.CardOptions(exact=True)
+EXACT = single.CardOptions(exact=True)
 RATES = (200.0, 512.0, 600.0, 1000.0, 2000.0)
 
 
@@ -29,21 +30,21 @@ RATES = (200.0, 512.0, 600.0, 1000.0, 2000.0)
 @pytest.mark.interpreted
 def test_share_of_an_interval_above_the_dead_zone() -> None:
     # a ramp from 0 to 2 V over the two intervals; the last 0.5 V lie above 1.5 V
-    assert card.share_above(0.0, 2.0, 1.5) == 0.25
-    assert card.share_above(2.0, 0.0, 1.5) == 0.25
-    assert card.share_above(1.0, 1.0, 1.0) == 0.0
-    assert card.share_above(2.0, 3.0, 1.0) == 1.0
+    assert single.share_above(0.0, 2.0, 1.5) == 0.25
+    assert single.share_above(2.0, 0.0, 1.5) == 0.25
+    assert single.share_above(1.0, 1.0, 1.0) == 0.0
+    assert single.share_above(2.0, 3.0, 1.0) == 1.0
     # the interval ends 0.3 samples before the newest: it sees 1.3..2 of 0..1 and 1..2 of 1..2
-    assert card.jump_share(2.0, 1.0, 0.0, 0.3, 1.0) == pytest.approx(0.7)
+    assert single.jump_share(2.0, 1.0, 0.0, 0.3, 1.0) == pytest.approx(0.7)
 
 
 @pytest.mark.interpreted
 def test_the_settled_current_is_a_jump_and_a_cubic(channel: Channel) -> None:
     p = channel._replace(V_dz=0.5, J=0.3, G1=0.1, G2=0.01, G3=-0.002)
-    assert card.steady_current(2.5, 1.0, p) == pytest.approx(0.3 + 0.2 + 0.04 - 0.016)
-    assert card.steady_current(0.4, 0.25, p) == 0.075
-    assert card.channel_level(0.5, p) == 0.0
-    assert card.channel_level(-3.0, p) == 0.0
+    assert single.steady_current(2.5, 1.0, p) == pytest.approx(0.3 + 0.2 + 0.04 - 0.016)
+    assert single.steady_current(0.4, 0.25, p) == 0.075
+    assert single.channel_level(0.5, p) == 0.0
+    assert single.channel_level(-3.0, p) == 0.0
 
 
 def test_published_levels() -> None:
@@ -57,7 +58,7 @@ def test_published_levels() -> None:
     for (axis, side), currents in expected.items():
         numbers = Drive.preset(axis).parameters.numbers
         p = Channel(*(numbers[f"{name}_{side}"] for name in Channel._fields))
-        found = [card.channel_level(voltage, p) for voltage in (1.0, 4.0, 6.5, 9.0)]
+        found = [single.channel_level(voltage, p) for voltage in (1.0, 4.0, 6.5, 9.0)]
         assert found == pytest.approx(currents, abs=5e-5)
 
 
@@ -71,13 +72,13 @@ def test_the_recursion_is_the_printed_difference_equation(channel: Channel) -> N
     # 2(1 - 0.5) 0.3 + (2·0.5 - 1 - 1) 0.2 - 2 h² sign + 1·0.7
     plain = 0.3 - 0.2 + 0.7
     friction = 2.0 / 64.0**2
-    found = card.filtered_current(0.3, 0.2, 0.7, p, h, None)
+    found = single.filtered_current(0.3, 0.2, 0.7, p, h, None)
     assert found == pytest.approx(plain - friction, rel=1e-15)
-    assert card.filtered_current(0.2, 0.2, 0.7, p, h, None) == pytest.approx(0.7)
-    assert card.coulomb_sign(0.005 * h, h, None) == pytest.approx(0.5)
-    assert card.coulomb_sign(0.005 * h, h, True) == 1.0
-    assert card.coulomb_sign(-0.005 * h, h, True) == -1.0
-    assert card.coulomb_sign(0.0, h, True) == 0.0
+    assert single.filtered_current(0.2, 0.2, 0.7, p, h, None) == pytest.approx(0.7)
+    assert single.coulomb_sign(0.005 * h, h, None) == pytest.approx(0.5)
+    assert single.coulomb_sign(0.005 * h, h, True) == 1.0
+    assert single.coulomb_sign(-0.005 * h, h, True) == -1.0
+    assert single.coulomb_sign(0.0, h, True) == 0.0
 
 
 @pytest.mark.interpreted
@@ -96,10 +97,10 @@ def test_the_largest_step_is_that_of_the_recursions_roots(
 
 def marched(p: Channel, steady: Array, h: float) -> Array:
     """I* of the exact filter under an I_ss straight between samples, settled at the first."""
-    k = card.channel_constants(p, h, EXACT)
+    k = single.channel_constants(p, h, EXACT)
     state, found = Filter(float(steady[0]), 0.0, 0.0), []
     for begins, ends in pairwise([float(steady[0]), *map(float, steady)]):
-        filtered, rate = card.exact_filter(state, begins, ends, k)
+        filtered, rate = single.exact_filter(state, begins, ends, k)
         found.append(filtered)
         state = Filter(filtered, rate, 0.0)
     return np.array(found)
@@ -111,7 +112,7 @@ def test_the_waves_are_cosh_and_sinh(zeta: float, w: float) -> None:
     q, e = (zeta * zeta - 1.0) * w * w, exp(-zeta * w)
     r = sqrt(abs(q))
     even, odd = (cosh(r), sinh(r)) if q > 0.0 else (cos(r), sin(r))
-    found = card.damped_waves(zeta, w)
+    found = single.damped_waves(zeta, w)
     expected = (e * even, e * odd / r if r > 0.0 else e)
     assert found == pytest.approx(expected, rel=1e-13, abs=1e-15)
 
@@ -121,8 +122,8 @@ def test_nothing_happens_at_critical_damping() -> None:
     """Value and slope by ζ go through ζ = 1 as those of the power series, known there."""
     for w in (0.03, 0.3, 0.99, 1.0, 2.0):
         e, s = exp(-w), 1e-5
-        assert card.damped_waves(1.0, w) == pytest.approx((e, e), rel=1e-15)
-        below, above = card.damped_waves(1.0 - s, w), card.damped_waves(1.0 + s, w)
+        assert single.damped_waves(1.0, w) == pytest.approx((e, e), rel=1e-15)
+        below, above = single.damped_waves(1.0 - s, w), single.damped_waves(1.0 + s, w)
         slopes = [(b - a) / (2.0 * s) for a, b in zip(below, above, strict=True)]
         # cosh r is 1 + r²/2 and sinh r/r is 1 + r²/6 there, with r² = (ζ² - 1) w²
         expected = (e * (w * w - w), e * (w * w / 3.0 - w))
@@ -171,18 +172,18 @@ def test_it_is_stable_and_sticks_at_any_rate(zeta: float) -> None:
 
 
 @njit(error_model="numpy")
-def currents(command: Array, p: card.Card, h: float, options: card.CardOptions) -> Array:
+def currents(command: Array, p: card.Card, h: float, options: single.CardOptions) -> Array:
     """Signed current under a command that is zero before the first sample."""
     made = np.empty(command.size)
     k = card.card_constants(p, h, options)
     behind, ahead = p.tau / h, p.tau / h - 0.5
     back, late = int(behind), int(ahead)
     padded = np.concatenate((np.zeros(back + 3), command))
-    still = card.CardInputs(Window((0.0, 0.0, 0.0), 0.0), Window((0.0, 0.0, 0.0), 0.0))
+    still = single.CardInputs(Window((0.0, 0.0, 0.0), 0.0), Window((0.0, 0.0, 0.0), 0.0))
     state = card.card_rest(p, k, options, still)
     for n in range(command.size):
         at, end = n + 3, n + back + 3 - late
-        inputs = card.CardInputs(
+        inputs = single.CardInputs(
             Window((padded[at], padded[at - 1], padded[at - 2]), behind - back),
             Window((padded[end], padded[end - 1], padded[end - 2]), ahead - late),
         )
@@ -215,15 +216,15 @@ def test_the_same_parameters_describe_the_response_at_every_rate(rate: float) ->
 @pytest.mark.interpreted
 def test_friction_takes_the_rate_and_stops_at_zero(channel: Channel) -> None:
     k = ChannelConstants(1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, coulomb=0.5, lost=0.1)
-    assert card.exact_filter(Filter(0.2, 0.8, 0.0), 0.0, 0.0, k) == pytest.approx((0.15, 0.3))
-    assert card.exact_filter(Filter(0.2, -0.4, 0.0), 0.0, 0.0, k) == pytest.approx((0.24, 0.0))
+    assert single.exact_filter(Filter(0.2, 0.8, 0.0), 0.0, 0.0, k) == pytest.approx((0.15, 0.3))
+    assert single.exact_filter(Filter(0.2, -0.4, 0.0), 0.0, 0.0, k) == pytest.approx((0.24, 0.0))
 
 
 @pytest.mark.interpreted
 @given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3), st.floats(0.0, 1.0))
 def test_the_course_over_a_step_keeps_integral_and_moment(samples: list[float], f: float) -> None:
     p = Channel(0.5, 0.3, 0.1, 0.0, 0.0, 1.0, 1.0, 0.0, inf, inf, inf, 0.0, inf)
-    begins, ends = card.steady_course(-1.0, Window(tuple(samples), f), p)
+    begins, ends = single.steady_course(-1.0, Window(tuple(samples), f), p)
     # time in samples back from the newest; the step goes from f + 1 to f
     back = f + (np.arange(100_000) + 0.5) / 100_000
     command = -np.interp(back, [0.0, 1.0, 2.0], samples)
@@ -236,14 +237,14 @@ def test_the_course_over_a_step_keeps_integral_and_moment(samples: list[float], 
 @pytest.mark.parametrize("exact", [None, True])
 def test_a_settled_card_stays(channel: Channel, exact: bool | None) -> None:
     p = card.Card(channel, channel._replace(C=3.0, zeta=1.2), 0.014)
-    options = card.CardOptions(exact=exact)
+    options = single.CardOptions(exact=exact)
     k = card.card_constants(p, 1.0 / 512.0, options)
     for voltage in (6.0, -6.0):
-        inputs = card.CardInputs(Window((voltage,) * 3, 0.2), Window((voltage,) * 3, 0.7))
+        inputs = single.CardInputs(Window((voltage,) * 3, 0.2), Window((voltage,) * 3, 0.7))
         state = card.card_settled(inputs, p, k, options)
         for _ in range(50):
             signals = card.card_sample(state, inputs, p, k, 1.0 / 512.0, options)
-            level = card.channel_level(6.0, p.plus if voltage > 0.0 else p.minus)
+            level = single.channel_level(6.0, p.plus if voltage > 0.0 else p.minus)
             assert signals.current == pytest.approx(np.sign(voltage) * level, rel=1e-14)
             assert not card.card_limits(state, signals, inputs, p, k, options).current_rate
             state = card.card_step(state, signals, inputs, p, k, 1.0 / 512.0, options)
@@ -273,9 +274,9 @@ def test_limiter_branches(
     channel: Channel, target: float, previous: float, steady: float, output: float, limited: bool
 ) -> None:
     p = channel._replace(**LIMITS)
-    found = card.limited_current(target, previous, steady, p, 0.9, 0.01, None)
+    found = single.limited_current(target, previous, steady, p, 0.9, 0.01, None)
     assert found == pytest.approx(output)
-    assert card.rate_limit_active(output, target, previous, p.I_t2) is limited
+    assert single.rate_limit_active(output, target, previous, p.I_t2) is limited
 
 
 @pytest.mark.interpreted
@@ -297,15 +298,15 @@ def test_switches_from_within_a_step(
     channel: Channel, target: float, previous: float, steady: float, output: float
 ) -> None:
     p = channel._replace(**LIMITS)
-    found = card.limited_current(target, previous, steady, p, 0.9, 0.01, True)
+    found = single.limited_current(target, previous, steady, p, 0.9, 0.01, True)
     assert found == pytest.approx(output)
 
 
 @pytest.mark.interpreted
 def test_limits_can_be_off(channel: Channel) -> None:
     p = channel._replace(lim1=inf, lim2=inf, I_t1=inf, I_t2=0.0, a=inf)
-    decay = card.channel_constants(p, 0.01, card.CardOptions()).decay
+    decay = single.channel_constants(p, 0.01, single.CardOptions()).decay
     assert decay == 0.0
-    assert card.limited_current(1.3, 0.2, 1.0, p, decay, 0.01, None) == 1.3
-    assert card.limited_current(0.1, 0.9, 0.0, p, decay, 0.01, None) == 0.1
-    assert card.limited_current(-0.1, 0.9, 0.0, p, decay, 0.01, None) == 0.0
+    assert single.limited_current(1.3, 0.2, 1.0, p, decay, 0.01, None) == 1.3
+    assert single.limited_current(0.1, 0.9, 0.0, p, decay, 0.01, None) == 0.1
+    assert single.limited_current(-0.1, 0.9, 0.0, p, decay, 0.01, None) == 0.0

@@ -7,9 +7,9 @@ import pytest
 
 from swashplate.equations import derive
 from swashplate.equations.library import faded, small_arctangent, soft_threshold
-from swashplate.models import card
+from swashplate.models import channel as single
 from swashplate.models import displacement_control as control
-from swashplate.models.card import Channel
+from swashplate.models.channel import Channel
 from swashplate.models.displacement_control import Pump
 
 pytestmark = pytest.mark.interpreted
@@ -61,20 +61,20 @@ def test_edge_of_the_solenoids_dead_zone_has_no_force_and_no_slope() -> None:
 def test_edge_of_the_cards_dead_zone_belongs_to_the_dead_side() -> None:
     p = channel(V_dz=0.5, J=0.3, G1=0.1)
     by = ("command", "share", "p.V_dz", "p.J", "p.G1")
-    assert partials(card.steady_current, by, 0.5, 0.25, p) == (0.0, 0.3, 0.0, 0.25, 0.0)
+    assert partials(single.steady_current, by, 0.5, 0.25, p) == (0.0, 0.3, 0.0, 0.25, 0.0)
 
 
 def test_a_command_resting_at_the_threshold_gives_no_derivative() -> None:
     by = ("newest", "middle", "oldest", "fraction", "threshold")
-    assert partials(card.jump_share, by, 0.5, 0.5, 0.5, 0.3, 0.5) == (0.0,) * 5
-    assert partials(card.share_above, ("first", "last", "threshold"), 0.5, 0.5, 0.5) == (0.0,) * 3
+    assert partials(single.jump_share, by, 0.5, 0.5, 0.5, 0.3, 0.5) == (0.0,) * 5
+    assert partials(single.share_above, ("first", "last", "threshold"), 0.5, 0.5, 0.5) == (0.0,) * 3
 
 
 def test_a_command_that_begins_at_the_threshold_has_a_slope() -> None:
     by = ("first", "last", "threshold")
     # the way from 0.5 to 1.5 is above 0.5 but for its first point: only that one moves the share
-    assert partials(card.share_above, by, 0.5, 1.5, 0.5) == (1.0, 0.0, -1.0)
-    assert partials(card.share_above, by, 1.5, 0.5, 0.5) == (0.0, 1.0, -1.0)
+    assert partials(single.share_above, by, 0.5, 1.5, 0.5) == (1.0, 0.0, -1.0)
+    assert partials(single.share_above, by, 1.5, 0.5, 0.5) == (0.0, 1.0, -1.0)
 
 
 @pytest.mark.parametrize(
@@ -136,16 +136,16 @@ def test_at_the_limiters_switches_the_unlimited_side_counts(
     p = channel(lim1=2.0, lim2=2.0, I_t1=0.25, I_t2=0.125)
     arguments = (target, previous, 1.0, p, 0.5, H, split)
     by = ("target", "previous")
-    assert partials(card.limited_current, by, *arguments, split=split) == (1.0, 0.0)
+    assert partials(single.limited_current, by, *arguments, split=split) == (1.0, 0.0)
 
 
 def test_ends_of_the_smooth_sign_are_saturated() -> None:
-    width = card.COULOMB_WIDTH * H
+    width = single.COULOMB_WIDTH * H
     p = channel(zeta=0.5, omega=1.0, C=2.0)
     by = ("now", "p.C")
-    within = partials(card.filtered_current, by, 0.5 * width, 0.0, 0.0, p, H, None, literal=None)
-    at_end = partials(card.filtered_current, by, width, 0.0, 0.0, p, H, None, literal=None)
-    assert within[0] - at_end[0] == pytest.approx(-2.0 * H / card.COULOMB_WIDTH)
+    within = partials(single.filtered_current, by, 0.5 * width, 0.0, 0.0, p, H, None, literal=None)
+    at_end = partials(single.filtered_current, by, width, 0.0, 0.0, p, H, None, literal=None)
+    assert within[0] - at_end[0] == pytest.approx(-2.0 * H / single.COULOMB_WIDTH)
     assert at_end[1] == pytest.approx(-H * H)
 
 
@@ -153,7 +153,7 @@ def test_at_rest_the_filter_still_follows_its_input() -> None:
     p, h = channel(zeta=0.5, omega=100.0), 1.0 / 512.0
     w = 100.0 * h
     by = ("now", "before", "steady")
-    found = partials(card.filtered_current, by, 0.0, 0.0, 0.0, p, h, None, literal=None)
+    found = partials(single.filtered_current, by, 0.0, 0.0, 0.0, p, h, None, literal=None)
     assert found == pytest.approx((2.0 * (1.0 - 0.5 * w), w - w * w - 1.0, w * w))
     assert partials(faded, ("value",), 0.0) == (1.0,)
 

@@ -1,5 +1,7 @@
 """Many sets at once of models of one's own and of drives: costs, outputs, files, executors."""
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import NamedTuple
 
@@ -233,3 +235,28 @@ def test_bad_batches_are_refused(options, sentence: str) -> None:
     }
     with pytest.raises(InputError, match=sentence):
         simulate_many(**asked)
+
+
+STREAMED = """
+import resource, sys
+import numpy as np
+from swashplate import Drive, Serial
+
+sets, folder = int(sys.argv[1]), sys.argv[2]
+drive, voltage = Drive.preset("hoist"), np.full(200_000, 3.0)
+spread = {"Z8": drive["Z8"].value * np.linspace(0.9, 1.1, sets)}
+found = drive.simulate_many(spread, voltage=voltage, to=folder, executor=Serial())
+assert len(found.files) > 1 and not found.failures
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.mark.slow
+def test_memory_does_not_grow_with_the_sets_that_are_streamed(tmp_path: Path) -> None:
+    """Of 400 sets more, 640 MB of outputs, a twentieth at most."""
+    peaks = []
+    for sets in (100, 500):
+        words = [sys.executable, "-c", STREAMED, str(sets), str(tmp_path / str(sets))]
+        done = subprocess.run(words, capture_output=True, text=True, check=True)
+        peaks.append(1024.0 * int(done.stdout))
+    assert peaks[1] - peaks[0] < 400 * 200_000 * 8 / 20

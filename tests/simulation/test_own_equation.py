@@ -11,7 +11,7 @@ from swashplate import Campaign, Drive, InputError, ParameterError, maneuvers
 from swashplate.analysis import envelope
 from swashplate.equations import Definition, equation
 from swashplate.identification import fit, load_setup
-from swashplate.models.card import Channel, steady_current
+from swashplate.models.channel import Channel, steady_current
 from swashplate.models.displacement_control import Pump, spool_balance
 from swashplate.models.pump import shaft_speed
 
@@ -185,3 +185,17 @@ def test_what_does_not_fit_is_refused() -> None:
         PLAIN.with_equation(spool_balance, sealed_balance, Taken)
     with pytest.raises(ParameterError, match="Unnamed.another needs a Definition"):
         PLAIN.with_equation(shaft_speed, faster, Unnamed)
+
+
+def test_a_file_keeps_its_equations(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    for drive in (DRAGGED, PLAIN.with_equation(shaft_speed, faster)):
+        drive.to_toml(path)
+        again = Drive.from_toml(path)
+        assert again.parameters.equations == drive.parameters.equations
+        assert again == drive
+    assert again.steady_speed(3.0) != PLAIN.steady_speed(3.0)
+    text = path.read_text("utf-8")
+    path.write_text(text.replace(f"{__name__}:faster", "nobodys_module:faster"))
+    with pytest.raises(ParameterError, match="faster of the module nobodys_module: import that"):
+        Drive.from_toml(path)

@@ -8,7 +8,8 @@ import sympy as sp
 
 from swashplate import Drive, maneuvers
 from swashplate.equations.model import place
-from swashplate.models.card import Channel, card, filtered_current, steady_current
+from swashplate.models.card import card
+from swashplate.models.channel import Channel, filtered_current, steady_current
 
 H = 1.0 / 512.0
 NOW, BEFORE, NEXT, STEADY = sp.symbols("I_n I_before I_next I_ss", real=True)

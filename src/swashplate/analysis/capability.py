@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.drive import Drive
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import SOURCE_RATE
-from swashplate.equations.marching.run import Instance, Part, observe_kernel
+from swashplate.equations.marching.run import Instance, Part, observed_at
 from swashplate.models.displacement_control import PumpOptions
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result, Tabular, short
@@ -156,13 +156,10 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
     forms = PumpOptions(symmetric=options.symmetric, steep=options.steep, leakage=leaks)
     still = Part(p._replace(Z12=0.0, load_inertia=0.0), forms)
     instance = Instance(instance.model, (front, still), instance.name)
-    kept = (Stored(0, "signals", "current"), Stored(1, "state", "pressure"))
+    current = np.full_like(pressure, drive.steady_current(voltage))
+    known = {Stored(0, "signals", "current"): current, Stored(1, "state", "pressure"): pressure}
     wanted = tuple(Stored(1, "signals", s) for s in ("shaft_speed", "swash_rate", "spool_free"))
-    rows = np.stack([np.full_like(pressure, drive.steady_current(voltage)), pressure])
-    out = np.empty((3, pressure.size))
-    observe = observe_kernel(instance.model, 1, ("current",), instance.options, kept, wanted)
-    observe(instance.params, instance.given, 1.0, rows, out)
-    speed, rate, free = out
+    speed, rate, free = observed_at(instance, 1, known, ("current",), 1.0, wanted)
     orifice = np.where(free > 0.0, p.Z16_plus, p.Z16_minus)
     limited = np.minimum(np.abs(free), p.Z14) > orifice
     code = np.where(limited, 2, np.where(np.abs(free) > p.Z14, 1, 0))

@@ -187,6 +187,12 @@ def subroutine(function: Callable[P, R]) -> Callable[P, R]:
     return compiled  # type: ignore[no-any-return]
 
 
+def pasted(function: Callable[P, R]) -> Callable[P, R]:
+    """A `subroutine` of one caller, which takes in its code: compiled once, and not twice."""
+    known[plain(function)] = None
+    return njit(nogil=True, error_model="numpy", inline="always")(function)
+
+
 def on_disk(compiled: Any, function: Callable[..., Any]) -> None:
     """Let a compiled function keep its machine code."""
     try:

@@ -253,9 +253,13 @@ def positive(a: Node, definition: Callable[[str], Node | None], strict: bool = T
 # --- text -----------------------------------------------------------------------------------------
 
 
-def render(node: Node, known: Callable[[Node], str | None]) -> str:
-    """An expression as Python writes it, with the names that parts of it have."""
-    return _render(node, known)[0]
+def render(node: Node, known: Callable[[Node], str | None], straight: bool = False) -> str:
+    """An expression as Python writes it, with the names that parts of it have.
+
+    In `straight` text a choice between what is `CHEAP` is ``choose(test, one, two)``, and tests are
+    joined by ``&`` and ``|``: no branch, which a compiler would take a while to remove.
+    """
+    return _render(node, known, straight)[0]
 
 
 def text(node: Node) -> str:
@@ -263,7 +267,9 @@ def text(node: Node) -> str:
     return render(node, lambda each: None)
 
 
-def _render(node: Node, known: Callable[[Node], str | None]) -> tuple[str, int]:
+def _render(
+    node: Node, known: Callable[[Node], str | None], straight: bool = False
+) -> tuple[str, int]:
     given = known(node)
     if given is not None:
         return given, ATOM
@@ -275,10 +281,14 @@ def _render(node: Node, known: Callable[[Node], str | None]) -> tuple[str, int]:
         return node.value, ATOM
 
     def part(a: Node, level: int) -> str:
-        text, own = _render(a, known)
+        text, own = _render(a, known, straight)
         return text if own >= level else f"({text})"
 
     level = _PRECEDENCE.get(op, ATOM)
+    if straight and op in ("and", "or") and node.cheap:
+        return f" {'&' if op == 'and' else '|'} ".join(part(a, ATOM) for a in args), level
+    if straight and op == "if" and args[1].cheap and args[2].cheap:
+        return f"choose({', '.join(part(a, 1) for a in args)})", ATOM
     if op == "if":
         return f"{part(args[1], 2)} if {part(args[0], 2)} else {part(args[2], 1)}", level
     if op in ("and", "or"):

@@ -7,6 +7,7 @@ made of a model follows: derivatives, marches, batches, linear models, fits.
 
 from __future__ import annotations
 
+import sys
 from collections import namedtuple
 from collections.abc import Mapping
 from dataclasses import fields, replace
@@ -29,21 +30,42 @@ class Replacement(NamedTuple):
     parameters: type[Any] | None = None
     """What it brings along, see `replaced`."""
 
+    @property
+    def places(self) -> dict[str, str]:
+        """Where its members stand, as ``module:name``."""
+        present = {name: plain(each) for name, each in self._asdict().items() if each is not None}
+        return {name: f"{each.__module__}:{each.__qualname__}" for name, each in present.items()}
+
     def __reduce__(self) -> tuple[Any, ...]:
         # by name: another process must find the very equation that its model uses
-        named = [None if each is None else _place_of(each) for each in self]
-        return _found, tuple(named)
+        return _sent, (self.places,)
 
 
-def _place_of(thing: Any) -> tuple[str, str]:
-    return plain(thing).__module__, plain(thing).__qualname__
+def _sent(places: Mapping[str, str]) -> Replacement:
+    for place in places.values():
+        import_module(place.partition(":")[0])
+    return found_at(places)
 
 
-def _found(*places: tuple[str, str] | None) -> Replacement:
-    found: list[Any] = [
-        None if each is None else getattr(import_module(each[0]), each[1]) for each in places
-    ]
-    return Replacement(*found)
+def found_at(places: Mapping[str, str]) -> Replacement:
+    """A replacement by `Replacement.places`.
+
+    Raises
+    ------
+    InputError
+        If a name is not found in the modules that are imported.
+    """
+    found: dict[str, Any] = {}
+    for what, place in places.items():
+        module, _, name = place.partition(":")
+        ours = module.startswith("swashplate.")
+        home = import_module(module) if ours else sys.modules.get(module)
+        found[what] = getattr(home, name, None)
+        if found[what] is None:
+            raise InputError(
+                f"an equation of one's own is {name} of the module {module}: import that first."
+            )
+    return Replacement(**found)
 
 
 def uses(model: Model, equation: Equation) -> bool:

@@ -81,6 +81,7 @@ class Writer:
     `taken` names stand for something else; `hints` are names for expressions, should they need one.
     The items are `lines`, which call `functions` by name, the results `texts` by names that the
     lines make. `inner` are names that only one side of a choice makes, with a number of their type.
+    `straight` text has few branches, see `expressions.render`.
     """
 
     def __init__(
@@ -89,8 +90,9 @@ class Writer:
         items: Sequence[Item],
         results: Sequence[Node],
         hints: Mapping[Node, str] | None = None,
+        straight: bool = False,
     ) -> None:
-        self.taken, self.hints = taken, hints or {}
+        self.taken, self.hints, self.straight = taken, hints or {}, straight
         self.functions: dict[str, Function] = {}
         self.inner: dict[str, str] = {}
         self.uses: dict[Node, list[_Region]] = {}
@@ -148,7 +150,7 @@ class Writer:
 
     def text(self, node: Node, region: _Region) -> str:
         """Text of an expression, by the names that are known here."""
-        return ex.render(node, lambda each: region.known.get(each.same))
+        return ex.render(node, lambda each: region.known.get(each.same), self.straight)
 
     def define(self, node: Node, region: _Region, pad: str, name: str | None = None) -> list[str]:
         """Lines that give an expression a name."""
@@ -263,9 +265,9 @@ def _trivial(node: Node) -> bool:
     return node.op == "neg" and node.args[0].op in ex.LEAVES
 
 
-def lines_of(code: Code, wanted: Iterable[Node]) -> list[str]:
-    """Text of all that some names in straight code need."""
-    writer = Writer(code.taken, code.items, [*wanted])
+def lines_of(code: Code, wanted: Iterable[Node], straight: bool = False) -> list[str]:
+    """Text of all that some names in straight code need; `straight` as of `Writer`."""
+    writer = Writer(code.taken, code.items, [*wanted], straight=straight)
     code.names |= writer.functions
     return writer.lines
 

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from math import ceil
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate import maneuvers
 from swashplate.equations.marching.record import SOURCE_RATE, least_substeps
 from swashplate.equations.marching.run import Start
-from swashplate.full_order.drive import FullOrderDrive, FullOrderSimulation, Method
+from swashplate.full_order.drive import FullOrderDrive, FullOrderSimulation
 from swashplate.results import Result, Tabular
 from swashplate.simulation.result import read_only
 from swashplate.tables import Cell, Column, Table
@@ -88,13 +87,6 @@ class Difference(Result):
         return next((band for band in BANDS if self.relative <= band), None)
 
 
-class Lag(NamedTuple):
-    """How much later the full-order model's speed comes, as if that were all the difference."""
-
-    time: float  # Positive where the full-order model comes later. [s]
-    share: float  # Share of the mean squared difference that it explains. [1]
-
-
 @dataclass(frozen=True, eq=False)
 class Comparison(Tabular):
     """Both models over one command, driven by the same current."""
@@ -118,23 +110,6 @@ class Comparison(Tabular):
         """Speed of the reduced model less that of the full-order one. [rad/s]"""
         return self.reduced_speed - self.full.shaft_speed
 
-    @cached_property
-    def lag(self) -> Lag | None:
-        """The lag that explains most of the difference, by least squares; None at a constant speed.
-
-        A speed that comes later by a time T is less by T times its acceleration.
-        """
-        if self.time.size < 2:
-            return None
-        acceleration = np.gradient(self.full.shaft_speed, 1.0 / self.full.record.rate)
-        error, power = self.error, float(acceleration @ acceleration)
-        whole = float(error @ error)
-        if not self.difference.moves or power == 0.0 or whole == 0.0:
-            return None
-        time = float(error @ acceleration) / power
-        rest = error - time * acceleration
-        return Lag(time, 1.0 - float(rest @ rest) / whole)
-
     def to_polars(self) -> polars.DataFrame:
         """Table of the full-order model's signals, with command and reduced model's speed."""
         import polars as pl
@@ -147,15 +122,13 @@ class Comparison(Tabular):
         return made
 
 
-def compare(
-    full: FullOrderDrive, run: Simulation, *, start: Start = "rest", method: Method = "march"
-) -> Comparison:
+def compare(full: FullOrderDrive, run: Simulation, *, start: Start = "rest") -> Comparison:
     """Simulate both models over the current of a run of ``full.drive``.
 
-    The reduced model has the lumps of the full-order one. `start` and `method` as in
+    The reduced model has the lumps of the full-order one; `start` as in
     `FullOrderDrive.simulate_current`.
     """
-    followed = full.follow(run, method=method, start=start)
+    followed = full.follow(run, start=start)
     reference, record = followed.shaft_speed, followed.record
     reduced, grid_rate = full.reduced, record.rate * record.substeps
 
@@ -237,8 +210,6 @@ def validity(
 
 # --- tables and verdicts --------------------------------------------------------------------------
 
-LAG_SHARE = 0.5  # Share of the difference from which a lag explains it.
-
 
 def usual_rate(rate: float) -> float:
     """Steps a second of the reduced model's march at a rate of samples. [Hz]"""
@@ -300,14 +271,8 @@ def comparison_verdict(found: Comparison) -> list[str]:
             f"One state is not enough here: up to {largest} of the top speed off, {rms} rms, where "
             "1 % is allowed."
         )
-    lag, left_out = found.lag, "the masses of spool and swash plate"
-    if lag is not None and lag.share >= LAG_SHARE:
-        left_out += (
-            f", which make the speed {1e3 * abs(lag.time):.2g} ms "
-            f"{'later' if lag.time > 0.0 else 'earlier'} ({100.0 * lag.share:.0f} % of the mean "
-            "squared difference)"
-        )
-    return [said, f"It leaves out {left_out}, and the motor's pressure drop."]
+    left_out = "the masses of spool and swash plate, and the motor's pressure drop"
+    return [said, f"It leaves out {left_out}."]
 
 
 def validity_verdict(table: Table) -> str:

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, floor
-from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.drive import Drive
-from swashplate.equations.cache import kernel
 from swashplate.equations.equation import interpreted
 from swashplate.equations.marching.jacobian import jacobian
 from swashplate.equations.marching.observation import Observation, ObservedRecord
@@ -20,12 +19,12 @@ from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, Record, record_of
 from swashplate.equations.marching.run import Instance, Part, Start, check_start, marched
 from swashplate.errors import DomainError, InputError
-from swashplate.full_order.continuous import Case, Feed, Modes, modes_of, solve, state_matrix
+from swashplate.full_order.modes import Modes, modes_of, state_matrix
 from swashplate.full_order.physical_set import PhysicalSet, from_lumped
 from swashplate.models import full_order as model
 from swashplate.models.displacement_control import Solenoids, solenoid_force
 from swashplate.models.drive import Source
-from swashplate.models.full_order import Motion, PlantSignals, plant_signals
+from swashplate.models.full_order import PlantConstants, PlantSignals
 from swashplate.models.machine import Machine, fastest_rate
 from swashplate.parameters.parameter_set import Change
 from swashplate.simulation.instance import PATHS, card_of, card_options, check_filter_stability
@@ -38,24 +37,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
-Method = Literal["march", "radau"]
 
 RESOLUTION = 1.0  # Largest product of a sub-step and the fastest natural frequency.
 STABLE = 2.0  # The same where the march is no longer stable.
 LEAST_SUBSTEPS = 8  # Sub-steps a sample that kinks of the flow, at the orifices' limits, are worth.
-MOST_SUBSTEPS = 20_000  # Sub-steps a sample, beyond which the solver is the better way.
-LOOSEST = 1e-3  # Largest relative tolerance.
+MOST_SUBSTEPS = 20_000  # Sub-steps a sample, beyond which the machine is too stiff for the march.
 
 
-class Integration(TypedDict, total=False):
-    """How a run is integrated, see `FullOrderDrive.simulate_current`."""
-
-    method: Method
-    substeps: int | None
-    tolerance: float
-
-
-STATES = tuple(Stored(1, "signals", name) for name in model.Motion._fields)
+KEPT = tuple(Stored(1, "signals", name) for name in PlantSignals._fields)
 
 
 def path_of(name: str) -> str:
@@ -90,16 +79,6 @@ SIGNALS = (
 """Signals in the order of the chain."""
 
 
-@kernel
-def observe(states: Array, current: Array, case: Case, out: Array) -> None:
-    """Every signal of `PlantSignals`, a column each, at known states (n, 5)."""
-    for n in range(current.size):
-        motion = Motion(states[n, 0], states[n, 1], states[n, 2], states[n, 3], states[n, 4])
-        found = plant_signals(motion, current[n], case.p, case.k, case.options)
-        for c in range(len(found)):
-            out[n, c] = found[c]
-
-
 @dataclass(frozen=True, eq=False)
 class FullOrderSimulation(Signals):
     """Signals of one record, read-only arrays of the record's length, all SI.
@@ -108,12 +87,12 @@ class FullOrderSimulation(Signals):
     pressure drop is positive where the load resists positive speed.
     """
 
-    method: str
-    """How it was integrated: ``"march"`` or ``"radau"``."""
-    case: Case
-    """The machine."""
-    states: Array
-    """(n, 5) the states on that grid, in the order of `swashplate.models.full_order.Motion`."""
+    plant: model.Plant
+    """The machine and its solenoids."""
+    constants: PlantConstants
+    """What follows from these alone."""
+    marched: Array
+    """(k, n) signals of `swashplate.models.full_order.PlantSignals` on the march's grid."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -121,14 +100,13 @@ class FullOrderSimulation(Signals):
         return ("time", *SIGNALS)
 
     def __repr__(self) -> str:
-        return f"FullOrderSimulation({self.name!r}, {self.time.size} samples, {self.method})"
+        return f"FullOrderSimulation({self.name!r}, {self.time.size} samples)"
 
     @cached_property
     def _fine(self) -> dict[str, Array]:
         """All signals on the grid that was marched."""
-        out = np.empty((len(PlantSignals._fields), self.states.shape[0]))
-        observe(self.states, self.record.values, self.case, out.T)
-        return {"current": self.record.values, **dict(zip(PlantSignals._fields, out, strict=True))}
+        found = zip(PlantSignals._fields, self.marched, strict=True)
+        return {"current": self.record.values, **dict(found)}
 
     def fine(self, signal: str) -> Array:
         """A signal on the march's grid: one of `SIGNALS`, or the ``"piston_pressure"``."""
@@ -164,19 +142,19 @@ class FullOrderSimulation(Signals):
     @property
     def spool_hold(self) -> Flags:
         """1 or -1 where the spool is at its stroke."""
-        stroke = self.case.p.machine.spool_stroke
+        stroke = self.plant.machine.spool_stroke
         return _beyond(self.spool_position, -stroke, stroke)
 
     @property
     def relief_hold(self) -> Flags:
         """1 or -1 where the relief valve holds the stroker pressure."""
         pressure = self.sampled(self.fine("piston_pressure"))
-        return _beyond(pressure, self.case.k.lower, self.case.k.upper)
+        return _beyond(pressure, self.constants.lower, self.constants.upper)
 
     @property
     def plate_hold(self) -> Flags:
         """1 or -1 where the swash plate rests on a stop."""
-        m = self.case.p.machine
+        m = self.plant.machine
         return _beyond(self.swash_angle, -m.swash_stop_minus, m.swash_stop_plus)
 
     def to_polars(self) -> polars.DataFrame:
@@ -313,8 +291,8 @@ class FullOrderDrive:
         if needed > MOST_SUBSTEPS:
             raise DomainError(
                 f"{self.physical.name}: the fastest mode, at {fastest:.3g} rad/s, would take "
-                f"{needed} steps a sample, more than {MOST_SUBSTEPS}; use method='radau', or a "
-                "larger mass or oil_volume."
+                f"{needed} steps a sample, more than {MOST_SUBSTEPS}; take a larger mass or "
+                "oil_volume."
             )
         return needed
 
@@ -327,20 +305,20 @@ class FullOrderDrive:
         interpolation: Interpolation | None = None,
         start: Start = "rest",
         clip: bool = False,
-        **how: Unpack[Integration],
+        substeps: int | None = None,
     ) -> FullOrderSimulation:
         """Simulate card and machine over a command [V]; arguments as `Drive.simulate`.
 
         The card's current at its own steps drives the machine, a straight line between them.
-        `method`, `substeps` and `tolerance` as in `simulate_current`.
+        `substeps` as in `simulate_current`.
         """
         run = self.drive.simulate(
             voltage, rate, time=time, interpolation=interpolation, start=start, clip=clip
         )
-        return self.follow(run, start=start, **how)
+        return self.follow(run, start=start, substeps=substeps)
 
     def follow(
-        self, run: Simulation, *, start: Start = "rest", **how: Unpack[Integration]
+        self, run: Simulation, *, start: Start = "rest", substeps: int | None = None
     ) -> FullOrderSimulation:
         """Simulate the machine over the current of a run that there is.
 
@@ -348,7 +326,7 @@ class FullOrderDrive:
         straight line between them. Other arguments as in `simulate_current`.
         """
         record = Record(run.fine("current"), run.record.start, run.record.rate, run.record.substeps)
-        return self._integrate(record, False, start, **how)
+        return self._integrate(record, False, start, substeps)
 
     def simulate_current(
         self,
@@ -358,7 +336,7 @@ class FullOrderDrive:
         time: ArrayLike | None = None,
         interpolation: Interpolation | None = None,
         start: Start = "rest",
-        **how: Unpack[Integration],
+        substeps: int | None = None,
     ) -> FullOrderSimulation:
         """Simulate the machine over a signed current.
 
@@ -368,24 +346,19 @@ class FullOrderDrive:
             Current, positive towards more speed. [A]
         rate, time, interpolation, start :
             As in `Drive.simulate`.
-        method : {"march", "radau"}
-            Compiled march in fixed sub-steps, or SciPy's stiff solver, restarted at each event, to
-            check it by.
         substeps : int, optional
             Sub-steps of the march a sample, at least 512 samples a second; by default 8, or so
             many that the fastest mode takes six steps a turn.
-        tolerance : float
-            Relative tolerance of the solver, by default 1e-6.
 
         Raises
         ------
         InputError
             For a record or option that cannot be simulated.
         DomainError
-            If the solver gives up or the machine is too stiff for the march.
+            If the machine is too stiff for the march.
         """
         record = record_of(current, rate, what="current", time=time, interpolation=interpolation)
-        return self._integrate(record, interpolation == "previous", start, **how)
+        return self._integrate(record, interpolation == "previous", start, substeps)
 
     def modes(self, current: float = 0.0) -> Modes:
         """Natural modes about the equilibrium under a constant signed current. [A]"""
@@ -423,30 +396,12 @@ class FullOrderDrive:
         return jacobian(self.instance(record.step, substeps=substeps), observed, columns).columns
 
     def _integrate(
-        self,
-        record: Record,
-        held: bool,
-        start: Start,
-        method: Method = "march",
-        substeps: int | None = None,
-        tolerance: float = 1e-6,
+        self, record: Record, held: bool, start: Start, substeps: int | None
     ) -> FullOrderSimulation:
         check_start(start)
-        if method not in ("march", "radau"):
-            raise InputError(f"method is '{method}'; it is 'march' or 'radau'.")
-        if not 0.0 < tolerance <= LOOSEST:
-            raise InputError(
-                f"tolerance is {tolerance:g}, but must be above 0 and at most {LOOSEST:g}."
-            )
         step, records = record.step, {"current": np.ascontiguousarray(record.values)}
-        instance = self._machine(self.substeps(step, substeps) if method == "march" else 1, held)
+        instance = self._machine(self.substeps(step, substeps), held)
         started = instance.start({"current": float(record.values[0])}, step, start)
-        plant = instance.parts[1]
-        case = Case(plant.p, started.arguments[1]["k"], plant.options)
-        if method == "march":
-            out, _ = marched(instance, records, step, started, STATES, "current")
-            states = np.ascontiguousarray(out.T)
-        else:
-            feed = Feed(records["current"], held, step)
-            states = solve(feed, case, started.states[1].motion, tolerance)
-        return FullOrderSimulation(self.physical.name, record, method, case, states)
+        out, _ = marched(instance, records, step, started, KEPT, "current")
+        constants = started.arguments[1]["k"]
+        return FullOrderSimulation(self.physical.name, record, self.plant, constants, out)

@@ -23,7 +23,8 @@ from swashplate.linear.operating_point import (
     beyond_dead_zone,
     operating_point,
 )
-from swashplate.models.card import COULOMB_WIDTH, Card
+from swashplate.models.card import Card
+from swashplate.models.channel import COULOMB_WIDTH
 from swashplate.models.pump import PumpState
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.simulation.instance import (

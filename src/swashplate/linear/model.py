@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from importlib import import_module
 from math import log
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -211,78 +210,27 @@ class LinearModel:
 
         return loop_margins(loop, self.delay, self._fastest(), self.name)
 
-    def delay_margin(self, controller: Controller) -> float:
-        """Delay more than the model's own that the loop of `margins` bears before it swings. [s]"""
-        return self.margins(controller).delay_margin
+    def to_scipy(self, *, without_delay: bool = False) -> StateSpace:
+        """The model as `scipy.signal.StateSpace`, continuous or sampled.
 
-    def transfer_function(
-        self, output: str | None = None, input: str | None = None
-    ) -> tuple[Array, Array]:
-        """Numerator and denominator, highest power first, without the delay.
-
-        Of an output by an input, by default the first. With the Markov parameters m₀ = D,
-        mₖ = C Aᵏ⁻¹ B the numerator is the polynomial part of denominator · Σ mₖ s⁻ᵏ. Those that the
-        structure makes zero are exactly zero, so no leading coefficients are left by rounding.
+        A sampled model's delay is exact, as states. A continuous one's must be left out by
+        `without_delay`; it is refused in an `InputError` otherwise. Its matrices are those that
+        SciPy's ``ss2tf`` and python-control's ``ss`` take.
         """
-        output = self.outputs[0] if output is None else output
-        if output not in self.outputs:
-            raise InputError(
-                f"The model of {self.name} has no output '{output}'; it has "
-                f"{', '.join(self.outputs)}."
-            )
-        row, column = self.outputs.index(output), self.index_of_input(input)
-        n = self.A.shape[0]
-        denominator = np.zeros(n + 1)
-        moving = np.real(np.poly(self.poles))
-        denominator[: moving.size] = moving
-        markov = np.empty(n + 1)
-        markov[0] = self.D[row, column]
-        into = self.B[:, column]
-        for k in range(1, n + 1):
-            markov[k] = self.C[row] @ into
-            into = self.A @ into
-        numerator = np.convolve(denominator, markov)[: n + 1]
-        first = int(np.argmax(numerator != 0.0)) if numerator.any() else n
-        return numerator[first:], denominator
+        from scipy.signal import StateSpace
 
-    def _exported(self, without_delay: bool) -> tuple[Matrices, tuple[str, ...]]:
-        """Matrices and names of the states, whole samples of delay among them."""
         matrices = self.A, self.B, self.C, self.D
         if self.sample_time is not None:
             late = round(self.delay / self.sample_time)
-            return with_line(matrices, self.states, self.input, late)
+            matrices, _ = with_line(matrices, self.states, self.input, late)
+            return StateSpace(*matrices, dt=self.sample_time)
         if self.delay != 0.0 and not without_delay:
             raise InputError(
                 f"The model has a delay of {self.delay:g} s, which no state space holds exactly; "
                 "say without_delay=True and put an approximant before it, python-control's pade "
                 "for example, or take a sampled model (discrete), which has it as states."
             )
-        return matrices, self.states
-
-    def to_scipy(self, *, without_delay: bool = False) -> StateSpace:
-        """The model as `scipy.signal.StateSpace`, continuous or sampled.
-
-        A sampled model's delay is exact, as states. A continuous one's must be left out by
-        `without_delay`; it is refused in an `InputError` otherwise.
-        """
-        from scipy.signal import StateSpace
-
-        matrices, _ = self._exported(without_delay)
-        sampled = {} if self.sample_time is None else {"dt": self.sample_time}
-        return StateSpace(*matrices, **sampled)
-
-    def to_control(self, *, without_delay: bool = False) -> Any:
-        """The model as python-control's StateSpace with named signals; as `to_scipy`."""
-        matrices, states = self._exported(without_delay)
-        try:
-            control = import_module("control")
-        except ImportError:
-            raise InputError(
-                "python-control is not installed: pip install swashplate[control]; to_scipy needs "
-                "nothing more."
-            ) from None
-        named = {"inputs": list(self.inputs), "outputs": list(self.outputs), "name": self.name}
-        return control.ss(*matrices, self.sample_time or 0, states=list(states), **named)
+        return StateSpace(*matrices)
 
     def content(self) -> dict[str, Any]:
         """What is written of a model, as plain numbers, strings and lists; SI."""

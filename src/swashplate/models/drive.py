@@ -7,12 +7,11 @@ from swashplate.equations.equation import equation
 from swashplate.equations.model import Model, join
 from swashplate.models.card import (
     Card,
-    CardOptions,
     Currents,
     card,
-    channel_level,
     flowing_card,
 )
+from swashplate.models.channel import CardOptions, channel_level
 from swashplate.models.displacement_control import Pump, PumpConstants, PumpOptions
 from swashplate.models.pump import (
     PumpInputs,

@@ -9,8 +9,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 
 from swashplate.documents import parse_toml, read_text, validated
+from swashplate.equations.replacement import Replacement, found_at
 from swashplate.errors import InputError, ParameterError
-from swashplate.parameters.definitions import Block, Definition, find, options_of
+from swashplate.parameters.definitions import Block, Definition, declare, find, options_of
 from swashplate.parameters.parameter_set import (
     CardSwitch,
     CoulombSign,
@@ -54,6 +55,8 @@ class ModelOptions(BaseModel):
     differential equation, for any rate."""
     options: list[str] | None = None
     """Terms of the pump that count; where they are not given, those whose parameters are not 0."""
+    equations: list[dict[str, str]] = []
+    """One's own equations in place of the package's, each as ``module:name``."""
     motion: Motion = "shaft"
 
 
@@ -122,6 +125,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
     else:
         rate = None
         card_name, entries = contents.card or f"{contents.name} card", contents.control_card
+    own = _equations(contents.model, origin)
     parameters = {
         **_parameters(entries, "control_card", origin),
         **_parameters(contents.pump_motor, "pump_motor", origin),
@@ -139,8 +143,22 @@ def read_set(text: str, origin: str) -> ParameterSet:
         model.card_switch,
         model.rate or rate,
         options_of(values) if model.options is None else frozenset(model.options),
+        own,
         motion=model.motion,
     )
+
+
+def _equations(model: ModelOptions, origin: str) -> tuple[Replacement, ...]:
+    """One's own equations; a file runs no code, so their module must be imported already."""
+    found = []
+    for places in model.equations:
+        try:
+            found.append(found_at(places))
+        except (ImportError, InputError, TypeError) as error:
+            raise ParameterError(f"{origin}: [model] equations: {error}") from None
+        if found[-1].parameters is not None:
+            declare(found[-1].parameters)
+    return tuple(found)
 
 
 def dump_set(parameters: ParameterSet) -> str:
@@ -161,6 +179,8 @@ def dump_set(parameters: ParameterSet) -> str:
         options.add("rate", parameters.rate)
     if parameters.options != options_of(parameters.numbers):
         options.add("options", sorted(parameters.options))
+    if parameters.equations:
+        options.add("equations", [each.places for each in parameters.equations])
     if parameters.motion != "shaft":
         options.add("motion", parameters.motion)
     text.add("model", options)

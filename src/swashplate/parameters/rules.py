@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from swashplate.equations.cache import kernel
 from swashplate.equations.equation import JIT_OFF
 from swashplate.errors import ParameterError
-from swashplate.models.card import Channel, channel_level
+from swashplate.models.channel import Channel, channel_level
 from swashplate.models.displacement_control import (
     Pump,
     moment_sine,

@@ -18,8 +18,9 @@ from swashplate.equations.model import Model
 from swashplate.equations.replacement import Replacement, again, uses
 from swashplate.equations.syntax import plain
 from swashplate.errors import InputError
-from swashplate.models.card import Card, CardOptions, Channel
-from swashplate.models.card import step_limit as filter_limit
+from swashplate.models.card import Card
+from swashplate.models.channel import CardOptions, Channel
+from swashplate.models.channel import step_limit as filter_limit
 from swashplate.models.displacement_control import Pump, PumpOptions, steep_stops
 from swashplate.models.drive import Source as CurrentSource
 from swashplate.models.drive import (
@@ -88,7 +89,8 @@ def with_equation(parameters: ParameterSet, made: Replacement) -> ParameterSet:
     if not uses(models.drive, made.old):
         raise InputError(
             f"{plain(made.old).__name__} is no equation of the drive: swashplate.models.card, "
-            "swashplate.models.displacement_control, swashplate.models.pump and "
+            "swashplate.models.channel, swashplate.models.displacement_control, "
+            "swashplate.models.pump and "
             "swashplate.models.refinements have those."
         )
     if made.parameters is not None and not uses(models.pump_drive, made.old):

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import Record
-from swashplate.equations.marching.run import Instance, observe_kernel
+from swashplate.equations.marching.run import Instance, observed_at
 from swashplate.errors import InputError
 from swashplate.models.displacement_control import Pump
 from swashplate.results import Tabular, figures
@@ -237,15 +237,11 @@ class Simulation(Signals):
 
     def _observed(self, wanted: tuple[Stored, ...]) -> Array:
         """Signals of the pump at the states that the march left."""
-        out = np.empty((len(wanted), self.out.shape[1]))
-        kept = tuple(each for each in self.kept if each.kind != "limits")
-        kept += tuple(Stored(1, "input", name) for name in self.measured)
-        rows = np.vstack([self.out, *self.measured.values()]) if self.measured else self.out
-        instance, signals = self.instance, (self.driven_by, *self.measured)
-        observe_kernel(instance.model, 1, signals, instance.options, kept, wanted)(
-            instance.params, instance.given, self.record.step, rows, out
-        )
-        return out
+        kept = (each for each in self.kept if each.kind != "limits")
+        known = dict(zip(kept, self.out, strict=True))
+        known |= {Stored(1, "input", name): values for name, values in self.measured.items()}
+        signals = (self.driven_by, *self.measured)
+        return observed_at(self.instance, 1, known, signals, self.record.step, wanted)
 
     current_positive = Named(signal)
     """Current of the solenoid towards positive speed, never negative. [A]"""

@@ -217,13 +217,15 @@ class _Builder:
 
     # -- scalar functions ----------------------------------------------------------------------
 
+    def _observed(self, part: PartCode, kind: str) -> list[str]:
+        """What of a part is observed."""
+        places = [place for place, _ in self.observed if place.part == part.part]
+        return [place.path for place in places if place.kind == kind]
+
     def _signals(self, part: PartCode) -> list[str]:
         """Signals of a part whose derivatives somebody needs."""
-        found = {s.signal: None for s in self.sampler.sources if s.part == part.part}
-        for place, _ in self.observed:
-            if place.part == part.part and place.kind == "signals":
-                found[place.path] = None
-        return list(found)
+        needed = [s.signal for s in self.sampler.sources if s.part == part.part]
+        return list(dict.fromkeys([*needed, *self._observed(part, "signals")]))
 
     def _results(self, part: PartCode) -> dict[str, Node]:
         """States behind the sample and signals that are needed, by result."""
@@ -235,13 +237,8 @@ class _Builder:
         return made
 
     def _states(self, part: PartCode) -> list[str]:
-        observed = [
-            place.path
-            for place, _ in self.observed
-            if place.part == part.part and place.kind == "state"
-        ]
         carried = self.sampler.carried[part.part]
-        return [*carried, *(each for each in observed if each not in carried)]
+        return list(dict.fromkeys([*carried, *self._observed(part, "state")]))
 
     def _by(self, part: PartCode) -> dict[str, By]:
         """What a part's results may be differentiated by, by the name in its code."""
@@ -333,16 +330,13 @@ class _Builder:
 
     def _values(self, graph: PartGraph, part: PartCode) -> None:
         """Piece that computes signals which the march does not leave, at known states."""
-        late = []
-        for place, _ in self.observed:
-            asked = place.part == part.part and place.kind == "signals"
-            if asked and place not in self.stored and place.path not in late:
-                late.append(place.path)
+        asked = dict.fromkeys(self._observed(part, "signals"))
+        late = [each for each in asked if Stored(part.part, "signals", each) not in self.stored]
         if not late:
             return
         nodes = [part.signal(signal) for signal in late]
         ahead, rows = self._arguments(part, part.code.reads(nodes))
-        inner = [*rows, *lines_of(part.code, nodes)]
+        inner = [*rows, *lines_of(part.code, nodes, straight=True)]
         for signal, node in zip(late, nodes, strict=True):
             self.values[part.part, signal] = self._new_row()
             inner.append(f"{_place(self.values[part.part, signal], 'm')} = {text(node)}")
@@ -390,7 +384,7 @@ class _Builder:
             by.path
             for out, by in graph.entries
             if out.startswith("signals.") and by.kind == "state"
-        } | {place.path for place, _ in self.observed if place.kind == "state"}
+        } | {*self._observed(part, "state")}
         at_sample |= {s.signal for s in self.sampler.sources if s.part == part.part}
         graph.aliases = {s: path for s, path in graph.aliases.items() if path not in at_sample}
         for c, outs in enumerate(components):
@@ -548,7 +542,7 @@ class _Builder:
             return -1
         wanted = [*(partials[key] for key in rows), *values.values()]
         taken = {*part.code.taken, *derivatives.taken}
-        writer = Writer(taken, derivatives.items, wanted, derivatives.hints)
+        writer = Writer(taken, derivatives.items, wanted, derivatives.hints, straight=True)
         ahead, loads = self._arguments(part, writer.needed)
         # what only one side of a choice makes would carry its value from one sample to the next, as
         # far as a compiler can know, and the loop would not become vector instructions
@@ -593,13 +587,9 @@ def _weakly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> l
 def _strongly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> list[list[str]]:
     """States in groups that wait for each other, each group behind those that it needs."""
     reach = {each: {each} for each in states}
-    changed = True
-    while changed:
-        changed = False
+    for _ in states:  # no way is longer
         for out in states:
-            wider = set().union(reach[out], *(reach[inp] for inp in flows[out] if inp in reach))
-            if wider != reach[out]:
-                reach[out], changed = wider, True
+            reach[out].update(*(reach[inp] for inp in flows[out] if inp in reach))
     group = {
         each: tuple(other for other in states if other in reach[each] and each in reach[other])
         for each in states

@@ -22,8 +22,6 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from swashplate.equations import expressions as ex
@@ -31,7 +29,7 @@ from swashplate.equations.code import Call, Choice, Code, Item, Let, Rule, gener
 from swashplate.equations.equation import JIT_OFF
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.marching.march import Sampler, lower, output_of
-from swashplate.equations.marching.part import rest_of
+from swashplate.equations.marching.part import choose, rest_of
 from swashplate.equations.marching.run import module
 from swashplate.equations.marching.triangle import aligned
 from swashplate.equations.model import Model
@@ -46,25 +44,11 @@ LANES = 16
 # --- without branches -----------------------------------------------------------------------------
 
 
-def _choose(test: bool, one: Any, two: Any) -> Any:
-    return one if test else two
-
-
-def _selected(typing: Any, test: Any, one: Any, two: Any) -> Any:
-    kind = types.boolean if one == two == types.boolean else types.float64
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return builder.select(*values)
-
-    return kind(types.boolean, kind, kind), generate
-
-
-CALLED: dict[str, Any] = {"choose": intrinsic(_selected)}
-"""What the text calls. ``choose(test, a, b)`` is one of two numbers that both have been computed:
-from ``a if test else b`` the compiler makes a choice between two addresses, and gathers."""
+CALLED: dict[str, Any] = {"choose": choose}
+"""What the text calls."""
 if JIT_OFF:
     # a root that nobody asks for may be one of a number below zero, which compiled code allows
-    CALLED = {"choose": _choose, "sqrt": np.sqrt}
+    CALLED |= {"sqrt": np.sqrt}
 
 SHORT = 16
 """Statements that are not worth a loop of their own."""

@@ -21,11 +21,11 @@ from itertools import chain
 from typing import Any
 
 from swashplate.equations import expressions as ex
-from swashplate.equations.code import Code, Let, Value, leaves
+from swashplate.equations.code import Code, Value, leaves
 from swashplate.equations.equation import inlined
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.fields import floats_of
-from swashplate.equations.marching.part import GUESSED, Guessed, PartCode, Stored
+from swashplate.equations.marching.part import PartCode, Stored, choose
 from swashplate.equations.marching.pieces import PIECE
 from swashplate.equations.model import Model, Source
 from swashplate.equations.reading import read
@@ -36,7 +36,7 @@ _OWN = """
 n m j c lane first last worst h half value error total count span used progress values lines
 whole fraction params given constants states out flags records before measured weight outputs flat
 table kept tangent columns program plan sink room block met machine volts current speed voltage
-target counts coming cost rate integral shown
+target counts coming cost rate integral shown choose
 """
 RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
 """Names that the kernels use themselves."""
@@ -123,7 +123,7 @@ class Sampler:
     @property
     def names(self) -> dict[str, Any]:
         """What the text refers to."""
-        found: dict[str, Any] = {"sample_at": sample_at, **GUESSED}
+        found: dict[str, Any] = {"sample_at": sample_at, "choose": choose}
         for part in self.parts:
             found |= part.code.names | part.prologue.names
         return found
@@ -198,22 +198,9 @@ class Sampler:
                 lines.append(f"x_{signal} = {signal}[n]")
         return lines
 
-    def guessed(self, part: PartCode) -> Guessed:
-        """A part's sample as the march of one set has it."""
-        following, carried = dict(leaves(part.following)), self.carried[part.part]
-        still = {node.value for _, node in (*leaves(part.p), *leaves(part.given))}
-        still |= {*self.constants(part), *map(part.fraction, part.taps)}
-        return Guessed(
-            part.code,
-            self.ends[part.part],
-            [node.value for path, node in leaves(part.state) if path in carried],
-            [following[path] for path in carried],
-            still,
-        )
-
-    def body(self, part: PartCode, code: Code | None = None) -> list[str]:
+    def body(self, part: PartCode) -> list[str]:
         """Lines of a part's sample, and of the signals that other parts need of it."""
-        lines = lines_of(code or part.code, self.ends[part.part])
+        lines = lines_of(part.code, self.ends[part.part])
         for source, node in self.sources.items():
             if source.part == part.part:
                 lines.append(f"{part.source(source)} = {text(node)}")
@@ -296,15 +283,8 @@ def march_source(
     lines = ["last = first + count", *sampler.places(), *sampler.ahead()]
     samples: list[list[str]] = []
     for part in parts:
-        code = part.code
-        if part is parts[-1]:
-            # the longest chain from sample to sample; others need not wait for it
-            guessed = sampler.guessed(part)
-            made = [ex.name(each.name) for each in guessed.ahead.items if isinstance(each, Let)]
-            lines += lines_of(guessed.ahead, made)
-            code = guessed.code
         lines += sampler.load(part)
-        inner = [*sampler.fetched(part), *sampler.body(part, code)]
+        inner = [*sampler.fetched(part), *sampler.body(part)]
         inner += sampler.stored(part, stored, lambda row: places[row])
         if part.margin is not None:
             margin = text(part.margin)
@@ -407,10 +387,10 @@ def observe_source(
     kept: Sequence[Stored],
     wanted: Sequence[Stored],
 ) -> tuple[str, dict[str, Any]]:
-    """Text of a kernel that computes signals of one part where its states are known.
+    """Text of a `piece` that computes signals of one part where its states are known.
 
-    The kernel ``observe(params, given, h, kept, out)`` takes rows of states, inputs and taps'
-    samples in the order of `kept`, and fills rows in the order of `wanted`.
+    In place of records it takes rows of states, inputs and taps' samples in the order of `kept`,
+    and fills rows in the order of `wanted`.
     """
     sampler = Sampler(model, signals, options, wanted)
     own = sampler.parts[part]
@@ -421,7 +401,7 @@ def observe_source(
         for node in (own.limits if each.kind == "limits" else [own.node(each)])
     ]
     read = sampler.read(own)
-    lines = [*sampler.ahead([own]), "for m in range(out.shape[1]):"]
+    lines = [*sampler.ahead([own]), "for m in range(count):"]
     inner = []
     for row, each in enumerate(kept):
         if each.part == part:
@@ -429,13 +409,12 @@ def observe_source(
         else:
             name = own.source(Source(each.part, each.path))
         if name in read:
-            inner.append(f"{name} = kept[{row}, m]")
-    inner += lines_of(own.code, sampler.ends[part])
-    inner += sampler.stored(own, wanted, lambda row: f"out[{row}, m]")
+            inner.append(f"{name} = records[{row}][m]")
+    inner += lines_of(own.code, sampler.ends[part], straight=True)
+    inner += sampler.stored(own, wanted, lambda row: f"flat[{row} * count + m]")
     lines += indented(inner)
-    head = "observe(params, given, h, kept, out)"
     says = f"Signals of {own.own.name} at known states."
-    return function_source(head, says, lines), sampler.names
+    return function_source(f"observe({PIECE})", says, lines, "@piece"), sampler.names
 
 
 def output_of(model: Model, output: str) -> tuple[Stored, bool]:

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
-from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 from swashplate.equations import expressions as ex
 from swashplate.equations.code import (
-    Choice,
     Code,
     Flag,
-    Item,
-    Let,
-    Rule,
     Tuple,
     Value,
     fixed,
@@ -303,125 +296,23 @@ def settled_of(part: PartCode) -> Start | None:
     return Start(code, part.call(code, part.own.settled, part.known))
 
 
-# --- one set alone --------------------------------------------------------------------------------
+# --- without branches -----------------------------------------------------------------------------
 
 
-def _rarely(typing: Any, test: Any) -> Any:
-    bit = ir.IntType(1)
+def _choose(test: bool, one: Any, two: Any) -> Any:
+    return one if test else two
+
+
+def _selected(typing: Any, test: Any, one: Any, two: Any) -> Any:
+    kind = typing.unify_types(one, two)
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        kind = ir.FunctionType(bit, [bit, bit])
-        inserted: Any = cgutils.get_or_insert_function
-        expect = inserted(builder.module, kind, "llvm.expect.i1")
-        return builder.call(expect, [values[0], ir.Constant(bit, 0)])
+        sides = (context.cast(builder, values[k], signature.args[k], kind) for k in (1, 2))
+        return builder.select(values[0], *sides)
 
-    return types.boolean(types.boolean), generate
+    return kind(types.boolean, one, two), generate
 
 
-GUESSED: dict[str, Any] = {"rarely": bool if JIT_OFF else intrinsic(_rarely)}
-"""What the text calls. ``rarely(test)`` is the test, for which there is a branch."""
-
-
-def reads_of(items: Iterable[Item]) -> Iterator[tuple[tuple[str, ...], frozenset[str]]]:
-    """Names that items make, in their order, and what each of them is made of."""
-    for item in items:
-        if isinstance(item, Let):
-            yield (item.name,), item.node.reads
-        elif isinstance(item, Choice):
-            yield from reads_of((*item.then, *item.other))
-            for name, one, two in item.merged:
-                yield (name,), one.reads | two.reads | item.test.reads
-        else:
-            assert not isinstance(item, Rule)
-            yield item.results, frozenset[str]().union(*(node.reads for node in item.arguments))
-
-
-class Guessed:
-    """A sample of one set, with a branch for each limit that the next sample waits for.
-
-    Each sample waits for the one before it, and a choice for what it chooses between. A limit,
-    whose value is known ahead of the march, is therefore a branch: the processor guesses that it
-    acts as it did at the last sample, and goes on. The operations and their order stay as they are,
-    and so does the last bit.
-
-    Of the sample in `code` are `wanted` some nodes, those of the states `following` it among them;
-    `states` and `still` are names of the states and of numbers that do not change over the march.
-    The attribute `code` is the same sample, `ahead` what of it is computed ahead of the march.
-    """
-
-    def __init__(
-        self,
-        code: Code,
-        wanted: Iterable[Node],
-        states: Iterable[str],
-        following: Iterable[Node],
-        still: Iterable[str],
-    ) -> None:
-        items = code.kept(wanted)
-        made = [*reads_of(items)]
-        self.still, self.moved = {"h", *still}, {*states}
-        for names, reads in made:
-            if reads & self.moved:
-                self.moved.update(names)
-        self.waits = set[str]().union(*(node.reads for node in following))
-        for names, reads in reversed(made):
-            if not self.waits.isdisjoint(names):
-                self.waits |= reads
-        self.choices: dict[str, Node] = {}
-        self.code, self.ahead = Code(code.taken), Code(code.taken)
-        self.code.names = self.ahead.names = code.names
-        self.code.items = self._items(items)
-
-    def _items(self, items: Iterable[Item]) -> list[Item]:
-        found: list[Item] = []
-        for item in items:
-            if isinstance(item, Let) and item.name in self.moved & self.waits:
-                found.append(Let(item.name, self._node(self._chosen(item.node))))
-                if item.node.op == "if" and all(map(self._still, item.node.args[1:])):
-                    self.choices[item.name] = item.node
-            elif isinstance(item, Choice):
-                then, other = self._items(item.then), self._items(item.other)
-                found.append(replace(item, then=then, other=other))
-            else:
-                found.append(item)
-        return found
-
-    def _still(self, node: Node) -> bool:
-        return node.reads <= self.still
-
-    def _chosen(self, node: Node) -> Node:
-        """A choice between two numbers that are known ahead, in place of what follows from one."""
-        moving = [*(node.reads - self.still)]
-        if len(moving) != 1 or moving[0] not in self.choices:
-            return node
-        test, *sides = self.choices[moving[0]].args
-        found = []
-        for side in sides:
-            ahead = Let(self.code.fresh("still"), ex.substitute(node, {moving[0]: side}))
-            self.ahead.items.append(ahead)
-            self.still.add(ahead.name)
-            found.append(ex.name(ahead.name))
-        return ex.choose(test, *found)
-
-    def _node(self, node: Node) -> Node:
-        """An expression with its limits as branches."""
-        if not node.reads & self.moved:
-            return node
-        args = [self._node(each) for each in node.args]
-        if node.op in ("min", "max") and len(args) == 2:
-            # the second counts where it is the smaller, or the larger, and else the first
-            one, two = args
-            test = ex.make("<" if node.op == "min" else ">", two, one)
-            if self._still(one) or self._still(two):
-                return self._branch(test, two, one, self._still(two))
-        if node.op == "if" and node.kind == "float":
-            test, one, two = args
-            if self._still(one) != self._still(two):
-                return self._branch(test, one, two, self._still(one))
-        return ex.make(node.op, *args, value=node.value) if args else node
-
-    def _branch(self, test: Node, one: Node, two: Node, rare: bool) -> Node:
-        """A choice whose first side is rare, or else its second."""
-        if not rare:
-            test, one, two = ex.make("not", test), two, one
-        return ex.choose(ex.make("rarely", test, kind="bool"), one, two)
+choose: Any = _choose if JIT_OFF else intrinsic(_selected)
+"""``choose(test, a, b)`` is one of two numbers that both have been computed: from ``a if test else
+b`` the compiler makes branches, or a choice between two addresses, and gathers."""

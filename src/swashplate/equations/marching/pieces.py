@@ -95,11 +95,29 @@ def pointers(records: tuple[NDArray[np.float64], ...]) -> Any:
 
 if JIT_OFF:
 
+    def behind(array: Any, start: int) -> Any:
+        """Numbers of an array from a place on, as one row."""
+        return array.reshape(-1)[start:]
+
     def call(piece: Piece, count: int, first: int, h: float, arrays: tuple[Any, ...]) -> None:
         """Call a piece."""
         piece(count, first, h, *arrays)
 
 else:
+
+    @intrinsic
+    def behind(typingctx: Any, array: Any, start: Any) -> Any:
+        """Numbers of an array from a place on: a pointer, which compiles faster than a slice."""
+
+        def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            data = arguments[0]
+            if not isinstance(array, types.CPointer):
+                data = context.make_array(array)(context, builder, data).data
+            return builder.gep(data, [arguments[1]])
+
+        taken: Any = signature
+        kind = array if isinstance(array, types.CPointer) else _pointer(array.dtype)
+        return taken(kind, array, start), codegen
 
     @intrinsic
     def call(typingctx: Any, address: Any, count: Any, first: Any, h: Any, arrays: Any) -> Any:
@@ -109,10 +127,10 @@ else:
             wanted = [context.get_value_type(each) for each in _TYPES]
             taken = list(arguments[1:4])
             for k, kind in enumerate(signature.args[4].types):
-                array = context.make_array(kind)(
-                    context, builder, builder.extract_value(arguments[4], k)
-                )
-                taken.append(builder.bitcast(array.data, wanted[3 + k]))
+                data = builder.extract_value(arguments[4], k)
+                if not isinstance(kind, types.CPointer):
+                    data = context.make_array(kind)(context, builder, data).data
+                taken.append(builder.bitcast(data, wanted[3 + k]))
             kind = ir.FunctionType(ir.VoidType(), wanted).as_pointer()
             builder.call(builder.inttoptr(arguments[0], kind), taken)
             return context.get_dummy_value()

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.cache import kernel, subroutine
-from swashplate.equations.marching.pieces import call
+from swashplate.equations.cache import kernel, pasted, subroutine
+from swashplate.equations.marching.pieces import behind, call
 from swashplate.equations.marching.triangle import EIGHTH, absorb, aligned, aligned_room
 
 Array = NDArray[np.float64]
@@ -167,15 +167,15 @@ def _columns(observations: int, derived: int) -> Indices:
 def combine(flat: Array, terms: Terms, first: int, end: int, count: int, into: Array) -> None:
     """Make rows of `into` from rows of `flat`."""
     for t in range(first, end):
-        row = into[terms.target[t] :]
+        row = behind(into, terms.target[t])
         if terms.first[t] == terms.first[t + 1]:
             for m in range(count):
                 row[m] = 0.0
         for s in range(terms.first[t], terms.first[t + 1]):
-            a, scale = flat[terms.a[s] :], terms.scale[s]
+            a, scale = behind(flat, terms.a[s]), terms.scale[s]
             fresh = s == terms.first[t]
             if terms.b[s] >= 0:
-                b = flat[terms.b[s] :]
+                b = behind(flat, terms.b[s])
                 if fresh:
                     for m in range(count):
                         row[m] = scale * (a[m] * b[m])
@@ -191,50 +191,54 @@ def combine(flat: Array, terms: Terms, first: int, end: int, count: int, into: A
 
 
 @subroutine
-def follow(a: Array, columns: Indices, flat: Array, count: int, tangent: Array) -> None:
+def follow(a: Array, columns: Indices, width: int, flat: Array, count: int, tangent: Array) -> None:
     """Run y[n+1] = a[n] y[n] + g[n], several columns side by side.
 
-    Rows of `columns` are the places of the inputs g and of the results in `flat`, which may be the
-    same, of y in `tangent`, and whether the result at n is y[n+1], not y[n].
+    `columns` are, `width` each, the places of the inputs g and of the results in `flat`, which may
+    be the same, of y in `tangent`, and whether the result at n is y[n+1], not y[n].
     """
-    behind = columns[3, 0] != 0
-    for c in range(0, columns.shape[1], ABREAST):
-        p0, p1, p2, p3 = columns[2, c], columns[2, c + 1], columns[2, c + 2], columns[2, c + 3]
-        g0, g1 = flat[columns[0, c] :], flat[columns[0, c + 1] :]
-        g2, g3 = flat[columns[0, c + 2] :], flat[columns[0, c + 3] :]
-        d0, d1 = flat[columns[1, c] :], flat[columns[1, c + 1] :]
-        d2, d3 = flat[columns[1, c + 2] :], flat[columns[1, c + 3] :]
+    last = columns[3 * width] != 0
+    for c in range(0, width, ABREAST):
+        to, at = behind(columns, c + width), behind(columns, c + 2 * width)
+        p0, p1, p2, p3 = at[0], at[1], at[2], at[3]
+        g0, g1 = behind(flat, columns[c]), behind(flat, columns[c + 1])
+        g2, g3 = behind(flat, columns[c + 2]), behind(flat, columns[c + 3])
+        d0, d1 = behind(flat, to[0]), behind(flat, to[1])
+        d2, d3 = behind(flat, to[2]), behind(flat, to[3])
         y0, y1, y2, y3 = tangent[p0], tangent[p1], tangent[p2], tangent[p3]
         for m in range(count):
             n0, n1 = a[m] * y0 + g0[m], a[m] * y1 + g1[m]
             n2, n3 = a[m] * y2 + g2[m], a[m] * y3 + g3[m]
-            d0[m], d1[m] = n0 if behind else y0, n1 if behind else y1
-            d2[m], d3[m] = n2 if behind else y2, n3 if behind else y3
+            d0[m], d1[m] = n0 if last else y0, n1 if last else y1
+            d2[m], d3[m] = n2 if last else y2, n3 if last else y3
             y0, y1, y2, y3 = n0, n1, n2, n3
         tangent[p0], tangent[p1], tangent[p2], tangent[p3] = y0, y1, y2, y3
 
 
 @subroutine
 def follow_out(
-    columns: Indices, flat: Array, tangent: Array, q: Array, sink: Sink, at: int, count: int
+    columns: Indices,
+    size: int,
+    flat: Array,
+    tangent: Array,
+    q: Array,
+    sink: Sink,
+    at: int,
+    count: int,
 ) -> None:
     """Run y[n+1] = a[n] y[n] + g[n] as `follow`, and put q[n] y[n] into the sink from `at` on.
 
-    `columns` are the place of a in `flat`, then for each OUTWARDS columns the place of the first g,
-    the others in the rows behind it; their places in `tangent`; and their numbers among the
-    derivatives. A column may stand there several times.
+    `columns` are, `size` in all, the place of a in `flat`, then for each OUTWARDS columns the place
+    of the first g, the others in the rows behind it; their places in `tangent`; and their numbers
+    among the derivatives. A column may stand there several times.
     """
-    a, out, size = flat[columns[0] :], sink.rows.reshape(-1), sink.rows.shape[1]
-    for c in range(1, columns.size, 1 + 2 * OUTWARDS):
-        g, p, to = flat[columns[c] :], columns[c + 1 :], columns[c + 1 + OUTWARDS :]
-        d0 = out[sink.to[to[0]] * size + at :]
-        d1 = out[sink.to[to[1]] * size + at :]
-        d2 = out[sink.to[to[2]] * size + at :]
-        d3 = out[sink.to[to[3]] * size + at :]
-        d4 = out[sink.to[to[4]] * size + at :]
-        d5 = out[sink.to[to[5]] * size + at :]
-        d6 = out[sink.to[to[6]] * size + at :]
-        d7 = out[sink.to[to[7]] * size + at :]
+    a, out, long = behind(flat, columns[0]), behind(sink.rows, at), sink.rows.shape[1]
+    for c in range(1, size, 1 + 2 * OUTWARDS):
+        g, p, to = behind(flat, columns[c]), behind(columns, c + 1), behind(columns, c + 9)
+        d0, d1 = behind(out, sink.to[to[0]] * long), behind(out, sink.to[to[1]] * long)
+        d2, d3 = behind(out, sink.to[to[2]] * long), behind(out, sink.to[to[3]] * long)
+        d4, d5 = behind(out, sink.to[to[4]] * long), behind(out, sink.to[to[5]] * long)
+        d6, d7 = behind(out, sink.to[to[6]] * long), behind(out, sink.to[to[7]] * long)
         y0, y1, y2, y3 = tangent[p[0]], tangent[p[1]], tangent[p[2]], tangent[p[3]]
         y4, y5, y6, y7 = tangent[p[4]], tangent[p[5]], tangent[p[6]], tangent[p[7]]
         for m in range(count):
@@ -250,14 +254,14 @@ def follow_out(
         tangent[p[4]], tangent[p[5]], tangent[p[6]], tangent[p[7]] = y4, y5, y6, y7
 
 
-@subroutine
-def integrate_row(row: Array, first: int, count: int, step: float, state: Array) -> None:
+@pasted
+def integrate_row(row: Array, count: int, step: float, state: Array) -> None:
     """Replace a rate, in `count` places, by its trapezoidal integral over the whole record.
 
     `state` holds integral and rate at the sample before, and 1.0 once there is one.
     """
     total, last = state[0], state[1]
-    for n in range(first, first + count):
+    for n in range(count):
         rate = row[n]
         if state[2] != 0.0:
             total = total + 0.5 * step * (last + rate)
@@ -267,60 +271,49 @@ def integrate_row(row: Array, first: int, count: int, step: float, state: Array)
     state[0], state[1] = total, last
 
 
-@subroutine
-def low_pass(
-    kept: float,
-    fresh: bool,
-    count: int,
-    columns: Indices,
-    factor: Array,
-    state: Array,
-    rows: Array,
-    flat: Array,
-) -> None:
-    """Replace the rows of an observation by what a first-order low pass makes of them.
+@pasted
+def low_pass(kept: float, fresh: bool, count: int, room: Room, r: int, q: int) -> None:
+    """Replace the rows of an observation by what one of its first-order low passes makes of them.
 
     `kept` is what a step leaves of the output, exp(-pole · h); a `fresh` record begins with the
-    input; the others are arguments of `follow`, `factor` room for one.
+    input.
     """
-    gain = 1.0 - kept
+    gain, size = 1.0 - kept, room.seen.shape[1] - 1
+    rows, state = behind(room.seen, r * (size + 1) * STRIDE + CARRIED), room.passed[r, q]
     for m in range(count):
-        factor[m] = kept
-    for c in range(rows.shape[0]):
-        row = rows[c]
+        room.aside[m] = kept
+    for c in range(size + 1):
+        row = behind(rows, c * STRIDE)
         if fresh:
-            state[c] = row[CARRIED]
+            state[c] = row[0]
         for m in range(count):
-            row[CARRIED + m] = gain * row[CARRIED + m]
-    follow(factor, columns, flat, count, state)
+            row[m] = gain * row[m]
+    columns, width = behind(room.columns, r * 4 * room.columns.shape[2]), room.columns.shape[2]
+    follow(behind(room.aside, 0), columns, width, room.flat_seen, count, state)
 
 
 @subroutine
 def place(
-    seen: Array,
-    base: int,
-    plan: Plan,
-    r: int,
-    at: int,
-    count: int,
-    sink: Sink,
-    to: int,
+    seen: Array, base: int, plan: Plan, r: int, at: int, count: int, sink: Sink, to: int
 ) -> None:
     """Weighted rows of the problem at some stamps of an observation, from its rows on the grid.
 
     `seen` holds the derivatives that the march gives, and the signal, from the grid's point `base`
     on; `at` is the first of the stamps, `to` the first place in the rows of the sink.
     """
-    derived, end = sink.to.size, at + count
-    # slices, because a place that may be negative to the compiler keeps it from vectorising
-    cell, fraction, weight = plan.cell[at:end], plan.fraction[at:end], plan.weight[at:end]
+    derived, long = sink.to.size, sink.rows.shape[1]
+    cell, fraction, weight = (
+        behind(plan.cell, at),
+        behind(plan.fraction, at),
+        behind(plan.weight, at),
+    )
     begin = cell[0] - base
     for c in range(derived):
-        column = sink.rows[sink.to[c], to : to + count]
+        column, row = behind(sink.rows, sink.to[c] * long + to), behind(seen, c * STRIDE)
         if plan.way[r, c] == DONE:
             continue
         if plan.regular[r]:
-            row = seen[c, begin : begin + count]
+            row = behind(row, begin)
             if plan.way[r, c] == ADD:
                 for i in range(count):
                     column[i] += weight[i] * row[i]
@@ -328,24 +321,23 @@ def place(
                 for i in range(count):
                     column[i] = weight[i] * row[i]
         else:
-            row = seen[c]
             for i in range(count):
                 n, f = cell[i] - base, fraction[i]
                 column[i] = weight[i] * ((1.0 - f) * row[n] + f * row[n + 1])
-    signal = seen[derived]
+    signal = behind(seen, derived * STRIDE)
     for c in sink.own:
-        column = sink.rows[c, to : to + count]
+        column = behind(sink.rows, c * long + to)
         for i in range(count):
             column[i] = weight[i] if c == plan.offset_column[r] else 0.0
         if c == plan.clock_column[r]:
-            back, ahead = plan.back[at:end], plan.ahead[at:end]
+            back, ahead = behind(plan.back, at), behind(plan.ahead, at)
             for i in range(count):
                 n = cell[i] - base
-                before, behind = signal[n] - signal[n - 1], signal[n + 1] - signal[n]
-                column[i] = weight[i] * (back[i] * before + ahead[i] * behind)
+                before, after = signal[n] - signal[n - 1], signal[n + 1] - signal[n]
+                column[i] = weight[i] * (back[i] * before + ahead[i] * after)
     squares = 0.0
-    measured = plan.measured[at:end]
-    column = sink.rows[sink.rows.shape[0] - 1, to : to + count]
+    measured = behind(plan.measured, at)
+    column = behind(sink.rows, (sink.rows.shape[0] - 1) * long + to)
     for i in range(count):
         n, f = cell[i] - base, fraction[i]
         residual = weight[i] * ((1.0 - f) * signal[n] + f * signal[n + 1] - measured[i])
@@ -354,7 +346,7 @@ def place(
     sink.squares[r] += squares
 
 
-@subroutine
+@pasted
 def rotate(
     seen: Array,
     base: int,
@@ -371,36 +363,23 @@ def rotate(
     rotated, and as many as are returned wait now.
     """
     at, end = stamps
+    long = sink.rows.shape[1]
     while at < end:
         if plan.weight[at] == 0.0:
             at += 1
             continue
         count = 1
-        while (
-            at + count < end
-            and used + count < sink.rows.shape[1]
-            and plan.weight[at + count] != 0.0
-        ):
+        while at + count < end and used + count < long and plan.weight[at + count] != 0.0:
             count += 1
         place(seen, base, plan, r, at, count, sink, used)
         at, used = at + count, used + count
-        if used == sink.rows.shape[1]:
+        if used == long:
             absorb(sink.rows, sink.factor, products)
             used = 0
     return used
 
 
-@subroutine
-def carry(room: Room, count: int) -> None:
-    """Keep what interpolation looks back at, from the end of the block before."""
-    for r in range(room.seen.shape[0]):
-        for c in range(room.seen.shape[1] - 1):
-            row = room.seen[r, c]
-            row[CARRIED - 2] = row[CARRIED + count - 2]
-            row[CARRIED - 1] = row[CARRIED + count - 1]
-
-
-@subroutine
+@pasted
 def deliver(
     program: Program,
     plan: Plan,
@@ -421,19 +400,18 @@ def deliver(
     combine(room.flat, program.terms, program.seen, targets, count, room.flat_seen)
     base, last = first - CARRIED, first + count == size
     for r in range(plan.first.size - 1):
-        rows = room.seen[r]
-        signal, value = rows[derived, CARRIED:], room.table[program.value[r]]
+        rows = behind(room.seen, r * (derived + 2) * STRIDE)
+        signal = behind(rows, derived * STRIDE + CARRIED)
+        value = behind(room.flat, program.value[r] * STRIDE)
         for m in range(count):
             signal[m] = value[m]
         if program.integral[r]:
             for c in range(derived + 1):
-                integrate_row(rows[c], CARRIED, count, step, room.integrals[r, c])
+                row = behind(rows, c * STRIDE + CARRIED)
+                integrate_row(row, count, step, room.integrals[r, c])
         for q in range(plan.kept.shape[1]):
-            kept = plan.kept[r, q]
-            if kept > 0.0:
-                state, columns = room.passed[r, q], room.columns[r]
-                fresh = first == 0
-                low_pass(kept, fresh, count, columns, room.aside, state, rows, room.flat_seen)
+            if plan.kept[r, q] > 0.0:
+                low_pass(plan.kept[r, q], first == 0, count, room, r, q)
         # off the grid, and for a slope, the point behind the stamp must be known as well
         alone = last or (plan.regular[r] and plan.clock_column[r] < 0)
         known = first + count if alone else first + count - 1
@@ -447,16 +425,6 @@ def deliver(
         elif end > at:
             place(rows, base, plan, r, at, end - at, sink, at)
     return used
-
-
-@subroutine
-def finish(sink: Sink, room: Room, used: int) -> None:
-    """Rotate the rows that still wait."""
-    if used > 0 and sink.factor.size > 0:
-        for c in range(sink.rows.shape[0]):
-            for i in range(used, sink.rows.shape[1]):
-                sink.rows[c, i] = 0.0
-        absorb(sink.rows, sink.factor, room.products)
 
 
 @kernel
@@ -478,26 +446,34 @@ def march_observed(
     last.
     """
     size, block, h = grid
-    used, count, flat = int(plan.first[0]), 0, room.flat
+    used, count, flat = plan.first[0], 0, room.flat
     for first in range(0, size, block):
-        carry(room, count)
-        count = min(block, size - first)
+        for k in range(0, room.flat_seen.size, STRIDE):
+            # what interpolation looks back at, from the end of the block before
+            row = behind(room.flat_seen, k + CARRIED - 2)
+            row[0], row[1] = row[count], row[count + 1]
+        count = block if block < size - first else size - first
         for step in range(program.todo.shape[0]):
-            what, a, b, c = program.todo[step]
+            what, a, b = program.todo[step, 0], program.todo[step, 1], program.todo[step, 2]
+            taken, many = behind(program.columns, b + 1), program.todo[step, 3] - b - 1
             if what == CALL:
                 call(pieces[a], count, first, h, arrays)
             elif what == COMBINE:
                 combine(flat, program.terms, a, b, count, flat)
             elif what == RECUR:
-                chosen = program.columns[b + 1 : c].reshape(4, (c - b - 1) // 4)
-                follow(flat[program.columns[b] :], chosen, flat, count, tangent)
+                factor = behind(flat, program.columns[b])
+                follow(factor, taken, many // 4, flat, count, tangent)
             elif what == CHAIN:
-                taken = (program.columns[b + 1 : c], arrays[3], tangent, *arrays[5:])
-                call(pieces[a], count, program.columns[b], h, (arrays[0], arrays[1], *taken))
+                given = (arrays[0], arrays[1], taken, arrays[3], tangent, *arrays[5:])
+                call(pieces[a], count, program.columns[b], h, given)
             else:
-                at, through = plan.first[a] + first, flat[program.columns[b] :]
+                at, through = plan.first[a] + first, behind(flat, program.columns[b])
                 for m in range(count):
                     room.aside[m] = plan.weight[at + m] * through[m]
-                follow_out(program.columns[b + 1 : c], flat, tangent, room.aside, sink, at, count)
+                follow_out(taken, many, flat, tangent, behind(room.aside, 0), sink, at, count)
         used = deliver(program, plan, sink, room, used, (first, count, size), h)
-    finish(sink, room, used)
+    if used > 0 and sink.factor.size > 0:
+        for c in range(sink.rows.shape[0]):
+            for i in range(used, sink.rows.shape[1]):
+                sink.rows[c, i] = 0.0
+        absorb(sink.rows, sink.factor, room.products)

@@ -297,17 +297,35 @@ def march_of(
 
 
 @generating
-def observe_kernel(
+def observer_of(
     model: Model,
     part: int,
     signals: tuple[str, ...],
     options: tuple[Any, ...],
     kept: tuple[Stored, ...],
     wanted: tuple[Stored, ...],
-) -> Callable[..., None]:
-    """The compiled kernel of signals at known states."""
+) -> Planned:
+    """The piece that computes signals at known states."""
     text, names = observe_source(model, part, signals, options, kept, wanted)
-    return module(f"{model.parts[part].name}_observe", text, names)["observe"]  # type: ignore[no-any-return]
+    names["piece"] = piece
+    return Planned(lambda: module(f"{model.parts[part].name}_observe", text, names)["observe"])
+
+
+def observed_at(
+    instance: Instance,
+    part: int,
+    known: Mapping[Stored, Array],
+    signals: tuple[str, ...],
+    h: float,
+    wanted: tuple[Stored, ...],
+) -> Array:
+    """(r, n) signals of a part where its states, and the external `signals`, are known."""
+    observer = observer_of(instance.model, part, signals, instance.options, tuple(known), wanted)
+    rows = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in known.values())
+    out, none, no_places = np.empty((len(wanted), rows[0].size)), np.empty(0), np.empty(0, np.int64)
+    arrays = (pointers(rows), none, no_places, none, instance.params, instance.given, none, none)
+    run_once(addresses((observer,), (0,)), (*arrays, out.reshape(-1)), rows[0].size, h)
+    return out
 
 
 def marched(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations.cache import kernel
 from swashplate.equations.equation import inlined
+from swashplate.equations.marching.pieces import behind
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]
@@ -73,7 +74,7 @@ def absorb(rows: Array, factor: Array, room: Array) -> None:
     triangle `factor`, zeros before the first block, is replaced; `room` has EIGHTH places.
     """
     for j in range(rows.shape[0]):
-        pivot = rows[j]
+        pivot = behind(rows, j * ROWS)
         square = dot(pivot, pivot, room)
         if square < NOTHING:
             continue  # nothing to rotate, as with a parameter that the block does not depend on
@@ -85,7 +86,7 @@ def absorb(rows: Array, factor: Array, room: Array) -> None:
         scale = 1.0 / (norm * (norm + abs(corner)))
         factor[j, j] = diagonal
         for k in range(j + 1, rows.shape[0]):
-            column = rows[k]
+            column = behind(rows, k * ROWS)
             along = scale * (lead * factor[j, k] + dot(pivot, column, room))
             factor[j, k] -= along * lead
             for i in range(ROWS):

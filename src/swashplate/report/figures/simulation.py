@@ -189,7 +189,7 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
         By default the name of the physical set.
     """
     full, differ = found.full, found.difference
-    machine = full.case.p.machine
+    machine = full.plant.machine
 
     def holding(limit: Limit, held: Flags) -> tuple[tuple[Limit, Array], ...]:
         return ((limit, stretches(found.time, held != 0)),)

@@ -1,0 +1,482 @@
+"""One channel of the control card: a command in its direction to a current magnitude.
+
+A channel is, in this order,
+
+1. a delay τ: the command is read at t - τ by linear interpolation,
+2. a static map with dead zone and jump,
+3. a second-order filter with a Coulomb-like term,
+4. a limiter of the output's rate with a decay at its end (Kruse 2001, eqs. 3.1-3.9).
+
+The filter has two forms. Kruse's recursion (eq. 3.6) belongs to its sample rate of 512 Hz: at
+another rate the same ζ and ω describe another response. With the option `exact` the equation behind
+it, I*'' + 2ζω I*' + C sign(I*') + ω² I* = ω² I_ss, is solved over each step instead, so that ζ, ω
+and C mean the same at every rate.
+"""
+
+from math import cos, exp, inf, pi, sin, sqrt
+from typing import Annotated, NamedTuple
+
+from swashplate.equations.derivatives import declared
+from swashplate.equations.equation import equation
+from swashplate.equations.fields import OFF, Definition, Flag
+from swashplate.equations.library import faded, interpolated, soft_threshold
+from swashplate.equations.model import Window
+
+COULOMB_WIDTH = 0.01
+"""Rate of current below which the smooth Coulomb sign is proportional to it. [A/s]"""
+BEYOND = "a command beyond the dead zone"
+CHANGING = "a current that changes"
+
+
+class Channel(NamedTuple):
+    """Parameters of one channel."""
+
+    # fmt: off
+    V_dz: Annotated[float, Definition("dead zone of the card", "V", lower=0.0, upper=10.0,
+        source="3.3", needs=BEYOND)]
+    J: Annotated[float, Definition("current jump at the edge of the dead zone", "A", lower=0.0,
+        source="3.3", needs=BEYOND)]
+    G1: Annotated[float, Definition("linear gain", "A/V", source="3.3", needs=BEYOND)]
+    G2: Annotated[float, Definition("quadratic gain", "A/V^2", source="3.3", needs=BEYOND)]
+    G3: Annotated[float, Definition("cubic gain", "A/V^3", source="3.3", needs=BEYOND)]
+    zeta: Annotated[float, Definition("damping ratio of the current filter", "1", above=0.0,
+        source="3.6", needs=CHANGING)]
+    omega: Annotated[float, Definition("natural frequency of the current filter", "rad/s",
+        above=0.0, source="3.6", needs=CHANGING)]
+    C: Annotated[float, Definition("Coulomb-like term of the current filter", "A/s^2", lower=0.0,
+        source="3.6", needs=CHANGING)]
+    lim1: Annotated[float, Definition("rate limit away from zero", "A/s", above=0.0,
+        can_be_off=True, source="3.8", needs="a current rising at its limit")]
+    lim2: Annotated[float, Definition("rate limit towards zero", "A/s", above=0.0, can_be_off=True,
+        source="3.9", needs="a current falling at its limit")]
+    I_t1: Annotated[float, Definition("current above which lim1 acts", "A", lower=0.0,
+        can_be_off=True, source="3.8", needs="a current held back at I_t1")]
+    I_t2: Annotated[float, Definition("current below which the decay acts", "A", lower=0.0,
+        source="3.9", needs="a current that decays from I_t2")]
+    a: Annotated[float, Definition("rate of the final decay", "1/s", lower=0.0, can_be_off=True,
+        source="3.9", needs="a current that decays to its end")]
+    # fmt: on
+
+
+class CardInputs(NamedTuple):
+    """The command as the card looks at it. [V]"""
+
+    at: Window  # Three samples around t - τ, two from there and one before.
+    span: Window  # Three samples around the end of the sample interval about t - τ, t - τ + h/2.
+
+
+class ChannelConstants(NamedTuple):
+    """What a channel needs of its parameters and the step; but for `decay` 0 without `exact`."""
+
+    decay: float  # exp(-a h).
+    stays: float  # I* one step after 1 A, at rest, without I_ss. [1]
+    swings: float  # I* one step after 1 A/s, without I_ss. [s]
+    pull: float  # Rate one step after I_ss came up to 1 A, at rest. [1/s]
+    slows: float  # Rate one step after 1 A/s, without I_ss. [1]
+    ramp: float  # I* at the end of a step in which I_ss rose from 0 to 1 A. [1]
+    ramp_rate: float  # Rate at the end of such a step. [1/s]
+    coulomb: float  # Rate that the Coulomb term takes in a step. [A/s]
+    lost: float  # I* lost for each rate that the Coulomb term takes. [s]
+
+
+class Filter(NamedTuple):
+    """State of one channel."""
+
+    now: float  # I* at this sample; with `exact`, one sample earlier. [A]
+    before: float  # I* one sample before `now` [A]; with `exact`, its rate at `now` [A/s].
+    out: float  # I one sample earlier. [A]
+
+
+class ChannelSignals(NamedTuple):
+    """What is known of one channel at a sample."""
+
+    current: float
+    steady: float
+    filtered: float
+    rate: float
+
+
+class CardOptions(NamedTuple):
+    """Forms of the card."""
+
+    literal: Flag = OFF  # Literal sign of the Coulomb term in the recursion, not the smooth one.
+    split: Flag = OFF  # lim1 and the decay take over within a step, at I_t1 and I_t2.
+    exact: Flag = OFF  # The filter's differential equation, in place of the recursion for 512 Hz.
+
+
+# --- command to settled current ------------------------------------------------------------------
+
+
+@equation
+def share_above(first: float, last: float, threshold: float) -> float:
+    """Share of a straight segment that lies above a threshold, 0 to 1."""
+    a = first - threshold
+    b = last - threshold
+    if a > 0.0 and b > 0.0:
+        return 1.0
+    if a <= 0.0 and b <= 0.0:
+        return 0.0
+    return max(a, b) / abs(a - b)
+
+
+@declared(share_above)
+def _share_above(first: float, last: float, threshold: float) -> tuple[float, float, float]:
+    # the crossing moves with both ends, each by how near it lies; at the threshold nothing moves
+    crosses = (first > threshold) != (last > threshold)
+    per_volt = 1.0 / abs(last - first) if crosses else 0.0
+    at = (threshold - first) / (last - first) if crosses else 0.0
+    return per_volt * (1.0 - at), per_volt * at, -per_volt
+
+
+@equation
+def jump_share(
+    newest: float, middle: float, oldest: float, fraction: float, threshold: float
+) -> float:
+    """Share s of one sample interval in which the command exceeds the dead zone, 0 to 1.
+
+    Of three neighbouring samples of the channel's command [V]; the interval's end lies `fraction`
+    of a sample behind `newest`. Switched by whole samples instead, the current would jump with V_dz
+    and τ, and no fit could move either.
+    """
+    first = interpolated(middle, oldest, fraction)
+    last = interpolated(newest, middle, fraction)
+    return fraction * share_above(first, middle, threshold) + (1.0 - fraction) * share_above(
+        middle, last, threshold
+    )
+
+
+@declared(jump_share)
+def _jump_share(
+    newest: float, middle: float, oldest: float, fraction: float, threshold: float
+) -> tuple[float, float, float, float, float]:
+    # the interval slides back as the fraction grows: it gains what its old end sees and loses what
+    # its new end sees; where the command rests exactly at the threshold nothing changes
+    first = interpolated(middle, oldest, fraction)
+    last = interpolated(newest, middle, fraction)
+    by_fraction = (1.0 if first > threshold else 0.0) - (1.0 if last > threshold else 0.0)
+    crosses_old = (first > threshold) != (middle > threshold)
+    crosses_new = (middle > threshold) != (last > threshold)
+    per_volt_old = fraction / abs(middle - first) if crosses_old else 0.0
+    per_volt_new = (1.0 - fraction) / abs(last - middle) if crosses_new else 0.0
+    # a share moves with both ends of its part, each by how near it lies to the crossing
+    at_old = (threshold - first) / (middle - first) if crosses_old else 0.0
+    at_new = (threshold - middle) / (last - middle) if crosses_new else 0.0
+    by_first = per_volt_old * (1.0 - at_old)
+    by_middle = per_volt_old * at_old + per_volt_new * (1.0 - at_new)
+    by_last = per_volt_new * at_new
+    return (
+        by_last * (1.0 - fraction),
+        by_middle + by_first * (1.0 - fraction) + by_last * fraction,
+        by_first * fraction,
+        by_fraction,
+        -per_volt_old - per_volt_new,
+    )
+
+
+@equation
+def steady_current(command: float, share: float, p: Channel) -> float:
+    """Current that a channel settles at, of the delayed command in its direction [V].
+
+    I_ss = J s + G1 d + G2 d² + G3 d³ with d = max(V - V_dz, 0) and s of `jump_share`; Kruse eq.
+    3.3. [A]
+    """
+    d = max(command - p.V_dz, 0.0)
+    return p.J * share + d * (p.G1 + d * (p.G2 + d * p.G3))
+
+
+@equation
+def channel_level(voltage: float, p: Channel) -> float:
+    """Current at which a channel settles under a constant `voltage` in its direction. [A]"""
+    return steady_current(voltage, 1.0 if voltage > p.V_dz else 0.0, p)
+
+
+# --- Kruse's recursion ----------------------------------------------------------------------
+
+
+@equation
+def coulomb_sign(change: float, h: float, literal: Flag) -> float:
+    """Sign of the filter's rate: smooth within ±0.01 A/s, or the literal sign on request."""
+    if literal is None:
+        return min(max(change / (COULOMB_WIDTH * h), -1.0), 1.0)
+    return (1.0 if change > 0.0 else 0.0) - (1.0 if change < 0.0 else 0.0)
+
+
+@equation
+def filtered_current(
+    now: float, before: float, steady: float, p: Channel, h: float, literal: Flag
+) -> float:
+    """I* at the next sample by Kruse's recursion, eq. 3.6. [A]
+
+    Of I* at this sample and the one before and of I_ss [A]; `literal` takes the literal sign of the
+    rate. Stable for ωh < 2ζ and ζωh < 1 + ω²h²/4 only (Jury).
+    """
+    w = p.omega * h
+    friction = p.C * h * h * coulomb_sign(now - before, h, literal)
+    following = (
+        2.0 * (1.0 - p.zeta * w) * now
+        + (2.0 * p.zeta * w - w * w - 1.0) * before
+        - friction
+        + w * w * steady
+    )
+    return faded(following)
+
+
+@equation
+def step_limit(zeta: float, exact: Flag) -> float:
+    """Largest ωh, itself excluded, that a channel's filter bears.
+
+    Recursion: Jury's criterion for z² - 2(1 - ζωh) z + 1 - 2ζωh + ω²h² is ωh < 2ζ and
+    ζωh < 1 + ω²h²/4. The first condition is the stricter one where damping is small: an explicit
+    step adds to a swing what the damping has to take away. From ζ = 1 on the second gives
+    ωh < 2(ζ - √(ζ² - 1)), here written without cancellation. Differential equation (`exact`): half
+    a swing, ωh √(1 - ζ²) < π, within which its Coulomb term may count as constant.
+    """
+    if exact is None:
+        over = max(zeta, 1.0)
+        slow = 2.0 / (over + sqrt(over - 1.0) * sqrt(over + 1.0))
+        return min(2.0 * zeta, slow)
+    share = sqrt(max(1.0 - zeta * zeta, 0.0))
+    return pi / share if share > 0.0 else inf
+
+
+@equation
+def current_acceleration(
+    current: float, rate: float, steady: float, p: Channel, literal: Flag
+) -> float:
+    """Second derivative of I*, of which the recursion is the discrete form.
+
+    I*'' = ω² (I_ss - I*) - 2ζω I*' - C sgn I*'; Kruse eq. 3.7 (erratum 3). [A/s²]
+    """
+    friction = p.C * coulomb_sign(rate, 1.0, literal)
+    return p.omega * p.omega * (steady - current) - 2.0 * p.zeta * p.omega * rate - friction
+
+
+# --- the filter's differential equation ----------------------------------------------------------
+
+
+@equation
+def damped_waves(zeta: float, w: float) -> tuple[float, float]:
+    """The two functions of a damped oscillator at w = ω t, e^(-ζw) cosh r and e^(-ζw) sinh r/r.
+
+    r² = (ζ² - 1) w² is negative where the oscillator swings: cosh r and sinh r/r are then cos |r|
+    and sin |r|/|r|. Both are entire functions of r², smooth at critical damping, where the power
+    series computes them, to below rounding up to |r| = 1.
+    """
+    q = (zeta * zeta - 1.0) * w * w
+    if q > 1.0:
+        r = sqrt(q)
+        rises = exp(r - zeta * w)
+        falls = exp(-r - zeta * w)
+        return 0.5 * (rises + falls), 0.5 * (rises - falls) / r
+    e = exp(-zeta * w)
+    if q < -1.0:
+        r = sqrt(-q)
+        return e * cos(r), e * sin(r) / r
+    even = 1.0 + q / 240.0 * (1.0 + q / 306.0 * (1.0 + q / 380.0))
+    even = 1.0 + q / 90.0 * (1.0 + q / 132.0 * (1.0 + q / 182.0 * even))
+    even = 1.0 + q / 2.0 * (1.0 + q / 12.0 * (1.0 + q / 30.0 * (1.0 + q / 56.0 * even)))
+    odd = 1.0 + q / 272.0 * (1.0 + q / 342.0 * (1.0 + q / 420.0))
+    odd = 1.0 + q / 110.0 * (1.0 + q / 156.0 * (1.0 + q / 210.0 * odd))
+    odd = 1.0 + q / 6.0 * (1.0 + q / 20.0 * (1.0 + q / 42.0 * (1.0 + q / 72.0 * odd)))
+    return e * even, e * odd
+
+
+@equation
+def channel_constants(p: Channel, h: float, options: CardOptions) -> ChannelConstants:
+    """Constants of a channel's march.
+
+    With C = e^(-ζw) cosh r and S = e^(-ζw) sinh r/r of `damped_waves` at w = ωh, the solution of
+    I'' + 2ζω I' + ω² I = ω² I_ss is I = (C + ζwS) I_0 + hS I_0', I' = -ω²hS I_0 + (C - ζwS) I_0'
+    without I_ss; under an I_ss that rises by 1 A, straight over the step,
+    I = 1 - 2ζ/w (1 - C - ζwS) - S and I' = (1 - C - ζwS)/h.
+    """
+    decay = exp(-p.a * h)
+    if options.exact is None:
+        return ChannelConstants(decay, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    w = p.omega * h
+    even, odd = damped_waves(p.zeta, w)
+    stays = even + p.zeta * w * odd
+    gone = 1.0 - stays
+    swings = h * odd
+    pull = p.omega * p.omega * swings
+    return ChannelConstants(
+        decay=decay,
+        stays=stays,
+        swings=swings,
+        pull=pull,
+        slows=even - p.zeta * w * odd,
+        ramp=1.0 - 2.0 * p.zeta / w * gone - odd,
+        ramp_rate=gone / h,
+        coulomb=p.C * swings,
+        lost=gone / pull,
+    )
+
+
+@equation
+def piece(
+    first: float, last: float, length: float, centre: float, p: Channel
+) -> tuple[float, float]:
+    """Integral of I_ss over a straight piece of the command, and its moment, in steps. [A]
+
+    The piece goes from `first` to `last` [V]; its length and its centre, counted from the middle of
+    the step, are in steps. The part beyond the dead zone lies at the end of a rise, at the
+    beginning of a fall. Over it the polynomial counts as straight.
+    """
+    on = length * share_above(first, last, p.V_dz)
+    shift = 0.5 * (length - on)
+    at = centre + (shift if last > first else -shift)
+    begins = steady_current(first, 1.0, p)
+    ends = steady_current(last, 1.0, p)
+    integral = 0.5 * (begins + ends) * on
+    return integral, integral * at + (ends - begins) * on * on / 12.0
+
+
+@equation
+def steady_course(direction: float, at: Window, p: Channel) -> tuple[float, float]:
+    """I_ss at both ends of the step that ends at this sample, if it went straight between them. [A]
+
+    The straight line has the integral and the moment of I_ss over the step: the command goes
+    straight between samples, one of which lies within the step; a jump happens where it passes
+    V_dz. A line through the two ends alone would come too early or too late by up to half a step,
+    and smear a jump over two. Nothing is seen of the command after t - τ.
+    """
+    middle = direction * at.s[1]
+    first = direction * interpolated(at.s[1], at.s[2], at.f)
+    last = direction * interpolated(at.s[0], at.s[1], at.f)
+    older, older_moment = piece(first, middle, at.f, 0.5 * (at.f - 1.0), p)
+    newer, newer_moment = piece(middle, last, 1.0 - at.f, 0.5 * at.f, p)
+    mean = older + newer
+    half_rise = 6.0 * (older_moment + newer_moment)
+    return mean - half_rise, mean + half_rise
+
+
+@equation
+def exact_filter(s: Filter, begins: float, ends: float, k: ChannelConstants) -> tuple[float, float]:
+    """I* [A] and its rate [A/s] at this sample, from the state and I_ss of the step between.
+
+    The Coulomb term is a constant between ±C, as large as it must be: it takes C e^(-ζw) h sinh r/r
+    of the rate, but stops at zero, where it holds the current. So it sticks exactly, at any step.
+    """
+    off = s.now - begins
+    rise = ends - begins
+    rate = k.slows * s.before - k.pull * off + k.ramp_rate * rise
+    left = soft_threshold(rate, k.coulomb)
+    filtered = begins + k.stays * off + k.swings * s.before + k.ramp * rise
+    return faded(filtered - k.lost * (rate - left)), faded(left)
+
+
+# --- filter to output ----------------------------------------------------------------------------
+
+
+@equation
+def remaining_decay(previous: float, fallen: float, I_t2: float, decay: float) -> float:
+    """What the rest of a step leaves of I_t2, where the output passes it on the way to `fallen`.
+
+    Both the way there and the decay count as straight within the step. [1]
+    """
+    return decay + (previous - I_t2) / (previous - fallen) * (1.0 - decay)
+
+
+@equation
+def taken_over(target: float, previous: float, I_t1: float, lim1: float, h: float) -> float:
+    """Output after a step in which it passes I_t1 on the way to `target` and then rises by lim1.
+
+    The way to I_t1 counts as straight, as steep as from `previous` to `target` in one step. [A]
+    """
+    return I_t1 + lim1 * h * (target - I_t1) / (target - previous)
+
+
+@equation
+def limited_current(
+    target: float, previous: float, steady: float, p: Channel, decay: float, h: float, split: Flag
+) -> float:
+    """Channel output: the filter's state `target` behind rate limits and the final decay. [A]
+
+    Kruse eqs. 3.8 and 3.9 as a limiter of position, because the printed rate form does not keep the
+    steady level. `previous` is the output one sample earlier; I_ss = 0 means that the command has
+    gone; `decay` is exp(-a h). Without `split` lim1 takes over from the filter, and the decay from
+    lim2, at a step's end; with it where the output passes I_t1 or I_t2: then it follows both
+    thresholds, and anything before them, without flat stretches or jumps.
+    """
+    if target >= previous:
+        if target <= p.I_t1:
+            return target
+        if split is None or previous >= p.I_t1:
+            return min(max(previous, p.I_t1) + p.lim1 * h, target)
+        return min(taken_over(target, previous, p.I_t1, p.lim1, h), target)
+    if previous > p.I_t2:
+        fallen = max(previous - p.lim2 * h, 0.0, target)
+        if split is None or fallen >= p.I_t2:
+            return fallen
+        left = p.I_t2 * remaining_decay(previous, fallen, p.I_t2, decay)
+        return left if steady == 0.0 else max(left, target)
+    left = faded(previous * decay)
+    return left if steady == 0.0 else max(left, target)
+
+
+@equation
+def rate_limit_active(output: float, target: float, previous: float, I_t2: float) -> bool:
+    """Whether a rate limit, rather than the filter or the decay, sets the output."""
+    if target >= previous:
+        return output < target
+    return previous > I_t2 and output > max(target, 0.0)
+
+
+# --- one channel ----------------------------------------------------------------------------------
+
+
+@equation
+def channel_sample(
+    state: Filter,
+    inputs: CardInputs,
+    direction: float,
+    p: Channel,
+    k: ChannelConstants,
+    h: float,
+    options: CardOptions,
+) -> ChannelSignals:
+    """One channel at a sample; `direction` is +1.0 or -1.0."""
+    span = inputs.span
+    share = jump_share(
+        direction * span.s[0], direction * span.s[1], direction * span.s[2], span.f, p.V_dz
+    )
+    command = interpolated(inputs.at.s[0], inputs.at.s[1], inputs.at.f)
+    steady = steady_current(direction * command, share, p)
+    if options.exact is None:
+        filtered = state.now
+        rate = (state.now - state.before) / h
+    else:
+        begins, ends = steady_course(direction, inputs.at, p)
+        filtered, rate = exact_filter(state, begins, ends, k)
+    current = limited_current(filtered, state.out, steady, p, k.decay, h, options.split)
+    return ChannelSignals(current, steady, filtered, rate)
+
+
+@equation
+def channel_step(
+    state: Filter,
+    at: ChannelSignals,
+    p: Channel,
+    k: ChannelConstants,
+    h: float,
+    options: CardOptions,
+) -> Filter:
+    """One channel from a sample to the next."""
+    if options.exact is None:
+        following = filtered_current(state.now, state.before, at.steady, p, h, options.literal)
+        return Filter(following, state.now, at.current)
+    return Filter(at.filtered, at.rate, at.current)
+
+
+@equation
+def channel_rates(state: Filter, command: float, p: Channel, options: CardOptions) -> Filter:
+    """Rates of I* and of its rate, which is `before` here, in continuous time."""
+    steady = steady_current(command, 1.0, p)
+    faster = current_acceleration(state.now, state.before, steady, p, options.literal)
+    return Filter(state.before, faster, 0.0)
+
+
+@equation
+def channel_settled(level: float, options: CardOptions) -> Filter:
+    """State of a channel that has settled at a current. [A]"""
+    return Filter(level, level if options.exact is None else 0.0, level)

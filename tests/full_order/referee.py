@@ -1,0 +1,84 @@
+"""SciPy's stiff solver on the five states' rates, restarted at every event: the trusted path."""
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from swashplate.equations.equation import interpreted
+from swashplate.full_order import FullOrderDrive
+from swashplate.models.displacement_control import solenoid_force
+from swashplate.models.full_order import Motion, free_rates
+from swashplate.simulation.result import Simulation
+
+TOLERANCES = np.array([1e-9, 1e-7, 1.0, 1e-9, 1e-7])  # m, m/s, Pa, rad, rad/s for 1e-6.
+
+
+def solved(full: FullOrderDrive, run: Simulation, tolerance: float = 1e-8) -> np.ndarray:
+    """(n, 5) states over the current of a run, a straight line between its samples.
+
+    A limit that holds is -1 or 1, one that does not is 0: the spool at its stroke, the relief valve
+    open, the plate at a stop. Stops are inelastic.
+    """
+    m, options, current = full.plant.machine, full.options(), run.fine("current")
+    instance = full.instance(run.record.step, card=False)
+    started = instance.start({"current": float(current[0])}, run.record.step, "rest")
+    k, state = started.arguments[1]["k"], np.array(started.states[1].motion)
+    time = run.record.step * np.arange(current.size)
+    lower = np.array([-m.spool_stroke, k.lower, -m.swash_stop_minus])
+    upper = np.array([m.spool_stroke, k.upper, m.swash_stop_plus])
+    size, places = upper - lower, [0, 2, 3]
+    rates_of, force_of = interpreted(free_rates), interpreted(solenoid_force)
+
+    def pushes(t: float, y: np.ndarray) -> np.ndarray:
+        """Rates of spool velocity, pressure and swash rate where no limit holds."""
+        force = force_of(float(np.interp(t, time, current)), full.plant.solenoids)
+        return np.array(rates_of(Motion(*y.tolist()), force, m, options))
+
+    def rates(t: float, y: np.ndarray, holds: np.ndarray) -> np.ndarray:
+        free = np.where(holds == 0, pushes(t, y), 0.0)
+        return np.array([y[1], free[0], free[1], y[4], free[2]])
+
+    def margin(number: int, holds: np.ndarray):
+        """How far a limit is from being reached, or from letting go."""
+
+        def of(t: float, y: np.ndarray, _: np.ndarray) -> float:
+            if holds[number]:
+                return float(holds[number] * pushes(t, y)[number])
+            at = y[places[number]]
+            return float(min(upper[number] - at, at - lower[number]) / size[number])
+
+        of.terminal, of.direction = True, -1  # type: ignore[attr-defined]
+        return of
+
+    def settled(t: float, y: np.ndarray) -> np.ndarray:
+        """Which limits hold from here on; what arrives at one is set on it, and stops."""
+        speed, near = np.array([y[1], 0.0, y[4]]), 1e-9 * size
+        side = np.where(y[places] >= upper - near, 1, np.where(y[places] <= lower + near, -1, 0))
+        side = np.where(side * speed >= 0.0, side, 0)
+        y[places] = np.where(side > 0, upper, np.where(side < 0, lower, y[places]))
+        y[[1, 4]] = np.where(side[[0, 2]] != 0, 0.0, y[[1, 4]])
+        return np.where(side * pushes(t, y) >= 0.0, side, 0)
+
+    found, now = np.empty((time.size, 5)), 0.0
+    while now < time[-1]:
+        holds = settled(now, state)
+        later = time[time >= now]
+        made = solve_ivp(
+            rates,
+            (now, time[-1]),
+            state,
+            "Radau",
+            later,
+            events=[margin(number, holds) for number in range(3)],
+            args=(holds,),
+            max_step=run.record.step,
+            rtol=tolerance,
+            atol=TOLERANCES * (tolerance / 1e-6),
+        )
+        assert made.status >= 0, made.message
+        if len(made.t):
+            found[time.size - later.size :][: len(made.t)] = made.y.T
+        if made.status == 0:
+            break
+        now = max(float(each[0]) for each in made.t_events if each.size)
+        state = next(each[0] for each in made.y_events if each.size).copy()
+    return found
