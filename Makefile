@@ -11,6 +11,8 @@ STAMP := .venv/.installed
 export PIP_CONSTRAINT := constraints.txt
 export PIP_BUILD_CONSTRAINT := constraints.txt
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# Byte code is kept whatever the shell says: tests and commands start many processes.
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help .venv demo test test-slow golden lint docs figures reproduce bench cluster fuzz tools browser calibration coverage dist binaries \

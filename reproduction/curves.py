@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from reproduction.catalogue import Shown
 from reproduction.content import Curve, Figure, Level, Panel
+from reproduction.speed_path import simulated_speed
 from swashplate.analysis import pulled
-from swashplate.campaign import matched_speed
 from swashplate.drive import Drive
 from swashplate.maneuvers import source_tests
 from swashplate.simulation.result import Simulation
@@ -53,7 +53,8 @@ def scaling_of(axis: str) -> Scaled:
 
 def filtered_speed_deg_s(run: Simulation) -> Array:
     """Speed through the two low passes of figure 7.4, as Kruse (2001) drew it. [deg/s]"""
-    return np.degrees(matched_speed(run.time, run.shaft_speed, form="source", aligned=False))
+    period = float(run.time[1] - run.time[0])
+    return np.degrees(simulated_speed(run.shaft_speed, period, aligned=False))
 
 
 @cache

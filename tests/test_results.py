@@ -158,6 +158,7 @@ def cranes() -> list[object]:
     return [crane, stick, waves, feedback, *parts, run, grid, crane.stepper()]
 
 
+@pytest.mark.slow  # all that the package makes is made once
 def test_every_public_class_has_a_short_repr(work: Work) -> None:
     hoist = Drive.preset("hoist")
     voltage = TESTS[0].sample()

@@ -15,6 +15,7 @@ from swashplate.tables import (
     Column,
     Table,
     count,
+    ended,
     joined,
     listed,
     percent,
@@ -142,6 +143,7 @@ def test_numbers_show_what_is_known() -> None:
     assert (quantity(0.0076, "A"), quantity(1.0, "rad/s", spec=".1f")) == ("7.60 mA", "57.3 deg/s")
     assert unit_text("sqrt(Pa)/(m s)") == "√Pa/(m s)"
     assert listed(["a", "b", "c"]) == "a, b and c"
+    assert [ended(words) for words in ("it is", "is it?")] == ["it is.", "is it?"]
     assert [count(n, "entry is", "entries are") for n in (1, 2)] == ["1 entry is", "2 entries are"]
 
 

@@ -269,6 +269,11 @@ def listed(words: Sequence[str]) -> str:
     return " and ".join([*([", ".join(words[:-1])] if words[:-1] else []), *words[-1:]])
 
 
+def ended(words: str) -> str:
+    """Words with a stop at their end, unless they ask."""
+    return words if words.endswith("?") else f"{words}."
+
+
 def count(number: int, what: str, several: str = "") -> str:
     """``1 run``, ``13 runs``, ``110,605 samples``."""
     return f"{number:,} {what if number == 1 else several or what + 's'}"

@@ -6,20 +6,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from swashplate import Drive, InputError, ParameterError, maneuvers
+from swashplate import Drive, InputError, maneuvers
 from swashplate.analysis import (
     Deviations,
+    Draws,
     bands,
     draw_deviations,
     drives,
-    independent_drives,
     stored_draws,
 )
 from swashplate.campaign import Campaign, rig
 from swashplate.errors import FileError
 from swashplate.identification.assessment import Judged, assess
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.fitting import fit
+from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.setup import Free, Setup, load_setup
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.maneuvers import source_tests
@@ -106,22 +106,15 @@ def test_errors_that_leave_nothing(hoist):
         drives([assessment(hoist, unknowns, np.array([[1e10]]))], 10)
 
 
-def test_standard_errors_alone(hoist):
-    drawn = independent_drives(hoist, {"Z10": 0.12396, "Z16": 1e-6}, 1000, seed=1)
-    columns = drawn.columns
-    assert columns["Z10"].std() == pytest.approx(0.12396, rel=0.1)
-    both = [
-        columns[f"Z16_{side}"] - hoist.parameters.numbers[f"Z16_{side}"]
-        for side in ("plus", "minus")
-    ]
-    np.testing.assert_allclose(both[0], both[1], atol=1e-18)
-    assert not drawn.correlated
-    assert "Correlations ignored" in drawn.sentences()[0]
+def pumps(drive: Drive, error: float, count: int) -> Draws:
+    """Drives whose pumps differ."""
+    normal = np.random.default_rng(1).normal(size=count)
+    return Draws(tuple(drive.replace(Z10=12.396 + error * each) for each in normal), 0)
 
 
 def test_a_band_by_hand(hoist):
     """The speed at the stop goes with the pump: its band is that of the drawn factors."""
-    drawn = independent_drives(hoist, {"Z10": 0.3}, 101, seed=1)
+    drawn = pumps(hoist, 0.3, 101)
     band = bands(drawn, VOLTAGE, level=0.9)
     held = int(3.9 * 512)
     angle = hoist.parameters.numbers["Z13_plus"]
@@ -136,7 +129,7 @@ def test_a_band_by_hand(hoist):
 
 
 def test_levers_on_drawn_drives(hoist):
-    drawn = independent_drives(hoist, {"Z10": 0.1}, 3)
+    drawn = pumps(hoist, 0.1, 3)
     moved = drawn.pulled({"pump": 1.5})
     np.testing.assert_allclose(moved.columns["Z10"], 1.5 * drawn.columns["Z10"], rtol=1e-15)
 
@@ -144,15 +137,10 @@ def test_levers_on_drawn_drives(hoist):
 def test_refusals(hoist):
     with pytest.raises(InputError, match="at least one stage"):
         drives([])
+    unknowns = Unknowns((Unknown("Z10", 12.396, 6.0, 24.0),))
     with pytest.raises(InputError, match="at least one draw, not 0"):
-        independent_drives(hoist, {"Z10": 0.1}, 0)
-    with pytest.raises(InputError, match="standard error of Z10 is nan"):
-        independent_drives(hoist, {"Z10": np.nan})
-    with pytest.raises(InputError, match="at least one parameter"):
-        independent_drives(hoist, {})
-    with pytest.raises(ParameterError, match="Z99"):
-        independent_drives(hoist, {"Z99": 0.1})
-    drawn = independent_drives(hoist, {"Z10": 0.1}, 2)
+        drives([assessment(hoist, unknowns, np.array([[1e-4]]))], 0)
+    drawn = pumps(hoist, 0.1, 2)
     with pytest.raises(InputError, match="level 1 of a band"):
         bands(drawn, VOLTAGE, level=1.0)
     with pytest.raises(InputError, match="takes too much memory: draw 1 drives at most"):
@@ -172,8 +160,8 @@ def small_setup() -> Setup:
 
 
 @pytest.fixture(scope="module")
-def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder as `swashplate fit` writes it, of a virtual hoist, with its campaign beside it."""
+def fit_and_folder(tmp_path_factory: pytest.TempPathFactory) -> tuple[Fit, Path]:
+    """A fit, and a folder as `swashplate fit` writes it, with its virtual campaign beside it."""
     place = tmp_path_factory.mktemp("fit")
     tests = source_tests("hoist")
     names = ("step +4 V", "step -4 V", "step +9 V")
@@ -182,13 +170,17 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     campaign = Campaign.from_toml(path)
     result = fit(Drive.preset("hoist").parameters, campaign.experiments, small_setup())
     Judged(campaign, result, campaign.experiments).store(place / "fit.json")
-    return place
+    return result, place
 
 
-def test_a_stored_fit_gives_drives_of_its_quoted_errors(fitted):
+@pytest.fixture(scope="module")
+def fitted(fit_and_folder: tuple[Fit, Path]) -> Path:
+    return fit_and_folder[1]
+
+
+def test_a_stored_fit_gives_drives_of_its_quoted_errors(fit_and_folder):
+    result, fitted = fit_and_folder
     drawn = stored_draws(fitted, draws=400, seed=1)
-    campaign = Campaign.from_toml(fitted / "virtual" / "campaign.toml")
-    result = fit(Drive.preset("hoist").parameters, campaign.experiments, small_setup())
     columns = drawn.columns
     for each in assess(result.stages):
         for estimate in each.uncertainty.estimates:
@@ -201,7 +193,6 @@ def test_a_stored_fit_gives_drives_of_its_quoted_errors(fitted):
                 assert columns[estimate.name].mean() == pytest.approx(
                     estimate.value, abs=0.25 * estimate.standard_error
                 )
-    assert drawn.correlated
     # what the card's stage does not know moves the pump along, by the slopes that are quoted
     card, pump = assess(result.stages)
     (handed,) = pump.uncertainty.handed

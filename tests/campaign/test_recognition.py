@@ -243,11 +243,6 @@ def test_roundest(value: float, uncertainty: float, expected: float) -> None:
     assert roundest(value, uncertainty) == expected
 
 
-@given(st.floats(-1e6, 1e6), st.floats(1e-9, 1e3))
-def test_the_roundest_is_near(value: float, uncertainty: float) -> None:
-    assert abs(roundest(value, uncertainty) - value) <= uncertainty
-
-
 @pytest.mark.parametrize(
     ("time", "voltage", "sentence"),
     [

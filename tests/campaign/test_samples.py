@@ -17,7 +17,6 @@ from swashplate.campaign import (
     stamp_statistics,
     stamps_of,
     unwrap_counts,
-    zero_crossings,
 )
 from swashplate.errors import InputError
 
@@ -76,20 +75,6 @@ def test_statistics_by_hand() -> None:
     assert found.longest == pytest.approx(0.5)
     np.testing.assert_array_equal(found.gaps, [5])
     assert found.missing == 4
-
-
-def test_a_real_log_with_a_pause() -> None:
-    folder = SHARED / "data" / "excavator"
-    if not folder.exists():
-        pytest.skip("the excavator's measured data are not beside this checkout")
-    import polars as pl
-
-    path = sorted(folder.glob("steps_*.csv"))[0]
-    time = pl.read_csv(path)["Time"].to_numpy().astype(float)
-    found = stamp_statistics(time)
-    assert found.rate == pytest.approx(52.0, abs=2.0)
-    assert found.longest == pytest.approx(1.0, abs=0.2)
-    assert found.missing > 40
 
 
 # --- counts ---------------------------------------------------------------------------------------
@@ -163,22 +148,6 @@ def test_interpolation_by_hand(time: list, counts: list, lines: list) -> None:
     np.testing.assert_allclose(interpolate_counts(time, counts), lines, rtol=1e-15)
 
 
-@given(st.floats(0.02, 30.0), st.floats(0.0, 1.0), st.sampled_from([-1.0, 1.0]))
-def test_steady_motion_is_found_to_the_motion_within_one_sample(
-    speed: float, first: float, direction: float
-) -> None:
-    rows = np.arange(2000)
-    position = first + direction * speed * rows
-    counts = np.floor(position)
-    changes = np.flatnonzero(np.diff(counts)) + 1
-    inside = slice(changes[0], changes[-1] + 1)
-    lines = interpolate_counts(rows, counts)
-    # the edge below (forth) or above (back) was passed within the sample before the change
-    behind = direction * (position - lines)[inside] + (1.0 if direction < 0.0 else 0.0)
-    assert behind.min() >= -1e-9
-    assert behind.max() <= min(1.0, speed) + 1e-9
-
-
 def test_lost_counts_are_found_where_they_are() -> None:
     time = np.arange(1000) / 512.0
     counts = np.floor(300.0 * np.sin(2.0 * np.pi * time))  # at most 1885 counts/s
@@ -194,11 +163,6 @@ def test_stamps_count_and_a_record_must_be_long_enough() -> None:
     np.testing.assert_array_equal(find_lost_counts(time, counts), [4])
     with pytest.raises(InputError, match="5 rows is too short to find lost counts"):
         find_lost_counts(time[:5], counts[:5])
-
-
-def test_rest_has_no_lost_counts() -> None:
-    flicker = np.array([0, 0, 0, 1, 0, 0, 0, 0, 1, 1, 1, 0], dtype=float)
-    assert find_lost_counts(np.arange(12.0), flicker).size == 0
 
 
 # --- columns that are counters --------------------------------------------------------------------
@@ -239,25 +203,6 @@ def test_columns_that_are_counters(
 TIME = np.arange(11) * 0.1
 
 
-@pytest.mark.parametrize(
-    ("values", "options", "instants", "masked"),
-    [
-        # from +3 at 0.4 s to -1 at 0.5 s: zero at 0.475 s; 0.26 s around: 0.345 to 0.605 s
-        ([3, 3, 3, 3, 3, -1, -1, -1, -1, -1, -1], {"width": 0.26}, [0.475], [4, 5, 6]),
-        # a stay at zero is masked at both ends
-        ([1, 1, 0, 0, 0, 0, 0, 0, -1, -1, -1], {"width": 0.22}, [0.1, 0.8], [0, 1, 2, 7, 8, 9]),
-        # rest and the return to it are no crossings
-        ([0, 0, 1, 2, 0, 0, 1, 0, 0, 0, 0], {"width": 0.2}, [], []),
-        # noise below the level has no sign
-        ([2, 2, 0.01, -0.01, 0.01, -0.01, 2, 2, 2, 2, 2], {"width": 0.1, "level": 0.05}, [], []),
-    ],
-)
-def test_zero_crossings(values: list, options: dict, instants: list, masked: list) -> None:
-    found = zero_crossings(TIME, values, **options)
-    np.testing.assert_allclose(found.instants, instants)
-    np.testing.assert_array_equal(np.flatnonzero(found.masked), masked)
-
-
 def test_sign_of_a_current_on_its_way_to_zero() -> None:
     command = np.array([0.0, -5.0, -5.0, 0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 4.0, 4.0])
     reading = np.array([0.0, 0.1, 0.4, 0.3, 0.1, 0.0, 0.0, 0.2, 0.3, 0.4, 0.4])
@@ -268,7 +213,3 @@ def test_sign_of_a_current_on_its_way_to_zero() -> None:
 def test_wrong_readings_are_refused() -> None:
     with pytest.raises(InputError, match="rectified must not be negative, but row 3"):
         signed_by_command(np.where(np.arange(11) == 3, -0.1, 0.1), TIME)
-    with pytest.raises(InputError, match="width must be positive"):
-        zero_crossings(TIME, TIME, width=0.0)
-    with pytest.raises(InputError, match="level must not be negative"):
-        zero_crossings(TIME, TIME, width=0.1, level=-1.0)

@@ -54,12 +54,15 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result
 
 @pytest.fixture
 def done(run: Callable[..., Result]) -> Callable[..., str]:
-    """Run what must succeed and return what it printed."""
+    """Run what must succeed and return what it printed: no table is cut or wider than 80."""
 
     def call(*words: str) -> str:
         result = run(*words)
         assert result.exit_code == 0, result.output
         assert result.stderr == ""
+        assert "…" not in result.stdout
+        rules = [len(line) for line in result.stdout.splitlines() if set(line) == {"─"}]
+        assert max(rules, default=0) <= 80
         return result.stdout
 
     return call

@@ -45,6 +45,7 @@ def test_a_campaign_becomes_a_drive(
     done: Words, refused: Words, campaign: Path, tmp_path: Path
 ) -> None:
     said = done("fit", "virtual/campaign.toml", "--setup", "setup.toml", "--out", "fitted")
+    assert re.search(r": searched for [\d.]+ s, judged for [\d.]+ s, wrote for [\d.]+ s\n", said)
     assert "Stage card" in said
     assert "Stage pump" in said
     fitted = Drive.from_toml(tmp_path / "fitted" / "drive.toml")

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scipy.signal import StateSpace, lsim
 
 from swashplate.crane import Crane, Seaway, Stick, Suspension, control
 from swashplate.crane.loop import INVERSE, VOLTS, inverse_of, voltage_for
@@ -96,6 +97,51 @@ def test_delayed_feedback_damps_as_its_rightmost_root_says(crane):
     ratios = swing[peaks[1:]] / swing[peaks[:-1]]
     decay = exp(-2.0 * pi * 0.1160 / sqrt(1.0 - 0.1160**2))
     np.testing.assert_allclose(ratios, decay, atol=0.012)
+
+
+def test_map_of_delayed_feedback_has_the_roots_that_were_found_apart():
+    gain, delay = [0.1, 0.2, 0.2, 0.2, 0.3, 0.3], [0.25, 0.2, 0.25, 0.3, 0.25, 0.3]
+    found = control.feedback_damping(gain, delay)
+    wanted = [0.0541, 0.0948, 0.1160, 0.1289, 0.1779, 0.2377]
+    np.testing.assert_allclose(found, wanted, atol=6e-5)
+    # at 0.4 and 0.35 the root that has come from ω₀ has 0.4240, but another one lies right of it
+    assert control.feedback_damping(0.4, 0.35) == pytest.approx(0.0579, abs=6e-5)
+    h, late = 2.0 * pi / 2000.0, 700
+    d, x, v = np.zeros(24000), 1.0, 0.0
+    for n in range(d.size):  # x'' = -d, d = x - k d(t - τ)
+        d[n] = x - (0.4 * d[n - late] if n >= late else 0.0)
+        v -= h * d[n]
+        x += h * v
+    peaks = 1 + np.flatnonzero((d[1:-1] > d[:-2]) & (d[1:-1] >= d[2:]))[-6:]
+    decay = np.log(d[peaks[0]] / d[peaks[-1]]) / (2.0 * pi * 5.0)
+    assert decay / sqrt(1.0 + decay**2) == pytest.approx(0.0579, abs=1e-3)
+    # half a period late it pushes where it should pull
+    table = control.feedback_damping(np.array([0.01, 0.02])[:, None], [0.25, 0.75])
+    assert table.shape == (2, 2)
+    np.testing.assert_allclose(table, [[0.005, -0.005], [0.01, -0.01]], rtol=0.15)
+    with refuse("gain of delayed feedback must be above 0 and below 1"):
+        control.feedback_damping(1.0, 0.25)
+    with refuse("more than 0 and at most 1 period"):
+        control.feedback_damping(0.2, 0.0)
+
+
+def test_linear_crane_swings_as_the_whole_one_does_by_little(crane):
+    stick = Stick.trapezoid(hoist=-0.005, slew=0.005, luff=-0.005, duration=8.0, length=20.0)
+    run = crane.simulate(stick, actuation="ideal", boom_deg=50.0, rope_m=25.0)
+    model = crane.linearize(50.0, 25.0)
+    system = StateSpace(model.A, model.B, model.C, np.zeros((5, 3)))
+    _, made, _ = lsim(system, run.shaft_speed, run.time)
+    across = np.radians(90.0 - run.slew_deg), np.radians(-run.slew_deg)
+    d = run.load - run.tip
+    out = d[:, 0] * np.cos(across[1]) + d[:, 1] * np.sin(across[1])
+    starboard = -(d[:, 0] * np.cos(across[0]) + d[:, 1] * np.sin(across[0]))
+    largest = np.abs(made[:, :2]).max(axis=0)
+    assert (largest > 1e-6).all()
+    np.testing.assert_allclose(out / run.rope, made[:, 0], atol=0.015 * largest[0])
+    np.testing.assert_allclose(starboard / run.rope, made[:, 1], atol=0.015 * largest[1])
+    np.testing.assert_allclose(run.rope - 25.0, made[:, 2], atol=1e-3)
+    np.testing.assert_allclose(np.radians(run.slew_deg), made[:, 3], atol=1e-9)
+    np.testing.assert_allclose(np.radians(run.boom_deg - 50.0), made[:, 4], atol=2e-5)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

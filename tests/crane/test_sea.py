@@ -3,16 +3,23 @@
 from math import cos, pi, radians, sin
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
+from scipy.io import netcdf_file
 
 from swashplate.crane import (
     SEA_STATES,
+    Crane,
     Hull,
     Seaway,
     Spectrum,
+    Stick,
+    read_capytaine,
     read_csv,
     read_veres,
+    read_wamit,
+    ship_motion,
 )
 from swashplate.errors import FileError, InputError
 
@@ -162,6 +169,136 @@ def test_table_gives_what_it_was_made_of(tmp_path):
     between = table.response(np.array([0.75]), np.array([pi / 2.0]))[2]
     ends = hull.response(np.array([0.5, 1.0]), np.full(2, pi / 2.0))[2]
     assert between == pytest.approx(ends.mean())
+
+
+# --- files of other programs ----------------------------------------------------------------------
+
+
+def small_body(heading, omega):
+    """Motions of a body that goes with the water, by e^{+iωt}: what a long wave does to any."""
+    k = omega**2 / G
+    c, s = cos(heading), sin(heading)
+    return np.array([-1j * c, -1j * s, 1.0, -1j * k * s, 1j * k * c, 0.0])
+
+
+HEADINGS, OMEGAS = (0.0, 30.0, 90.0, 150.0, 180.0), (0.1, 0.2, 0.5)
+
+
+def wamit_lines(length=80.0):
+    lines = []
+    for omega in OMEGAS:
+        for heading in (*HEADINGS, 270.0):
+            motions = small_body(radians(heading), omega) * [1, 1, 1, length, length, length]
+            for i, z in enumerate(motions.tolist(), 1):
+                parts = (
+                    2 * pi / omega,
+                    heading,
+                    i,
+                    abs(z),
+                    np.degrees(np.angle(z)),
+                    z.real,
+                    z.imag,
+                )
+                lines.append(
+                    "{:14.6e} {:13.6e} {:6d} {:14.6e} {:14.6e} {:14.6e} {:14.6e}".format(*parts)
+                )
+    return lines
+
+
+def write_capytaine(path, kind, sign=-1.0):
+    """The file that separate_complex_values and to_netcdf write, made by h5py or scipy."""
+    table = np.array([[small_body(radians(h), w) for h in HEADINGS] for w in OMEGAS])
+    parts = np.stack([table.real, sign * table.imag])  # complex, omega, wave_direction, dof
+    grids = {"omega": np.array(OMEGAS), "wave_direction": np.radians(HEADINGS)}
+    words = {"complex": ["re", "im"], "radiating_dof": [each.title() for each in MOTIONS]}
+    axes = ("complex", "omega", "wave_direction", "radiating_dof")
+    if kind == 4:
+        with h5py.File(path, "w") as file:
+            for name, values in (grids | words).items():
+                text = h5py.string_dtype() if name in words else None
+                file.create_dataset(name, data=values, dtype=text).make_scale(name)
+            file["RAO"] = parts
+            for n, axis in enumerate(axes):
+                file["RAO"].dims[n].attach_scale(file[axis])
+        return
+    with netcdf_file(path, "w") as file:
+        file.createDimension("letters", 5)
+        for name, values in (grids | words).items():
+            file.createDimension(name, len(values))
+            if name in grids:
+                file.createVariable(name, "d", (name,))[:] = values
+            else:
+                cells = [list(each.ljust(5, "\0").encode()) for each in values]
+                made = file.createVariable(name, "c", (name, "letters"))
+                made[:] = np.array(cells, dtype=np.uint8).view("S1")
+        file.createVariable("RAO", "d", axes)[:] = parts
+
+
+@pytest.mark.parametrize("program", ["wamit", "capytaine 4", "capytaine 3"])
+def test_files_of_other_programs_go_with_the_water_in_a_long_wave(tmp_path, program):
+    path = tmp_path / "ship"
+    if program == "wamit":
+        path.write_text("\n".join(wamit_lines()), "utf-8")
+        ship = read_wamit(path, 80.0)
+    else:
+        write_capytaine(path, int(program[-1]))
+        ship = read_capytaine(path)
+    assert ship.headings.size == 5
+    assert ship.frequencies == pytest.approx(OMEGAS)
+    for heading in (*HEADINGS, -90.0, 210.0):
+        found, wanted, _ = long_wave(ship, heading, 0.2)
+        np.testing.assert_allclose(found[:5], wanted, atol=3e-6)
+
+
+def test_cut_files_and_other_conventions_are_refused(tmp_path):
+    path, lines = tmp_path / "ship.4", wamit_lines()
+
+    def refused(message, text, error=FileError):
+        path.write_text("\n".join(text), "utf-8")
+        with pytest.raises(error, match=message):
+            read_wamit(path, 80.0)
+
+    refused("there is no yaw for 12.5664 s and 180 deg; the file is cut", lines[:-7])
+    refused("line 3: needs period, heading, motion, modulus", [*lines[:2], lines[2][:40]])
+    wrong = lines[2].replace("1.000000e+00", "3.000000e+00", 1)
+    refused("line 3: the parts 1 and .* have not the modulus 3", [*lines[:2], wrong])
+    refused("has no motions in waves from 0 to 180", [])
+    # headings counted from where waves come: everything but heave the other way
+    turned = [
+        line[:14] + f" {(180.0 - float(line.split()[1])) % 360.0:13.6e}" + line[28:]
+        for line in lines
+    ]
+    refused("of 0 deg surge is .* must go with the water, .*-1j times", turned, InputError)
+    with pytest.raises(InputError, match="ULEN is 0 m"):
+        read_wamit(path, 0.0)
+    write_capytaine(path, 4, sign=1.0)
+    with pytest.raises(InputError, match="in the longest wave of 0 deg surge is"):
+        read_capytaine(path)
+    with h5py.File(path, "a") as file:
+        del file["RAO"]
+    with pytest.raises(FileError, match="has no array RAO; it has complex, omega, radiating_dof"):
+        read_capytaine(path)
+    path.write_text("nothing", "utf-8")
+    with pytest.raises(FileError, match="is no netCDF file that can be read"):
+        read_capytaine(path)
+
+
+def test_measured_motion_comes_from_a_log(tmp_path):
+    path, time = tmp_path / "ship.csv", np.arange(0.0, 40.0, 0.1)
+    rows = [f"{t:.1f};{0.5 * sin(0.7 * t):.9f};{2.0 * sin(0.5 * t + 1.0):.9f}" for t in time]
+    path.write_text("\n".join(["time [s];heave [m];roll [deg]", *rows]), "utf-8")
+    made = ship_motion(path, {"heave": "heave", "roll": "roll"})
+    assert made.shape == (20429, 6)
+    fine = np.arange(len(made)) / 512.0
+    np.testing.assert_allclose(made[:, 2], 0.5 * np.sin(0.7 * fine), atol=1e-5)
+    np.testing.assert_allclose(made[:, 3], np.radians(2.0) * np.sin(0.5 * fine + 1.0), atol=1e-6)
+    assert not made[:, [0, 1, 4, 5]].any()
+    run = Crane.preset("tg3637").simulate(Stick.rest(20.0), sea=made, actuation="ideal")
+    assert run.swing_deg.max() > 0.05
+    with pytest.raises(InputError, match="no column .surge.; it has .*: name the one"):
+        ship_motion(path)
+    with pytest.raises(InputError, match="A ship's motions are surge, .* not rolling"):
+        ship_motion(path, {"rolling": "roll"})
 
 
 # --- refusals -------------------------------------------------------------------------------------

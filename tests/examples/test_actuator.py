@@ -47,11 +47,6 @@ def free_run(actuator: ModuleType, opening: np.ndarray, rate: float = 1.0) -> np
     return simulate(actuator.actuator.model, numbers, {"u": opening}, rate)["p"]
 
 
-def test_a_valve_within_its_overlap_moves_nothing(actuator: ModuleType) -> None:
-    opening = 0.04 * np.sin(np.arange(50.0))  # overlaps are 0.05 and 0.08
-    assert np.array_equal(free_run(actuator, opening), np.zeros(50))
-
-
 @pytest.mark.parametrize("opening", [1.0, -1.0])
 def test_at_rest_the_pressure_drives_the_load_against_its_drag(
     actuator: ModuleType, opening: float
@@ -111,13 +106,3 @@ def test_the_free_run_beats_what_is_published(
     assert ours == pytest.approx(float(stated["these equations"]), abs=2e-3)
     assert linear == pytest.approx(float(stated["ARX(10,10)"]), abs=2e-3)
     assert not capsys.readouterr().out
-
-
-def test_the_linear_model_is_found_again_where_it_holds(actuator: ModuleType) -> None:
-    opening = np.random.default_rng(2).standard_normal(1024)
-    pressure = np.zeros(1024)
-    for t in range(2, 1024):
-        pressure[t] = (
-            0.1 + 1.5 * pressure[t - 1] - 0.7 * pressure[t - 2] + 0.3 * opening[t] + opening[t - 1]
-        )
-    assert np.allclose(actuator.arx(opening, pressure), pressure[512:], atol=1e-6)

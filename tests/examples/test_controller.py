@@ -39,18 +39,6 @@ def test_the_load_against_an_adaptive_solver(run: Any, name: str) -> None:
     assert np.abs(position - exact).max() < 0.02 * np.abs(exact).max()
 
 
-def test_the_swing_of_the_stick_alone(run: Any) -> None:
-    # 4 deg/s for 7 s through a ramp of the orifice and then calm: two steps of speed v leave
-    # 2 v/ω |sin(3.5 ω)|, less sin(ω T/2)/(ω T/2) for ramps that last T = 4/5.81 s, less damping
-    v, ramp = RADIUS * np.radians(4.0), 4.0 / 5.81
-    swing = 2.0 * v / OMEGA * abs(np.sin(3.5 * OMEGA)) * np.sinc(OMEGA * ramp / (2.0 * np.pi))
-    position, _ = run.names["runs"]["stick alone"]
-    time = run.names["TIME"]
-    last = np.abs(position[time > 30.0]).max()
-    # the lag of the valve rounds the ramps, and the way down is a little faster
-    assert last == pytest.approx(swing * np.exp(-OWN * OMEGA * 26.0), rel=0.1)
-
-
 def margin(damping: float, foretold: float) -> float:
     """The least delay that turns the loop to -1, from the equations; 0 if it is unstable."""
     slew = Drive.preset("slew").parameters.numbers

@@ -9,10 +9,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from swashplate import Campaign, Channel, Experiment
-from swashplate.campaign import InputSignal, Source
+from swashplate import Campaign
 from swashplate.equations import simulate
-from swashplate.identification import Linearised, Problem, Unknown, Unknowns, solve
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "excavator"
@@ -57,76 +55,6 @@ def test_beyond_it_the_flow_saturates(excavator: ModuleType) -> None:
     ):
         position = rod(excavator, command)
         assert position[200] - position[100] == pytest.approx(moved, rel=1e-9)
-
-
-def test_a_load_slows_what_extends_and_helps_it_back(excavator: ModuleType) -> None:
-    for command, speed in ((9.0, 0.02), (-9.0, -0.03)):
-        position = rod(excavator, command, 0.2)
-        # counted from the middle of 80 mm, in half strokes of 40 mm
-        load = 0.2 * (position[9] - 0.08) / 0.04
-        factor = 1.0 - load if command > 0.0 else 1.0 + load
-        assert RATE * (position[10] - position[9]) == pytest.approx(speed * factor, rel=1e-6)
-
-
-def test_the_end_stops_hold_the_rod(excavator: ModuleType) -> None:
-    out, back = (rod(excavator, command, stops=(0.05, 0.13)) for command in (9.0, -9.0))
-    assert out[-1] == out.max() == 0.13
-    assert back[-1] == back.min() == 0.05
-
-
-def position(time: list[float], values: list[float], weight: list[float]) -> Channel:
-    arrays = (np.array(each, dtype=float) for each in (time, values, weight))
-    return Channel("position", "position", "m", *arrays, Source(Path("none.csv"), "x"))
-
-
-def test_each_window_begins_at_a_measured_position(excavator: ModuleType) -> None:
-    time = np.arange(0.5, 13.0, 0.25)
-    rod = position(list(time), list(3.0 * time), [1] * time.size)
-    command = InputSignal("voltage", "V", time, time, "linear", rod.source)
-    run = Experiment("run", "boom", "run", "fit", "rest", None, command, {"position": rod})
-    pieces = excavator.windows(run)
-    assert [each["position"].time[0] for each in pieces] == [0.0, -1.0, -1.0]
-    for number, each in enumerate(pieces):
-        piece = each["position"]
-        since = excavator.since_anchor(piece, piece.values)
-        assert since == pytest.approx(np.where(piece.time < 0.0, 0.0, 3.0 * piece.time))
-        # the command keeps its own clock: it is as old as the position
-        assert each.input.values - each.input.time == pytest.approx(0.5 + 5.0 * number)
-
-
-class Ramp:
-    """A position that grows by a speed, from a zero of its own."""
-
-    def simulate(self, values, experiment):
-        return {"position": 3.0 + values["speed"] * experiment["position"].time}
-
-
-class KnownRamp(Ramp):
-    """The same, with derivatives."""
-
-    def linearise(self, values, experiment, names):
-        by = np.column_stack([experiment["position"].time for _ in names])
-        return {"position": Linearised(self.simulate(values, experiment)["position"], by)}
-
-
-@pytest.mark.parametrize("model", [Ramp(), KnownRamp()])
-def test_a_position_that_slips_between_windows_does_not_spoil_the_speed(
-    excavator: ModuleType, model: Ramp
-) -> None:
-    time = np.arange(0.0, 20.0, 0.25)
-    rod = position(time, 0.7 * time + 2.0 * np.floor(time / 5.0), np.ones(time.size))
-    command = InputSignal("other", "1", time, time, "linear", rod.source)
-    run = Experiment("run", "axis", "run", "fit", "rest", None, command, {"position": rod})
-    problem = Problem(
-        model,
-        excavator.windows(run),
-        Unknowns((Unknown("speed", 1.0, 0.1, 5.0),)),
-        ("position",),
-        {"position": 1.0},
-        compare=excavator.since_anchor,
-    )
-    found = problem.unknowns.values(solve(problem).vector)
-    assert found["speed"] == pytest.approx(0.7, abs=1e-9)
 
 
 @logs

@@ -156,7 +156,7 @@ def test_a_scale_that_is_off_is_named_with_the_fixed_value_that_looks_like_it(
     tmp_path: Path, name: str, said: str
 ) -> None:
     def off(columns: dict[str, np.ndarray]) -> None:
-        columns["current"] *= 1.03
+        columns["current"] *= 1.05
 
     # 3 % more counts are a shaft that is 3 % faster
     faster = Drive.preset("slew").scale(Z10=1.03)
@@ -167,7 +167,7 @@ def test_a_scale_that_is_off_is_named_with_the_fixed_value_that_looks_like_it(
     fault = lack_of_fit(assessments).fault(f"scale of {name}")
     assert fault is not None
     # one step from where the estimates have made up for a part of it
-    assert 2.0 < fault.size < 4.0
+    assert 2.0 < fault.size < 5.0
     assert fault.hidden == (name == "counts")
 
 

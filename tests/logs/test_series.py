@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import polars as pl
 import pytest
 
 from swashplate import FileError, InputError
@@ -11,12 +10,10 @@ from swashplate.logs import (
     Column,
     Log,
     TextOptions,
-    check_finite,
     check_stamps,
     read_series,
     unit_of,
 )
-from swashplate.tables import write_table
 
 
 def log_of(*columns: Column, **left_out: str) -> Log:
@@ -70,12 +67,6 @@ def test_find(wanted, name):
 def test_find_nothing_or_too_much(wanted, said):
     with pytest.raises(InputError, match=said):
         log_of(*COLUMNS).find(wanted)
-
-
-def test_names_that_occur_twice_are_refused():
-    log = log_of(Column("u"), Column("u"))
-    with pytest.raises(InputError, match="more than one 'u'"):
-        log.read(["u"])
 
 
 def test_what_was_left_out_says_why():
@@ -155,12 +146,6 @@ def test_series_are_si(tmp_path, text, column, unit, options, time, values):
     np.testing.assert_allclose(series.values, values, rtol=1e-14)
 
 
-def test_parquet(tmp_path):
-    table = pl.DataFrame({"time": [0.0, 0.5], "voltage": [1, 2]})
-    write_table(table, tmp_path / "log.parquet")
-    assert list(read_series(tmp_path / "log.parquet", "voltage", "V").values) == [1.0, 2.0]
-
-
 @pytest.mark.parametrize(
     ("text", "error", "sentence"),
     [
@@ -210,11 +195,6 @@ NAN = float("nan")
 def test_stamps(numbers, said):
     with pytest.raises(FileError, match=f"log.xyz: column .*{said}"):
         check_stamps(log_of(), "time", np.array(numbers))
-
-
-def test_good_stamps_and_values():
-    check_stamps(log_of(), "time", np.array([0.0, 1e-300, 1.0]))
-    check_finite(log_of(), "u", np.array([1.0, 1.0, -1.0]))
 
 
 def test_columns_of_unequal_length(tmp_path):

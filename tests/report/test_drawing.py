@@ -3,7 +3,6 @@
 import subprocess
 import sys
 import warnings
-from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,8 +14,8 @@ from matplotlib.figure import Figure
 
 from swashplate import FileError, Simulation
 from swashplate.report.figures import plot_simulation, save_figure
-from swashplate.report.lines import draw, gap_rows, merged, thinned
-from swashplate.report.style import BLUE, dress, handle, in_lines, sheet, spread
+from swashplate.report.lines import draw, gap_rows, thinned
+from swashplate.report.style import BLUE, dress, handle, sheet
 
 GAP = 0.1
 
@@ -81,35 +80,6 @@ def test_a_long_line_keeps_a_single_spike_either_way() -> None:
     assert heights[stamps == time[123_456]] == 7.0
     assert heights[stamps == time[765_432]] == -3.0
     assert (stamps[0], stamps[-1]) == (time[0], time[-1])
-
-
-def test_spans_are_merged_only_when_there_are_too_many() -> None:
-    spans = np.array([[0.0, 1.0], [1.1, 2.0], [4.0, 5.0], [5.05, 6.0]])
-    np.testing.assert_array_equal(merged(spans, most=4), spans)
-    np.testing.assert_array_equal(merged(spans, most=3), [[0.0, 2.0], [4.0, 6.0]])
-
-
-@given(st.lists(st.floats(0.0, 1.0), max_size=8))
-def test_spread_labels_keep_their_order_and_their_distance(places: list[float]) -> None:
-    wanted = sorted(places)
-    found = spread(wanted, GAP)
-    assert len(found) == len(wanted)
-    assert all(b - a >= GAP - 1e-9 for a, b in pairwise(found))
-    assert sum(found) == pytest.approx(sum(wanted), abs=1e-9)
-    if all(b - a > GAP for a, b in pairwise(wanted)):
-        assert found == wanted
-
-
-@pytest.mark.parametrize(
-    ("label", "letters", "lines"),
-    [
-        ("speed (deg/s)", 20, ["speed (deg/s)"]),
-        ("speed from counts (deg/s)", 12, ["speed from", "counts", "(deg/s)"]),
-        ("current_of_the_winch (A)", 12, ["current_of_", "the_winch", "(A)"]),
-    ],
-)
-def test_a_label_is_broken_where_it_may_be(label: str, letters: int, lines: list[str]) -> None:
-    assert in_lines(label, letters).split("\n") == lines
 
 
 SIGNATURES = {".PNG": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}

@@ -23,7 +23,6 @@ from swashplate.identification.resampling import CrossValidation, Fold, HeldRun
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import StartResult
 from swashplate.identification.staging import stage_problem
-from swashplate.identification.tables import ignored_words
 from swashplate.identification.validation import Measures, predict, run_qualities
 from swashplate.identification.verdict import verdict
 from swashplate.report.figures import plot_fit
@@ -581,10 +580,3 @@ def test_without_a_browser_it_says_so(page: Path, tmp_path: Path, monkeypatch) -
     with pytest.raises(FileError, match=r"No browser was found .* install Chromium"):
         print_report(page, tmp_path / "fit.pdf")
     assert not list(tmp_path.glob("*.pdf"))
-
-
-def test_ignored_windows_in_words(fitted: Fit) -> None:
-    experiment = fitted.stages[0].problem.experiments[0]
-    words = ignored_words(experiment, experiment["current"])
-    assert re.fullmatch(r"0 to 0\.\d+ s \(the dither starts\)", words)
-    assert ignored_words(experiment, experiment["counts"]) == "nothing"

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import sympy as sp
+from reproduction.speed_path import path_delay, simulated_speed, speed_of_angle
 
 from swashplate import Drive, maneuvers
 from swashplate.campaign import (
@@ -10,8 +11,6 @@ from swashplate.campaign import (
     LOW_PASS,
     Encoder,
     interpolate_counts,
-    matched_speed,
-    path_delay,
     speed_from_angle,
 )
 from swashplate.simulation.batch import SquaredError
@@ -90,8 +89,22 @@ def test_eq_7_7_cut_offs() -> None:
 def test_figures_7_3_and_7_4_have_the_same_low_passes() -> None:
     """a/(s + a) and b/(s + b), the measured path with an s: a slow ramp comes 1/a + 1/b late."""
     late = 1.0 / (20.0 * np.pi) + 1.0 / (60.0 * np.pi)
-    assert path_delay(H, form="exact") == pytest.approx(late, rel=2e-3)
-    assert path_delay(H) == pytest.approx(late - 0.5 * H, rel=1e-9)
+    time = np.arange(4096) * H
+    ramps = speed_from_angle(time, 50.0 * time**2), speed_of_angle(50.0 * time**2, H)
+    found = [time[-1] - ramp[-1] / 100.0 for ramp in ramps]
+    # the exact form but for terms in h²
+    assert found == [pytest.approx(late, rel=2e-3), pytest.approx(late - 0.5 * H, rel=1e-9)]
+    assert path_delay(H) == pytest.approx(found[1], rel=1e-9)
+
+
+def test_figure_7_3_is_its_two_recursions() -> None:
+    """As printed: w ← (1 - ah)·w + ah·u₋₁, then y ← (1 - bh)·y + b·(w - w₋₁)."""
+    angle = np.random.default_rng(3).normal(size=1500).cumsum()
+    a, b, low, speed = LOW_PASS, DIFFERENTIATOR, np.full(1500, angle[0]), np.zeros(1500)
+    for n in range(1, 1500):
+        low[n] = (1.0 - a * H) * low[n - 1] + a * H * angle[n - 1]
+        speed[n] = (1.0 - b * H) * speed[n - 1] + b * (low[n] - low[n - 1])
+    np.testing.assert_allclose(speed_of_angle(angle, H), speed, atol=1e-10)
 
 
 def test_erratum_33_simulated_speed_comes_half_a_sample_late() -> None:
@@ -110,11 +123,11 @@ def test_erratum_33_simulated_speed_comes_half_a_sample_late() -> None:
 
 
 @pytest.mark.parametrize(("aligned", "half_samples"), [(True, 0.0), (False, 1.0)])
-def test_erratum_33_the_package_aligns_both(aligned: bool, half_samples: float) -> None:
+def test_erratum_33_a_mean_of_two_samples_aligns_both(aligned: bool, half_samples: float) -> None:
     """On a ramp of speed a delay is a constant difference: 100 rad/s² times it."""
     time = np.arange(4096) * H
-    measured = speed_from_angle(time, 50.0 * time**2)
-    simulated = matched_speed(time, 100.0 * time, aligned=aligned)
+    measured = speed_of_angle(50.0 * time**2, H)
+    simulated = simulated_speed(100.0 * time, H, aligned=aligned)
     late = (measured[-1] - simulated[-1]) / 100.0
     assert late == pytest.approx(half_samples * 0.5 * H, abs=1e-12)
 

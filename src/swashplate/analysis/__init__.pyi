@@ -13,8 +13,6 @@ from .compensation import INVERSE_MAP as INVERSE_MAP
 from .compensation import Branch as Branch
 from .compensation import InverseMap as InverseMap
 from .compensation import inverse_map as inverse_map
-from .compensation import map_limits_table as map_limits_table
-from .compensation import map_table as map_table
 from .compensation import wanted_table as wanted_table
 from .limits import REMOVALS as REMOVALS
 from .limits import LimitShare as LimitShare
@@ -29,7 +27,6 @@ from .monte_carlo import bands as bands
 from .monte_carlo import draw_deviations as draw_deviations
 from .monte_carlo import drives as drives
 from .monte_carlo import half_widths as half_widths
-from .monte_carlo import independent_drives as independent_drives
 from .monte_carlo import stored_draws as stored_draws
 from .outcomes import OUTCOMES as OUTCOMES
 from .outcomes import BatchOutcomes as BatchOutcomes
@@ -57,7 +54,6 @@ from .sensitivity import ranges_of as ranges_of
 from .sizing import WIDEST as WIDEST
 from .sizing import Requirements as Requirements
 from .sizing import Sizing as Sizing
-from .sizing import levers_table as levers_table
 from .sizing import performance_table as performance_table
 from .sizing import size as size
 from .sizing import smallest_alone as smallest_alone
@@ -70,7 +66,6 @@ from .tracking import improvement_table as improvement_table
 from .tracking import largest_sine as largest_sine
 from .tracking import proportional_command as proportional_command
 from .tracking import sine_errors as sine_errors
-from .tracking import sine_table as sine_table
 from .tracking import wanted_of_stick as wanted_of_stick
 from .whatif import AS_IS as AS_IS
 from .whatif import CHANGED as CHANGED

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from swashplate.analysis.capability import dead_zone, saturation, starting_acceleration
-from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -28,6 +25,7 @@ Array = NDArray[np.float64]
 # --- the map --------------------------------------------------------------------------------------
 
 FEWEST, MOST = 2, 10_001  # Points each way.
+MOST_SHOWN = 5  # Points each way in a table.
 INVERSE_MAP = Form("an inverse map", (".toml", ".csv", ".parquet"), (".pq",))
 COMMENTS = """\
 # swashplate inverse steady-state map: the voltage for a wanted speed; SI units
@@ -170,21 +168,6 @@ class InverseMap(Result):
             return plain
         return self.voltage(wanted + ahead * np.gradient(wanted, 1.0 / rate), clip=True)
 
-    def reachable(self, speed: ArrayLike, rate: float) -> Array:
-        """A wanted speed over time, held within the limits of speed and acceleration.
-
-        What the drive is asked for then never changes faster than the orifice lets it, so that it
-        does not trail behind. Arguments as in `command`; beyond the limits it is clipped. [rad/s]
-        """
-        wanted = np.clip(_finite(speed), *self.limits)
-        if wanted.ndim != 1 or not rate > 0.0:
-            raise InputError("A wanted speed over time is one row of numbers at a rate above 0 Hz.")
-        up, down = (each / rate for each in self.acceleration)
-        held = wanted.tolist()
-        for n in range(1, len(held)):
-            held[n] = min(max(held[n], held[n - 1] - down), held[n - 1] + up)
-        return np.array(held)
-
     def to_polars(self) -> polars.DataFrame:
         """Table of the points, voltage rising: ``speed`` [rad/s] and ``voltage`` [V], SI."""
         import polars as pl
@@ -198,7 +181,7 @@ class InverseMap(Result):
         )
 
     def to_toml(self, path: str | Path) -> None:
-        """Write the map for a controller; `from_toml` gives an equal one back.
+        """Write the map for a controller.
 
         If the file cannot be written (`FileError`), an older one of that name stays as it was.
         """
@@ -218,24 +201,6 @@ class InverseMap(Result):
         }
         write_text(COMMENTS + dumps(content), path)
 
-    @classmethod
-    def from_toml(cls, path: str | Path) -> InverseMap:
-        """A map from a file that `to_toml` wrote.
-
-        Raises
-        ------
-        FileError
-            If the file cannot be read or is not TOML.
-        ParameterError
-            If an entry is wrong; the sentence names it.
-        """
-        read = validated(parse_toml(read_text(path), str(path)), MapFile, str(path))
-        minus, plus = (
-            Branch(np.array(each.speed), np.array(each.voltage)) for each in (read.minus, read.plus)
-        )
-        up, down = read.acceleration
-        return cls(read.drive, minus, plus, read.rest.speed, (up, down), read.lag, read.error)
-
     def write(self, path: str | Path) -> None:
         """Write the map as .toml, or the table of `to_polars` as .csv or .parquet.
 
@@ -251,7 +216,27 @@ class InverseMap(Result):
 
     def tables(self) -> list[Table]:
         """The map, at a few points each way, and between which limits it holds."""
-        return [map_table(self), map_limits_table(self)]
+        made = Table("", (Column("speed", "z.3f", "rad/s"), Column("voltage", "z.4f", "V")))
+        for branch in (self.minus, None, self.plus):
+            if branch is None:
+                made.add(self.creep, 0.0)
+                continue
+            size = branch.speed.size
+            for n in np.unique(np.linspace(0, size - 1, min(MOST_SHOWN, size)).round().astype(int)):
+                made.add(float(branch.speed[n]), float(branch.voltage[n]))
+        total = self.minus.speed.size + self.plus.speed.size + 1
+        if len(made.rows) < total:
+            made.caption = f"{len(made.rows)} of {total} points shown"
+        up, down = self.acceleration
+        limits = Table(
+            "", (Column("Limit"), Column("negative", ".3f"), Column("positive", ".3f"), UNIT)
+        )
+        limits.add("speed", *self.limits, unit="rad/s")
+        limits.add("slowest that can be held", *self.gap, unit="rad/s", spec="z.3f")
+        limits.add("acceleration at rest", -down, up, unit="rad/s^2", spec=".2f")
+        limits.add("lag", "", 1e3 * self.lag, unit="ms", spec=".1f")
+        limits.add("error of the straight lines", "", self.error, unit="rad/s", spec=".2g")
+        return [made, limits]
 
 
 def _finite(speed: ArrayLike) -> Array:
@@ -358,74 +343,6 @@ def _lag(drive: Drive, plus: Branch, minus: Branch) -> float:
     return 0.5 * sum(lags)
 
 
-# --- its file -------------------------------------------------------------------------------------
-
-
-def _rising(values: list[float]) -> list[float]:
-    if any(later <= earlier for earlier, later in pairwise(values)):
-        raise ValueError("the numbers must rise from each to the next.")
-    return values
-
-
-Points = Annotated[
-    list[FiniteFloat], Field(min_length=FEWEST, max_length=MOST), AfterValidator(_rising)
-]
-Positive = Annotated[FiniteFloat, Field(ge=0.0)]
-
-
-class BranchFile(BaseModel):
-    """Points of one way, both columns rising."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    speed: Points
-    voltage: Points
-
-    @model_validator(mode="after")
-    def _fits(self) -> BranchFile:
-        if len(self.speed) != len(self.voltage):
-            raise ValueError(
-                f"speed has {len(self.speed)} numbers and voltage {len(self.voltage)}; give as "
-                "many of both."
-            )
-        if max(abs(self.voltage[0]), abs(self.voltage[-1])) > FULL_VOLTAGE:
-            raise ValueError(f"the voltage must stay within ±{FULL_VOLTAGE:g} V.")
-        return self
-
-
-class RestFile(BaseModel):
-    """What happens at 0 V."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    speed: FiniteFloat
-
-
-class MapFile(BaseModel):
-    """An inverse map."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    format: Literal[1] = 1
-    drive: str
-    speed_unit: Literal["rad/s"] = "rad/s"
-    voltage_unit: Literal["V"] = "V"
-    acceleration: Annotated[list[Positive], Field(min_length=2, max_length=2)]
-    lag: Positive
-    error: Positive
-    minus: BranchFile
-    rest: RestFile
-    plus: BranchFile
-
-    @model_validator(mode="after")
-    def _ordered(self) -> MapFile:
-        if not self.minus.speed[-1] <= self.rest.speed <= self.plus.speed[0]:
-            raise ValueError("the speed at rest must lie between those of minus and plus.")
-        if not self.minus.voltage[-1] <= 0.0 <= self.plus.voltage[0]:
-            raise ValueError("minus needs voltages of at most 0 V, plus of at least 0 V.")
-        return self
-
-
 # --- tables ---------------------------------------------------------------------------------------
 
 
@@ -434,32 +351,4 @@ def wanted_table(found: InverseMap, speeds: Sequence[float]) -> Table:
     made = Table("", (Column("wanted speed", "g", "rad/s"), Column("voltage", "z.4f", "V")))
     for speed, voltage in zip(speeds, found.voltage(speeds), strict=True):
         made.add(speed, float(voltage))
-    return made
-
-
-def map_table(found: InverseMap, most: int = 5) -> Table:
-    """The map, at most so many points each way."""
-    made = Table("", (Column("speed", "z.3f", "rad/s"), Column("voltage", "z.4f", "V")))
-    for branch in (found.minus, None, found.plus):
-        if branch is None:
-            made.add(found.creep, 0.0)
-            continue
-        size = branch.speed.size
-        for n in np.unique(np.linspace(0, size - 1, min(most, size)).round().astype(int)):
-            made.add(float(branch.speed[n]), float(branch.voltage[n]))
-    total = found.minus.speed.size + found.plus.speed.size + 1
-    if len(made.rows) < total:
-        made.caption = f"{len(made.rows)} of {total} points shown"
-    return made
-
-
-def map_limits_table(found: InverseMap) -> Table:
-    """Between which speeds and accelerations the map holds, its lag and its error."""
-    up, down = found.acceleration
-    made = Table("", (Column("Limit"), Column("negative", ".3f"), Column("positive", ".3f"), UNIT))
-    made.add("speed", *found.limits, unit="rad/s")
-    made.add("slowest that can be held", *found.gap, unit="rad/s", spec="z.3f")
-    made.add("acceleration at rest", -down, up, unit="rad/s^2", spec=".2f")
-    made.add("lag", "", 1e3 * found.lag, unit="ms", spec=".1f")
-    made.add("error of the straight lines", "", found.error, unit="rad/s", spec=".2g")
     return made

@@ -16,10 +16,9 @@ from swashplate.analysis.whatif import WhatIf, pulled
 from swashplate.campaign import Campaign
 from swashplate.documents import read_text
 from swashplate.drive import Drive
-from swashplate.errors import DomainError, FileError, InputError, ParameterError
+from swashplate.errors import DomainError, FileError, InputError
 from swashplate.identification.assessment import Assessment, assess, load_fit
 from swashplate.identification.drive_model import DriveModel
-from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
@@ -41,8 +40,6 @@ class Draws(Result):
     """Draws that were outside the parameters' bounds or the model's domain, and drawn again."""
     held: tuple[str, ...] = ()
     """Parameters that stay as fitted: at a bound or not determined by the tests."""
-    correlated: bool = True
-    """Whether errors were drawn together; if not, each by itself, which widens most bands."""
 
     def pulled(self, factors: Mapping[str, float]) -> Draws:
         """The same with levers moved on every drive."""
@@ -57,11 +54,6 @@ class Draws(Result):
     def sentences(self) -> tuple[str, ...]:
         """What the draws rest on."""
         said = []
-        if not self.correlated:
-            said.append(
-                "Correlations ignored: each estimate is drawn by its own standard error, which "
-                "makes most bands wider than they are."
-            )
         if self.held:
             said.append(
                 f"Not drawn, as fitted in all drives: {', '.join(self.held)}; the bands leave out "
@@ -94,55 +86,6 @@ def _drawn(once: Callable[[], ParameterSet | None], draws: int) -> tuple[tuple[D
                 "free fewer parameters."
             )
     return tuple(made), redrawn
-
-
-def independent_drives(
-    drive: Drive, standard_errors: Mapping[str, float], draws: int = 200, seed: int = 0
-) -> Draws:
-    """Drives about a known one, each parameter drawn by itself.
-
-    For tolerances, and for fits of which no more than standard errors are left: the correlations
-    of the estimates, in which errors largely cancel, are ignored.
-
-    Parameters
-    ----------
-    drive : Drive
-        As fitted.
-    standard_errors : mapping of str to float
-        By symbol (one error for both directions, which move together) or column. [SI]
-    draws, seed :
-        As of `drives`.
-
-    Raises
-    ------
-    InputError
-        If an error is negative or not finite, none is given, or nearly all draws leave the model's
-        domain.
-    ParameterError
-        For an unknown parameter.
-    """
-    for name, error in standard_errors.items():
-        if not (np.isfinite(error) and error >= 0.0):
-            raise InputError(
-                f"The standard error of {name} is {error:g}, but must be a finite number, 0 or "
-                "more."
-            )
-    if not standard_errors:
-        raise InputError("A Monte Carlo needs the standard error of at least one parameter.")
-    columns = {name: columns_of([name]) for name in standard_errors}
-    random, numbers = np.random.default_rng(seed), drive.parameters.numbers
-
-    def once() -> ParameterSet | None:
-        changes: dict[str, float] = {}
-        for name, error in standard_errors.items():
-            shift = float(error * random.normal())
-            changes |= {column: numbers[column] + shift for column in columns[name]}
-        try:
-            return drive.parameters.replace(changes)
-        except ParameterError:
-            return None
-
-    return Draws(*_drawn(once, draws), correlated=False)
 
 
 @dataclass(frozen=True, eq=False)

@@ -244,7 +244,11 @@ class Sizing(Result):
 
     def table(self) -> Table:
         """How far each lever moves, and how far it would have to by itself."""
-        return levers_table(self)
+        heads = Column("lever"), Column("factor", ".4f"), Column("change", "+z.2%")
+        made = Table("", (*heads, Column("enough by itself", ".4f", none="no")))
+        for name, factor in self.factors.items():
+            made.add(name, factor, factor - 1.0, self.alone[name])
+        return made
 
 
 def size(
@@ -331,15 +335,6 @@ def _reached(
         "meets each requirement, but not all at once: nearest is "
         f"{', '.join(said(name, nearest) for name in names)}"
     )
-
-
-def levers_table(found: Sizing) -> Table:
-    """How far each lever moves, and how far it would have to by itself."""
-    heads = Column("lever"), Column("factor", ".4f"), Column("change", "+z.2%")
-    made = Table("", (*heads, Column("enough by itself", ".4f", none="no")))
-    for name, factor in found.factors.items():
-        made.add(name, factor, factor - 1.0, found.alone[name])
-    return made
 
 
 def performance_table(found: Sizing, required: Requirements) -> Table:

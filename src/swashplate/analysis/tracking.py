@@ -143,7 +143,19 @@ class LargestSine(Result):
 
     def table(self) -> Table:
         """The largest sine at each frequency."""
-        return sine_table(self)
+        made = Table(
+            f"Largest sine followed within {100.0 * self.error:g} %",
+            (
+                Column("frequency", "g", "Hz"),
+                Column("with time shift", ".2f", "rad/s"),
+                Column("without", ".2f", "rad/s"),
+            ),
+        )
+        for frequency, *amplitudes in zip(
+            self.frequencies, self.shifted, self.in_time, strict=True
+        ):
+            made.add(frequency, *(a if a > 0.0 else Cell(0.0, "none") for a in amplitudes))
+        return made
 
 
 def largest_sine(drive: Drive, frequencies: ArrayLike, error: float = 0.1) -> LargestSine:
@@ -247,21 +259,6 @@ def sine_errors(
     shifted, in_time = (abs(first) - amplitude) ** 2, abs(first - amplitude) ** 2
     forgiven, counted = (float(np.sqrt(other + each)) / amplitude for each in (shifted, in_time))
     return forgiven, counted
-
-
-def sine_table(sines: LargestSine) -> Table:
-    """The largest sine at each frequency that a drive follows."""
-    made = Table(
-        f"Largest sine followed within {100.0 * sines.error:g} %",
-        (
-            Column("frequency", "g", "Hz"),
-            Column("with time shift", ".2f", "rad/s"),
-            Column("without", ".2f", "rad/s"),
-        ),
-    )
-    for frequency, *amplitudes in zip(sines.frequencies, sines.shifted, sines.in_time, strict=True):
-        made.add(frequency, *(a if a > 0.0 else Cell(0.0, "none") for a in amplitudes))
-    return made
 
 
 def improvement_table(bought: Improvement, name: str) -> Table:

@@ -22,7 +22,6 @@ from .quality import unsigned_currents as unsigned_currents
 from .recognition import Recognised as Recognised
 from .recognition import recognise as recognise
 from .recognition import roundest as roundest
-from .samples import ZeroCrossings as ZeroCrossings
 from .samples import ambiguous_gaps as ambiguous_gaps
 from .samples import find_lost_counts as find_lost_counts
 from .samples import increasing as increasing
@@ -33,7 +32,6 @@ from .samples import signed_by_command as signed_by_command
 from .samples import stamp_statistics as stamp_statistics
 from .samples import stamps_of as stamps_of
 from .samples import unwrap_counts as unwrap_counts
-from .samples import zero_crossings as zero_crossings
 from .schema import CHANNEL_KINDS as CHANNEL_KINDS
 from .schema import KINDS as KINDS
 from .schema import CampaignFile as CampaignFile
@@ -45,7 +43,5 @@ from .speed import DIFFERENTIATOR as DIFFERENTIATOR
 from .speed import LOW_PASS as LOW_PASS
 from .speed import Method as Method
 from .speed import Speed as Speed
-from .speed import matched_speed as matched_speed
-from .speed import path_delay as path_delay
 from .speed import speed_from_angle as speed_from_angle
 from .speed import speed_of as speed_of

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -18,7 +18,15 @@ from swashplate.campaign.campaign import read_run
 from swashplate.campaign.quality import has_sign
 from swashplate.campaign.recognition import recognise
 from swashplate.campaign.samples import rolls_over_at
-from swashplate.campaign.schema import KINDS, CampaignFile, ChannelKind, InputKind, conversion
+from swashplate.campaign.schema import (
+    KINDS,
+    CampaignFile,
+    ChannelKind,
+    InputKind,
+    axis_lines,
+    conversion,
+    run_lines,
+)
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
 from swashplate.logs import Column, Log, open_log
@@ -222,7 +230,7 @@ def draft_campaign(
     _mark_unreadable(lines, runs, looks)
     _hold_back(runs)
     for each in runs:
-        lines += [*each.lines[:2], f'role = "{each.role}"{each.why}', *each.lines[2:], ""]
+        lines += each.lines()
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -318,43 +326,28 @@ def _axis(
 ) -> list[str]:
     from swashplate.parameters.files import preset_names
 
-    lines = [f"[axes.{toml_key(name)}]"]
+    own = ['# drive = "hoist"    # a packaged drive or a parameter file, to be fitted']
     if drive is not None:
-        lines.append(f"drive = {toml_string(name if name in preset_names() else drive)}")
-    else:
-        lines.append('# drive = "hoist"    # a packaged drive or a parameter file, to be fitted')
+        own = [f"drive = {toml_string(name if name in preset_names() else drive)}"]
     column = None if look.time is None else look.time.column
     clock = f"{{ rate = 512 }}    # {FIXME}: no column of time found; samples a second"
     if look.time is not None and column is not None:
         unit = f', unit = "{look.time.unit or "s"}"' if column.unit is None else ""
         clock = f"{{ column = {toml_string(column.name)}{unit} }}"
-    table = f"axes.{toml_key(name)}"
-    lines += [
-        f"time = {clock}",
-        'start = "rest"    # at the first sample: rest, steady or estimated',
-        "",
-        f"[{table}.input]",
-    ]
+    own += [f"time = {clock}", 'start = "rest"    # at the first sample: rest, steady or estimated']
     names = ", ".join(repr(each.name) for each in look.log.columns)
     left_open = f'column = "{FIXME}"    # which of {names}'
     drives = [each for each in guesses if each.role == "input"]
-    if drives:
-        lines += _signal(drives[0], look, None)
-    else:
-        lines += [f'kind = "voltage"    # {FIXME}: or current, or other', f"{left_open} commands?"]
-    lines += ['interpolation = "previous"    # guessed: held between samples; or "linear"', ""]
-    lines += [f"# another input? '{each.column.name}'" for each in drives[1:]]
-    channels = _channels(guesses)
-    for channel, each in channels.items():
-        lines += [f"[{table}.channels.{channel}]", *_signal(each, look, counts_per_turn), ""]
-    if not channels:
-        lines += [
-            f"[{table}.channels.measured]",
-            f'kind = "shaft_speed"    # {FIXME}: or position, encoder_counts ...',
-            f"{left_open} was measured?",
-            "",
-        ]
-    return lines
+    given = [f'kind = "voltage"    # {FIXME}: or current, or other', f"{left_open} commands?"]
+    given = _signal(drives[0], look, None) if drives else given
+    given.append('interpolation = "previous"    # guessed: held between samples; or "linear"')
+    given += [f"# another input? '{each.column.name}'" for each in drives[1:]]
+    kind = f'kind = "shaft_speed"    # {FIXME}: or position, encoder_counts ...'
+    channels = {
+        channel: _signal(each, look, counts_per_turn)
+        for channel, each in _channels(guesses).items()
+    } or {"measured": [kind, f"{left_open} was measured?"]}
+    return axis_lines(name, own, given, channels)
 
 
 def _channels(guesses: Iterable[ColumnGuess]) -> dict[str, ColumnGuess]:
@@ -411,20 +404,25 @@ def _signal(guessed: ColumnGuess, look: _Look, counts_per_turn: float | None) ->
 
 @dataclass
 class _Draft:
-    """A run's lines, its role, and kind and direction, and the size, of its maneuver."""
+    """A run's entries, and kind and direction, and the size, of its maneuver."""
 
-    lines: list[str]
+    file: str
+    seen: str
+    more: list[str]
     stratum: str
     peak: float
     role: str
     why: str = ""
+
+    def lines(self) -> list[str]:
+        return run_lines(self.file, self.role, self.more, seen=self.seen, why=self.why)
 
 
 def _run(look: _Look, axes: Mapping[str, list[ColumnGuess]], folder: Path) -> _Draft:
     path, root = look.log.path.resolve(), folder.resolve()
     file = path.relative_to(root) if path.is_relative_to(root) else path
     seen, stratum, peak = _seen(look, axes)
-    lines = ["[[runs]]", f"file = {toml_string(file.as_posix())}    # {seen}"]
+    lines = list[str]()
     names = {column.name for column in look.log.columns}
     tested, without = list[str](), list[str]()
     for axis, guesses in axes.items():
@@ -441,9 +439,8 @@ def _run(look: _Look, axes: Mapping[str, list[ColumnGuess]], folder: Path) -> _D
             without += missing
     if tested and len(tested) < len(axes):
         lines.append(f"only = [{', '.join(toml_string(axis) for axis in tested)}]")
-    if tested:
-        return _Draft([*lines, *without], stratum, peak, "fit")
-    return _Draft([*lines, *without], stratum, peak, "ignore", "    # it has no input")
+    made = _Draft(file.as_posix(), seen, [*lines, *without], stratum, peak, "fit")
+    return made if tested else replace(made, role="ignore", why="it has no input")
 
 
 def _seen(look: _Look, axes: Mapping[str, list[ColumnGuess]]) -> tuple[str, str, float]:
@@ -487,12 +484,12 @@ def _mark_unreadable(lines: list[str], runs: list[_Draft], looks: Sequence[_Look
     for each, look in zip(runs, looks, strict=True):
         if each.role == "ignore":
             continue
-        one = "\n".join([text, *each.lines])
+        one = "\n".join([text, *each.lines()])
         try:
             file = validated(parse_toml(one, "the draft"), CampaignFile, "the draft")
             read_run("the draft", "run", file.runs[0], file.axes, look.log)
         except (FileError, InputError) as error:
-            each.role, each.why = "ignore", f"    # {FIXME}: {error}"
+            each.role, each.why = "ignore", f"{FIXME}: {error}"
 
 
 def _hold_back(runs: list[_Draft]) -> None:

@@ -1,8 +1,8 @@
 """Samples and their time stamps, checked; an encoder's counts; one ammeter around both leads.
 
 Counts have their roll-overs taken out, their staircase filled and their jumps found. The ammeter
-reads the sum of magnitudes: compare it with the same of the simulation, and leave out what lies
-around the zero crossings, where a sign that is put back is a guess. Never differentiate through it.
+reads the sum of magnitudes: compare it with the same of the simulation, because around the zero
+crossings a sign that is put back is a guess. Never differentiate through it.
 """
 
 from math import ceil, log2
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.errors import InputError
-from swashplate.maneuvers.pieces import not_negative, positive, row, whole
+from swashplate.maneuvers.pieces import row, whole
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -343,65 +343,6 @@ def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int | 
 
 
 # --- the ammeter ----------------------------------------------------------------------------------
-
-
-class ZeroCrossings(NamedTuple):
-    """Where a signal changes its sign, and what lies around it."""
-
-    instants: Array
-    """Instants of the crossings; of a stay at zero, when it begins and ends. [s]"""
-    masked: Mask
-    """True for samples within half the width of an instant: leave them out."""
-
-
-def zero_crossings(
-    time: ArrayLike, values: ArrayLike, *, width: float, level: float = 0.0
-) -> ZeroCrossings:
-    """Find where a signal changes its sign and mask the samples around.
-
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        Stamps. [s]
-    values : array_like, shape (n,)
-        The command, or better the simulated signed current, which lags like the measured one.
-    width : float
-        Length of the mask around each crossing, half before and half after. [s]
-    level : float
-        What is no larger than this counts as zero, in the unit of `values`.
-
-    Returns
-    -------
-    ZeroCrossings
-        A stay at zero between both signs is masked at both of its ends, and within if it is no
-        longer than the width. Leaving zero and coming back with the same sign is no crossing.
-
-    Raises
-    ------
-    InputError
-        If the stamps do not increase, a number is not finite, or the width is not positive.
-    """
-    stamps = increasing(time)
-    numbers = signal("values", values, stamps.size)
-    half = 0.5 * positive("width", width)
-    band = not_negative("level", level)
-    sure = np.flatnonzero(np.abs(numbers) > band)
-    turns = np.flatnonzero(np.sign(numbers[sure[1:]]) != np.sign(numbers[sure[:-1]]))
-    before, after = sure[turns], sure[turns + 1]
-    direct = after == before + 1
-    share = numbers[before] / (numbers[before] - numbers[after])
-    crossed = stamps[before] + share * (stamps[after] - stamps[before])
-    instants = np.unique(
-        np.concatenate([crossed[direct], stamps[before[~direct]], stamps[after[~direct]]])
-    )
-    masked = np.zeros(stamps.size, dtype=np.bool_)
-    for first, last in zip(
-        np.searchsorted(stamps, instants - half, side="left"),
-        np.searchsorted(stamps, instants + half, side="right"),
-        strict=True,
-    ):
-        masked[first:last] = True
-    return ZeroCrossings(instants, masked)
 
 
 def signed_by_command(rectified: ArrayLike, command: ArrayLike, *, level: float = 0.0) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from swashplate.cli.options import (
 )
 from swashplate.cli.terminal import Outputs, note, say, show, working
 from swashplate.cli.words import (
+    assigned,
     campaign_of,
     configuration_of,
     file_kind,
@@ -27,7 +27,7 @@ from swashplate.cli.words import (
     runs_to_fit,
 )
 from swashplate.errors import InputError
-from swashplate.tables import TABLE
+from swashplate.tables import TABLE, joined
 
 if TYPE_CHECKING:
     from swashplate.campaign import ChannelKind
@@ -64,7 +64,7 @@ def excitation(
     from swashplate.identification.excitation import outlook
     from swashplate.identification.fitting import smooth
     from swashplate.identification.staging import setup_of
-    from swashplate.identification.tables import outlook_rows, outlook_table
+    from swashplate.identification.tables import outlook_table
 
     files = Outputs((out, TABLE))
     with working(f"Reading {path}"):
@@ -75,12 +75,13 @@ def excitation(
     with working("Simulating"):
         doubts = refuse_unsound(check_sound(runs, smooth(drive), plan, rank=False))
         looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
-    files.write(out, "Table", outlook_rows(looks).write)
+    names = [each.name for each in runs]
+    shown = [outlook_table(look, names) for look in looks]
+    files.write(out, "Table", joined(shown).write)
     for sentence in doubts:
         say(f"! {sentence}")
-    names = [each.name for each in runs]
-    for look in looks:
-        show(outlook_table(look, names))
+    for look, table in zip(looks, shown, strict=True):
+        show(table)
         # what no run exercises is said with its reason
         verdict = replace(look.identifiability, unexcited=())
         for sentence in (*verdict.sentences(), *look.sentences()):
@@ -155,7 +156,7 @@ def advise(
         at_hand = [bench.candidate(each, bench.sensors) for each in trials]
         ranked = judged(bench.present, at_hand, bench.variables)
         plan = in_turn(bench.present, at_hand, bench.variables, tests)
-    files.write(out, "Table", tables.advice_rows(ranked).write)
+    files.write(out, "Table", tables.advice_table("", ranked).write)
     show(tables.advice_table("Tests", ranked[:top]))
     if plan:
         show(tables.advice_table("A plan, each test chosen in addition to those before it", plan))
@@ -228,21 +229,13 @@ def _noises(words: Sequence[str], fresh: ParameterSet | None = None) -> list[Sen
     from swashplate.identification.experiment_design import Sensor, default_sensors
     from swashplate.units import to_si
 
-    made: dict[str, Sensor] = {}
-    for word in words:
-        name, equals, given = (part.strip() for part in word.partition("="))
-        match = re.fullmatch(r"([+]?[\d.]+(?:[eE][+-]?\d+)?)\s*(.*)", given)
-        if not equals or match is None or not match[1].strip("+.0eE-"):
-            raise InputError(
-                f"--noise cannot read '{word}'; write it as swash_angle=0.1deg, above 0."
-            )
+    def read(name: str, numbers: list[float], unit: str) -> Sensor | None:
         kind = _kind(name)
         si = KINDS[kind].units[0]
-        try:
-            value = to_si(float(match[1]), match[2] or si, si, f"--noise {name}")
-        except ValueError as error:
-            raise InputError(str(error)) from None
-        made[kind] = Sensor(kind, value)
+        value = to_si(numbers[0], unit or si, si, f"--noise {name}")
+        return Sensor(kind, value) if len(numbers) == 1 and value > 0.0 else None
+
+    made = assigned("--noise", words, "swash_angle=0.1deg, above 0", read)
     if fresh is None:
         return list(made.values())
     return [made.get(each.kind, each) for each in default_sensors(Drive(fresh))]

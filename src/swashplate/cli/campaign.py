@@ -36,7 +36,7 @@ from swashplate.cli.words import (
     runs_to_fit,
 )
 from swashplate.errors import InputError
-from swashplate.tables import FIGURE, count, write_text
+from swashplate.tables import FIGURE, count, ended, write_text
 
 if TYPE_CHECKING:
     from swashplate.campaign import Campaign
@@ -176,10 +176,10 @@ def check(
             say(f"- {text}.")
         for each in qualities[experiment.name]:
             for text in each.findings:
-                say(f"! {each.signal}: {text}{'' if text.endswith('?') else '.'}")
+                say(ended(f"! {each.signal}: {text}"))
     note(LEGEND)
     for text in of_file:
-        say(f"! {text}.")
+        say(ended(f"! {text}"))
     findings = sum(len(each.findings) for found in qualities.values() for each in found)
     findings += len(of_file)
     if campaign.ignored:

@@ -7,7 +7,6 @@ import platform
 import sys
 from importlib import metadata
 from pathlib import Path
-from typing import NamedTuple
 
 import typer
 
@@ -19,22 +18,15 @@ LIBRARIES = ("numpy", "scipy", "numba", "polars", "pydantic", "matplotlib", "jin
 """Whose versions matter when a result or a figure differs."""
 
 
-class Extra(NamedTuple):
-    """An optional extra of the package."""
-
-    name: str
-    library: str
-    enables: str
-
-
-EXTRAS = (
-    Extra("binaries", "ziglang", "exports of equations of one's own for every platform"),
-    Extra("control", "control", "linear models as python-control's StateSpace"),
-    Extra("dask", "distributed", "fit --dask: many starts on a cluster"),
-    Extra("fmu", "fmpy", "an FMU compared with the drive, export.compare"),
-    Extra("mdf", "asammdf", "logs in ASAM MDF 4 (.mf4)"),
-    Extra("tdms", "npTDMS", "logs in National Instruments' TDMS"),
-)
+EXTRAS = {
+    "binaries": ("ziglang", "exports of equations of one's own for every platform"),
+    "control": ("control", "linear models as python-control's StateSpace"),
+    "dask": ("distributed", "fit --dask: many starts on a cluster"),
+    "fmu": ("fmpy", "an FMU compared with the drive, export.compare"),
+    "mdf": ("asammdf", "logs in ASAM MDF 4 (.mf4)"),
+    "tdms": ("npTDMS", "logs in National Instruments' TDMS"),
+}
+"""Library of each optional extra, and what it enables."""
 FULL_SPEED_DEG_S = 196.0
 """At which the published hoist's step of 9 V ends: the swash plate's stop times Z10. [deg/s]"""
 DIGITS = 0.05
@@ -50,7 +42,7 @@ def doctor() -> None:
     For example:
       swashplate doctor
     """
-    show(_versions(), _machine(), _extras())
+    show(*_tables())
     with working("Simulating the hoist"):
         speed, seconds = _simulated()
     well = abs(speed - FULL_SPEED_DEG_S) < DIGITS
@@ -71,40 +63,26 @@ def _version(library: str) -> str | None:
         return None
 
 
-def _versions() -> Table:
-    made = Table("Versions", (Column("what"), Column("version")))
-    made.add("swashplate", __version__)
-    made.add("Python", f"{platform.python_version()} ({platform.python_implementation()})")
-    for library in LIBRARIES:
-        made.add(library, _version(library) or "missing: install swashplate again")
-    return made
-
-
-def _machine() -> Table:
-    made = Table("Machine", (Column("what"), Column("found")))
-    made.add("system", f"{platform.system()} {platform.machine()}")
-    made.add("cores", _cores())
-    threads = os.environ.get("OPENBLAS_NUM_THREADS")
-    if threads:
-        made.add("OPENBLAS_NUM_THREADS", threads)
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
-        made.add("NUMBA_DISABLE_JIT", "set: nothing is compiled, all is a hundred times slower")
-    made.add("installed in", str(Path(sys.prefix)))
-    return made
-
-
-def _cores() -> str:
+def _tables() -> tuple[Table, Table, Table]:
+    """Versions, machine and extras."""
     there = os.cpu_count() or 1
     given = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else there
-    return f"{there}" if given == there else f"{given} of {there} given to this process"
-
-
-def _extras() -> Table:
+    versions = Table("Versions", (Column("what"), Column("version")))
+    versions.add("swashplate", __version__)
+    versions.add("Python", f"{platform.python_version()} ({platform.python_implementation()})")
+    for library in LIBRARIES:
+        versions.add(library, _version(library) or "missing: install swashplate again")
+    machine = Table("Machine", (Column("what"), Column("found")))
+    machine.add("system", f"{platform.system()} {platform.machine()}")
+    machine.add("cores", f"{given} of {there} given to this process")
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
+        machine.add("NUMBA_DISABLE_JIT", "set: nothing is compiled, all is a hundred times slower")
+    machine.add("installed in", str(Path(sys.prefix)))
     columns = (Column("name"), Column("version"), Column("enables"))
-    made = Table("Extras: pip install 'swashplate[NAME]'", columns)
-    for extra in EXTRAS:
-        made.add(extra.name, _version(extra.library) or "-", extra.enables)
-    return made
+    extras = Table("Extras: pip install 'swashplate[NAME]'", columns)
+    for name, (library, enables) in EXTRAS.items():
+        extras.add(name, _version(library) or "-", enables)
+    return versions, machine, extras
 
 
 def _simulated() -> tuple[float, float]:

@@ -160,7 +160,7 @@ def fit(
         from swashplate.identification.assessment import Wanted, judge_fit
         from swashplate.identification.fitting import fit as fitted
         from swashplate.identification.fitting import refined
-        from swashplate.identification.own_model import ModelSetup
+        from swashplate.identification.setup import ModelSetup
         from swashplate.identification.solving import longest_left
         from swashplate.identification.staging import setup_of
     with working(f"Reading {path}"):
@@ -204,10 +204,7 @@ def fit(
     lines = _written(found, out)
     lines += _shown(found, out, report=report, pdf=pdf)
     virtual = " (virtual)" if campaign.virtual else ""
-    note(
-        f"{campaign.title}{virtual}: searched for {searched - begun:.2f} s, judged for "
-        f"{judged - searched:.2f} s, wrote for {perf_counter() - judged:.2f} s"
-    )
+    note(f"{campaign.title}{virtual}: {_spent(begun, searched, judged)}")
     _say_fit(found)
     for line in lines:
         note(line)
@@ -215,6 +212,14 @@ def fit(
         note("Interrupted: this is the best so far, not an optimum.")
         raise typer.Exit(INTERRUPTED)
     _say_verdict(found.verdict)
+
+
+def _spent(begun: float, searched: float, judged: float) -> str:
+    """Where the time went until now, from the clock at three instants. [s]"""
+    return (
+        f"searched for {searched - begun:.2f} s, judged for {judged - searched:.2f} s, wrote for "
+        f"{perf_counter() - judged:.2f} s"
+    )
 
 
 def _search(
@@ -280,8 +285,7 @@ def _written(found: Judged, out: Path) -> list[str]:
     from tomlkit import dumps
 
     from swashplate.drive import Drive
-    from swashplate.identification.own_model import ModelParameters
-    from swashplate.identification.setup import setup_text
+    from swashplate.identification.setup import ModelParameters, setup_text
     from swashplate.identification.tables import estimates_table
 
     made_folder(out)
@@ -534,7 +538,7 @@ def report(
 def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -> Judged:
     """The stored fit; of a drive that is named, the one beside it that found it."""
     from swashplate.identification.assessment import load_fit
-    from swashplate.identification.own_model import ModelSetup
+    from swashplate.identification.setup import ModelSetup
 
     own = None if model is None else ModelSetup.from_file(model)
     stored = load_fit(place, campaign, model=own)
@@ -589,14 +593,16 @@ def demo(
         runs = campaign.select(role="fit")
         start = campaign.drive("hoist").parameters
         result = fit(start, runs, setup)
-        seconds = perf_counter() - begun
+        searched = perf_counter()
         begin("computing intervals and verdict")
         found = judge_fit(campaign, runs, start, setup, result, Wanted(seed=seed))
         found.verdict  # noqa: B018  computed here
+        judged = perf_counter()
         tables = [estimates_table(each, truth=truth.parameters) for each in found.assessments]
         begin("writing the report")
         lines = [*_written(found, out), *_shown(found, out, truth=truth.parameters)]
         lines.append(_result_drawn(found, truth, out))
+        spent = _spent(begun, searched, judged)
     note(f"Campaign:  {path}")
     show(*tables)
     inside, counted = truth_count(tables)
@@ -605,7 +611,7 @@ def demo(
     note("Held out of the fit, and predicted")
     show(*runs_tables(found.predicted))
     say(found.verdict.headline)
-    note(f"Fitted in {seconds:.2f} s, compiling included where it was the first time.")
+    note(f"Time, compiling included where it was the first: {spent}")
     for line in lines:
         note(line)
 

@@ -208,6 +208,9 @@ class ShownUnits:
 WRITTEN = {"out", "plot", "write", "pdf", "fmu", "c", "wasm"}
 """Parameters of commands that write files, and so replace older ones with --force alone."""
 
+UNITLESS = {"axes", "doctor", "init", "schema"}
+"""Commands that show no quantity."""
+
 
 def command(
     app: typer.Typer, name: str, examples: str = "", panel: str | None = None
@@ -229,10 +232,10 @@ def command(
                 kind = inspect.Parameter.KEYWORD_ONLY
                 flat.append(each.replace(annotation=hints[each.name], kind=kind))
         flat += _spread(Replacing) if WRITTEN & {each.name for each in given} else []
-        flat += _spread(ShownUnits)
+        flat += _spread(ShownUnits) if name not in UNITLESS else []
 
         def run(**words: Any) -> None:
-            units, drum = words.pop("units"), words.pop("drum")
+            units, drum = words.pop("units", ""), words.pop("drum", None)
             FORCED.set(words.pop("force", False))
             for name, group in groups.items():
                 own = [each.name for each in fields(group)]

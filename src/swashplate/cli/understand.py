@@ -127,12 +127,12 @@ def _say_envelope(
 ) -> None:
     with working("Measuring"):
         from swashplate.analysis.capability import envelope
-        from swashplate.analysis.tracking import largest_sine, sine_table
+        from swashplate.analysis.tracking import largest_sine
 
         found, refusal = envelope(drive.chosen), ""
         tables = [found.table()]
         try:
-            tables.append(sine_table(largest_sine(drive.chosen, frequencies, error)))
+            tables.append(largest_sine(drive.chosen, frequencies, error).table())
         except DomainError as no_inverse:
             refusal = f"No sine can be commanded: {no_inverse}"
     files.write(out, "Envelope, in SI", found.write)
@@ -359,7 +359,7 @@ def size(
         found = sizing.size(drive.chosen, required, ranges, follow=follow)
     files.write(out, "Changed drive", found.drive.to_toml)
     drive.note(drive.title)
-    show(sizing.levers_table(found), sizing.performance_table(found, required))
+    show(found.table(), sizing.performance_table(found, required))
     if found.change == 0.0:
         say("The drive meets it as it is; nothing needs to be changed.")
     elif not drive.changes:  # whatif begins at a drive as its file has it
@@ -464,7 +464,7 @@ def compensate(
     files = Outputs((out, compensation.INVERSE_MAP), (plot, FIGURE))
     with working("Inverting"):
         found = compensation.inverse_map(drive.chosen, points)
-        tables = [compensation.map_table(found), compensation.map_limits_table(found)]
+        tables = found.tables()
         if speeds_deg_s:
             speeds = [radians(each) for each in speeds_deg_s]
             tables.insert(0, compensation.wanted_table(found, speeds))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from swashplate.campaign import Campaign, Experiment
     from swashplate.cli.options import Sampling
     from swashplate.drive import Drive
-    from swashplate.identification.own_model import ModelParameters
+    from swashplate.identification.setup import ModelParameters
     from swashplate.maneuvers import Maneuver
     from swashplate.parameters.parameter_set import Change, ParameterSet
     from swashplate.simulation.result import Simulation
@@ -167,7 +167,7 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
     """
     from dataclasses import replace
 
-    from swashplate.identification.own_model import ModelSetup
+    from swashplate.identification.setup import ModelSetup
 
     setup = ModelSetup.from_file(file)
     place = Path(folder) / NUMBERS if Path(folder).is_dir() else Path(folder)
@@ -190,8 +190,8 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
 
     set_as = "Z16=1.2e-4, Z16=1.2e-4/1.5e-4 (plus/minus) or Z16_plus=0.12mm"
     scaled_as = "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
-    chosen: dict[str, Change] = _assigned("--set", values, set_as, _value)
-    scaled: dict[str, Change] = _assigned("--scale", factors, scaled_as, _factor)
+    chosen: dict[str, Change] = assigned("--set", values, set_as, _value)
+    scaled: dict[str, Change] = assigned("--scale", factors, scaled_as, _factor)
     drive = Drive(parameters_of(word)).replace(**chosen)
     own = {name: change for name, change in scaled.items() if not _is_lever(name)}
     drive = drive.scale(**own)
@@ -244,7 +244,7 @@ def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
     return lines
 
 
-def _assigned(
+def assigned(
     option: str,
     words: Iterable[str],
     example: str,
@@ -303,7 +303,7 @@ def physical_values(words: Sequence[str]) -> dict[str, Change]:
         quantity = chosen_quantity(name)
         return _one_or_both([si_value(quantity, x, unit) if unit else x for x in numbers])
 
-    return _assigned("--physical", words, "oil_volume=1e-4 or oil_volume=100cm^3", read)
+    return assigned("--physical", words, "oil_volume=1e-4 or oil_volume=100cm^3", read)
 
 
 def factors_of(words: Sequence[str]) -> dict[str, float]:
@@ -314,7 +314,7 @@ def factors_of(words: Sequence[str]) -> dict[str, float]:
         find_lever(name)
         return numbers[0] if len(numbers) == 1 and not unit else None
 
-    return _assigned("--scale", words, "orifice=1.5", read)
+    return assigned("--scale", words, "orifice=1.5", read)
 
 
 def ranges_of(words: Sequence[str], usual: Range) -> dict[str, Range]:
@@ -326,7 +326,7 @@ def ranges_of(words: Sequence[str], usual: Range) -> dict[str, Range]:
         return (numbers[0], numbers[1]) if len(numbers) == 2 and not unit else None
 
     whole = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
-    return _assigned("--lever", whole, "pump or pump=0.8/1.5", read)
+    return assigned("--lever", whole, "pump or pump=0.8/1.5", read)
 
 
 def pairs_of(option: str, given: Sequence[str] | None, example: str) -> list[tuple[str, str]]:

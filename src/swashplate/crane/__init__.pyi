@@ -3,6 +3,8 @@ from .crane import Crane as Crane
 from .crane import CraneStepper as CraneStepper
 from .crane import Pose as Pose
 from .crane import Setup as Setup
+from .linear import LinearCrane as LinearCrane
+from .linear import linearize as linearize
 from .result import CraneRun as CraneRun
 from .result import limit_table as limit_table
 from .result import run_table as run_table
@@ -12,8 +14,11 @@ from .rope import load_motion as load_motion
 from .sea import SEA_STATES as SEA_STATES
 from .sea import Seaway as Seaway
 from .sea import Spectrum as Spectrum
+from .sea import ship_motion as ship_motion
 from .stick import Stick as Stick
 from .transfer_functions import Hull as Hull
 from .transfer_functions import TransferFunctions as TransferFunctions
+from .transfer_functions import read_capytaine as read_capytaine
 from .transfer_functions import read_csv as read_csv
 from .transfer_functions import read_veres as read_veres
+from .transfer_functions import read_wamit as read_wamit

@@ -11,9 +11,13 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from swashplate.equations import Model
 from swashplate.errors import InputError
 
+Array = NDArray[np.float64]
 Shaping = Literal["zv", "zvd", "ei"]
 IMPULSES: dict[str, tuple[float, ...]] = {
     "zv": (0.5, 0.5),
@@ -136,6 +140,49 @@ class DelayedFeedback(Control):
                 f"Delayed feedback waits for {self.delay:g} periods, but more than 0 and at most 1 "
                 "are possible."
             )
+
+
+def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
+    """Damping ratio that delayed position feedback gives the load on ideal drives.
+
+    Parameters
+    ----------
+    gain, delay : array_like
+        k, above 0 and below 1, and τ in periods of the load; ``gain[:, None]`` and ``delay`` make a
+        map.
+
+    Returns
+    -------
+    array
+        ζ = -Re s/|s| of the rightmost root with |s| < 2 ω₀; negative where the swing grows.
+
+    Raises
+    ------
+    InputError
+        For a gain out of range, with 1 or more of which every delay is unstable, or a delay that is
+        not above 0 and at most 1.
+
+    Notes
+    -----
+    s² (1 + k e^(-sτ)) + ω₀² = 0; roots by Newton's method from a grid of starts. Those of higher
+    frequency tend to Re s = ln k/τ, which is stable for k < 1.
+    """
+    k, tau = np.broadcast_arrays(np.asarray(gain, float), 2.0 * np.pi * np.asarray(delay, float))
+    if not ((k > 0.0) & (k < 1.0)).all():
+        raise InputError("The gain of delayed feedback must be above 0 and below 1.")
+    if not ((tau > 0.0) & (tau <= 2.0 * np.pi)).all():
+        raise InputError("Delayed feedback waits for more than 0 and at most 1 period.")
+    k, tau = k[..., None], tau[..., None]
+    real, imaginary = np.meshgrid(np.linspace(-1.5, 0.5, 9), np.linspace(0.2, 4.0, 20))
+    s = np.broadcast_to((real + 1j * imaginary).ravel(), (*k.shape[:-1], real.size))
+    with np.errstate(all="ignore"):
+        for _ in range(30):
+            late = k * np.exp(-s * tau)
+            s = s - (s * s * (1.0 + late) + 1.0) / (2.0 * s * (1.0 + late) - s * s * tau * late)
+        left = np.abs(s * s * (1.0 + k * np.exp(-s * tau)) + 1.0)
+    right = np.where((left < 1e-9) & (s.imag > 1e-6) & (np.abs(s) < 2.0), s, -np.inf)
+    first = np.take_along_axis(right, np.argmax(right.real, axis=-1)[..., None], axis=-1)[..., 0]
+    return np.asarray(-first.real / np.abs(first))
 
 
 @dataclass(frozen=True)

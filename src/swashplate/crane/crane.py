@@ -19,6 +19,7 @@ from swashplate.analysis.capability import dead_zone
 from swashplate.analysis.compensation import InverseMap, inverse_map
 from swashplate.crane.control import Control, settings_of
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
+from swashplate.crane.linear import LinearCrane, linearize
 from swashplate.crane.loop import BOOM_OUT, DIRECT, FINE, ROPE_OUT, Fixed, Loop
 from swashplate.crane.result import CraneRun
 from swashplate.crane.rope import AIR, Air, Suspension, too_fast
@@ -359,6 +360,10 @@ class Crane:
         """
         return CraneStepper(self, self._loop(DEFAULTS | setup)[0])
 
+    def linearize(self, boom_deg: float = 45.0, rope_m: float = 20.0) -> LinearCrane:
+        """The linear crane at a boom and rope; see `swashplate.crane.linearize`."""
+        return linearize(self, boom_deg, rope_m)
+
     def _loop(self, how: Setup) -> tuple[Loop, Pose, int]:
         """The loop of a complete setup, where it begins, and half periods of its shaper."""
         strange = [each for each in how if each not in DEFAULTS]
@@ -492,7 +497,11 @@ class CraneStepper:
         motion = np.zeros((1, 1)) if ship is None else np.array([ship], dtype=np.float64)
         if motion.shape not in ((1, 1), (1, 6)) or not np.isfinite(motion).all():
             raise InputError("The ship's motion is six finite numbers.")
-        return dict(zip(self._loop.rows, self.take(commands, motion)[0].tolist(), strict=True))
+        return self.named(self.take(commands, motion)[0])
+
+    def named(self, row: Array) -> dict[str, float]:
+        """Signals of a row that `take` returns, by name."""
+        return dict(zip(self._loop.rows, row.tolist(), strict=True))
 
     def take(self, commands: Array, ship: Array) -> Array:
         """Advance by many samples at once.

@@ -6,15 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import cos, isfinite, log, radians, sin
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.rope import GRAVITY
-from swashplate.crane.transfer_functions import CRANE_SHIP, Hull, TransferFunctions
+from swashplate.crane.transfer_functions import CRANE_SHIP, MOTIONS, Hull, TransferFunctions
 from swashplate.equations import kernel
 from swashplate.errors import InputError
+from swashplate.logs import TextOptions, read_series
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
@@ -196,6 +198,67 @@ class Seaway(Result):
         made = np.empty((intervals * inner + 1, 6))
         _synthesised(met, amplitude.real.copy(), amplitude.imag.copy(), rise, made)
         return made[:count]
+
+
+# --- measured motion ------------------------------------------------------------------------------
+
+
+def ship_motion(
+    path: str | Path,
+    columns: Mapping[str, str] | None = None,
+    *,
+    time_column: str = "time",
+    rate: float = 512.0,
+    options: TextOptions | None = None,
+) -> Array:
+    """Motion of a ship from a log, as `Crane.simulate` takes it for a sea.
+
+    Parameters
+    ----------
+    path : path
+        A log of any format that `logs.open_log` reads; units stand in its header, as ``roll
+        [deg]``.
+    columns : mapping of str to str, optional
+        Column of each motion, surge, sway, heave, roll, pitch, yaw; those that are left out are
+        zero. By default all six by these names.
+    time_column : str
+    rate : float
+        Samples a second of the result. [Hz]
+    options : TextOptions, optional
+        How a text file is written, where that cannot be recognised from it.
+
+    Returns
+    -------
+    (n, 6) array
+        [m], [rad], by cubic splines through the samples, from the first time stamp on. Axes are
+        those of the package: z up, y to port.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read; it names file, column and row.
+    InputError
+        For a motion or column that there is not, or fewer than four samples.
+    """
+    from scipy.interpolate import CubicSpline
+
+    wanted = dict(zip(MOTIONS, MOTIONS, strict=True)) if columns is None else dict(columns)
+    strange = [each for each in wanted if each not in MOTIONS]
+    if strange or not wanted:
+        raise InputError(
+            f"A ship's motions are {', '.join(MOTIONS)}, not {', '.join(strange) or 'none'}."
+        )
+    made: Array = np.zeros((0, 6))
+    for motion, column in wanted.items():
+        unit = "m" if motion in MOTIONS[:3] else "rad"
+        time, values = read_series(path, column, unit, time_column=time_column, options=options)
+        if time.size < 4:
+            raise InputError(f"{path} has {time.size} samples of {column}, but needs four.")
+        if not len(made):
+            made = np.zeros((int((time[-1] - time[0]) * rate + 1e-6) + 1, 6))
+        grid = time[0] + np.arange(len(made)) / rate
+        made[:, MOTIONS.index(motion)] = CubicSpline(time, values)(grid)
+    return made
 
 
 def _basis(inner: int) -> Array:

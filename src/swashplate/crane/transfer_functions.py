@@ -1,4 +1,4 @@
-"""Motion transfer functions of ships: VERES files, CSV tables, and closed forms without a file.
+"""Motion transfer functions of ships: files of VERES, WAMIT and Capytaine, CSV, closed forms.
 
 All are complex, per metre of wave amplitude and by e^{+iωt}, with the phase to the crest at the
 ship's mean place: surge, sway, heave in m, roll, pitch, yaw in rad; axes as in `kinematics`: x
@@ -12,6 +12,7 @@ import csv
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,8 @@ Complex = NDArray[np.complex128]
 MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 MIRRORED = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 """Signs of the motions where waves come from the other side."""
+OPPOSITE = 0.2
+"""Part of the water's surge or sway that must be seen to say that a ship goes the other way."""
 LONG_WAVE = 0.3
 """Largest distance of heave from 1 in the longest wave of a file, which the wave's crest lifts."""
 
@@ -122,7 +125,8 @@ class TransferFunctions(Result):
     Raises
     ------
     InputError
-        If the longest wave does not lift the ship by about its height: another convention.
+        If the longest wave does not lift the ship by about its height, or carries it to another
+        side than the water: another convention.
     """
 
     name: str
@@ -143,6 +147,18 @@ class TransferFunctions(Result):
                 "metre, but must be near 1 + 0i, as with the phase to the crest and z up: convert "
                 "the file."
             )
+        for motion, angle, wanted in ((0, 0.0, -1j), (1, 0.5 * np.pi, -1j), (4, 0.0, 1j)):
+            at = np.abs(self.headings - angle) < 1e-6
+            if self.frequencies[0] < 0.4 and at.any():
+                found = complex(self.values[0, at, 0, motion][0])
+                wrong = (found * np.conj(wanted)).real < 0.0
+                if wrong and abs(found) > (OPPOSITE if motion < 3 else 0.0):
+                    raise InputError(
+                        f"{self.name}: in the longest wave of {np.degrees(angle):g} deg "
+                        f"{MOTIONS[motion]} is {found:.3g} for each metre, but must go with the "
+                        f"water, {wanted:g} times what it is: axes, headings or phases are counted "
+                        "otherwise; convert the file."
+                    )
 
     def response(self, omega: Array, heading: Array, speed: float = 0.0) -> Complex:
         """Complex amplitudes of the six motions for each metre of wave.
@@ -246,6 +262,154 @@ def read_veres(path: str | Path) -> TransferFunctions:
                         )
                     values[v, m, f, int(motion) - 1] = complex(real, imaginary)
     return _ordered(str(path), speeds, headings, omega, values)
+
+
+def read_wamit(path: str | Path, length: float) -> TransferFunctions:
+    """Motion transfer functions of a WAMIT file of displacements, ``.4``.
+
+    Each line is period [s], heading [deg], motion 1 to 6, modulus, phase [deg], real and imaginary
+    part, by e^{+iωt} with the phase to the crest at the origin. WAMIT's z points up and its heading
+    is where waves run, from x to y: with x to the bow this module's own. Rotations are for ξ L/A.
+
+    Parameters
+    ----------
+    path : path
+        The file; lines of headings beyond 180 deg, which follow by symmetry, are left out.
+    length : float
+        ULEN of the run, by which rotations are made dimensionless. [m]
+
+    Raises
+    ------
+    FileError
+        If a line does not hold such numbers, or a motion is missing.
+    """
+    if not (isfinite(length) and length > 0.0):
+        raise InputError(f"WAMIT's length ULEN is {length:g} m, but must be above 0.")
+    found: dict[tuple[float, float, int], complex] = {}
+    for row, line in enumerate(read_text(path).splitlines(), 1):
+        words = line.split()
+        try:
+            period, heading, motion, size, _, real, imaginary = map(float, words)
+        except ValueError:
+            if row == 1 and not _is_number(words[:1]):
+                continue  # a line of headings of columns
+            raise FileError(
+                f"{path}, line {row}: needs period, heading, motion, modulus, phase, real and "
+                "imaginary part, seven numbers; the file is cut or another one."
+            ) from None
+        value = complex(real, imaginary)
+        if not abs(abs(value) - size) <= 1e-3 * size + 1e-5 or motion not in range(1, 7):
+            raise FileError(
+                f"{path}, line {row}: the parts {real:g} and {imaginary:g} of motion {motion:g} "
+                f"have not the modulus {size:g}, or it is none of 1 to 6: these are no motions of "
+                "one ship as WAMIT writes them."
+            )
+        if not period > 0.0:
+            raise FileError(
+                f"{path}, line {row}: the period is {period:g} s; leave out the limits of zero and "
+                "infinite frequency."
+            )
+        heading %= 360.0
+        if heading <= 180.0:
+            found[period, heading, int(motion)] = value / (length if motion > 3 else 1.0)
+    if not found:
+        raise FileError(f"{path} has no motions in waves from 0 to 180 deg.")
+    periods, headings = (np.array(sorted({key[i] for key in found})) for i in range(2))
+    values = np.empty((1, headings.size, periods.size, 6), dtype=np.complex128)
+    for m, heading in enumerate(headings.tolist()):
+        for f, period in enumerate(periods.tolist()):
+            for motion in range(1, 7):
+                if (period, heading, motion) not in found:
+                    raise FileError(
+                        f"{path}: there is no {MOTIONS[motion - 1]} for {period:g} s and "
+                        f"{heading:g} deg; the file is cut."
+                    )
+                values[0, m, f, motion - 1] = found[period, heading, motion]
+    return _ordered(str(path), np.zeros(1), np.radians(headings), 2.0 * np.pi / periods, values)
+
+
+def _is_number(words: list[str]) -> bool:
+    try:
+        return bool(words) and isfinite(float(words[0]))
+    except ValueError:
+        return False
+
+
+def read_capytaine(path: str | Path) -> TransferFunctions:
+    """Motion transfer functions of a netCDF file of Capytaine.
+
+    The file holds the array ``RAO`` (or ``rao``) that ``capytaine.post_pro.rao`` gives, stored by
+    ``separate_complex_values``, netCDF 4 or 3. Capytaine counts by e^{-iωt}; here it becomes
+    e^{+iωt}. Its headings are where waves run, from x to y.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read, or lacks that array, a dimension of it or a motion.
+    """
+    arrays, dimensions = _netcdf(path)
+    name = next((each for each in ("RAO", "rao") if each in arrays), None)
+    if name is None:
+        raise FileError(f"{path} has no array RAO; it has {', '.join(sorted(arrays)) or 'none'}.")
+    found = dimensions[name]
+    motion = next((each for each in found if each.endswith("_dof")), "radiating_dof")
+    order = ["complex", "wave_direction", "omega", motion]
+    lacks = [each for each in order if each not in found or each not in arrays]
+    if lacks or len(found) != 4:
+        raise FileError(
+            f"{path}: {name} has the dimensions {', '.join(found)}, but needs {', '.join(order)} "
+            "with their coordinates."
+        )
+    parts, names = arrays["complex"].tolist(), [each.lower() for each in arrays[motion].tolist()]
+    missing = [each for each in MOTIONS if each not in names]
+    if missing or sorted(parts) != ["im", "re"]:
+        raise FileError(
+            f"{path}: {name} has the motions {', '.join(names)} and the parts {', '.join(parts)}, "
+            f"but needs {', '.join(MOTIONS)}, re and im."
+        )
+    table = np.transpose(arrays[name], [found.index(each) for each in order])
+    made = table[parts.index("re")] - 1j * table[parts.index("im")]
+    turned = np.mod(np.asarray(arrays["wave_direction"], dtype=np.float64), 2.0 * np.pi)
+    near = turned <= np.pi + 1e-9
+    values = made[near][None, :, :, [names.index(each) for each in MOTIONS]]
+    if not np.isfinite(values).all():
+        raise FileError(f"{path}: {name} is not finite everywhere.")
+    omega = np.asarray(arrays["omega"], dtype=np.float64)
+    return _ordered(str(path), np.zeros(1), turned[near], omega, values)
+
+
+def _netcdf(path: str | Path) -> tuple[dict[str, Any], dict[str, tuple[str, ...]]]:
+    """Arrays of a netCDF file, words as str, and their dimensions, by name."""
+    arrays: dict[str, Any] = {}
+    dimensions: dict[str, tuple[str, ...]] = {}
+    try:
+        if Path(path).read_bytes()[:3] == b"CDF":
+            from scipy.io import netcdf_file
+
+            with netcdf_file(path, mmap=False) as old:
+                for name, each in old.variables.items():
+                    data, dimensions[name] = each[...], tuple(each.dimensions)
+                    if data.dtype.kind == "S":
+                        words = [b"".join(row.tolist()).decode().strip("\0 ") for row in data]
+                        data, dimensions[name] = np.array(words), dimensions[name][:1]
+                    arrays[name] = np.array(data)
+            return arrays, dimensions
+        from h5py import Dataset, File
+
+        with File(path, "r") as new:
+            for name, each in new.items():
+                if isinstance(each, Dataset):
+                    data = each[...]
+                    if data.dtype.kind in "OS":
+                        data = np.array([word.decode() for word in data.ravel().tolist()])
+                    arrays[name] = data
+                    axes = (
+                        scale[0].name.rpartition("/")[2] if scale else "" for scale in each.dims
+                    )
+                    dimensions[name] = (name,) if each.is_scale else tuple(axes)
+    except (OSError, ValueError, TypeError, AttributeError, UnicodeDecodeError) as error:
+        raise FileError(f"{path} is no netCDF file that can be read: {error}.") from None
+    return arrays, dimensions
 
 
 def read_csv(path: str | Path) -> TransferFunctions:

@@ -20,7 +20,6 @@ from .model import Differentiable as Differentiable
 from .model import Linearised as Linearised
 from .model import Model as Model
 from .model import OwnModel as OwnModel
-from .own_model import ModelSetup as ModelSetup
 from .problem import Problem as Problem
 from .problem import linearised_fit as linearised_fit
 from .profile import Profile as Profile
@@ -29,6 +28,7 @@ from .resampling import Bootstrap as Bootstrap
 from .resampling import CrossValidation as CrossValidation
 from .resampling import bootstraps_of as bootstraps_of
 from .resampling import cross_validate as cross_validate
+from .setup import ModelSetup as ModelSetup
 from .setup import Setup as Setup
 from .setup import Stage as Stage
 from .setup import load_setup as load_setup

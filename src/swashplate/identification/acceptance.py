@@ -328,7 +328,7 @@ def _is_wrong(fault: Fault, poor: bool) -> bool:
 
     Where there is lack of fit, only a fault that explains it is told from what else is wrong.
     """
-    told = isfinite(fault.plausible) and fault.told and fault.significant
+    told = isfinite(fault.plausible) and fault.visible and fault.significant
     return told and abs(fault.size) > fault.plausible / 3.0 and (fault.explains or not poor)
 
 
@@ -367,7 +367,7 @@ def _fault_criterion(fault: Fault, poor: bool, wrong: Fault | None) -> list[Crit
                 else "",
             )
         ]
-    if not (isfinite(fault.plausible) and fault.told):
+    if not (isfinite(fault.plausible) and fault.visible):
         return []
     value = "not seen" if abs(fault.size) > fault.plausible / 3.0 else size
     if wrong is not None and wrong is not fault and _is_wrong(fault, poor):

@@ -33,7 +33,6 @@ from swashplate.identification.intervals import (
     slopes_by_fixed,
     uncertainty,
 )
-from swashplate.identification.own_model import ModelParameters, ModelSetup
 from swashplate.identification.problem import LinearisedFit, linearised_fit
 from swashplate.identification.profile import Profile, checked_ends, profiles_of
 from swashplate.identification.resampling import (
@@ -42,7 +41,7 @@ from swashplate.identification.resampling import (
     bootstraps_of,
     cross_validate,
 )
-from swashplate.identification.setup import Setup
+from swashplate.identification.setup import ModelParameters, ModelSetup, Setup
 from swashplate.identification.solving import Solution, StartResult
 from swashplate.identification.staging import Parameters, stage_problem, with_estimates
 from swashplate.identification.unknowns import Unknown, Unknowns

@@ -18,9 +18,8 @@ from swashplate.errors import InputError
 from swashplate.identification.drive_model import SIGNALS
 from swashplate.identification.excitation import simulated_run
 from swashplate.identification.model import EquationModel
-from swashplate.identification.own_model import ModelSetup
 from swashplate.identification.problem import Problem
-from swashplate.identification.setup import Setup
+from swashplate.identification.setup import ModelSetup, Setup
 from swashplate.identification.staging import stage_problem
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE

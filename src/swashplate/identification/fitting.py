@@ -24,9 +24,8 @@ from swashplate.identification.drive_model import DriveModel, at_rate_of
 from swashplate.identification.intervals import weighed
 from swashplate.identification.lack_of_fit import measurement_error
 from swashplate.identification.model import Model, OwnModel
-from swashplate.identification.own_model import ModelParameters, ModelSetup, Range
 from swashplate.identification.problem import Problem
-from swashplate.identification.setup import Setup, Stage
+from swashplate.identification.setup import ModelParameters, ModelSetup, Range, Setup, Stage
 from swashplate.identification.solving import (
     Loss,
     Progress,

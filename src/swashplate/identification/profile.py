@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
+from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.problem import LinearisedFit, Problem
 from swashplate.identification.solving import Evaluation, solve
 from swashplate.identification.unknowns import Vector
@@ -361,6 +362,10 @@ def profile(
     )
 
 
+SWITCHING = ("V_dz", "J_", "lim", "I_t", "Z13", "Z14", "Z15", "Z16", "Z17")
+"""What the names of a drive's parameters begin with at which its equations switch."""
+STRAIGHT = 0.02
+"""Half width, in the solver's vector, up to which the drive is linear in all others."""
 SHALLOW = 0.25
 """Part of the linearised rise of the cost below which an interval's end is looked for anew."""
 MOST_POINTS = 8
@@ -395,7 +400,8 @@ def checked_ends(
 ) -> tuple[CheckedEnd, ...]:
     """Sides on which the cost does not rise as the linearised fit says, and how it does.
 
-    Unknowns of single runs, such as a free zero, are passed over: residuals are linear in them.
+    Unknowns of single runs, such as a free zero, are passed over: residuals are linear in them; and
+    those of a drive with narrow intervals and without a switch, in which it is as good as linear.
     `reach` (K,) is the half width of each interval in the solver's vector, 0 for unknowns without
     one; `limits` are the numbers of the unknowns that limit something, such as a stop.
 
@@ -416,7 +422,10 @@ def checked_ends(
     cost = problem.cost(vector)
     found = []
     machine = np.array([each.run is None for each in problem.unknowns])
-    for index in np.flatnonzero((reach > 0.0) & machine):
+    drive = isinstance(problem.model, DriveModel)
+    bends = np.array([_bends(each.targets[0]) or not drive for each in problem.unknowns])
+    looked = machine & ((bends & (reach > 0.0)) | (reach > STRAIGHT))
+    for index in np.flatnonzero(looked):
         direction = inverse[index] / inverse[index, index]
         rise = 0.5 * reach[index] ** 2 / inverse[index, index]
         if index in limits and _unneeded(problem, vector, int(index), cost + rise):
@@ -446,6 +455,11 @@ def checked_ends(
             better = side.better.cost if side.better is not None else None
             found.append(CheckedEnd(int(index), sign > 0.0, float(distance), better))
     return tuple(found)
+
+
+def _bends(name: str) -> bool:
+    """Whether a drive's parameter is one at which its equations switch."""
+    return name.startswith(SWITCHING)
 
 
 def _unneeded(problem: Problem, vector: Array, index: int, allowed: float) -> bool:

@@ -1,18 +1,28 @@
-"""What a fit is to find: stages, free parameters, bounds; read from TOML or packaged."""
+"""What a fit is to find: of a drive, from TOML or packaged; of one's own model, from Python."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 
 from swashplate.campaign import ChannelKind
+from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.schema import NotNegative, Weight, Window
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.errors import ParameterError
-from swashplate.results import short
+from swashplate.equations import Model as Equations
+from swashplate.errors import FileError, InputError, ParameterError
+from swashplate.identification.model import OFFSET, Model, OwnModel, simulated
+from swashplate.identification.problem import Problem, noise_scales
+from swashplate.identification.solving import solve
+from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.results import Result, short
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[PositiveFloat, Field(allow_inf_nan=False)]
@@ -269,3 +279,254 @@ def setup_text(setup: Setup) -> str:
             stage["free"][name] = inline_table()
             stage["free"][name].update(entry)
     return dumps(content)
+
+
+# --- models of one's own --------------------------------------------------------------------------
+
+
+Array = NDArray[np.float64]
+Range = tuple[float, float, float] | tuple[float, float, float, str]
+"""Lower bound, nominal value, upper bound, and the unit if it is said."""
+START = "start."
+"""What the name of a number of the state at the first sample begins with."""
+BY_ORDER = 10.0
+"""Ratio of positive bounds from which a range is searched by the logarithm."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModelSetup(Result):
+    """What is to be found of a model of one's own: to it what `Setup` is to a drive.
+
+    Parameters
+    ----------
+    model : Model
+        Of equations, an `OwnModel` of them with more said, or any object with `simulate`.
+    free : mapping of str to (low, nominal, high), (low, nominal, high, unit) or Unknown
+        What is to be found, by the model's names. A range of positive bounds, the upper one at
+        least ten times the lower one, is searched by its logarithm. ``"start.PATH"`` of a state and
+        ``"offset CHANNEL"``, the zero of a sensor, are free in each run by themselves.
+    name : str
+        For tables and files; the model's by default.
+    channels : tuple of str
+        Those that are fitted; all that the model gives by default.
+    noise : mapping of str to float
+        Standard deviation of a channel, where the campaign does not state it. [unit]
+    fixed : mapping of str to float
+        Values of names that are not free.
+    standard_uncertainty : mapping of str to float or str
+        What values of `fixed` may be off by, one standard deviation, also as ``"5 %"``.
+    """
+
+    model: Model | Equations
+    free: Mapping[str, Range | Unknown]
+    name: str = ""
+    channels: tuple[str, ...] = ()
+    noise: Mapping[str, float] = field(default_factory=dict)
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    standard_uncertainty: Mapping[str, StandardUncertainty] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        model = self.model
+        own = OwnModel(model) if isinstance(model, Equations) else model
+        if not callable(getattr(own, "simulate", None)):
+            raise InputError(
+                f"A {type(model).__name__} is no model: give a Model of equations, or an object "
+                "with simulate(values, experiment)."
+            )
+        equations = own.model if isinstance(own, OwnModel) else own
+        object.__setattr__(self, "model", own)
+        if not self.name:
+            name = getattr(equations, "name", None)
+            object.__setattr__(self, "name", str(name or type(equations).__name__).lower())
+        if not self.free:
+            raise InputError(f"Nothing of {self.name} is free: name what is to be found.")
+        unfixed = [name for name in self.standard_uncertainty if name not in self.fixed]
+        if unfixed:
+            raise InputError(
+                f"{unfixed[0]} has a standard uncertainty but no value: name it in fixed, or give "
+                "it a prior if it is free."
+            )
+        free = {name: _unknown(name, entry) for name, entry in self.free.items()}
+        object.__setattr__(self, "free", free)
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> ModelSetup:
+        """The set-up that a Python file states by its names ``model`` and ``free``.
+
+        Besides those it may have ``name``, ``channels``, ``noise``, ``fixed`` and
+        ``standard_uncertainty``. The file is executed, as a module that worker processes import as
+        well.
+
+        Raises
+        ------
+        FileError
+            If there is no such file, or a module of that name is another one.
+        InputError
+            If it lacks one of the names.
+        """
+        import sys
+        from importlib import import_module
+
+        file = Path(path).resolve()
+        if not file.is_file() or file.suffix != ".py" or not file.stem.isidentifier():
+            raise FileError(f"{path} is no Python file with a model, such as valve.py.")
+        if str(file.parent) not in sys.path:
+            sys.path.insert(0, str(file.parent))
+        module = import_module(file.stem)
+        if module.__file__ is None or Path(module.__file__).resolve() != file:
+            raise FileError(f"{path}: another module is called {file.stem}; rename the file.")
+        missing = [name for name in ("model", "free") if not hasattr(module, name)]
+        if missing:
+            raise InputError(
+                f"{path} has no '{missing[0]}': it needs model = Model(...) and free = "
+                "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
+            )
+        known = ("name", "channels", "noise", "fixed", "standard_uncertainty")
+        more = {key: getattr(module, key) for key in known if hasattr(module, key)}
+        return cls(module.model, module.free, **more)
+
+    @property
+    def stage(self) -> Stage:
+        """The set-up as the only stage of a fit."""
+        free = {}
+        for name, each in self._free.items():
+            known = each.prior
+            prior = (
+                None if known is None else GivenPrior(mean=known.mean, deviation=known.deviation)
+            )
+            free[name] = Free(bounds=(each.low, each.high), log=each.log, prior=prior)
+        return Stage(name=self.name, part="model", free=free)
+
+    @property
+    def setup(self) -> Setup:
+        """The set-up as that of a fit in stages."""
+        return Setup(
+            title=self.name,
+            stages=(self.stage,),
+            standard_uncertainty=dict(self.standard_uncertainty),
+        )
+
+    def nominal(self, experiments: Sequence[Experiment]) -> ModelParameters:
+        """The model's numbers before a fit to some runs."""
+        problem = self.problem(experiments)
+        numbers = {**self.fixed, **problem.unknowns.targets(problem.start, "")}
+        return ModelParameters(self, numbers, problem.scales)
+
+    def problem(self, experiments: Sequence[Experiment], *, threads: int = 1) -> Problem:
+        """The problem that it states for some runs.
+
+        Raises
+        ------
+        InputError
+            If no run has a channel that is fitted, or the model gives none.
+        """
+        own = {each.name: self.own(each) for each in experiments}
+        of_runs = {each.name for unknowns in own.values() for each in unknowns}
+        channels = self.channels or self._given(experiments)
+        runs = tuple(
+            self._with_noise(each)
+            for each in experiments
+            if any(name in each.channels for name in channels)
+        )
+        if not runs:
+            had = ", ".join(dict.fromkeys(name for each in experiments for name in each.channels))
+            raise InputError(
+                f"{self.name} is fitted to {', '.join(channels) or 'nothing'}, but the runs have "
+                f"{had or 'no channel'}."
+            )
+        machine = [each for each in self._free.values() if each.name not in of_runs]
+        unknowns = (*machine, *(unknown for each in runs for unknown in own[each.name]))
+        return Problem(
+            self.model,  # type: ignore[arg-type]  # made one that simulates at the beginning
+            runs,
+            Unknowns(unknowns),
+            channels,
+            noise_scales(runs, channels),
+            dict(self.fixed),
+            tuple(
+                {name: deviation(uncertainty, self.fixed[name])}
+                for name, uncertainty in self.standard_uncertainty.items()
+            ),
+            threads if isinstance(self.model, OwnModel) else 1,
+        )
+
+    def own(self, experiment: Experiment) -> tuple[Unknown, ...]:
+        """The unknowns of a single run: where its state begins, and the zeros of its sensors."""
+        zeros = {f"{OFFSET}{name}" for name in experiment.channels}
+        states = isinstance(self.model, OwnModel)
+        return tuple(
+            replace(each, run=experiment.name)
+            for each in self._free.values()
+            if each.run is None and (each.name in zeros or (states and each.name.startswith(START)))
+        )
+
+    def _with_noise(self, experiment: Experiment) -> Experiment:
+        """The run with the noise of channels that the campaign does not state."""
+        stated = {
+            name: replace(channel, noise=self.noise[name])
+            for name, channel in experiment.channels.items()
+            if channel.noise is None and name in self.noise
+        }
+        return replace(experiment, channels={**experiment.channels, **stated})
+
+    @property
+    def _free(self) -> dict[str, Unknown]:
+        return self.free  # type: ignore[return-value]  # made unknowns at the beginning
+
+    def _given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
+        """Names of the channels that the model gives."""
+        if isinstance(self.model, OwnModel):
+            given = [self.model.signals_of(each) for each in experiments]
+            return tuple(dict.fromkeys(name for each in given for name in each))
+        values = {name: each.start for name, each in self._free.items()} | dict(self.fixed)
+        made = [simulated(self.model, values, each) for each in experiments]  # type: ignore[arg-type]
+        return tuple(dict.fromkeys(name for each in made for name in each))
+
+
+@dataclass(frozen=True, eq=False)
+class ModelParameters(Result):
+    """The numbers of a model of one's own: to it what `ParameterSet` is to a drive."""
+
+    setup: ModelSetup
+    numbers: Mapping[str, float]
+    """By the model's names, those of single runs left out."""
+    scales: Mapping[str, float]
+    """What one unit of residual is, by channel: its noise. [unit]"""
+
+    @property
+    def name(self) -> str:
+        """Of the model."""
+        return self.setup.name
+
+    def predicted(self, experiment: Experiment) -> Mapping[str, Array]:
+        """A run predicted from its input: for each channel (m,) samples at its stamps. [unit]
+
+        What is free in each run by itself, a beginning of the state or the zero of a sensor, is
+        estimated from this run; everything else is as it is.
+        """
+        own = tuple(each for each in self.setup.own(experiment) if each.name not in self.numbers)
+        channels = tuple(name for name in self.scales if name in experiment.channels)
+        model: Any = self.setup.model
+        if not own:
+            found = simulated(model, self.numbers, experiment)
+            return {name: found[name] for name in channels}
+        problem = Problem(model, (experiment,), Unknowns(own), channels, self.scales, self.numbers)
+        return problem.outputs(solve(problem).vector, 0)
+
+
+def _unknown(name: str, entry: Range | Unknown) -> Unknown:
+    if isinstance(entry, Unknown):
+        if name not in (entry.name, *entry.sets):
+            raise InputError(
+                f"'{name}' is free as the parameter '{entry.name}': give both one name."
+            )
+        return entry
+    try:
+        low, start, high = (float(number) for number in entry[:3])
+        (unit,) = entry[3:] or ("",)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{name} is free as {entry!r}: give lower bound, nominal value and upper bound, and "
+            "the unit if you like, or an Unknown."
+        ) from None
+    return Unknown(name, start, low, high, str(unit), low > 0.0 and high >= BY_ORDER * low)

@@ -23,9 +23,15 @@ from swashplate.identification.drive_model import (
     measured_current,
     simulated_current,
 )
-from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.problem import Problem, noise_scales
-from swashplate.identification.setup import Free, Setup, Stage, deviation, load_setup
+from swashplate.identification.setup import (
+    Free,
+    ModelParameters,
+    Setup,
+    Stage,
+    deviation,
+    load_setup,
+)
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
 from swashplate.parameters.definitions import SWITCHES, columns_of, find
 from swashplate.parameters.parameter_set import ParameterSet

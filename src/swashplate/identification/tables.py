@@ -16,7 +16,7 @@ from swashplate.identification.drive_model import DriveModel
 from swashplate.identification.experiment_design import Advice, Gain
 from swashplate.identification.identifiability import GAUGES, SCALES, moved_columns, true_values
 from swashplate.identification.intervals import Estimate
-from swashplate.identification.own_model import ModelParameters
+from swashplate.identification.setup import ModelParameters
 from swashplate.identification.validation import ignored_windows, pooled, with_speeds
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.simulation.instance import START_PRESSURE
@@ -465,37 +465,27 @@ _LETTERS = {"most": "#", "some": "+", "unseen": "o", "none": "."}
 
 
 def outlook_table(look: Outlook, runs: Sequence[str]) -> Table:
-    """What runs can tell of each unknown of a stage, one letter a run."""
+    """What runs can tell of each unknown of a stage, one letter a run; in a file their shares."""
     made = Table(
         f"Stage {look.stage.name}",
         (
+            Column("stage", of="f"),
             Column("parameter"),
             Column("needs", wrap=True),
             Column("s", ".3g"),
             Column("effect", ".3g"),
             Column("runs"),
+            *(Column(run, ".6g", of="f") for run in runs),
         ),
     )
     for k, name in enumerate(look.names):
         letters = {r: _LETTERS[m] for r, m in zip(look.simulations, look.marks(name), strict=True)}
         marks = "".join(letters.get(run, "-") for run in runs)
         seconds = float(look.seconds[:, k].sum())
-        made.add(name, look.need(name), seconds, look.effect(name), marks)
-    return made
-
-
-def outlook_rows(looks: Sequence[Outlook]) -> Table:
-    """The same for a file, a row for each unknown and run."""
-    columns = ("seconds", "share", "effect of 1 %")
-    words = ("stage", "parameter", "needs", "run")
-    made = Table("", (*map(Column, words), *(Column(each, ".6g") for each in columns)))
-    for look in looks:
-        for k, name in enumerate(look.names):
-            share = look.shares[:, look.linearised.variables.index(name)]
-            for r, run in enumerate(look.simulations):
-                effect = look.effect(name) * float(share[r]) ** 0.5
-                start = (look.stage.name, name, look.need(name), run)
-                made.add(*start, float(look.seconds[r, k]), float(share[r]), effect)
+        shares = look.shares[:, look.linearised.variables.index(name)]
+        parts = {run: float(share) for run, share in zip(look.simulations, shares, strict=True)}
+        cells = (look.need(name), seconds, look.effect(name), marks)
+        made.add(look.stage.name, name, *cells, *(parts.get(run) for run in runs))
     return made
 
 
@@ -506,7 +496,7 @@ WORTH = 1e-3
 
 
 def advice_table(title: str, judged: Sequence[Advice]) -> Table:
-    """Tests in the order given, and what each would tell."""
+    """Tests in the order given, what each would tell, and in a file all errors with it."""
     new = any(each.newly_determined for each in judged)
     made = Table(
         title,
@@ -516,6 +506,7 @@ def advice_table(title: str, judged: Sequence[Advice]) -> Table:
             Column("first to determine", wrap=True, of="tpf" if new else ""),
             Column("gains most"),
             Column("better", "s"),
+            *(Column(f"error of {gain.name}", ".6g", of="f") for gain in judged[0].gains),
         ),
     )
     for each in judged:
@@ -526,7 +517,8 @@ def advice_table(title: str, judged: Sequence[Advice]) -> Table:
         gained = (
             "" if best is None else f"{best.name} {_error(best.before)} to {_error(best.after)}"
         )
-        made.add(each.candidate, each.duration, first, gained, times)
+        errors = (gain.after if isfinite(gain.after) else None for gain in each.gains)
+        made.add(each.candidate, each.duration, first, gained, times, *errors)
     return made
 
 
@@ -544,19 +536,6 @@ def best_tests_table(gains: Sequence[Gain], best: Mapping[str, tuple[str, Gain]]
 
 def _error(error: float) -> str:
     return f"{100.0 * error:.2g} %" if error <= 1.0 else "-"
-
-
-def advice_rows(ranked: Sequence[Advice]) -> Table:
-    """All that was judged for a file, a row for each test and unknown."""
-    heads = ("relative error before", "relative error after", "first to determine", "D-gain")
-    made = Table("", tuple(map(Column, ("test", "duration", "parameter", *heads))))
-    for advice in ranked:
-        for gain in advice.gains:
-            errors = (e if isfinite(e) else None for e in (gain.before, gain.after))
-            first = gain.name in advice.newly_determined
-            cells = (advice.duration, gain.name, *errors, first, advice.d_gain)
-            made.add(advice.candidate, *cells)
-    return made
 
 
 # --- sentences ------------------------------------------------------------------------------------

@@ -84,20 +84,9 @@ def test_the_same_seed_gives_the_same_logs_in_any_order_and_company() -> None:
     assert not same(alone.runs[STEP.name], other.runs[STEP.name])
 
 
-def test_switching_one_error_off_leaves_the_others() -> None:
-    tools = rig.SEVERITIES["realistic"]
-    quiet = replace(tools, current_noise=0.0, dither=0.0)
-    noisy = rig.run("hoist", [STEP], instruments=tools).runs[STEP.name].columns
-    calm = rig.run("hoist", [STEP], instruments=quiet).runs[STEP.name].columns
-    for column in ("time", "voltage", "counts"):
-        np.testing.assert_array_equal(noisy[column], calm[column])
-    assert np.ptp(noisy["current"][3000:3050]) > np.ptp(calm["current"][3000:3050])
-
-
-@pytest.mark.parametrize("severity", ["clean", "realistic", "harsh"])
 @pytest.mark.parametrize("axis", ["hoist", "slew", "luff"])
-def test_every_log_can_be_recognised(axis: str, severity: rig.Severity) -> None:
-    for name, run in rig.run(axis, severity=severity).runs.items():
+def test_every_log_can_be_recognised(axis: str) -> None:
+    for name, run in rig.run(axis, severity="harsh").runs.items():
         voltage = run.columns["voltage"]
         there = np.isfinite(voltage)
         assert recognise(run.columns["time"][there], voltage[there]).name == name
@@ -148,17 +137,6 @@ def test_what_is_simulated_may_be_another_drive() -> None:
     assert tests.drive == split(truth)
     expected = 1.1 * split(Drive.preset("hoist")).simulate(STEP.sample()).shaft_speed
     np.testing.assert_allclose(tests.runs[STEP.name].truth.shaft_speed, expected, rtol=1e-12)
-
-
-def test_refinements_are_those_of_the_drive_that_is_simulated() -> None:
-    truth = Drive.preset("hoist").replace(cam_ripple=0.02, load_torque=2e4, motor_leakage=1e-6)
-    tests = rig.run("hoist", [STEP], severity="clean", truth=truth, channels=("shaft_speed",))
-    expected = split(truth).simulate(STEP.sample()).shaft_speed
-    np.testing.assert_array_equal(tests.runs[STEP.name].columns["shaft_speed"], expected)
-    assert tests.nominal == Drive.preset("hoist")
-    drawn = rig.run("hoist", [STEP], truth=truth, perturb=0.1, seed=3).drive
-    assert drawn == split(perturbed(truth, 0.1, 3))
-    assert drawn["cam_ripple"].value != 0.02
 
 
 def test_backlash_is_between_shaft_and_encoder() -> None:

@@ -6,7 +6,6 @@ import pytest
 from swashplate import InputError
 from swashplate.campaign.rig import SEVERITIES, Instruments
 from swashplate.campaign.rig.instruments import (
-    dither_ripple,
     lost,
     play,
     put_out,
@@ -14,7 +13,6 @@ from swashplate.campaign.rig.instruments import (
     read_current,
     read_transducer,
     read_voltage,
-    rounded,
     sampled_instants,
 )
 
@@ -75,26 +73,6 @@ def test_readings_of_the_ammeter_by_hand(
 ) -> None:
     reading = ammeter(np.full(GRID.size, plus), np.full(GRID.size, minus), **errors)
     np.testing.assert_allclose(reading, shown, rtol=1e-14)
-
-
-def test_noise_of_the_ammeter_has_no_mean_even_at_zero() -> None:
-    off = np.zeros(GRID.size)
-    reading = ammeter(off, off, current_noise=0.002)
-    assert abs(reading.mean()) < 4.0 * 0.002 / np.sqrt(GRID.size)
-    assert reading.std() == pytest.approx(0.002, rel=0.04)
-
-
-def test_the_ripple_by_hand() -> None:
-    """D = 0.3/1.2 = 1/4: from −h to h in a quarter of the period, h = 4 · 20 mA · D (1 − D)."""
-    tools = Instruments(dither=0.02)
-    passed = np.array([0.0, 0.125, 0.25, 0.625, 0.9999999])
-    height = 4.0 * 0.02 * 0.25 * 0.75
-    expected = height * np.array([-1.0, 0.0, 1.0, 0.0, -1.0])
-    ripple = dither_ripple(passed / 100.0, np.full(5, 0.3), 0.0, tools)
-    np.testing.assert_allclose(ripple, expected, atol=1e-8)
-    shifted = dither_ripple((passed - 0.4) / 100.0, np.full(5, 0.3), 0.4, tools)
-    np.testing.assert_allclose(shifted, expected, atol=1e-8)
-    np.testing.assert_array_equal(dither_ripple(passed / 100.0, np.zeros(5), 0.0, tools), 0.0)
 
 
 def spectrum(reading: np.ndarray) -> dict[float, float]:
@@ -198,13 +176,6 @@ def test_stamps_tell_the_jitter_but_not_the_hidden_part() -> None:
         assert np.diff(each).min() > 0.0
 
 
-def test_rounding_gives_the_floats_of_decimal_numbers() -> None:
-    np.testing.assert_array_equal(
-        rounded(np.array([0.1234564, 1.9999996, -0.0000001]), 1e-6), [0.123456, 2.0, 0.0]
-    )
-    np.testing.assert_array_equal(rounded(np.array([0.7, 1.1]), 0.75), [0.75, 0.75])
-
-
 @pytest.mark.parametrize("longest", [1, 20])
 def test_a_share_of_rows_is_lost_in_runs(longest: int) -> None:
     gone = lost(1_000_000, 0.01, longest, chance())
@@ -215,14 +186,6 @@ def test_a_share_of_rows_is_lost_in_runs(longest: int) -> None:
     assert lengths.min() == 1
     assert lengths.mean() == pytest.approx(0.5 * (1 + longest), rel=0.06)
     assert not lost(1000, 0.0, longest, chance()).any()
-
-
-def test_play_by_hand() -> None:
-    """A gap of 2: 1 is lost at first from its middle, 2 at each reversal."""
-    drives = np.array([0.0, 0.5, 1.0, 2.0, 4.0, 3.0, 2.0, 1.0, -1.0, -1.0, 0.0, 1.5, 3.0])
-    driven = np.array([0.0, 0.0, 0.0, 1.0, 3.0, 3.0, 3.0, 2.0, 0.0, 0.0, 0.0, 0.5, 2.0])
-    np.testing.assert_array_equal(play(drives, 2.0), driven)
-    np.testing.assert_array_equal(play(-drives, 2.0), -driven)
 
 
 def test_the_play_operator_sample_by_sample() -> None:

@@ -24,8 +24,14 @@ from swashplate.campaign.rig.instruments import (
     put_out,
     stream,
 )
-from swashplate.campaign.schema import CHANNEL_KINDS, KINDS, ChannelKind
-from swashplate.documents import toml_key, toml_string
+from swashplate.campaign.schema import (
+    CHANNEL_KINDS,
+    KINDS,
+    ChannelKind,
+    axis_lines,
+    run_lines,
+)
+from swashplate.documents import toml_string
 from swashplate.drive import Drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import FileError, InputError, ParameterError
@@ -345,8 +351,24 @@ def campaign_text(tests: VirtualTests) -> str:
     The input is joined by straight lines, because that is what was simulated between two samples.
     """
     refinements = ", ".join(tests.drive.parameters.refinements) or "none"
-    axis = f"axes.{toml_key(tests.axis)}"
     missing = ['missing = "drop"    # cells without a number'] * bool(tests.instruments.empty_cells)
+    own = [
+        f'drive = "{tests.preset or DRIVE_FILE}"    # the model that a fit starts from',
+        'time = { column = "time", unit = "s" }',
+        'start = "rest"',
+    ]
+    given = ['kind = "voltage"', 'column = "voltage"', 'unit = "V"', 'interpolation = "linear"']
+    channels = {}
+    for kind in tests.channels:
+        column = COLUMNS.get(kind, kind)
+        entries = [f'kind = "{kind}"', f'column = "{column}"']
+        if kind == "encoder_counts":
+            entries.append(f"counts_per_turn = {tests.counts_per_turn!r}    # of the shaft")
+            if tests.instruments.counter_bits:
+                entries.append(f"rolls_over_at = {2**tests.instruments.counter_bits}")
+        else:
+            entries.append(f'unit = "{KINDS[kind].units[0]}"')
+        channels[column] = [*entries, *missing]
     lines = [
         f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.",
         f"# Instruments: {tests.severity}; refinements: {refinements}; seed {tests.seed}.",
@@ -354,31 +376,11 @@ def campaign_text(tests: VirtualTests) -> str:
         f"title = {toml_string(f'Virtual tests, {tests.axis}')}",
         "virtual = true",
         "",
-        f"[{axis}]",
-        f'drive = "{tests.preset or DRIVE_FILE}"    # the model that a fit starts from',
-        'time = { column = "time", unit = "s" }',
-        'start = "rest"',
-        "",
-        f"[{axis}.input]",
-        'kind = "voltage"',
-        'column = "voltage"',
-        'unit = "V"',
-        'interpolation = "linear"',
-        *missing,
+        *axis_lines(tests.axis, own, [*given, *missing], channels),
     ]
-    for kind in tests.channels:
-        column = COLUMNS.get(kind, kind)
-        lines += ["", f"[{axis}.channels.{column}]", f'kind = "{kind}"', f'column = "{column}"']
-        if kind == "encoder_counts":
-            lines.append(f"counts_per_turn = {tests.counts_per_turn!r}    # of the shaft")
-            if tests.instruments.counter_bits:
-                lines.append(f"rolls_over_at = {2**tests.instruments.counter_bits}")
-        else:
-            lines.append(f'unit = "{KINDS[kind].units[0]}"')
-        lines += missing
     for run in tests.runs.values():
-        lines += ["", "[[runs]]", f'file = "{run.stem}.csv"', f'role = "{run.role}"']
-    return "\n".join(lines) + "\n"
+        lines += run_lines(f"{run.stem}.csv", run.role)
+    return "\n".join(lines)
 
 
 def truth_text(tests: VirtualTests) -> str:

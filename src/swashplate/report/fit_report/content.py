@@ -19,8 +19,8 @@ from swashplate.identification import tables
 from swashplate.identification.acceptance import percent
 from swashplate.identification.assessment import Assessment, StageProfile, assess, motion_of
 from swashplate.identification.fitting import Fit, StageFit
-from swashplate.identification.own_model import ModelParameters
 from swashplate.identification.resampling import CrossValidation
+from swashplate.identification.setup import ModelParameters
 from swashplate.identification.solving import StartResult
 from swashplate.identification.staging import Parameters
 from swashplate.identification.validation import RunQuality, pooled
@@ -36,7 +36,7 @@ from swashplate.report.fit_report.runs import (
     shown_runs,
 )
 from swashplate.report.fit_report.summary import light, run_error, run_lights, summary_section
-from swashplate.tables import NONE, Cell, Column, Table, count, joined, listed, write_text
+from swashplate.tables import NONE, Cell, Column, Table, count, ended, joined, listed, write_text
 from swashplate.units import chosen_unit, show_rod, shown_in, unit_text
 
 Role = Literal["fit", "validate"]
@@ -206,7 +206,7 @@ def _shared(
     axes = {run.experiment.axis for run in runs}
     examined = {each: examine(each) for each in campaign if each.axis in axes}
     found = [
-        (each.experiment, f"{each.experiment}, {each.signal}: {words}.")
+        (each.experiment, ended(f"{each.experiment}, {each.signal}: {words}"))
         for qualities in examined.values()
         for each in qualities
         for words in each.findings
