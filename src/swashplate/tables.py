@@ -284,6 +284,7 @@ def count(number: int, what: str, several: str = "") -> str:
 
 TABLE = Form("a table", (".csv", ".parquet"), (".pq",))
 FIGURE = Form("a figure", (".png", ".svg", ".pdf"))
+PAGE = Form("a page", (".html",), (".htm",))
 
 
 def ending(path: str | Path, form: Form) -> str:

@@ -43,9 +43,61 @@ def test_run_compares_variants_and_writes_signals_and_a_figure(tmp_path):
     assert {"time", "stick_slew", "load_x", "pull", "voltage_luff", "swing"} <= set(table.columns)
 
 
+JUDGE = ["judge", "tg3637", "--seeds", "6", "--no-remedies"]
+
+
+def test_judge_ends_with_the_verdict_as_its_exit_code(tmp_path):
+    page, table = tmp_path / "judge.html", tmp_path / "judge.csv"
+    fails = said(*JUDGE, "--out", str(table), "--plot", str(tmp_path / "judge.png"))
+    assert fails.exit_code == 1, fails.output
+    assert "Fails: The controller makes swing worse than none in" in fails.stderr
+    found = pl.read_csv(table)
+    assert found.height == 18
+    worse = found.pivot(on="variant", index="seed", values="rms_swing")
+    share = (worse["identified"] > worse["no control"]).mean()
+    assert f"in {100 * share:.0f} % of 6 seaways" in " ".join(fails.stderr.split())
+    works = said(*JUDGE, "--scale", "luff.orifice=4", "--out", str(page))
+    assert works.exit_code == 0, works.output
+    assert "Works: With the drives 'luff orifice ×4' the controller brings the swing" in " ".join(
+        works.stdout.split()
+    )
+    assert "luff orifice ×4" in page.read_text("utf-8")
+
+
+def test_follow_and_sectors_print_their_tables(tmp_path):
+    found = said("follow", "tg3637", "--sea", "ss3", "--plot", str(tmp_path / "follow.png"))
+    rows = {each.split()[0]: each.split()[1:] for each in found.stdout.splitlines() if each.strip()}
+    # of an independent model: 0.110 m/s² along the boom, limited by acceleration at 8 s
+    assert float(rows["8.0"][2]) == pytest.approx(0.110 / (2 * 3.14159 / 8.0) ** 2, abs=1.5e-3)
+    assert {"ss3"} < set(rows)
+    assert "ss4" not in rows
+    around = said("sectors", "tg3637", "--step", "90", "--seeds", "1", "--drives", "identified")
+    assert around.exit_code == 0, around.output
+    bearings = [each.split()[0] for each in around.stdout.splitlines() if each.strip()][-4:]
+    assert bearings == ["0", "90", "180", "270"]
+
+
+def test_run_writes_its_scene(tmp_path):
+    scene = tmp_path / "scene.html"
+    made = said("run", "tg3637", "--length", "5", "--sea", "ss2", "--scene", str(scene))
+    assert made.exit_code == 0, made.output
+    assert "Hägglunds TG3637" in scene.read_text("utf-8")
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
+        ("judge tg3637 --control none", "There is no control 'none'"),
+        ("judge tg3637 --drives fast", "There are no drives 'fast'; there are ideal, identified"),
+        ("judge tg3637 --drives drawn", "needs the folder of a fit: --drive luff=FOLDER"),
+        ("judge tg3637 --scale orifice=2", "write the axis first, luff.orifice=1.5"),
+        ("judge tg3637 --scale luff.bore=2", "bore"),
+        ("judge tg3637 --sea ss9", "There is no sea 'ss9'"),
+        ("judge tg3637 --allowed 200", "allowed is 2, but is a share of seaways"),
+        ("judge tg3637 --out judge.pdf", "a verdict is written as"),
+        ("judge tg3637 --at slew=3", "--at has no slew; it has slew_deg, boom_deg, rope_m"),
+        ("follow tg3637 --sea ss9", "There is no sea 'ss9'"),
+        ("sectors tg3637 --at slew_deg=3 --seeds 1 --step 400", "--step"),
         ("run tg --slew 1", "There is no packaged crane 'tg'; there is tg3637."),
         ("run tg3637 --variant fast", "actuation is 'fast'; it is ideal, volts, inverse."),
         ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-joint"),

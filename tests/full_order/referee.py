@@ -9,6 +9,8 @@ from swashplate.models.displacement_control import solenoid_force
 from swashplate.models.full_order import Motion, free_rates
 from swashplate.simulation.result import Simulation
 
+SLACK = 1e-9
+"""Part of its range by which a state passes a limit before it counts: more than rounding."""
 TOLERANCES = np.array([1e-9, 1e-7, 1.0, 1e-9, 1e-7])  # m, m/s, Pa, rad, rad/s for 1e-6.
 
 
@@ -44,23 +46,24 @@ def solved(full: FullOrderDrive, run: Simulation, tolerance: float = 1e-8) -> np
             if holds[number]:
                 return float(holds[number] * pushes(t, y)[number])
             at = y[places[number]]
-            return float(min(upper[number] - at, at - lower[number]) / size[number])
+            return float(min(upper[number] - at, at - lower[number]) / size[number]) + SLACK
 
         of.terminal, of.direction = True, -1  # type: ignore[attr-defined]
         return of
 
-    def settled(t: float, y: np.ndarray) -> np.ndarray:
+    def settled(t: float, y: np.ndarray, let_go: np.ndarray) -> np.ndarray:
         """Which limits hold from here on; what arrives at one is set on it, and stops."""
-        speed, near = np.array([y[1], 0.0, y[4]]), 1e-9 * size
+        speed, near = np.array([y[1], 0.0, y[4]]), 2.0 * SLACK * size
         side = np.where(y[places] >= upper - near, 1, np.where(y[places] <= lower + near, -1, 0))
         side = np.where(side * speed >= 0.0, side, 0)
         y[places] = np.where(side > 0, upper, np.where(side < 0, lower, y[places]))
         y[[1, 4]] = np.where(side[[0, 2]] != 0, 0.0, y[[1, 4]])
-        return np.where(side * pushes(t, y) >= 0.0, side, 0)
+        return np.where((side * pushes(t, y) >= 0.0) & ~let_go, side, 0)
 
-    found, now = np.empty((time.size, 5)), 0.0
+    found, now, events = np.empty((time.size, 5)), 0.0, 0
+    let_go = np.zeros(3, dtype=bool)
     while now < time[-1]:
-        holds = settled(now, state)
+        holds = settled(now, state, let_go)
         later = time[time >= now]
         made = solve_ivp(
             rates,
@@ -79,6 +82,10 @@ def solved(full: FullOrderDrive, run: Simulation, tolerance: float = 1e-8) -> np
             found[time.size - later.size :][: len(made.t)] = made.y.T
         if made.status == 0:
             break
+        # what has let go is not held again by rounding
+        let_go = np.array([bool(each.size) for each in made.t_events]) & (holds != 0)
+        events += 1
+        assert events < 1000, f"the limits chatter at {now:g} s"
         now = max(float(each[0]) for each in made.t_events if each.size)
         state = next(each[0] for each in made.y_events if each.size).copy()
     return found

@@ -1,4 +1,7 @@
+import shutil
+import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
@@ -55,3 +58,28 @@ def assert_legible():
             boxes.append((text, box))
 
     return check
+
+
+@pytest.fixture
+def browsed(tmp_path: Path):
+    """Show a page in a browser, which must not complain; what it made of the page."""
+    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    if browser is None:
+        pytest.skip("there is no Chromium here; `make browser` installs it where it can")
+
+    def show(page: Path, at: str = "#all") -> str:
+        options = ("--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr")
+        more = ("--virtual-time-budget=20000", f"--user-data-dir={tmp_path / 'profile'}")
+        words = [browser, *options, *more, "--window-size=1280,1000", "--dump-dom"]
+        done = subprocess.run(
+            [*words, f"{page.as_uri()}{at}"],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        said = [line for line in done.stderr.splitlines() if ":CONSOLE" in line]
+        assert [line for line in said if "setting log level" not in line] == []
+        return done.stdout
+
+    return show

@@ -3,6 +3,13 @@ from .crane import Crane as Crane
 from .crane import CraneStepper as CraneStepper
 from .crane import Pose as Pose
 from .crane import Setup as Setup
+from .following import Demand as Demand
+from .following import Followable as Followable
+from .following import follow as follow
+from .judgment import Estimate as Estimate
+from .judgment import Judgment as Judgment
+from .judgment import Remedy as Remedy
+from .judgment import judge as judge
 from .linear import LinearCrane as LinearCrane
 from .linear import linearize as linearize
 from .result import CraneRun as CraneRun
@@ -16,6 +23,12 @@ from .sea import Seaway as Seaway
 from .sea import Spectrum as Spectrum
 from .sea import ship_motion as ship_motion
 from .stick import Stick as Stick
+from .study import Residuals as Residuals
+from .study import Sweep as Sweep
+from .study import operability as operability
+from .study import orifices as orifices
+from .study import residuals as residuals
+from .study import sectors as sectors
 from .transfer_functions import Hull as Hull
 from .transfer_functions import TransferFunctions as TransferFunctions
 from .transfer_functions import read_capytaine as read_capytaine

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from importlib.resources import files
 from math import cos, degrees, inf, isfinite, radians, sin
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, NamedTuple, TypedDict, Unpack, get_args
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    NamedTuple,
+    Protocol,
+    TypedDict,
+    Unpack,
+    get_args,
+)
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,6 +42,12 @@ from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.tables import Column, Table
 from swashplate.units import to_si
 
+if TYPE_CHECKING:
+    from swashplate.analysis.monte_carlo import Draws
+    from swashplate.crane.following import Followable
+    from swashplate.crane.judgment import Judgment
+    from swashplate.crane.study import Sweep
+
 Array = NDArray[np.float64]
 Actuation = Literal["ideal", "volts", "inverse"]
 """In the order of `loop.IDEAL` and the others."""
@@ -40,6 +56,19 @@ ACTUATIONS = (*get_args(Actuation), "direct")
 QUICKEST = 0.4
 """Largest part of a rope's pull by which a leaking drive may lower it within a sample: at 0.7 they
 would swing against each other from sample to sample."""
+
+
+class Fitted(Protocol):
+    """What a fit returns, as far as a crane takes it."""
+
+    @property
+    def drive(self) -> Drive:
+        """The drive that was found."""
+        ...
+
+
+DriveLike = Drive | Fitted | str | Path
+
 RATE = 512.0
 """Samples a second of the loop: the packaged drives' own. [Hz]"""
 
@@ -208,13 +237,69 @@ class Crane:
         assumed = sum(each.status == "assumed" for each in self.quantities.values())
         return f"Crane({self.name!r}, {drives}; {assumed} of {len(UNITS)} quantities assumed)"
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Names and numbers, by which another process makes the same crane."""
+        drives = {axis: getattr(self, axis) for axis in AXES}
+        return _crane_of, (self.name, self.title, dict(self.quantities), drives)
+
     def with_drive(
-        self, *, hoist: Drive | None = None, slew: Drive | None = None, luff: Drive | None = None
+        self,
+        *,
+        hoist: DriveLike | None = None,
+        slew: DriveLike | None = None,
+        luff: DriveLike | None = None,
     ) -> Crane:
-        """The crane with other drives: ``crane.with_drive(luff=crane.luff.scale(Z16=1.5))``."""
-        return replace(
-            self, hoist=hoist or self.hoist, slew=slew or self.slew, luff=luff or self.luff
+        """The crane with other drives.
+
+        Parameters
+        ----------
+        hoist, slew, luff : Drive, Fit, str or path, optional
+            A drive, ``crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a packaged
+            name, a parameter file, or the folder that a fit wrote.
+
+        Raises
+        ------
+        FileError, ParameterError
+            If there is no such file, or it is no drive's.
+        """
+        given = {"hoist": hoist, "slew": slew, "luff": luff}
+        made: dict[str, Any] = {
+            axis: _drive_of(each) for axis, each in given.items() if each is not None
+        }
+        return replace(self, **made)
+
+    def drawn(
+        self,
+        *,
+        hoist: Draws | None = None,
+        slew: Draws | None = None,
+        luff: Draws | None = None,
+    ) -> tuple[Crane, ...]:
+        """Cranes whose drives are drawn from the errors of fits.
+
+        Parameters
+        ----------
+        hoist, slew, luff : Draws, optional
+            Of `analysis.monte_carlo.drives`; axes without keep their drive.
+
+        Returns
+        -------
+        tuple of Crane
+            As many as the shortest of the draws; of several axes the first with the first.
+
+        Raises
+        ------
+        InputError
+            If no draws are given.
+        """
+        given = {"hoist": hoist, "slew": slew, "luff": luff}
+        found = {axis: each.drives for axis, each in given.items() if each is not None}
+        if not found:
+            raise InputError("Cranes are drawn from the draws of at least one axis.")
+        sets: Iterator[dict[str, Any]] = (
+            dict(zip(found, each, strict=True)) for each in zip(*found.values(), strict=False)
         )
+        return tuple(replace(self, **each) for each in sets)
 
     def with_geometry(self, **changes: float | tuple[float, ...]) -> Crane:
         """The crane with other quantities, in SI and by name: ``boom_length=38.0``.
@@ -364,6 +449,30 @@ class Crane:
         """The linear crane at a boom and rope; see `swashplate.crane.linearize`."""
         return linearize(self, boom_deg, rope_m)
 
+    def judge(self, control: Control | Mapping[str, Control], **how: Any) -> Judgment:
+        """Judgment of control over many seaways; see `swashplate.crane.judge`."""
+        from swashplate.crane.judgment import judge
+
+        return judge(self, control, **how)
+
+    def follow(self, periods: ArrayLike = tuple(range(4, 17)), **how: Any) -> Followable:
+        """Largest sines of the tip that each axis can follow; see `swashplate.crane.follow`."""
+        from swashplate.crane.following import follow
+
+        return follow(self, periods, **how)
+
+    def sectors(self, control: Control | Mapping[str, Control], **how: Any) -> Sweep:
+        """Swing over the bearing of the boom; see `swashplate.crane.sectors`."""
+        from swashplate.crane.study import sectors
+
+        return sectors(self, control, **how)
+
+    def operability(self, control: Control | Mapping[str, Control], **how: Any) -> Sweep:
+        """Swing over the height of the waves; see `swashplate.crane.operability`."""
+        from swashplate.crane.study import operability
+
+        return operability(self, control, **how)
+
     def _loop(self, how: Setup) -> tuple[Loop, Pose, int]:
         """The loop of a complete setup, where it begins, and half periods of its shaper."""
         strange = [each for each in how if each not in DEFAULTS]
@@ -385,7 +494,7 @@ class Crane:
             raise InputError("With direct actuation the voltages are given: leave control out.")
         if how["loaded"]:
             self._check_loaded(actuation, load + suspension.hook, suspension)
-        edges = [dead_zone(self.hoist, way).outside for way in (-1.0, 1.0)]
+        edges = _edges(self.hoist)
         low, high = self.boom_limits
         forward, port = how["wind"]
         fixed = Fixed(
@@ -529,9 +638,33 @@ class CraneStepper:
         return out
 
 
-@lru_cache(maxsize=64)
+def _crane_of(
+    name: str, title: str, quantities: dict[str, Quantity], drives: dict[str, Drive]
+) -> Crane:
+    return Crane(name, title, MappingProxyType(quantities), **drives)
+
+
+def _drive_of(given: DriveLike) -> Drive:
+    """A drive as it may be given to a crane."""
+    if isinstance(given, Drive):
+        return given
+    if not isinstance(given, str | Path):
+        return given.drive
+    place = Path(given)
+    if place.is_dir():
+        return Drive.from_toml(place / "drive.toml")
+    return Drive.from_toml(place) if place.suffix == ".toml" else Drive.preset(str(given))
+
+
+@lru_cache(maxsize=512)
 def _inverse(drive: Drive) -> InverseMap:
     return inverse_map(drive)
+
+
+@lru_cache(maxsize=64)
+def _edges(drive: Drive) -> tuple[float | None, float | None]:
+    """Voltages of a drive's dead zone, negative and positive. [V]"""
+    return dead_zone(drive, -1.0).outside, dead_zone(drive, 1.0).outside
 
 
 @lru_cache(maxsize=64)

@@ -135,6 +135,8 @@ class _KernelCache(FunctionCache):
     def _cache_file(self) -> _Index:  # type: ignore[override]
         stamp = f"{closure_hash(self._py_func)} {numba_version}"
         base = self._impl.filename_base
+        if self._py_func.__closure__ is not None:
+            stamp += f" {_cells(self._py_func)}"
         if "locals" in base:  # one of several functions of this name, which do not displace another
             base = f"{base}.{hash_of({'': stamp})[:12]}"
         return _Index(self._cache_path, base, stamp)  # type: ignore[no-untyped-call]
@@ -149,6 +151,16 @@ class _KernelCache(FunctionCache):
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # whole, and yet nothing that this Numba can use
             return None
+
+
+def _cells(function: Any) -> list[tuple[str, str]]:
+    """What a function closes over, by name: functions by what they reach, others as they are.
+
+    The hash of a closure knows each function once, but not which of several names it has.
+    """
+    cells = [each.cell_contents for each in function.__closure__]
+    known_by = [closure_hash(each) if is_function(each) else repr(each) for each in cells]
+    return list(zip(function.__code__.co_freevars, known_by, strict=True))
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:

@@ -30,18 +30,25 @@ from swashplate.simulation.result import Limit
 MOST_RUNS = 6
 """More lines than that nobody can follow."""
 MOVED = 2.0
-"""Travel of the boom that gets a panel of its own. [deg]"""
+"""Travel of slew and boom that gets a panel of its own. [deg]"""
 ACTING = (Limit.ORIFICE, Limit.SWASH_STOP)
 """Limits that a crane's drives are judged by: of acceleration and of speed."""
 
 
-def plot_crane(runs: CraneRun | Mapping[str, CraneRun], *, title: str | None = None) -> Figure:
-    """Figure of a run or of several: swing, slew, boom, and when limits act.
+def plot_crane(
+    runs: CraneRun | Mapping[str, CraneRun],
+    *,
+    sea: Mapping[str, CraneRun] | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Figure of a run or of several: swing, slew and boom where they move, and when limits act.
 
     Parameters
     ----------
     runs : CraneRun or mapping of str to CraneRun
         Runs of one length, by their names.
+    sea : mapping of str to CraneRun, optional
+        The same in a seaway, whose swing gets a panel of its own.
     title : str, optional
         By default the crane's.
 
@@ -56,33 +63,35 @@ def plot_crane(runs: CraneRun | Mapping[str, CraneRun], *, title: str | None = N
     first = next(iter(named.values()))
     looks = strokes(named)
     driven = {name: run for name, run in named.items() if run.actuation != "ideal"}
-    moved = any(np.ptp(run.boom_deg) > MOVED for run in named.values())
+    heads = {"swing_deg": "swing (deg)", "slew_deg": "slew (deg)", "boom_deg": "boom (deg)"}
+    for signal in ("slew_deg", "boom_deg"):
+        if all(np.ptp(getattr(run, signal)) <= MOVED for run in named.values()):
+            del heads[signal]
     legend = [handle(name, *look) for name, look in looks.items()] if len(named) > 1 else []
-    heights = [
-        2.1,
-        1.5,
-        *([1.2] if moved else []),
-        *([0.17 * 2 * len(driven) + 0.25] if driven else []),
-    ]
+    sizes = {"swing_deg": 2.1, "slew_deg": 1.5, "boom_deg": 1.2}
+    heights = [sizes[each] for each in heads] + ([1.5] if sea else [])
+    heights += [0.17 * 2 * len(driven) + 0.25] if driven else []
     assumed = [each for each in first.crane.quantities.values() if each.status == "assumed"]
     figure, axes = sheet(heights, title or first.crane.title, legend=legend, lines=1)
-    _lines(axes[0], named, looks, "swing_deg", "swing (deg)")
+    for ax, (signal, label) in zip(axes, heads.items(), strict=False):
+        _lines(ax, named, looks, signal, label)
     axes[0].set_ylim(bottom=0.0)
-    _lines(axes[1], named, looks, "slew_deg", "slew (deg)")
-    if moved:
-        _lines(axes[2], named, looks, "boom_deg", "boom (deg)")
+    if sea:
+        _lines(axes[len(heads)], sea, looks, "swing_deg", "in sea (deg)")
+        axes[len(heads)].set_ylim(bottom=0.0)
     if driven:
         _acting(axes[-1], driven, looks)
     for ax in axes:
         fit_time(ax, first.time)
-        ax.axvline(first.stick_end, color=FAINT, linewidth=0.8, zorder=1.0)
-    says = "grey line: the stick is back at zero"
+        if first.stick_end > 0.0:
+            ax.axvline(first.stick_end, color=FAINT, linewidth=0.8, zorder=1.0)
+    says = ["grey line: the stick is back at zero"] if first.stick_end > 0.0 else []
     if assumed:
-        says += (
-            f"; {len(assumed)} of {len(first.crane.quantities)} quantities of the crane are assumed"
+        says.append(
+            f"{len(assumed)} of {len(first.crane.quantities)} quantities of the crane are assumed"
         )
     axes[0].annotate(
-        says,
+        "; ".join(says),
         (0.0, 1.0),
         xytext=(0.0, 18.0 if legend else 4.0),
         xycoords="axes fraction",

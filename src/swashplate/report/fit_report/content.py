@@ -27,6 +27,7 @@ from swashplate.identification.validation import RunQuality, pooled
 from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
+from swashplate.report.fit_report.live import can_run, live_page
 from swashplate.report.fit_report.page import Block, Section, listed_block, page, text
 from swashplate.report.fit_report.runs import (
     ShownRun,
@@ -125,6 +126,7 @@ def write_fit_report(
         sections = [
             summary_section(judged, campaign, found, assessed, runs, head["findings"]),
             *shared[:2],
+            _live_section(drive, campaign, runs),
             _parameter_section(fit, assessed, truth),
             _identifiability_section(assessed),
             _profile_section(fit, profiles),
@@ -311,6 +313,19 @@ def _curves_section(runs: Sequence[ShownRun], virtual: bool) -> Section:
         }
         blocks.append(Block("run", content))
     return Section("runs", "Curves", blocks)
+
+
+def _live_section(drive: Parameters, campaign: Campaign, runs: Sequence[ShownRun]) -> Section:
+    """The drive itself beside the run that it misses most, of those held out if there are any."""
+    blocks: list[Block] = []
+    if isinstance(drive, ParameterSet):
+        out = [run for run in runs if run.validates] or list(runs)
+        worst = max(out, key=lambda run: run_error(run, runs)).experiment
+        if can_run(drive, worst):
+            made = live_page(drive, [worst], campaign.title, campaign.virtual, "drive.toml")
+            words = f"Sliders for every parameter beside {worst.name}"
+            blocks = [Block("live", made, words)]
+    return Section("live", "Try other values", blocks)
 
 
 def _residual_section(runs: Sequence[ShownRun]) -> Section:

@@ -54,7 +54,17 @@ def listed_block(sentences: Sequence[str]) -> list[Block]:
 
 
 def page(sections: Sequence[Section], content: Mapping[str, Any]) -> str:
-    """HTML of a page."""
+    """HTML of a report's page."""
+    return rendered(
+        "page.html",
+        ("curves.js", "page.js"),
+        **{**content, "run_data": map(script_json, content["run_data"])},
+        sections=sections,
+    )
+
+
+def rendered(template: str, scripts: Sequence[str], looks: str = "", **content: Any) -> str:
+    """HTML of a template of this folder, with its scripts in a scope of their own and its looks."""
     environment = Environment(
         loader=PackageLoader("swashplate.report.fit_report", ""),
         autoescape=True,
@@ -63,11 +73,11 @@ def page(sections: Sequence[Section], content: Mapping[str, Any]) -> str:
         lstrip_blocks=True,
     )
     environment.globals["html_table"] = html_table
-    made: str = environment.get_template("page.html").render(
-        {**content, "run_data": map(_script_json, content["run_data"])},
-        sections=sections,
-        css=Markup(resource("page.css")),
-        js=scripts("curves.js", "page.js"),
+    code = "\n".join(resource(name) for name in scripts)
+    made: str = environment.get_template(template).render(
+        content,
+        css=Markup(resource("page.css") + looks),
+        js=Markup('"use strict";\n(() => {\n' + code + "})();"),
     )
     # control characters of a name, and what turns the direction of writing, are no part of HTML
     return re.sub("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]", "\ufffd", made)
@@ -76,12 +86,6 @@ def page(sections: Sequence[Section], content: Mapping[str, Any]) -> str:
 def resource(name: str) -> str:
     """A file of this folder."""
     return files("swashplate.report.fit_report").joinpath(name).read_text("utf-8")
-
-
-def scripts(*names: str) -> Markup:
-    """Scripts of this folder in one scope of their own."""
-    whole = "\n".join(resource(name) for name in names)
-    return Markup('"use strict";\n(() => {\n' + whole + "})();")
 
 
 def html_table(table: Table, look: str = "") -> Markup:
@@ -141,7 +145,7 @@ def typeset(words: str) -> str:
     return re.sub(r"(?<![\w.])-(?=\d)", "−", raised)
 
 
-def _script_json(content: Any) -> Markup:
+def script_json(content: Any) -> Markup:
     """JSON that can stand in a script element: no text in it can end the element."""
     words = json.dumps(content, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return Markup(words.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))

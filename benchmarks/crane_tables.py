@@ -1,0 +1,287 @@
+"""The crane beside an independent one: residual swing, and swing in seaways with intervals.
+
+python benchmarks/crane_tables.py [--seeds 200] [--write]   (writes docs/crane-checks.md)
+
+The other crane is a prototype that shares no code with this one; its numbers are copied here.
+"""
+
+import argparse
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from swashplate.crane import Crane, Estimate, Seaway, Spectrum, Stick, control, read_veres
+from swashplate.crane.judgment import mean_of
+from swashplate.crane.study import Case, Study, commands_of, outcomes, station
+from swashplate.executors import Threads
+
+PAGE = Path(__file__).parent.parent / "docs" / "crane-checks.md"
+S175 = Path(__file__).parents[2] / "shared" / "data" / "s175" / "input.re1"
+LENGTH, START = 240.0, 60.0
+"""Of a seaway, and from when on swing counts. [s]"""
+FACTORS = (1.0, 1.5, 2.0, 3.0, 5.0)
+OTHERS = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 10.0)
+
+FEEDBACK = control.DelayedFeedback(0.2, delay=0.2)
+MEANT = FEEDBACK | control.ShipCompensation() | control.PositionLoop(1.5)
+CLIPPED = FEEDBACK | control.ShipCompensation() | control.Clip()
+ALONE = FEEDBACK | control.Clip(0.25)
+"""Designed for ideal drives; clipped at 0.8 of what the luff can follow; feedback alone."""
+
+SEAS = {  # none, ideal, meant at FACTORS, clipped at FACTORS, feedback alone [deg RMS]
+    "ss3": (
+        *(2.49, 0.00, 10.87, 1.12, 0.11, 0.07, 0.07),
+        *(1.07, 0.46, 0.15, 0.11, 0.11, 0.69),
+    ),
+    "ss3-swell": (
+        *(10.83, 0.00, 16.64, 0.16, 0.11, 0.10, 0.10),
+        *(1.38, 0.43, 0.19, 0.17, 0.17, 1.86),
+    ),
+    "ss4": (
+        *(11.37, 0.47, 18.58, 15.12, 7.06, 2.13, 1.10),
+        *(4.46, 3.28, 2.42, 1.59, 0.98, 4.11),
+    ),
+}
+ROLLING = (  # none, ideal, meant at OTHERS, clipped at OTHERS
+    *(4.21, 0.61, 17.8, 13.9, 9.6, 4.3, 2.9, 2.3, 1.6, 1.2, 1.0),
+    *(3.0, 3.0, 2.8, 2.2, 1.85, 1.6, 1.3, 0.9, 0.8),
+)
+
+
+def cases(crane: Crane, factors: tuple[float, ...], alone: bool) -> dict[str, Case]:
+    """Variants by name."""
+    how = station(90.0, 45.0, 27.0, {})
+    made = {
+        "no control": Case((crane,), None, "inverse", how),
+        "ideal drives": Case((crane,), MEANT, "ideal", how),
+    }
+    for name, law in (("meant for ideal", MEANT), ("clipped", CLIPPED)):
+        for factor in factors:
+            larger = crane.with_drive(luff=crane.luff.scale(Z16=factor))
+            made[f"{name}, orifice ×{factor:g}"] = Case((larger,), law, "inverse", how)
+    if alone:
+        made["feedback alone, clip 0.25 m"] = Case((crane,), ALONE, "inverse", how)
+    return made
+
+
+def measured(
+    crane: Crane, sea: Seaway, found: Mapping[str, Case], seeds: range, brake: bool = True
+) -> dict[str, np.ndarray]:
+    """(n,) root mean square swing of each variant in each seaway. [deg]"""
+    all_cases = [each._replace(how={**each.how, "brake": brake}) for each in found.values()]
+    commands, first = commands_of(crane, Stick.rest(LENGTH), all_cases[0].how, START)
+    study = Study(tuple(all_cases), sea, commands, first)
+    values = np.degrees(outcomes(study, seeds, Threads(2))[..., 0])
+    return {name: values[:, k] for k, name in enumerate(found)}
+
+
+def seaway_rows(
+    found: Mapping[str, np.ndarray], others: tuple[float, ...], random: np.random.Generator
+) -> Iterator[str]:
+    """A row for each variant: our mean and interval, the other's, and where such means of 4 lie."""
+    none = found["no control"]
+    for (name, values), other in zip(found.items(), others, strict=True):
+        mean = mean_of(values)
+        fours = np.sort(values[random.integers(0, values.size, (20_000, 4))].mean(axis=1))
+        low, high = fours[[500, 19_499]]
+        # both are printed to two decimals, of which the last may be rounded
+        within = "yes" if low - 0.005 <= other <= high + 0.005 else "no"
+        less = "" if name == "no control" else interval(mean_of(values - none), "+.2f")
+        yield (
+            f"| {name} | {interval(mean, '.2f')} | {less} | {other:g} | {low:.2f} to {high:.2f} "
+            f"| {within} |"
+        )
+
+
+def interval(estimate: Estimate, spec: str) -> str:
+    """A mean with its interval."""
+    low, high = format(estimate.low, spec), format(estimate.high, spec)
+    return f"{estimate.value:{spec}} ({low} to {high})"
+
+
+def seaway_tables(crane: Crane, count: int) -> Iterator[str]:
+    """Swing of a load held abeam in beam seas."""
+    head = (
+        "| variant | this crane, mean (95 %) | less no control (95 %) | other crane, 4 seaways | "
+        "95 % of means of 4 of ours | within |\n|---|---|---|--:|---|---|"
+    )
+    random, seeds = np.random.default_rng(0), range(count)
+    if S175.exists():
+        hull = read_veres(S175)
+        variants = cases(crane, FACTORS, True)
+        for name, others in SEAS.items():
+            print(name, flush=True)
+            found = measured(crane, Seaway(name, ship=hull), variants, seeds)
+            yield f"\n### S175, {name}, {count} seaways\n\n{head}"
+            yield from seaway_rows(found, others, random)
+        yield from switch_rows(crane, count, hull)
+    print("rolling hull", flush=True)
+    found = measured(crane, Seaway("ss3"), cases(crane, OTHERS, False), seeds)
+    yield f"\n### Hull that rolls at 13 s, ss3, {count} seaways\n\n{head}"
+    yield from seaway_rows(found, ROLLING, random)
+
+
+def switch_rows(crane: Crane, count: int, hull: object) -> Iterator[str]:
+    """No control with one switch changed at a time: brake, peak of the spectrum."""
+    none = {"no control": cases(crane, (1.0,), False)["no control"]}
+    yield "\n### No control, one switch changed\n\n| sea | as above | no brake | γ = 3.3 | both |"
+    yield "|---|--:|--:|--:|--:|"
+    for name in SEAS:
+        plain = Seaway(name, ship=hull)  # type: ignore[arg-type]
+        peaked = Spectrum(plain.spectrum.height, plain.spectrum.period, 3.3)
+        cells = [
+            interval(mean_of(measured(crane, sea, none, range(count), brake)["no control"]), ".2f")
+            for sea in (plain, Seaway(peaked, ship=hull))  # type: ignore[arg-type]
+            for brake in (True, False)
+        ]
+        yield f"| {name} | {cells[0]} | {cells[1]} | {cells[2]} | {cells[3]} |"
+
+
+# --- residual swing -------------------------------------------------------------------------------
+
+SLEWS = {  # ideal none, ZV; volts none, ZV, ZVD; inverse none, ZV, ZVD [deg]
+    0.1: (0.831, 0.014, 2.17, 0.201, 0.218, 0.842, 0.023, 0.292),
+    0.2: (1.258, 0.047, 4.44, 0.194, 0.193, 1.243, 0.056, 0.031),
+    0.5: (7.03, 0.204, 10.23, 0.799, 0.582, 6.95, 0.198, 0.072),
+    0.8: (12.51, 0.788, 14.89, 5.73, 3.81, 12.38, 0.780, 0.101),
+    1.0: (7.88, 0.543, 8.95, 11.23, 1.49, 7.75, 0.519, 0.609),
+}
+PATHS = {  # ideal joint ZV, ideal tip ZV, drives tip ZV and ZVD with a position loop of 1 /s [deg]
+    0.2: (0.047, 0.0001, 0.051, 0.070),
+    0.5: (0.204, 0.0031, 0.169, 0.087),
+    0.8: (0.788, 0.0171, 0.097, 0.182),
+    1.0: (0.543, 0.0327, 1.144, 0.368),
+}
+ZV, ZVD = control.JointShaper("zv"), control.JointShaper("zvd")
+TIP = control.TipShaper("zv")
+JOINTS = (
+    *(("ideal", None), ("ideal", ZV), ("volts", None), ("volts", ZV), ("volts", ZVD)),
+    *(("inverse", None), ("inverse", ZV), ("inverse", ZVD)),
+)
+TIPS = (
+    *(("ideal", ZV), ("ideal", TIP), ("inverse", TIP | control.PositionLoop(1.0))),
+    ("inverse", control.TipShaper("zvd") | control.PositionLoop(1.0)),
+)
+
+
+def slew_tables(crane: Crane) -> Iterator[str]:
+    """Residual swing after a slew of 45 degrees."""
+    for title, heads, variants, others in (
+        (
+            "Slew of 45°, rope 20 m, boom 45°: residual swing, this crane / other [deg]",
+            "ideal | ideal ZV | volts | volts ZV | volts ZVD | inverse | inverse ZV | inverse ZVD",
+            JOINTS,
+            SLEWS,
+        ),
+        (
+            "The same slew, path of the tip shaped [deg]",
+            "ideal, joints ZV | ideal, tip ZV | drives, tip ZV | drives, tip ZVD",
+            TIPS,
+            PATHS,
+        ),
+    ):
+        yield f"\n### {title}\n\n| stick | {heads} |\n|--:|{'--:|' * len(variants)}"
+        for part, numbers in others.items():
+            stick = Stick.trapezoid(slew=part, until={"slew_deg": 45.0}, length=160.0)
+            cells = []
+            for (actuation, law), other in zip(variants, numbers, strict=True):
+                run = crane.simulate(stick, control=law, actuation=actuation)  # type: ignore[arg-type]
+                cells.append(f"{run.residual_deg:.3g} / {other:g}")
+            yield f"| {part:g} | {' | '.join(cells)} |"
+
+
+MANEUVERS = (  # actuation, control, the other crane's residual and RMS in a seaway [deg]
+    ("ideal", "none", None, 9.77, 8.58),
+    ("volts", "none", None, 13.78, 12.30),
+    ("volts", "joints ZV", ZV, 5.98, 6.99),
+    ("inverse", "joints ZV", ZV, 1.14, 4.99),
+    ("inverse", "tip ZV", TIP, 0.33, 4.81),
+    ("inverse", "tip ZV + feedback", TIP | FEEDBACK, 0.55, 3.48),
+    ("ideal", "tip ZV + feedback", TIP | FEEDBACK, 0.43, 2.28),
+)
+
+
+def maneuver_table(crane: Crane, count: int) -> Iterator[str]:
+    """Slew, luff and hoist at once, calm and in seaways of the rolling hull."""
+    stick = Stick.trapezoid(
+        slew=0.8, luff=0.8, hoist=0.6, length=120.0,
+        until={"slew_deg": 90.0, "boom_deg": 52.7, "rope_m": 23.0},
+    )  # fmt: skip
+    yield "\n### Slew to 90°, luff from 38° to 52.7°, hoist from 28 m to 23 m"
+    yield f"\nIn {count} seaways of ss3 abeam, RMS from the stick's end on.\n"
+    yield "| drives | control | calm, residual | other | slew ends | seaways, RMS (95 %) | other |"
+    yield "|---|---|--:|--:|--:|--:|--:|"
+    for actuation, name, law, calm, sea in MANEUVERS:
+        how = {"control": law, "actuation": actuation, "boom_deg": 38.0, "rope_m": 28.0}
+        run = crane.simulate(stick, **how)  # type: ignore[arg-type]
+        swing = [
+            crane.simulate(stick, sea=Seaway("ss3", seed=seed), **how).rms_deg(run.stick_end)  # type: ignore[arg-type]
+            for seed in range(count)
+        ]
+        yield (
+            f"| {actuation} | {name} | {run.residual_deg:.2f} | {calm:g} | {run.slew_deg[-1]:.2f}° "
+            f"| {interval(mean_of(np.array(swing)), '.2f')} | {sea:g} |"
+        )
+
+
+def rope_table() -> Iterator[str]:
+    """Shapers tuned to a wrong rope, and one that knows the rope, along a straight path."""
+    from swashplate.crane import load_motion
+
+    yield "\n### Rope not as the shaper believes, straight path, residual swing to unshaped"
+    yield "\n| frequency to the shaper's | ZV | ZVD | EI | ZV, ZVD or EI that know the rope |"
+    yield "|--:|--:|--:|--:|--:|"
+    for ratio in (0.6, 0.8, 1.0, 1.2, 1.4):
+        rope = 20.0 / ratio**2
+        plain = _left(load_motion, rope, None, 20.0)
+        fixed = [_left(load_motion, rope, shape, 20.0) / plain for shape in ("zv", "zvd", "ei")]
+        live = [_left(load_motion, rope, shape, rope) / plain for shape in ("zv", "zvd", "ei")]
+        yield (
+            f"| {ratio:.0%} | {' | '.join(f'{each:.1%}' for each in fixed)} | "
+            f"{', '.join(f'{each:.1%}' for each in live)} |"
+        )
+
+
+def _left(march: object, rope: float, shape: str | None, tuned: float) -> float:
+    """Residual swing [rad] of a tip that is moved along a line, shaped for a rope."""
+    rate, half = 512.0, np.pi * np.sqrt(tuned / 9.80665)
+    time = np.arange(round(90.0 * rate)) / rate
+    impulses = control.IMPULSES[shape] if shape else (1.0,)
+    tip = np.zeros((time.size, 3))
+    for k, share in enumerate(impulses):
+        # 0.5 m/s for 3 s with ramps of 0.5 s: small, so that the swing is linear
+        begun = np.interp(time - 1.0 - k * half, [0.0, 0.5, 3.0, 3.5], [0.0, 0.5, 0.5, 0.0])
+        tip[:, 0] += share * np.cumsum(begun) / rate
+    load = march(tip, np.full(time.size, rope), rate).position  # type: ignore[operator]
+    late = time > 1.0 + 3.5 + 2.0 * half + 0.1
+    return float(np.abs(load[late, 0] - tip[late, 0]).max() / rope)
+
+
+# --- page -----------------------------------------------------------------------------------------
+
+BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
+
+
+def main() -> None:
+    """Compute all tables, print them, and on request put them into the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=200)
+    parser.add_argument("--write", action="store_true", help=f"update {PAGE.name}")
+    arguments = parser.parse_args()
+    crane = Crane.preset("tg3637")
+    lines = [
+        *slew_tables(crane),
+        *maneuver_table(crane, min(arguments.seeds, 40)),
+        *rope_table(),
+        *seaway_tables(crane, arguments.seeds),
+    ]
+    print("\n".join(lines))
+    if arguments.write:
+        before, rest = PAGE.read_text("utf-8").split(BEGIN)
+        after = rest.split(END)[1]
+        PAGE.write_text(before + BEGIN + "\n".join(["", *lines, ""]) + END + after, "utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,340 @@
+"""Live page of a drive: one HTML file in which it runs, with sliders beside what was measured."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Iterable, Sequence
+from datetime import date
+from math import isfinite
+from pathlib import Path
+from typing import Any
+from zlib import compress
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.analysis.whatif import LEVERS
+from swashplate.campaign import Campaign, Channel, Experiment
+from swashplate.campaign.speed import DIFFERENTIATOR, LOW_PASS, speed_of
+from swashplate.drive import Drive
+from swashplate.equations.marching.record import Record, record_of
+from swashplate.errors import InputError
+from swashplate.export import exported_drive, values_of
+from swashplate.export.libraries import WASM, packaged
+from swashplate.identification.drive_model import SIGNALS, at_rate_of, voltage_record
+from swashplate.identification.validation import ignored_windows
+from swashplate.maneuvers import Maneuver
+from swashplate.parameters.parameter_set import HasParameters, Parameter, ParameterSet, set_of
+from swashplate.report.fit_report.page import rendered, resource, script_json
+from swashplate.report.fit_report.runs import packed
+from swashplate.report.lines import SHADES, gap_rows
+from swashplate.report.style import in_lines
+from swashplate.simulation.result import Limit
+from swashplate.tables import listed, write_text
+from swashplate.units import DisplayUnit, display_unit, unit_text
+
+Array = NDArray[np.float64]
+
+SPAN = 4.0
+"""Factor by which a slider goes below and above the present value."""
+SHOWN = ("orifice", "pump", "supply_pressure", "rate_limits", "dead_zone", "plussing")
+"""Levers that have a slider of their own; each parameter has one too."""
+BEFORE_CURRENT = Limit.DEAD_ZONE | Limit.CURRENT_RATE
+"""Limits that are shaded behind a current; the others are behind what the pump does."""
+UNMEASURED = ("current", "shaft_speed")
+"""Signals that are shown of a command alone."""
+
+
+def write_live_page(
+    drive: ParameterSet | HasParameters,
+    path: str | Path,
+    *,
+    campaign: Campaign | None = None,
+    axis: str | None = None,
+    command: Maneuver | None = None,
+    rate: float = 512.0,
+    name: str = "drive.toml",
+) -> tuple[str, ...]:
+    """Write the live page of a drive: one HTML file, whole or not at all, that needs no network.
+
+    The drive runs in the reader's browser, from the equations' C source as WebAssembly. Parameters
+    and levers have sliders; the curves, their errors and the limits follow at once.
+
+    Parameters
+    ----------
+    drive : Drive, ParameterSet or a fit
+        What the sliders begin at.
+    path : path
+        The file, which replaces an older one.
+    campaign : Campaign, optional
+        Its runs with a voltage as their input are shown beside what the drive makes of them.
+    axis : str, optional
+        The axis, where the campaign has several.
+    command : Maneuver, optional
+        A voltage that the drive is simulated under where there is no campaign.
+    rate : float
+        At which the command is sampled. [Hz]
+    name : str
+        File that the changed values belong to, for the page's words.
+
+    Returns
+    -------
+    tuple of str
+        Sentences on what the page leaves out or changes.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to simulate: no run is driven by a voltage, or neither a campaign nor a
+        command is given; or the drive has an equation of its own.
+    FileError
+        If the file cannot be written.
+    """
+    parameters = set_of(drive)
+    if campaign is not None:
+        tests = campaign.select(axis=axis)
+        driven = [each for each in tests if each.input.kind == "voltage"]
+        if not driven:
+            raise InputError(
+                f"{campaign.path.name} has no run that a voltage drives; a live page needs one."
+            )
+        parameters, said = at_rate_of(driven, parameters)
+        left = [each.name for each in tests if each.input.kind != "voltage"]
+        if left:
+            said += (f"Left out, driven by something else than a voltage: {listed(left)}.",)
+        made = live_page(parameters, driven, campaign.title, campaign.virtual, name)
+    elif command is not None:
+        record, said = record_of(command.sample(rate), rate, what="voltage"), ()
+        run = {**_record(record), "name": command.name, "role": "", "channels": []}
+        made = _page(parameters, [run], parameters.title or parameters.name, False, name)
+    else:
+        raise InputError("A live page needs the runs of a campaign, or a command to simulate.")
+    write_text(made, path)
+    return said
+
+
+def live_page(
+    parameters: ParameterSet,
+    experiments: Sequence[Experiment],
+    title: str,
+    virtual: bool,
+    name: str,
+) -> str:
+    """HTML of a live page beside runs that a voltage drives; see `write_live_page`."""
+    return _page(parameters, [_run(each) for each in experiments], title, virtual, name)
+
+
+def _page(
+    parameters: ParameterSet,
+    runs: Sequence[dict[str, Any]],
+    title: str,
+    virtual: bool,
+    name: str,
+) -> str:
+    if parameters.equations:
+        raise InputError(
+            f"{parameters.name} has an equation of its own, which the WebAssembly of the package "
+            "does not have: export its C source with swashplate.export.c."
+        )
+    exported = exported_drive()
+    limits = [(1 << k, Limit[name.upper()]) for k, (_, name) in enumerate(exported.limits)]
+    values = parameters_of(parameters)
+    before = "as fitted" if any(each["main"] for each in values) else "as it is"
+    content = {
+        "wasm": b64encode(packaged(WASM)).decode("ascii"),
+        "values": _doubles(values_of(Drive(parameters), runs[0]["step"])),
+        "parameters": values,
+        "levers": _levers(values),
+        "outputs": [{"name": each, "number": k} for k, each in enumerate(exported.names)],
+        "limits": [[bit, _word(limit)] for bit, limit in limits],
+        "before": before,
+        "filter": {"low": LOW_PASS, "high": DIFFERENTIATOR},
+        "unmeasured": [_shown(each) for each in UNMEASURED],
+        "runs": runs,
+    }
+    colours = "".join(
+        f".stack .{_word(limit)} {{ fill: {SHADES[limit].color}; }}\n" for _, limit in limits
+    )
+    return rendered(
+        "live.html",
+        ("curves.js", "live.js"),
+        resource("live.css") + colours,
+        data=script_json(content),
+        title=title,
+        drive=parameters.title or parameters.name,
+        virtual=virtual,
+        measured=any(run["channels"] for run in runs),
+        fitted=before == "as fitted",
+        before=before,
+        limits=[(SHADES[limit].name, SHADES[limit].color) for limit in SHADES],
+        date=f"{date.today():%d %B %Y}",
+        file=name,
+    )
+
+
+def can_run(parameters: ParameterSet, experiment: Experiment) -> bool:
+    """Whether a page can run a drive as it is beside a run: see `write_live_page`."""
+    driven = experiment.input.kind == "voltage" and not parameters.equations
+    return driven and not at_rate_of([experiment], parameters)[1]
+
+
+# --- parameters and levers ------------------------------------------------------------------------
+
+
+def parameters_of(parameters: ParameterSet) -> list[dict[str, Any]]:
+    """Every value of a set: its number in C, its words, and the ends of its slider."""
+    names = [name for _, _, name in exported_drive().named("parameters")]
+    numbers = {name: k for k, name in enumerate(names)}
+    made = []
+    for parameter in parameters.values():
+        definition = parameter.definition
+        sides = ("", "") if len(definition.columns) == 1 else (", positive", ", negative")
+        for column, side, value in zip(definition.columns, sides, parameter.values, strict=False):
+            if column not in numbers:
+                continue  # of an equation of one's own
+            unit = _unit(definition.unit)
+            made.append(
+                {
+                    "number": numbers[column],
+                    "symbol": parameter.symbol,
+                    "column": column,
+                    "block": definition.block,
+                    "words": f"{definition.name}{side}",
+                    "si": definition.unit,
+                    "unit": unit.name,
+                    "factor": unit.factor,
+                    "value": value if isfinite(value) else 1e30,
+                    "range": slider(parameter, value),
+                    "main": parameter.status == "fitted",
+                }
+            )
+    return made
+
+
+def _unit(si: str) -> DisplayUnit:
+    """Unit of people for a parameter: mm, bar and degrees; SI for the others."""
+    return (
+        display_unit(si, 1e5 if si == "Pa" else 0.0)
+        if si in ("m", "Pa", "rad")
+        else (DisplayUnit(unit_text(si), 1.0))
+    )
+
+
+def slider(parameter: Parameter, value: float) -> tuple[float, float] | None:
+    """Ends of a value's slider; None where no factor moves it. SI"""
+    if parameter.own_bounds is not None and all(map(isfinite, parameter.own_bounds)):
+        low, high = parameter.own_bounds
+        return (low, high) if low < high else None
+    if value == 0.0 or not isfinite(value):
+        return None
+    low, high = sorted((value / SPAN, value * SPAN))
+    definition = parameter.definition
+    return max(low, definition.lower), min(high, definition.upper)
+
+
+def _levers(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Levers with the numbers that they move and the powers with which they do."""
+    made = []
+    for name in SHOWN:
+        lever = LEVERS[name]
+        moves = [
+            (each["number"], lever.powers[key])
+            for each in values
+            for key in (each["symbol"], each["column"])
+            if key in lever.powers and each["value"] not in (0.0, 1e30)
+        ]
+        if moves:
+            words = name.replace("_", " ").capitalize()
+            ends = (1.0 / SPAN, SPAN)
+            made.append({"name": name, "words": words, "moves": moves, "range": ends})
+    return made
+
+
+# --- runs -----------------------------------------------------------------------------------------
+
+
+def _run(experiment: Experiment) -> dict[str, Any]:
+    record = voltage_record(experiment)
+    channels = [_channel(each) for each in _comparable(experiment.channels.values())]
+    return {
+        **_record(record),
+        "name": experiment.name,
+        "role": experiment.role,
+        "steady": experiment.begins == "steady",
+        "channels": channels,
+    }
+
+
+def _record(record: Record) -> dict[str, Any]:
+    """A voltage as the page takes it, rounded to four bytes: far finer than any converter."""
+    planes = record.values.astype("<f4").view(np.uint8).reshape(-1, 4).T.tobytes()
+    return {
+        "start": record.start,
+        "step": record.step,
+        "voltage": b64encode(compress(planes, 9)).decode("ascii"),
+    }
+
+
+def _comparable(channels: Iterable[Channel]) -> list[Channel]:
+    """Channels that a drive simulates; of a position its speed, if the filters take its stamps."""
+    made = []
+    for channel in channels:
+        if channel.kind not in SIGNALS or not channel.used.any():
+            continue
+        if channel.is_position:
+            try:
+                speed_of(channel, "exact")
+            except InputError:
+                continue
+        made.append(channel)
+    return made
+
+
+def _channel(channel: Channel) -> dict[str, Any]:
+    """A measured channel with what it is compared with."""
+    signal, values, unit = SIGNALS[channel.kind], channel.values, channel.unit
+    name = channel.name
+    if channel.is_position:
+        values, unit = speed_of(channel, "exact").speed, f"{channel.unit}/s"
+        name = f"speed from {channel.name}"
+    also = ""
+    if signal == "current_sum":
+        signal, also = "current_positive", "current_negative"
+    shown = _shown(signal, name, unit, float(np.abs(values).max(initial=0.0)))
+    interval = float(np.median(np.diff(channel.time)))
+    return {
+        **shown,
+        "also": also,
+        "speed": channel.is_position,
+        "time": packed(channel.time, interval / 2**20),
+        "measured": packed(shown["factor"] * values),
+        "breaks": [int(each) for each in gap_rows(channel.time)],
+        "ignored": ignored_windows(channel),
+    }
+
+
+def _shown(signal: str, name: str = "", unit: str = "", size: float = 0.0) -> dict[str, Any]:
+    """A signal's panel: label, unit of people, limits that are shaded behind it."""
+    unit = unit or {"current": "A", "shaft_speed": "rad/s"}[signal]
+    shown = display_unit(unit, size)
+    words = name or signal.replace("_", " ")
+    electric = "current" in signal
+    shaded = [_word(each) for each in Limit if bool(each & BEFORE_CURRENT) == electric]
+    return {
+        "signal": signal,
+        "name": words,
+        "unit": shown.name,
+        "factor": shown.factor,
+        "label": in_lines(shown.label(words), 24),
+        "residual": in_lines(shown.label("residual"), 14),
+        "shaded": shaded,
+    }
+
+
+def _word(limit: Limit) -> str:
+    """A limit's name as a class of the page."""
+    return str(limit.name).lower().replace("_", "-")
+
+
+def _doubles(values: Array) -> str:
+    return b64encode(np.ascontiguousarray(values, "<f8").tobytes()).decode("ascii")

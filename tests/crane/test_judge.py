@@ -1,0 +1,249 @@
+"""Judgment over seaways, sweeps, and what the axes can follow."""
+
+from math import pi, radians
+
+import numpy as np
+import pytest
+
+from swashplate import Campaign, Drive
+from swashplate.analysis.monte_carlo import independent_drives, stored_draws
+from swashplate.campaign import rig
+from swashplate.crane import (
+    Crane,
+    Seaway,
+    Stick,
+    control,
+    follow,
+    judge,
+    operability,
+    orifices,
+    residuals,
+    sectors,
+)
+from swashplate.crane.judgment import mean_of, share_of
+from swashplate.crane.study import PUMPS
+from swashplate.errors import InputError
+from swashplate.executors import Processes, Serial, Threads
+from swashplate.identification.assessment import Judged
+from swashplate.identification.fitting import fit
+from swashplate.identification.setup import Free, Setup, load_setup
+from swashplate.maneuvers import source_tests
+
+MEANT = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.PositionLoop(1.5)
+SHORT = {"length": 70.0, "start": 40.0}
+
+
+@pytest.fixture(scope="module")
+def crane():
+    return Crane.preset("tg3637")
+
+
+@pytest.fixture(scope="module")
+def judged(crane):
+    return judge(crane, MEANT, seeds=range(6), allowed=0.2, **SHORT)
+
+
+def test_numbers_are_those_of_whole_runs(judged):
+    run = judged.run("identified", 3)
+    counted = run.swing_deg[round(40.0 * 512) :]
+    assert judged.rms("identified")[3] == pytest.approx(radians(run.rms_deg(40.0)), rel=1e-12)
+    assert judged.largest("identified")[3] == pytest.approx(radians(counted.max()), rel=1e-12)
+    # limits: against each drive simulated by itself
+    for k, axis in enumerate(("hoist", "slew", "luff")):
+        for i, limit in enumerate(PUMPS):
+            share = run.drive(axis).active(limit)[round(40.0 * 512) :].mean()
+            assert judged.values[3, 2, 2 + 5 * k + i] == pytest.approx(share, abs=1e-12)
+
+
+@pytest.mark.parametrize("executor", [Serial(), Threads(1), Threads(3)], ids=["one", "1", "3"])
+def test_numbers_do_not_depend_on_who_runs_them(crane, judged, executor):
+    again = judge(crane, MEANT, seeds=[3, 5], remedies=False, executor=executor, **SHORT)
+    np.testing.assert_array_equal(again.values, judged.values[[3, 5]])
+
+
+@pytest.mark.slow
+def test_processes_give_the_same_numbers(crane, judged):
+    again = judge(crane, MEANT, seeds=range(4), remedies=False, executor=Processes(2), **SHORT)
+    np.testing.assert_array_equal(again.values, judged.values[:4])
+
+
+def test_verdict_and_what_would_do(crane, judged):
+    assert not judged.passed
+    assert judged.names == ("no control", "ideal", "identified")
+    assert "of 6 seaways" in judged.verdict()
+    assert "luff at its acceleration limit" in judged.verdict()
+    factor = next(each for each in judged.remedies if "orifice" in each.what)
+    assert f"Luff orifice ×{factor.size:g}" in judged.verdict()
+    # the remedy, judged by itself, passes; and the next smaller one was tried and did not
+    larger = crane.with_drive(luff=crane.luff.scale(Z16=factor.size))
+    upgraded = judge(crane, MEANT, seeds=range(6), drives={"larger": larger}, allowed=0.2, **SHORT)
+    assert upgraded.passed
+    assert upgraded.difference("larger").value < 0.0
+    assert upgraded.worse("larger") == factor.worse
+    assert any("orifice" in each for each in judged.tried) or factor.size == 1.25
+    assert "brings the swing from" in upgraded.verdict()
+
+
+def test_differences_are_paired(judged):
+    found = judged.difference("identified", "ideal")
+    assert found.value == pytest.approx(
+        judged.rms("identified").mean() - judged.rms("ideal").mean(), rel=1e-12
+    )
+    assert found.low < found.value < found.high
+    rows = {(row.cells[0], row.cells[1]): row.cells[2] for row in judged.tables()[1].rows}
+    assert rows["identified", "ideal"] == found.value
+    frame = judged.to_polars()
+    assert frame.height == 18
+    assert frame.filter(variant="ideal")["rms_swing"].to_numpy() == pytest.approx(
+        judged.rms("ideal")
+    )
+
+
+def test_intervals_against_published_tables():
+    # Student, 4 degrees of freedom: 2.776; values 1 to 5 have a standard error of √0.5
+    found = mean_of(np.array([1.0, 2.0, 3.0, 4.0, 5.0, np.nan]))
+    assert found.value == 3.0
+    assert found.high - found.value == pytest.approx(2.776 * 0.5**0.5, abs=1e-3)
+    # Clopper and Pearson: 0 of 20 and 5 of 20
+    none = share_of(np.zeros(20, dtype=bool))
+    assert (none.low, none.high) == pytest.approx((0.0, 0.1684), abs=1e-4)
+    some = share_of(np.arange(20) < 5)
+    assert (some.low, some.high) == pytest.approx((0.0866, 0.4910), abs=1e-4)
+
+
+def test_a_stopped_run_counts_as_worse(crane):
+    # lowering while the load is held 3 m above the longest rope ends beyond it
+    stick = Stick.trapezoid(hoist=-0.5, duration=30.0, length=40.0)
+    found = judge(
+        crane, {"none": control.Clip()}, seeds=[0], stick=stick, start=5.0, rope_m=47.0,
+        remedies=False,
+    )  # fmt: skip
+    assert np.isnan(found.rms("no control")).all()
+    assert found.tables()[0].rows[0].cells[-1] == 1
+
+
+def test_axes_follow_what_speed_and_acceleration_allow(crane):
+    found = follow(crane, [5.0, 7.5, 60.0], boom_deg=45.0)
+    # of an independent model of this crane: tip 0.110 m/s² upwards, 0.454 m/s along the boom
+    omega = 2.0 * pi / np.array([5.0, 7.5, 60.0])
+    allowed = np.minimum(0.454 / omega, 0.110 / omega**2)
+    np.testing.assert_allclose(found.amplitude[:, 2], allowed, rtol=0.01)
+    assert found.amplitude[1, 2] == pytest.approx(0.157, abs=1e-3)
+    assert (found.simulated[:2] > found.amplitude[:2, 2]).all()
+    assert found.simulated[0] < found.simulated[1]
+    # the hull that rolls at 13 s asks for this much along the boom, of the same model
+    asked = [found.seas[each].amplitude[2] for each in ("ss3", "ss3-swell", "ss4")]
+    np.testing.assert_allclose(asked, [0.75, 1.65, 2.1], rtol=0.06)
+
+
+def test_demand_is_that_of_simulated_motion(crane):
+    sea = Seaway("ss3", seed=2)
+    motion = sea.motion(2000 * 8 + 1, 8.0)
+    g, pose = crane.geometry, follow(crane, [7.5]).pose
+    reach = g.foot + g.boom * np.cos(pose.boom)
+    along = motion[:, 1] - motion[:, 3] * (g.axis.z + g.boom * np.sin(pose.boom))
+    along = along + motion[:, 5] * (g.axis.x + reach * np.cos(pose.slew))
+    asked = follow(crane, [7.5], seas=("ss3",)).seas["ss3"]
+    # 270 waves: a standard deviation is good to about 10 %
+    assert 2.0 * along.std() == pytest.approx(asked.amplitude[2], rel=0.2)
+
+
+def test_boom_along_the_ship_is_calm_where_the_slew_does_the_work(crane):
+    found = sectors(crane, MEANT, bearings=[0.0, 90.0], seeds=[0], drives=("identified",), **SHORT)
+    mean = found.mean()
+    assert found.names == ("no control", "identified")
+    assert mean[0, 1] < 0.2 * mean[0, 0]
+    assert mean[1, 1] > mean[0, 1]
+
+
+def test_swing_without_control_is_proportional_to_small_waves(crane):
+    found = operability(crane, MEANT, heights=[0.05, 0.1], seeds=[0, 1], **SHORT)
+    swing = found.values[:, :, 0, 0]
+    # what is left is of second order in the height: half a per cent here
+    np.testing.assert_allclose(swing[:, 1] / swing[:, 0], 2.0, rtol=1e-2)
+    assert found.below(90.0).min() == 1.0
+
+
+def test_orifice_is_that_of_another_luff_drive(crane):
+    found = orifices(crane, MEANT, factors=[1.0, 3.0], seeds=[1], **SHORT)
+    larger = crane.with_drive(luff=crane.luff.scale(Z16=3.0))
+    alone = judge(crane, MEANT, seeds=[1], drives={"larger": larger}, remedies=False, **SHORT)
+    assert found.values[0, 1, 2, 0] == alone.rms("larger")[0]
+    assert found.values[0, 0, 0, 0] == found.values[0, 1, 0, 0] == alone.rms("no control")[0]
+
+
+def test_residuals_over_the_stick_are_those_of_runs(crane):
+    shaper = control.JointShaper("zv")
+    found = residuals(crane, {"volts": ("volts", None), "ZV": ("volts", shaper)}, sticks=[0.5, 1.0])
+    # of an independent model: a shaper on the volts is worse than none at full stick
+    np.testing.assert_allclose(np.degrees(found.values), [[10.23, 0.799], [8.95, 11.23]], rtol=0.01)
+    np.testing.assert_allclose(np.degrees(found.reached[1]), [46.11, 62.02], rtol=0.002)
+
+
+# --- drives of fits -------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """The folder of a small fit of a virtual luff drive."""
+    place = tmp_path_factory.mktemp("fit")
+    names = ("step +4 V", "step +9 V", "sine 4 V 0.1 Hz")
+    virtual = rig.run("luff", {name: source_tests("luff")[name] for name in names}, seed=3)
+    path = rig.write(virtual, place / "virtual")
+    campaign = Campaign.from_toml(path)
+    (stage,) = (each for each in load_setup("luff").stages if each.name == "pump")
+    free = {"Z16": Free(relative=(0.5, 2.0))}
+    setup = Setup(stages=(stage.model_copy(update={"free": free, "forces": None}),))
+    result = fit(Drive.preset("luff").parameters, campaign.experiments, setup)
+    Judged(campaign, result, campaign.experiments).store(place / "fit.json")
+    result.drive.to_toml(place / "drive.toml")
+    return place, result
+
+
+@pytest.mark.slow
+def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
+    place, result = fitted
+    own = crane.with_drive(luff=place)
+    assert own.luff.parameters.numbers == pytest.approx(result.drive.parameters.numbers, rel=1e-9)
+    given = crane.with_drive(luff=result)
+    assert given.luff.parameters.numbers == result.drive.parameters.numbers
+    assert crane.with_drive(luff="hoist").luff.name == "hoist"
+    drawn = own.drawn(luff=stored_draws(place, draws=3, seed=1))
+    assert len(drawn) == 3
+    found = judge(
+        own, MEANT, seeds=range(4), drives={"drawn": drawn}, remedies=False, length=30.0, start=10.0
+    )
+    # the first and the fourth seaway have the first crane
+    alone = judge(
+        own, MEANT, seeds=[3], drives={"one": drawn[0]}, remedies=False, length=30.0, start=10.0
+    )
+    assert found.rms("drawn")[3] == alone.rms("one")[0]
+    assert found.rms("drawn")[1] != alone.rms("one")[0]
+
+
+def test_cranes_are_drawn_axis_by_axis(crane):
+    hoist = independent_drives(crane.hoist, {"Z16": 1e-5}, 3)
+    luff = independent_drives(crane.luff, {"Z16": 1e-5}, 2)
+    drawn = crane.drawn(hoist=hoist, luff=luff)
+    assert [each.luff for each in drawn] == list(luff.drives)
+    assert [each.hoist for each in drawn] == list(hoist.drives[:2])
+    with pytest.raises(InputError, match="draws of at least one axis"):
+        crane.drawn()
+
+
+def test_what_makes_no_study_is_said(crane):
+    def refuse(message, **how):
+        with pytest.raises(InputError, match=message):
+            judge(crane, MEANT, **{"seeds": [0], **how})
+
+    refuse("at least one seed", seeds=[])
+    refuse("no drives 'fast'; there are ideal, identified", drives=("fast",))
+    refuse("one controller and one set of drives", drives=())
+    refuse("empty list of cranes", drives={"drawn": []})
+    refuse("counts from 40 s on, but a run is 30 s long", length=30.0)
+    refuse("allowed is 2, but is a share", allowed=2.0)
+    refuse("boom of tg3637 stands at 85 deg", boom_deg=85.0)
+    with pytest.raises(InputError, match="Periods to follow must be above 0 s"):
+        follow(crane, [0.0])
+    with pytest.raises(InputError, match="Heights of waves must be one or more finite"):
+        operability(crane, MEANT, heights=[-1.0])
