@@ -51,8 +51,8 @@ def export(
 ) -> None:
     """Take a drive along: as an FMU, as C source, or as WebAssembly.
 
-    The FMU runs in Simulink, OpenModelica, FMPy and other importers without Python and
-    without a compiler: the package brings its libraries along.
+    An FMU needs neither Python nor a compiler where it runs, and none is
+    needed to write it: the package brings its libraries along.
 
     For example:
       swashplate export hoist --fmu hoist.fmu
