@@ -101,7 +101,7 @@ def interval(estimate: Estimate, spec: str) -> str:
 
 
 def seaway_tables(crane: Crane, count: int) -> Iterator[str]:
-    """Swing of a load held abeam in beam seas."""
+    """Swing of a load kept abeam in beam seas."""
     head = (
         "| variant | this crane, mean (95 %) | less no control (95 %) | other crane, 4 seaways | "
         "95 % of means of 4 of ours | within |\n|---|---|---|--:|---|---|"

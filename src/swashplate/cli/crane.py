@@ -62,7 +62,7 @@ app = typer.Typer(
 )
 
 HELD = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0}
-"""Where a load is held while seaways pass."""
+"""Where a load is kept while seaways pass."""
 CraneWord = Annotated[str, argument("CRANE|FILE.toml", "A packaged crane, tg3637, or your own.")]
 
 
@@ -84,7 +84,7 @@ DriveWords = Annotated[
 ]
 HeldAt = Annotated[
     list[str] | None,
-    option("Where the load is held: slew_deg=90, boom_deg=45, rope_m=27.", metavar="NAME=VALUE"),
+    option("Where the load is kept: slew_deg=90, boom_deg=45, rope_m=27.", metavar="NAME=VALUE"),
 ]
 Seeds = Annotated[int, option("Number of seaways.", min=1)]
 

@@ -313,7 +313,7 @@ def sectors(
     progress: Progress | None = None,
     **more: Any,
 ) -> Sweep:
-    """Swing over the bearing of the boom, held there, without control and with it.
+    """Swing over the bearing of the boom, at rest there, without control and with it.
 
     Parameters are those of `judge`; `bearings` [deg] from the bow to starboard.
     """

@@ -69,10 +69,10 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
 
 def svg(figure: Figure) -> Markup:
     """A figure as SVG within a page, as wide as there is room."""
-    held = StringIO()
+    written = StringIO()
     with rc_context({"svg.hashsalt": "swashplate"}):
-        figure.savefig(held, format="svg", metadata={"Date": None})
-    drawn = held.getvalue()
+        figure.savefig(written, format="svg", metadata={"Date": None})
+    drawn = written.getvalue()
     return Markup(
         drawn[drawn.index("<svg") :].replace(
             "<svg", '<svg class="chart" style="min-width: 600px"', 1
