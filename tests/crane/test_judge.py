@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swashplate import Campaign, Drive
-from swashplate.analysis.monte_carlo import independent_drives, stored_draws
+from swashplate.analysis.monte_carlo import Draws, stored_draws
 from swashplate.campaign import rig
 from swashplate.crane import (
     Crane,
@@ -222,8 +222,8 @@ def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
 
 
 def test_cranes_are_drawn_axis_by_axis(crane):
-    hoist = independent_drives(crane.hoist, {"Z16": 1e-5}, 3)
-    luff = independent_drives(crane.luff, {"Z16": 1e-5}, 2)
+    hoist = Draws(tuple(crane.hoist.scale(Z16=each) for each in (0.9, 1.0, 1.1)), 0)
+    luff = Draws(tuple(crane.luff.scale(Z16=each) for each in (0.8, 1.2)), 0)
     drawn = crane.drawn(hoist=hoist, luff=luff)
     assert [each.luff for each in drawn] == list(luff.drives)
     assert [each.hoist for each in drawn] == list(hoist.drives[:2])

@@ -291,7 +291,9 @@ def sectors(
     sea: SeaWord = "ss3,90",
     ship: ShipFile = None,
     seeds: Seeds = 4,
-    step: Annotated[float, option("Between two bearings.", metavar="DEG", min=1.0)] = 15.0,
+    step: Annotated[
+        float, option("Between two bearings.", metavar="DEG", min=1.0, max=180.0)
+    ] = 15.0,
     drives: Annotated[
         str, option("ideal, identified, drawn; as of 'judge'.", metavar="NAMES")
     ] = "ideal,identified",

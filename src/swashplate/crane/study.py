@@ -277,6 +277,7 @@ def _swept(
     points: Sequence[Mapping[str, Case]],
     crane: Crane,
     sea: Seaway,
+    *,
     seeds: Sequence[int],
     spans: tuple[float, float],
     executor: Executor | None,
@@ -325,8 +326,16 @@ def sectors(
         points.append({NONE: none, **cases_of(crane, control, drives, how)})
     spans = length, start
     return _swept(
-        "bearing", np.radians(grid), points, crane, seaway_of(sea), seeds, spans, executor, progress
-    )  # fmt: skip
+        "bearing",
+        np.radians(grid),
+        points,
+        crane,
+        seaway_of(sea),
+        seeds=seeds,
+        spans=spans,
+        executor=executor,
+        progress=progress,
+    )
 
 
 def operability(
@@ -360,7 +369,17 @@ def operability(
     ]
     base = replace(seaway_of(sea), sea=Spectrum(1.0, period))
     spans = length, start
-    return _swept("height", grid, points, crane, base, seeds, spans, executor, progress)
+    return _swept(
+        "height",
+        grid,
+        points,
+        crane,
+        base,
+        seeds=seeds,
+        spans=spans,
+        executor=executor,
+        progress=progress,
+    )
 
 
 def orifices(
@@ -398,8 +417,16 @@ def orifices(
         points.append({**common, **own})
     spans = length, start
     return _swept(
-        "orifice", grid, points, crane, seaway_of(sea), seeds, spans, executor, progress
-    )  # fmt: skip
+        "orifice",
+        grid,
+        points,
+        crane,
+        seaway_of(sea),
+        seeds=seeds,
+        spans=spans,
+        executor=executor,
+        progress=progress,
+    )
 
 
 def _rising(what: str, given: ArrayLike, above: float = -np.inf) -> Array:
