@@ -85,7 +85,7 @@ def test_one_run_that_contradicts_the_others_is_named(quality: Make) -> None:
     assert not found.usable
     failed = criterion(found, "predicted runs worse than mean")
     assert failed.value == "1"
-    assert "mean in turned: it contradicts the other runs" in failed.failure
+    assert "mean of the run: y in turned, which contradicts the other runs" in failed.failure
 
 
 def test_large_residuals_that_follow_the_input_are_a_model_error(quality: Make) -> None:

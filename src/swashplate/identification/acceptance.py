@@ -43,7 +43,8 @@ MOST = 0.5
 """Share of parameters without a value of their own from which a fit has found nothing."""
 MOVES = 0.05
 """A run that moves by less than this part of the channel's movement is not judged by itself; where
-the measurement error is known, by less than five times that."""
+the measurement error is known, by less than five times that beyond the range of the noise alone."""
+STANDS_OUT = 5.0
 MISFIT = 1.2
 """Residuals over their known measurement error from which there is lack of fit: 37 of 39 sound
 campaigns of slew lay between 0.97 and 1.02; in two the search ended in another optimum."""
@@ -155,10 +156,13 @@ def no_worse_than_mean(qualities: Sequence[RunQuality], which: str) -> Criterion
     worse = [each for each in qualities if _is_worse(each, found[each.channel])]
     failure = ""
     if worse:
-        names = listed(list(dict.fromkeys(each.experiment.name for each in worse)))
+        runs: dict[str, list[str]] = {}
+        for each in worse:
+            runs.setdefault(each.channel, []).append(each.experiment.name)
+        words = listed([f"{name} in {listed(names)}" for name, names in runs.items()])
         failure = (
-            f"{worse[0].channel} is simulated no better than by its mean in {names}: it "
-            "contradicts the other runs, or shows what the model has not"
+            f"simulated no better than by the mean of the run: {words}, which contradicts the "
+            "other runs, or shows what the model has not"
         )
     return Criterion(
         f"{which} runs worse than mean",
@@ -172,9 +176,13 @@ def no_worse_than_mean(qualities: Sequence[RunQuality], which: str) -> Criterion
 
 def _is_worse(quality: RunQuality, pool: Measures) -> bool:
     own, channel = quality.measures, quality.experiment[quality.channel]
-    error = measurement_error(channel)
-    range_ = float(np.ptp(channel.values[channel.used]))
-    moves = own.spread > MOVES * pool.spread if error is None else range_ > 5.0 * error
+    error, values = measurement_error(channel), channel.values[channel.used]
+    if error is None:
+        moves = own.spread > MOVES * pool.spread
+    else:
+        # what noise alone reaches both ways in so many samples is no movement
+        noise = 2.0 * np.sqrt(2.0 * np.log(max(values.size, 2)))
+        moves = float(np.ptp(values)) > (STANDS_OUT + noise) * error
     return moves and (own.nrmse or 0.0) >= 1.0
 
 
