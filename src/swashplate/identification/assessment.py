@@ -533,7 +533,7 @@ def _same(campaign: Campaign, name: str, mark: str, path: str | Path) -> Experim
     if fingerprint(experiment) != mark:
         raise InputError(
             f"The run '{name}' of {campaign.path} is not as it was when {path} was fitted (its "
-            "samples, weights or ignored windows differ): name the campaign that was fitted, or fit "
-            "again."
+            "samples, weights or ignored windows differ): name the campaign that was fitted, or "
+            "fit again."
         )
     return experiment
