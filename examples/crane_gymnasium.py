@@ -4,9 +4,10 @@ An episode brings the load to a slew angle in calm water. Observed are the joint
 offset from the tip with its rates, and what is left to go; an action is three voltages over ±10,
 applied for 32 samples. Needs `gymnasium`, which the package does not.
 
-    python examples/crane_gymnasium.py
+    .venv/bin/python examples/crane_gymnasium.py
 """
 
+# %%
 from math import radians
 from typing import Any
 
@@ -15,10 +16,12 @@ import numpy as np
 
 from swashplate.crane import Crane
 
+# %%
 SAMPLES, SECONDS, TARGET = 32, 40.0, radians(45.0)
 """Samples of an action, length of an episode, slew that is wanted."""
 
 
+# %%
 class CraneEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     """The TG3637 on its identified drives; reward is minus squared swing and squared error."""
 
@@ -56,6 +59,7 @@ class CraneEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return seen, reward, False, self.time >= SECONDS, {}
 
 
+# %%
 def main() -> None:
     """Print what a proportional slew earns, with and without the load's offset fed back."""
     env = CraneEnv()
@@ -72,5 +76,6 @@ def main() -> None:
               f"swing {swing:.2f} deg at the end")  # fmt: skip
 
 
+# %%
 if __name__ == "__main__":
     main()

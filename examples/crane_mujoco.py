@@ -6,9 +6,10 @@ ship, slew, luff, a ball joint, a slide for the rope); all but the ball are led 
 DOP853 integrates what is left. The package takes the tip's path alone. Needs `mujoco`, which the
 package does not.
 
-    python examples/crane_mujoco.py
+    .venv/bin/python examples/crane_mujoco.py
 """
 
+# %%
 from math import cos, degrees, radians, sin
 
 import mujoco
@@ -18,6 +19,7 @@ from scipy.integrate import solve_ivp
 from swashplate.crane import Crane, load_motion
 from swashplate.crane.kinematics import Boom, Vector, rotation, tip_of, to_inertial
 
+# %%
 SECONDS, RATE, START = 60.0, 512.0, 0.5  # the last one: swing at the start [rad]
 WAVES = {  # mean, amplitude, frequency [rad/s], phase; [m], [rad]
     "surge": (0.0, 0.3, 0.5, 0.0),
@@ -49,6 +51,7 @@ TREE = """
 LED = [*range(8), 11]  # velocities that are given; 8 to 10 are the ball's
 
 
+# %%
 def led(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places, speeds and accelerations of the joints that are led."""
     mean, size, omega, phase = np.array([*WAVES.values()]).T
@@ -57,6 +60,7 @@ def led(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return place, size * omega * np.cos(turn), -size * omega**2 * np.sin(turn)
 
 
+# %%
 def referee(crane: Crane, time: np.ndarray) -> np.ndarray:
     """Path of the load by MuJoCo's equations, (n, 3). [m]"""
     g = crane.geometry
@@ -120,6 +124,7 @@ def referee(crane: Crane, time: np.ndarray) -> np.ndarray:
     return path
 
 
+# %%
 def tip_at(crane: Crane, t: float) -> np.ndarray:
     """Tip of the boom. [m]"""
     surge, sway, heave, yaw, pitch, roll, slew, boom, _ = led(t)[0].tolist()
@@ -127,6 +132,7 @@ def tip_at(crane: Crane, t: float) -> np.ndarray:
     return np.array(to_inertial(rotation(roll, pitch, yaw), tip, Vector(surge, sway, heave)))
 
 
+# %%
 def main() -> None:
     """Print how far both loads are apart."""
     crane = Crane.preset("tg3637")
@@ -152,5 +158,6 @@ def main() -> None:
     print(f"swing up to {swing:.0f} deg in {SECONDS:g} s")
 
 
+# %%
 if __name__ == "__main__":
     main()

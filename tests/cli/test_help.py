@@ -72,7 +72,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
         )
         for stage in usual.stages
     ]
-    few = usual.model_copy(update={"stages": stages})
+    few = usual.model_copy(update={"stages": tuple(stages)})
     for name in ("mine.toml", "fewer.toml"):
         (folder / "harbour" / name).write_text(setup_text(few), "utf-8")
     hoist = Drive.preset("hoist")

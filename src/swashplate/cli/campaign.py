@@ -382,7 +382,7 @@ def guess(
         Drive(parameters).to_toml(start)
         write_text(fit_configuration(found, parameters), setup)
     show(guess_table(found))
-    note(f"These numbers alone follow the mean speeds to {found.fit_percent:.1f} %.")
+    note(f"These numbers alone: fit {found.fit_percent:.1f} % of the mean speeds (100 % is best).")
     note(f"Start:             {start}")
     note(f"Fit configuration: {setup}")
     note("Then run")

@@ -154,7 +154,7 @@ def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
     Returns
     -------
     array
-        ζ = -Re s/|s| of the rightmost root with |s| < 2 ω₀; negative where the swing grows.
+        ζ = -Re(s)/abs(s) of the rightmost root with abs(s) < 2 ω₀; negative where the swing grows.
 
     Raises
     ------

@@ -353,7 +353,7 @@ def _fault_criterion(fault: Fault, poor: bool, wrong: Fault | None) -> list[Crit
         return [
             Criterion(
                 fault.name.removesuffix(" over the campaign"),
-                size,
+                size if drifts or part <= DRIFTS else "not seen",
                 percent(DRIFTS),
                 "no single set of parameters describes a machine that changes",
                 "use" if part > DRIFTS_AWAY else "values",
@@ -407,7 +407,7 @@ def model_error(qualities: Sequence[RunQuality]) -> Criterion:
             )
     return Criterion(
         "residuals follow input",
-        f"{strongest:.2f}" if strongest else "none",
+        f"{strongest:.2f}{'' if clauses else ', but residuals small'}" if strongest else "none",
         f"{FOLLOWS:g}",
         "what the input causes grows with it",
         "use",

@@ -152,14 +152,16 @@ def verdict(
     unusable = [each for each in criteria if not each.passed and each.rules == "use"]
     untrusted = [each for each in criteria if not each.passed and each.rules == "values"]
     grade: Grade = "Not usable" if unusable else "Usable for prediction" if untrusted else "Usable"
-    experiments = fitted_runs(assessments)
+    tested = {each.name: each for each in fitted_runs(assessments)}
+    tested |= {each.experiment.name: each.experiment for each in held}
+    experiments = list(tested.values())
     words = _headline(bool(assessments), fitted, held, unusable, untrusted, experiments)
     return Verdict(
         words,
         tuple(criteria),
         grade,
         tuple(_remarks(assessments, fitted, held, own, misfit)),
-        _validity(assessments) if experiments else "",
+        _validity(assessments, experiments) if assessments else "",
         _assumptions(misfit),
     )
 
@@ -303,10 +305,10 @@ def _maneuvers(experiments: Sequence[Experiment]) -> str:
     return f"{listed(words)} from {low:.3g} to {high:.3g} {experiments[0].input.unit}"
 
 
-def _validity(assessments: Sequence[Assessment]) -> str:
+def _validity(assessments: Sequence[Assessment], tested: Sequence[Experiment]) -> str:
     """What the fit holds for, and what of the drive the fitted runs never reach."""
     experiments = fitted_runs(assessments)
-    said = f"Holds for {_maneuvers(experiments)}"
+    said = f"Holds for {_maneuvers(tested)}"
     if isinstance(assessments[-1].stage.problem.model, DriveModel):
         parameters, longest = assessments[-1].stage.drive.parameters, dict[str, float]()
         try:

@@ -266,7 +266,7 @@ def _next(
     if weak:
         code = Markup(
             "Not determined to within ±10 %: {}. The tests that would determine them are ranked by "
-            "<code>swashplate advise {}</code>."
+            "<code>swashplate advise {} --drive drive.toml --setup setup.toml</code>."
         )
         named = listed(weak[:6]) if len(weak) <= 6 else f"{', '.join(weak[:6])} and others"
         said.append(code.format(named, campaign.path))
