@@ -31,9 +31,9 @@ def live(
     below as lines to put into the drive's file.
 
     For example:
-      swashplate live fitted campaign.toml
+      swashplate live fitted harbour/campaign.toml
       swashplate live hoist --maneuver step:9 --out hoist.html
-      swashplate live fitted campaign.toml --scale orifice=1.5
+      swashplate live fitted harbour/campaign.toml --scale orifice=1.5
     """
     if (path is None) == (maneuver is None):
         raise InputError("Name a campaign, or a maneuver with --maneuver; one of them.")
