@@ -92,7 +92,7 @@ COMMANDS = {
         "full-order": "full_order.full_order",
         "crane": "crane.app",
     },
-    "Export": {"export": "export.export", "live": "live.live"},
+    "Export": {"export": "export.export", "live": "export.live"},
     "This installation": {"doctor": "doctor.doctor"},
 }
 """Where each command stands, by the panel of the help that lists it."""

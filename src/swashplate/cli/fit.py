@@ -199,7 +199,7 @@ def fit(
     wanted = Wanted(folds, bootstrap, tuple(profile or ()), seed, executor, loss, require / 100.0)
     with working("Judging") as status:
         found = judge_fit(campaign, runs, nominal, plan, result, wanted, status.update)
-        found.verdict  # noqa: B018  computed here
+        verdict = found.verdict
     judged = perf_counter()
     lines = _written(found, out)
     lines += _shown(found, out, report=report, pdf=pdf)
@@ -211,7 +211,7 @@ def fit(
     if result.interrupted:
         note("Interrupted: this is the best so far, not an optimum.")
         raise typer.Exit(INTERRUPTED)
-    _say_verdict(found.verdict)
+    _say_verdict(verdict)
 
 
 def _spent(begun: float, searched: float, judged: float) -> str:
@@ -525,14 +525,14 @@ def report(
             raise InputError(f"{path} is not virtual: nobody knows its truth, leave out --truth.")
         found = _stored(fitted, folder / STORED, campaign, model)
     with working("Judging"):
-        found.verdict  # noqa: B018  computed here
+        verdict = found.verdict
     place = made_folder(out or folder)
     for line in _shown(found, place, pdf=pdf, truth=true):
         note(line)
     if data is not None:
         write_samples(shown_runs(found.assessments, found.predicted), data)
         note(f"Samples:   {data}")
-    say(found.verdict.headline)
+    say(verdict.headline)
 
 
 def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -> Judged:
@@ -596,7 +596,7 @@ def demo(
         searched = perf_counter()
         begin("computing intervals and verdict")
         found = judge_fit(campaign, runs, start, setup, result, Wanted(seed=seed))
-        found.verdict  # noqa: B018  computed here
+        verdict = found.verdict
         judged = perf_counter()
         tables = [estimates_table(each, truth=truth.parameters) for each in found.assessments]
         begin("writing the report")
@@ -610,7 +610,7 @@ def demo(
     note("")
     note("Held out of the fit, and predicted")
     show(*runs_tables(found.predicted))
-    say(found.verdict.headline)
+    say(verdict.headline)
     note(f"Time, compiling included where it was the first: {spent}")
     for line in lines:
         note(line)
