@@ -11,7 +11,21 @@ from pathlib import Path
 
 import numpy as np
 
-from swashplate.crane import Crane, Estimate, Seaway, Spectrum, Stick, control, read_veres
+from swashplate.crane import (
+    Crane,
+    Estimate,
+    Hull,
+    Seaway,
+    Setup,
+    Spectrum,
+    Stick,
+    TransferFunctions,
+    control,
+    load_motion,
+    read_veres,
+)
+from swashplate.crane.control import Control
+from swashplate.crane.crane import Actuation
 from swashplate.crane.judgment import mean_of
 from swashplate.crane.study import Case, Study, commands_of, outcomes, station
 from swashplate.executors import Threads
@@ -122,17 +136,17 @@ def seaway_tables(crane: Crane, count: int) -> Iterator[str]:
     yield from seaway_rows(found, ROLLING, random)
 
 
-def switch_rows(crane: Crane, count: int, hull: object) -> Iterator[str]:
+def switch_rows(crane: Crane, count: int, hull: Hull | TransferFunctions) -> Iterator[str]:
     """No control with one switch changed at a time: brake, peak of the spectrum."""
     none = {"no control": cases(crane, (1.0,), False)["no control"]}
     yield "\n### No control, one switch changed\n\n| sea | as above | no brake | γ = 3.3 | both |"
     yield "|---|--:|--:|--:|--:|"
     for name in SEAS:
-        plain = Seaway(name, ship=hull)  # type: ignore[arg-type]
+        plain = Seaway(name, ship=hull)
         peaked = Spectrum(plain.spectrum.height, plain.spectrum.period, 3.3)
         cells = [
             interval(mean_of(measured(crane, sea, none, range(count), brake)["no control"]), ".2f")
-            for sea in (plain, Seaway(peaked, ship=hull))  # type: ignore[arg-type]
+            for sea in (plain, Seaway(peaked, ship=hull))
             for brake in (True, False)
         ]
         yield f"| {name} | {cells[0]} | {cells[1]} | {cells[2]} | {cells[3]} |"
@@ -155,11 +169,11 @@ PATHS = {  # ideal joint ZV, ideal tip ZV, drives tip ZV and ZVD with a position
 }
 ZV, ZVD = control.JointShaper("zv"), control.JointShaper("zvd")
 TIP = control.TipShaper("zv")
-JOINTS = (
+JOINTS: tuple[tuple[Actuation, Control | None], ...] = (
     *(("ideal", None), ("ideal", ZV), ("volts", None), ("volts", ZV), ("volts", ZVD)),
     *(("inverse", None), ("inverse", ZV), ("inverse", ZVD)),
 )
-TIPS = (
+TIPS: tuple[tuple[Actuation, Control | None], ...] = (
     *(("ideal", ZV), ("ideal", TIP), ("inverse", TIP | control.PositionLoop(1.0))),
     ("inverse", control.TipShaper("zvd") | control.PositionLoop(1.0)),
 )
@@ -186,12 +200,13 @@ def slew_tables(crane: Crane) -> Iterator[str]:
             stick = Stick.trapezoid(slew=part, until={"slew_deg": 45.0}, length=160.0)
             cells = []
             for (actuation, law), other in zip(variants, numbers, strict=True):
-                run = crane.simulate(stick, control=law, actuation=actuation)  # type: ignore[arg-type]
+                run = crane.simulate(stick, control=law, actuation=actuation)
                 cells.append(f"{run.residual_deg:.3g} / {other:g}")
             yield f"| {part:g} | {' | '.join(cells)} |"
 
 
-MANEUVERS = (  # actuation, control, the other crane's residual and RMS in a seaway [deg]
+# actuation, control, the other crane's residual and RMS in a seaway [deg]
+MANEUVERS: tuple[tuple[Actuation, str, Control | None, float, float], ...] = (
     ("ideal", "none", None, 9.77, 8.58),
     ("volts", "none", None, 13.78, 12.30),
     ("volts", "joints ZV", ZV, 5.98, 6.99),
@@ -213,10 +228,10 @@ def maneuver_table(crane: Crane, count: int) -> Iterator[str]:
     yield "| drives | control | calm, residual | other | slew ends | seaways, RMS (95 %) | other |"
     yield "|---|---|--:|--:|--:|--:|--:|"
     for actuation, name, law, calm, sea in MANEUVERS:
-        how = {"control": law, "actuation": actuation, "boom_deg": 38.0, "rope_m": 28.0}
-        run = crane.simulate(stick, **how)  # type: ignore[arg-type]
+        how: Setup = {"control": law, "actuation": actuation, "boom_deg": 38.0, "rope_m": 28.0}
+        run = crane.simulate(stick, **how)
         swing = [
-            crane.simulate(stick, sea=Seaway("ss3", seed=seed), **how).rms_deg(run.stick_end)  # type: ignore[arg-type]
+            crane.simulate(stick, sea=Seaway("ss3", seed=seed), **how).rms_deg(run.stick_end)
             for seed in range(count)
         ]
         yield (
@@ -227,23 +242,21 @@ def maneuver_table(crane: Crane, count: int) -> Iterator[str]:
 
 def rope_table() -> Iterator[str]:
     """Shapers tuned to a wrong rope, and one that knows the rope, along a straight path."""
-    from swashplate.crane import load_motion
-
     yield "\n### Rope not as the shaper believes, straight path, residual swing to unshaped"
     yield "\n| frequency to the shaper's | ZV | ZVD | EI | ZV, ZVD or EI that know the rope |"
     yield "|--:|--:|--:|--:|--:|"
     for ratio in (0.6, 0.8, 1.0, 1.2, 1.4):
         rope = 20.0 / ratio**2
-        plain = _left(load_motion, rope, None, 20.0)
-        fixed = [_left(load_motion, rope, shape, 20.0) / plain for shape in ("zv", "zvd", "ei")]
-        live = [_left(load_motion, rope, shape, rope) / plain for shape in ("zv", "zvd", "ei")]
+        plain = _left(rope, None, 20.0)
+        fixed = [_left(rope, shape, 20.0) / plain for shape in ("zv", "zvd", "ei")]
+        live = [_left(rope, shape, rope) / plain for shape in ("zv", "zvd", "ei")]
         yield (
             f"| {ratio:.0%} | {' | '.join(f'{each:.1%}' for each in fixed)} | "
             f"{', '.join(f'{each:.1%}' for each in live)} |"
         )
 
 
-def _left(march: object, rope: float, shape: str | None, tuned: float) -> float:
+def _left(rope: float, shape: str | None, tuned: float) -> float:
     """Residual swing [rad] of a tip that is moved along a line, shaped for a rope."""
     rate, half = 512.0, np.pi * np.sqrt(tuned / 9.80665)
     time = np.arange(round(90.0 * rate)) / rate
@@ -253,7 +266,7 @@ def _left(march: object, rope: float, shape: str | None, tuned: float) -> float:
         # 0.5 m/s for 3 s with ramps of 0.5 s: small, so that the swing is linear
         begun = np.interp(time - 1.0 - k * half, [0.0, 0.5, 3.0, 3.5], [0.0, 0.5, 0.5, 0.0])
         tip[:, 0] += share * np.cumsum(begun) / rate
-    load = march(tip, np.full(time.size, rope), rate).position  # type: ignore[operator]
+    load = load_motion(tip, np.full(time.size, rope), rate).position
     late = time > 1.0 + 3.5 + 2.0 * half + 0.1
     return float(np.abs(load[late, 0] - tip[late, 0]).max() / rope)
 

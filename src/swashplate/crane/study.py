@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.whatif import pulled
 from swashplate.crane.control import Control
-from swashplate.crane.crane import RATE, Crane, Pose
+from swashplate.crane.crane import RATE, Actuation, Crane, Pose
 from swashplate.crane.loop import ROWS
 from swashplate.crane.sea import Seaway, Spectrum
 from swashplate.crane.stick import AXES, Stick
@@ -46,7 +46,7 @@ class Case(NamedTuple):
     cranes: tuple[Crane, ...]
     """One, or cranes of which each seaway takes the next."""
     control: Control | None
-    actuation: str
+    actuation: Actuation
     how: Mapping[str, Any]
     """Keywords of `Crane.stepper`: where it begins, load, brake."""
     height: float = 1.0
@@ -111,7 +111,7 @@ def outcomes(
 
 def _stepper(case: Case, number: int) -> Any:
     crane = case.cranes[number % len(case.cranes)]
-    return crane.stepper(control=case.control, actuation=case.actuation, **case.how)  # type: ignore[arg-type]
+    return crane.stepper(control=case.control, actuation=case.actuation, **case.how)
 
 
 def _of_seaway(study: Study, item: tuple[int, int]) -> Array:
@@ -186,7 +186,7 @@ def cases_of(
                 cranes = (given,) if isinstance(given, Crane) else tuple(given)
             if not cranes:
                 raise InputError(f"The drives '{name}' are an empty list of cranes.")
-            actuation = IDEAL if given == IDEAL else "inverse"
+            actuation: Actuation = "ideal" if given == IDEAL else "inverse"
             made[f"{law}, {name}" if law else name] = Case(cranes, stages, actuation, how)
     return made
 
@@ -408,7 +408,7 @@ def orifices(
     laws = control if isinstance(control, Mapping) else {"control": control}
     common = {
         NONE: Case((crane,), None, "inverse", how),
-        "ideal drives": Case((crane,), next(iter(laws.values())), IDEAL, how),
+        "ideal drives": Case((crane,), next(iter(laws.values())), "ideal", how),
     }
     points = []
     for factor in grid:
