@@ -376,6 +376,12 @@ def test_hostile_names_stay_text(write, campaign: Campaign, validation) -> None:
     assert not [tag for tag, of in page.tags if tag == "img" or "onerror" in of]
 
 
+def test_the_panel_offers_first_what_was_fitted(read: Page) -> None:
+    (panel,) = [a["srcdoc"] or "" for tag, a in read.tags if tag == "iframe"]
+    values = json.loads(re.search(r'id="live">(.*?)</script>', panel)[1])["parameters"]
+    assert {each["symbol"] for each in values if each["main"]} == {"G1", "Z10", "omega"}
+
+
 def test_the_headline_is_the_verdict(read: Page, assessments, validation) -> None:
     judged = verdict(assessments, validation)
     assert judged.headline in read.words.replace("\N{NO-BREAK SPACE}", " ")

@@ -126,7 +126,7 @@ def write_fit_report(
         sections = [
             summary_section(judged, campaign, found, assessed, runs, head["findings"]),
             *shared[:2],
-            _live_section(drive, campaign, runs),
+            _live_section(fit, campaign, runs),
             _parameter_section(fit, assessed, truth),
             _identifiability_section(assessed),
             _profile_section(fit, profiles),
@@ -315,10 +315,17 @@ def _curves_section(runs: Sequence[ShownRun], virtual: bool) -> Section:
     return Section("runs", "Curves", blocks)
 
 
-def _live_section(drive: Parameters, campaign: Campaign, runs: Sequence[ShownRun]) -> Section:
+def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Section:
     """The drive itself beside the run that it misses most, of those held out if there are any."""
     blocks: list[Block] = []
-    if isinstance(drive, ParameterSet):
+    drive, nominal = fit.parameters, fit.nominal
+    if isinstance(drive, ParameterSet) and isinstance(nominal, ParameterSet):
+        # the statuses are those of the nominal set: what was fitted is what has moved
+        before, moved = nominal.parameters, {}
+        for symbol, each in drive.parameters.items():
+            same = symbol in before and before[symbol].values == each.values
+            moved[symbol] = replace(each, status="fixed" if same else "fitted")
+        drive = replace(drive, parameters=moved)
         out = [run for run in runs if run.validates] or list(runs)
         worst = max(out, key=lambda run: run_error(run, runs)).experiment
         if can_run(drive, worst):
