@@ -10,7 +10,8 @@ import pytest
 import scipy.io
 
 from swashplate import FileError
-from swashplate.logs import apart, log, open_log
+from swashplate.logs import apart, open_log
+from swashplate.logs.binary import OPENERS
 
 
 def test_what_is_no_file(tmp_path):
@@ -56,7 +57,7 @@ def test_an_extra_that_is_not_installed(tmp_path, monkeypatch, content, library,
     for name in ("nptdms", "asammdf"):
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(FileError, match=rf"needs the library {library}.*'swashplate\[{extra}\]'"):
-        log.opener(extra.upper())(path)
+        OPENERS[extra.upper()](path)
 
 
 @pytest.fixture
@@ -117,9 +118,9 @@ def test_every_byte_of_a_small_table_may_be_damaged(table):
 def test_a_large_file_of_an_old_matlab_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "log.mat"
     scipy.io.savemat(path, {"t": np.arange(1e3)})
-    assert log.opener("MATLAB")(path).read(["t"])["t"].size == 1000
-    monkeypatch.setattr("swashplate.logs.arrays._LARGEST", 8000)
+    assert OPENERS["MATLAB"](path).read(["t"])["t"].size == 1000
+    monkeypatch.setattr("swashplate.logs.binary._LARGEST", 8000)
     with pytest.raises(
         FileError, match=r"up to version 7 are read as a whole.*save it with -v7\.3"
     ):
-        log.opener("MATLAB")(path)
+        OPENERS["MATLAB"](path)

@@ -245,10 +245,8 @@ def test_hdf5(tmp_path, options):
         written["run/counts"].attrs["unit"] = "1"
         written.create_dataset("run/x", data=NOISE, **options).attrs["units"] = ["V", "A", "bar"]
         written.create_dataset("y", data=np.ascontiguousarray(NOISE.T), **options)
-        written["table"] = np.rec.fromarrays([TIME, NOISE[:, 0]], names="t,u")
         written["on"] = NOISE[:, 0] > 0.0
     expected = {"/run/time [ms]": TIME, "/run/counts": np.arange(60), "/on": NOISE[:, 0] > 0.0}
-    expected |= {"/table.t": TIME, "/table.u": NOISE[:, 0]}
     expected |= matrix("/run/x", "[:,{}]", NOISE) | matrix("/y", "[{},:]", NOISE)
     units = {"/run/time [ms]": "ms", "/run/counts": "1"}
     units |= {"/run/x[:,0]": "V", "/run/x[:,1]": "A", "/run/x[:,2]": "bar"}
