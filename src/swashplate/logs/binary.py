@@ -10,6 +10,7 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from math import ceil, prod
 from pathlib import Path
 from types import MappingProxyType
@@ -289,7 +290,7 @@ def _open_h5(
 
 
 def _h5_signals(called: str, dataset: Any, matlab: bool) -> list[_Item]:
-    given = next((dataset.attrs[key] for key in _UNITS if key in dataset.attrs), [])
+    given: Any = next((dataset.attrs[key] for key in _UNITS if key in dataset.attrs), [])
     units = [_text(each) for each in np.ravel(given).tolist()]
     shape = dataset.shape[::-1] if matlab else dataset.shape
     return _signals(called, dataset.name, shape, dataset.dtype.kind, units, matlab=matlab)
@@ -439,7 +440,8 @@ def open_mdf(path: Path) -> Log:
     except ImportError:
         raise _missing(path, "asammdf", "mdf") from None
     items: list[_Item] = []
-    with asammdf.MDF(path) as mdf:
+    opened: Callable[[], Any] = partial(asammdf.MDF, path)
+    with opened() as mdf:
         named = [group.channel_group.acq_name or "" for group in mdf.groups]
         counts = Counter(named)
         for number, group in enumerate(mdf.groups):
@@ -460,15 +462,14 @@ def open_mdf(path: Path) -> Log:
                 items.append(_Item(name, unit, rows, (name, number, place, rows)))
 
     def read(keys: Sequence[Any], first: int, last: int | None) -> list[Array]:
-        with asammdf.MDF(path) as mdf:
-            return [_mdf_samples(path, mdf, *key, first, last) for key in keys]
+        with opened() as mdf:
+            return [_mdf_samples(path, mdf, key, first, last) for key in keys]
 
     return _log(path, "MDF 4", items, read, "channels")
 
 
-def _mdf_samples(
-    path: Path, mdf: Any, called: str, group: int, place: int, rows: int, first: int, last: Any
-) -> Array:
+def _mdf_samples(path: Path, mdf: Any, key: Any, first: int, last: int | None) -> Array:
+    called, group, place, rows = key
     count = (rows if last is None else min(last, rows)) - first
     # "ignore" leaves invalid samples where they are; they would be cut out otherwise
     samples, invalid = mdf.get(

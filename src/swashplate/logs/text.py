@@ -226,9 +226,10 @@ class _Table:
                 raise FileError(f"{self.path} has a NUL byte in {where}; it is damaged.")
             cells = text.split(self._delimiter)
             if '"' in text:
-                form = {"delimiter": self._delimiter, "skipinitialspace": True, "strict": True}
+                tab = self._delimiter
+                quoted = csv.reader([text], delimiter=tab, skipinitialspace=True, strict=True)
                 try:
-                    cells = next(csv.reader([text], **form)) or [""]
+                    cells = next(quoted) or [""]
                 except csv.Error as error:
                     said = printable(str(error))
                     raise FileError(
