@@ -31,8 +31,6 @@ from swashplate.identification.unknowns import Unknowns
 from swashplate.results import Result, short
 
 if TYPE_CHECKING:
-    from swashplate.campaign.experiment import Experiment
-    from swashplate.identification.assessment import Assessment
     from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
@@ -536,68 +534,3 @@ def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tu
             f"{abs(pull):.2g} deviations {'above' if pull >= 0.0 else 'below'} its mean."
         )
     return tuple(said)
-
-
-OPEN = 0.01
-"""Part of a channel's range that a prediction moves by, for 10 % of an unknown, from which it
-depends on that unknown."""
-
-
-def unbounded_predictions(
-    assessments: Sequence[Assessment], experiments: Sequence[Experiment]
-) -> tuple[str, ...]:
-    """Unknowns without an interval on which the prediction of some runs depends.
-
-    Parameters
-    ----------
-    assessments : sequence of Assessment
-        Of the stages.
-    experiments : sequence of Experiment
-        The runs that are predicted; each is looked at in the channels that a stage fits.
-
-    Notes
-    -----
-    Only a prediction that leaves the directions which the fitted runs determine is unbounded: of
-    two unknowns of which the fit tells the product, it depends on the product alone.
-    """
-    names = []
-    for each in assessments:
-        model, found = each.stage.problem.model, each.uncertainty
-        if not isinstance(model, DriveModel):
-            continue
-        unknowns, vector = each.stage.problem.unknowns, each.stage.solution.vector
-        status = [estimate.status for estimate in found.estimates]
-        undetermined = np.array(
-            [s == "undetermined" and u.run is None for s, u in zip(status, unknowns, strict=True)]
-        )
-        # a better optimum that was met says nothing of how far an unknown can go
-        one_ended = np.zeros(len(unknowns), dtype=np.bool_)
-        one_ended[[e.number for e in found.ends if np.isinf(e.distance) and e.better is None]] = (
-            True
-        )
-        if not (undetermined | one_ended).any():
-            continue
-        lengths = np.linalg.norm(each.linearised.triangle, axis=0)
-        lengths[lengths == 0.0] = 1.0
-        # directions that the fitted runs determine, in units of their effect there
-        told = np.linalg.qr(lengths[:, None] * each.linearised.whitening)[0]
-        chain = DriveModel(each.stage.drive.parameters, "card" if model.part == "card" else "chain")
-        chain = replace(chain, forces=model.forces)
-        for experiment in experiments:
-            if experiment.input.kind != "voltage" or not chain.signals_of(experiment):
-                continue
-            targets = [t for u in unknowns if u.run is None for t in u.targets]
-            values = {t: v for t, v in unknowns.targets(vector, "").items() if t in targets}
-            by_name = unknowns.chain(vector, targets, "")
-            for name, part in chain.linearise(values, experiment, targets).items():
-                channel = experiment[name]
-                rows = part.by[channel.used] @ by_name
-                reach = float(np.ptp(channel.values[channel.used]))
-                if channel.is_position:
-                    rows = rows - rows.mean(axis=0)
-                open_rows = rows / lengths
-                open_rows = (open_rows - (open_rows @ told) @ told.T) * lengths
-                moved = 0.1 * np.where(undetermined, np.abs(open_rows).max(axis=0), 0.0)
-                moved += 0.1 * np.where(one_ended, np.abs(rows).max(axis=0), 0.0)
-                names += [unknowns.names[k] for k in np.flatnonzero(moved > OPEN * reach)]
-    return tuple(dict.fromkeys(names))
