@@ -69,6 +69,13 @@ LOSS, STAMPS, SLOW = "loss at the largest speeds of ", "time stamps of ", "lag o
 """What names of faults begin with: a counter that does not follow, late stamps, slow instruments
 or amplifiers."""
 
+MEANS = {
+    STAMPS: " (or a delay or lag that the model leaves out)",
+    f"{SLOW}the command": " (an amplifier or filter that the model leaves out)",
+    SLOW: " (a slow instrument)",
+}
+"""What else a fault may be, by what its name begins with."""
+
 UNCERTAIN = "fixed: "
 """What the name of a fixed parameter with a standard uncertainty begins with: an estimate that its
 value, as a measurement, is part of."""
@@ -153,10 +160,8 @@ class Fault:
     def cause(self) -> str:
         """It as a likely cause, in words."""
         size = "" if self.lost else f" by {self.size:+.3g} {self.unit}"
-        either = ""
-        if self.name.startswith(STAMPS):
-            either = " (or a delay or lag that the model leaves out)"
-        return f"{self.name}{either}{size}"
+        start = next((each for each in MEANS if self.name.startswith(each)), "")
+        return f"{self.name}{MEANS.get(start, '')}{size}"
 
     @property
     def assumption(self) -> str:
