@@ -127,7 +127,7 @@ class Assessment(Result):
         unknowns = enumerate(self.stage.problem.unknowns)
         limits = [number for number, each in unknowns if each.targets[0].startswith(tuple(LIMITS))]
         ends = checked_ends(self.stage.problem, self._vector, fit, half, limits)
-        return replace(found, ends=ends)
+        return replace(found, ends=tuple(ends))
 
     @cached_property
     def runs(self) -> tuple[RunQuality, ...]:
