@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from swashplate import Channel, Drive, Experiment, InputError, maneuvers
-from swashplate.campaign import Campaign, InputSignal, Source, rig
+from swashplate.campaign import Campaign, InputSignal, Source, guess_drive, rig
 from swashplate.cli import app
 from swashplate.identification.data_checks import (
     Finding,
@@ -20,7 +20,7 @@ from swashplate.identification.data_checks import (
     refuse_unsound,
     time_constant,
 )
-from swashplate.identification.fitting import smooth
+from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import Free, Setup, Stage, load_setup
 
 NOMINAL = smooth(Drive.preset("hoist").parameters)
@@ -108,6 +108,20 @@ def test_all_runs_of_the_wrong_sign_are_one_finding() -> None:
     assert found.severity == "refuse"
     assert found.run is None
     assert found.sentence.startswith("In all 3 runs 'speed' goes against the command")
+
+
+def test_a_gross_spike_is_refused_with_the_line_that_leaves_it_out() -> None:
+    def spike(speed: np.ndarray) -> np.ndarray:
+        return np.where(np.arange(speed.size) == 900, 100.0, speed)
+
+    spoilt = (*GOOD, run("spoilt", held(5.0), spike))
+    with pytest.raises(InputError, match=r"spoilt: 'speed' has 1 spike.*ignore = \[\{ from = 1.75"):
+        fit(NOMINAL, spoilt, PUMP)
+    with pytest.raises(InputError, match="1 spike"):
+        guess_drive(spoilt)
+    found = fit(NOMINAL, spoilt, PUMP, loss="soft_l1")
+    assert any("1 spike" in each for each in found.doubts)
+    assert found.parameters.numbers["Z10"] == pytest.approx(TRUTH.parameters.numbers["Z10"], 0.01)
 
 
 def test_twins_of_another_scale() -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.quality import beyond_the_card, unsigned_currents
+from swashplate.campaign.quality import beyond_the_card, spiked, unsigned_currents
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import SIGNALS
@@ -20,6 +20,7 @@ from swashplate.identification.excitation import simulated_run
 from swashplate.identification.model import EquationModel
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import ModelSetup, Setup
+from swashplate.identification.solving import Loss
 from swashplate.identification.staging import stage_problem
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -207,6 +208,15 @@ def refuse_unsound(findings: Sequence[Finding]) -> tuple[str, ...]:
         also = f" ({more} more finding{'s' if more > 1 else ''} of this weight.)" if more else ""
         raise InputError(refused[0].sentence + also)
     return tuple(each.sentence for each in findings)
+
+
+def spike_findings(experiments: Sequence[Experiment], loss: Loss) -> list[Finding]:
+    """Spikes, gross ones to be refused unless a robust loss takes their weight."""
+    found = []
+    for (run, name), (sentence, gross) in spiked(experiments).items():
+        make = refusal if gross and loss == "linear" else warning
+        found.append(make(run, name, f"{sentence}."))
+    return found
 
 
 def _refused(found: Sequence[Finding]) -> bool:

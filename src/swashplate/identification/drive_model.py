@@ -233,13 +233,18 @@ CURRENTS: tuple[ChannelKind, ...] = (
 )
 
 
+START_CURRENTS = ("start_current_plus", "start_current_minus")
+"""Names of a channel's current at the first sample, where it is an unknown of the experiment."""
+
+
 @dataclass(frozen=True, eq=False)
 class DriveModel(Result, EquationModel):
     """A drive whose parameters are the unknowns, by columns such as ``"Z16_plus"``.
 
     Besides columns it knows ``"force_plus_1"`` ... (see `Forces`), ``"start_pressure"`` of an
-    experiment [Pa], and of each channel ``"offset NAME"`` (its free zero) and ``"clock NAME"``
-    (by how much the input's clock is ahead of the channel's [s]).
+    experiment [Pa], ``"start_current_plus"`` or ``"..._minus"`` of its card [A], and of each
+    channel ``"offset NAME"`` (its free zero) and ``"clock NAME"`` (by how much the input's clock
+    is ahead of the channel's [s]).
 
     Derivatives are exact, those by refinements as well.
     """
@@ -285,7 +290,13 @@ class DriveModel(Result, EquationModel):
         shifts: tuple[Sequence[float], Sequence[float]],
     ) -> Ready:
         """The drive with numbers; see `EquationModel.ready`."""
-        own = Own(values.get(START_PRESSURE), *shifts)
+        states = {
+            path.removeprefix("start."): values[name]
+            for name in START_CURRENTS
+            if name in values
+            for path in self._start_paths(name)
+        }
+        own = Own(values.get(START_PRESSURE), *shifts, states)
         try:
             return made_ready(self.parameters_at(values), observed, columns, own)
         except InputError as error:  # a filter that is unstable at this step
@@ -295,8 +306,17 @@ class DriveModel(Result, EquationModel):
         """Derivatives by a name of the columns that it moves: of coefficients by a force."""
         if self.forces is not None and name in self.forces.names:
             return self.forces.slopes(name)
+        if name in START_CURRENTS:
+            return dict.fromkeys(self._start_paths(name), 1.0)
         known = is_column(name) or name == START_PRESSURE
         return {name: 1.0} if known else {}
+
+    def _start_paths(self, name: str) -> list[str]:
+        """States that a current at the first sample sets: I*, that of a sample before, and I."""
+        side = name.removeprefix("start_current_")
+        # with the differential equation the second number is a rate
+        leaves = ("now", "out") if self.parameters.rate is None else ("now", "before", "out")
+        return [f"start.card.{side}.{leaf}" for leaf in leaves]
 
     def parameters_at(self, values: Mapping[str, float]) -> ParameterSet:
         """The parameter set for some values of the unknowns.

@@ -184,6 +184,8 @@ def meaning_of(name: str, stage: StageFit | None = None) -> str:
         return "number of the state at the first sample" if name.startswith("start.") else ""
     if name == START_PRESSURE:
         return "stroking pressure at the first sample"
+    if name.startswith("start_current_"):
+        return "current of the card at the first sample"
     if name.startswith("force_"):
         return _force_words(name, stage)
     definition = CATALOGUE.get(COLUMNS.get(name, name))
