@@ -22,7 +22,8 @@ from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 from swashplate.simulation.instance import START_PRESSURE, at_every_rate
 from swashplate.simulation.residuals import Own, Ready, made_ready
-from swashplate.simulation.run import check_voltage, simulate_drive
+from swashplate.simulation.result import Limit, Simulation
+from swashplate.simulation.run import check_voltage, simulate_drive, simulate_pump
 
 Array = NDArray[np.float64]
 
@@ -59,6 +60,43 @@ def simulated_current(experiment: Experiment, parameters: ParameterSet) -> Recor
     # refinements begin behind the card
     run = simulate_drive(parameters.plain, record, experiment.begins)
     return Record(run.fine("current"), record.start, record.rate, record.substeps)
+
+
+def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulation:
+    """An experiment as a parameter set has it, whatever was measured.
+
+    Raises
+    ------
+    InputError
+        If the input is neither a voltage nor a current, or cannot be marched.
+    DomainError
+        If the model does not hold under it.
+    """
+    begins = experiment.begins
+    try:
+        if experiment.input.kind == "current":
+            return simulate_pump(
+                parameters, current_record(experiment), begins, experiment.start_pressure
+            )
+        return simulate_drive(
+            parameters, voltage_record(experiment), begins, experiment.start_pressure
+        )
+    except InputError as error:
+        raise InputError(f"{experiment.input.source}: {error}") from None
+
+
+def limits_reached(experiment: Experiment, parameters: ParameterSet) -> set[str]:
+    """Columns of the limits that act in a run, such as ``"Z16_plus"``, of Z13 to Z16."""
+    run, found = simulated_run(experiment, parameters), set[str]()
+    for limit, symbol, signal in (
+        (Limit.SWASH_STOP, "Z13", run.swash_angle),
+        (Limit.ORIFICE, "Z16", run.orifice_opening),
+    ):
+        acts = run.active(limit)
+        found |= {f"{symbol}_plus"} if (acts & (signal > 0.0)).any() else set()
+        found |= {f"{symbol}_minus"} if (acts & (signal < 0.0)).any() else set()
+    found |= {"Z14"} if run.active(Limit.SPOOL).any() else set()
+    return found | ({"Z15"} if run.active(Limit.RELIEF).any() else set())
 
 
 def at_rate_of(

@@ -33,8 +33,7 @@ from swashplate.identification.acceptance import (
     range_of,
     required_accuracy,
 )
-from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.excitation import acting, simulated_run
+from swashplate.identification.drive_model import DriveModel, limits_reached
 from swashplate.identification.identifiability import WIDE
 from swashplate.identification.lack_of_fit import LackOfFit, lack_of_fit
 from swashplate.identification.solving import StartResult
@@ -310,23 +309,19 @@ def _validity(assessments: Sequence[Assessment], tested: Sequence[Experiment]) -
     experiments = fitted_runs(assessments)
     said = f"Holds for {_maneuvers(tested)}"
     if isinstance(assessments[-1].stage.problem.model, DriveModel):
-        parameters, longest = assessments[-1].stage.drive.parameters, dict[str, float]()
+        parameters = assessments[-1].stage.drive.parameters
         try:
-            for each in experiments:
-                for name, seconds in acting(simulated_run(each, parameters), parameters).items():
-                    longest[name] = max(longest.get(name, 0.0), seconds)
+            reached = set().union(*(limits_reached(each, parameters) for each in experiments))
         except (DomainError, InputError):
             return f"{said}."
-        reached = {
-            prefix: any(s > 0.0 for name, s in longest.items() if name.startswith(prefix))
-            for prefix in LIMITS
-        }
-        never = [words for prefix, words in LIMITS.items() if not reached[prefix]]
+        never = [
+            words for name, words in LIMITS.items() if not any(r.startswith(name) for r in reached)
+        ]
         never += [
-            f"{words} in {'negative' if sign == 'minus' else 'positive'} direction"
-            for prefix, words in LIMITS.items()
-            for sign in ("plus", "minus")
-            if reached[prefix] and longest.get(f"{prefix}_{sign}", 1.0) == 0.0
+            f"{LIMITS[name]} in {way} direction"
+            for name in ("Z13", "Z16")
+            for side, other, way in (("plus", "minus", "positive"), ("minus", "plus", "negative"))
+            if f"{name}_{side}" not in reached and f"{name}_{other}" in reached
         ]
         if never:
             said += f"; never reached: {listed(never)}"
