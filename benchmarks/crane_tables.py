@@ -20,16 +20,18 @@ from swashplate.crane import (
     Seaway,
     Setup,
     Spectrum,
+    Start,
     Stick,
+    Study,
     TransferFunctions,
     control,
     load_motion,
     read_veres,
 )
 from swashplate.crane.control import Control
-from swashplate.crane.crane import Actuation
 from swashplate.crane.judgment import mean_of
-from swashplate.crane.study import Case, Study, commands_of, outcomes, station
+from swashplate.crane.stepper import Actuation
+from swashplate.crane.study import NONE, Case
 from swashplate.executors import Threads
 
 PAGE = Path(__file__).parent.parent / "docs" / "crane-checks.md"
@@ -77,9 +79,9 @@ ROLLING = (  # none, ideal, meant at OTHERS, clipped at OTHERS
 
 def cases(crane: Crane, factors: tuple[float, ...], alone: bool) -> dict[str, Case]:
     """Variants by name."""
-    how = station(90.0, 45.0, 27.0, {})
+    how: Start = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0}
     made = {
-        "no control": Case((crane,), None, "inverse", how),
+        NONE: Case((crane,), None, "inverse", how),
         "ideal drives": Case((crane,), MEANT, "ideal", how),
     }
     for name, law in (("meant for ideal", MEANT), ("clipped", CLIPPED)):
@@ -100,10 +102,14 @@ def measured(
     length: float = LENGTH,
 ) -> dict[str, np.ndarray]:
     """(n,) root mean square swing of each variant in each seaway. [deg]"""
-    all_cases = [each._replace(how={**each.how, "brake": brake}) for each in found.values()]
-    commands, first = commands_of(crane, Stick.rest(length), all_cases[0].how, START)
-    study = Study(tuple(all_cases), sea, commands, first)
-    values = np.degrees(outcomes(study, seeds, Threads(2))[..., 0])
+    all_cases = [each._replace(where={**each.where, "brake": brake}) for each in found.values()]
+    study = Study.of(
+        crane,
+        MEANT,
+        {"sea": sea, "length": length, "start": START, "executor": Threads(2)},
+        seeds=seeds,
+    )
+    values = np.degrees(study.outcomes(all_cases)[..., 0])
     return {name: values[:, k] for k, name in enumerate(found)}
 
 
