@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from swashplate.cli.options import (
     AxisName,
@@ -13,8 +13,6 @@ from swashplate.cli.options import (
     SetupWord,
     StartWord,
     TableFile,
-    argument,
-    option,
 )
 from swashplate.cli.terminal import Outputs, note, say, show, working
 from swashplate.cli.words import (
@@ -96,34 +94,16 @@ def excitation(
 
 
 def advise(
-    word: Annotated[
-        str,
-        argument(
-            "CAMPAIGN.toml|AXIS|SET.toml", "Tests made so far; or only a drive, for a fresh plan."
-        ),
-    ],
-    drive: Annotated[
-        str | None,
-        option("The fitted drive: noise is then that of its residuals.", metavar="SET.toml"),
-    ] = None,
+    word: str,
+    *,
+    drive: str | None = None,
     axis: AxisName = None,
     setup: SetupWord = None,
-    free: Annotated[
-        list[str] | None,
-        option("A further parameter to determine, such as Z9. May be repeated.", metavar="SYMBOL"),
-    ] = None,
-    maneuver: Annotated[
-        list[str] | None,
-        option("A test to judge instead of the usual ones. May be repeated.", metavar="MANEUVER"),
-    ] = None,
-    noise: Annotated[
-        list[str] | None,
-        option(
-            "Standard deviation of a sensor, with its unit. May be repeated.", metavar="KIND=VALUE"
-        ),
-    ] = None,
-    top: Annotated[int, option("Tests to list.", min=1)] = 10,
-    tests: Annotated[int, option("Tests in the plan.", min=0)] = 4,
+    free: list[str] | None = None,
+    maneuver: list[str] | None = None,
+    noise: list[str] | None = None,
+    top: int = 10,
+    tests: int = 4,
     out: TableFile = None,
 ) -> None:
     """Recommend the test that determines each parameter best.
@@ -131,6 +111,15 @@ def advise(
     Ranks tests by the information that they would add to those made so far, at
     the drive's present values. Errors are standard errors from noise alone; a
     drive that differs from its model is known less well.
+
+    Options:
+      word CAMPAIGN.toml|AXIS|SET.toml: Tests made so far; or only a drive, for a fresh plan.
+      drive SET.toml: The fitted drive: noise is then that of its residuals.
+      free SYMBOL: A further parameter to determine, such as Z9. May be repeated.
+      maneuver MANEUVER: A test to judge instead of the usual ones. May be repeated.
+      noise KIND=VALUE: Standard deviation of a sensor, with its unit. May be repeated.
+      top: Tests to list.
+      tests: Tests in the plan.
 
     For example:
       swashplate advise hoist                                      a fresh plan
