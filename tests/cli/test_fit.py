@@ -134,15 +134,6 @@ def test_ctrl_c_stops_the_whole_search_and_resume_goes_on(campaign: Path, tmp_pa
     assert resumed == whole
 
 
-def test_a_folder_that_cannot_be_written_is_said_before_the_fit(
-    refused: Words, campaign: Path, tmp_path: Path
-) -> None:
-    (tmp_path / "file").write_text("", "utf-8")
-    said = refused("fit", "virtual/campaign.toml", "--setup", "setup.toml", "--out", "file/fitted")
-    assert "file/fitted cannot be made" in said
-    assert not list(tmp_path.glob("fitted*"))
-
-
 @pytest.mark.slow
 def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path: Path) -> None:
     asked = ("--folds", "2", "--bootstrap", "40", "--profile", "Z8", "--profile", "J_plus")

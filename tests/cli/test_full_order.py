@@ -36,26 +36,6 @@ def test_a_run(done, number):
     assert "One state is enough here: within 1 % of the top speed, at most 0.26 %" in text
 
 
-def test_the_load_that_is_given(done, number):
-    load = ("--physical", "load_torque=2kN*m", "--physical", "load_inertia=0")
-    text = done("full-order", "hoist", "step:4", *load)
-    assert "14 of 16 physical values are assumed" in text
-    assert cells(text, "load_torque") == ["2000", "N", "m", "given"]
-    # 2π over 25.1 l a turn times 2 kN m
-    drop = f"{2.0 * np.pi / 25.1e-3 * 2e3 / 1e6:.3f}"
-    assert cells(text, "motor pressure drop, MPa") == [drop, "to", drop]
-
-
-def test_too_fast_for_one_state(done):
-    # a sine of 3 Hz, whose end would overshoot, cut to its first 4 s
-    times = np.arange(0.0, 4.0, 1.0 / 512.0)
-    volts = 6.5 * np.sin(2.0 * np.pi * 3.0 * times)
-    pl.DataFrame({"time": times, "voltage": volts}).write_csv("sine.csv")
-    text = done("full-order", "hoist", "sine.csv", "--interpolation", "linear")
-    assert "One state is not enough here: up to 4." in text
-    assert cells(text, "within 1 %") == ["no"]
-
-
 def test_nothing_moves(done):
     text = done("full-order", "hoist", "rest:2", "--set", "Z18=0")
     assert "The shaft does not move under this command" in text

@@ -52,15 +52,6 @@ def test_a_correlation_beyond_its_band_is_marked(
         assert "* marks what lies beyond" in " ".join(said.split())
 
 
-def test_roles(done: Words, held_out: Path) -> None:
-    said = done("validate", "hoist", "virtual/campaign.toml", "--role", "all")
-    assert "hoist_step_-5_V" in said
-    assert "hoist_step_4_V" in said
-    assert "hoist_step_-5_V" not in done(
-        "validate", "hoist", "virtual/campaign.toml", "--role", "fit"
-    )
-
-
 def test_a_drive_that_is_not_usable_ends_with_1(
     run: Callable[..., Result], held_out: Path, tmp_path: Path
 ) -> None:

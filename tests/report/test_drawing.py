@@ -71,17 +71,6 @@ def test_a_line_is_broken_where_samples_are_missing_and_a_lonely_one_is_a_dot() 
     assert [each.tolist() for each in dots.get_data()] == [[3.0], [6.0]]
 
 
-def test_a_long_line_keeps_a_single_spike_either_way() -> None:
-    ax, time, values = Figure().subplots(), np.arange(1_000_000) / 512.0, np.zeros(1_000_000)
-    values[123_456], values[765_432] = 7.0, -3.0
-    draw(ax, time, values, "k", columns=1000)
-    stamps, heights = ax.lines[0].get_data()
-    assert stamps.size < 3000
-    assert heights[stamps == time[123_456]] == 7.0
-    assert heights[stamps == time[765_432]] == -3.0
-    assert (stamps[0], stamps[-1]) == (time[0], time[-1])
-
-
 SIGNATURES = {".PNG": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 
 

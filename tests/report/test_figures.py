@@ -176,11 +176,6 @@ def test_orifices_and_stops_are_marked_where_the_signal_comes_near(hoist: Drive)
     assert levels(4, low) == []
 
 
-def test_what_has_no_dead_zone_shows_none(made: dict[str, Figure]) -> None:
-    assert shades(made["neutral"], 1) == {}
-    assert legend(made["neutral"]) == []
-
-
 def test_a_long_run_is_drawn_by_few_points_and_few_spans(hoist: Drive) -> None:
     time = np.arange(900 * 512) / 512.0
     run = hoist.simulate(8.0 * np.sin(0.2 * time) + 1.5 * np.sin(20.0 * time))
@@ -193,18 +188,6 @@ def test_a_long_run_is_drawn_by_few_points_and_few_spans(hoist: Drive) -> None:
 
 def test_a_single_sample_can_be_shown(hoist: Drive) -> None:
     figures.plot_simulation(hoist.simulate([0.0])).draw_without_rendering()
-
-
-def test_both_models_and_what_lies_between(made: dict[str, Figure]) -> None:
-    assert labels(made["full order"]) == [
-        "voltage (V)",
-        "shaft speed (deg/s)",
-        "difference (% of top)",
-        "spool (mm)",
-        "swash angle (deg)",
-        "stroking pressure (bar)",
-        "motor pressure drop (bar)",
-    ]
 
 
 def test_a_comparison_shows_what_differs(step: Simulation, hoist: Drive) -> None:

@@ -256,12 +256,6 @@ def test_initial_state_and_ignored_windows_stand_beside_every_fit_percent(
     assert all("initial state rest" in each and "ignored:" in each for each in beside)
 
 
-def test_a_position_is_judged_by_its_speed_too(read: Page) -> None:
-    channels = {row["channel"] for row in read.rows("agreement")}
-    assert channels == {"current", "counts", "speed from counts"}
-    assert "speed from counts" in read.words
-
-
 def unpacked(found: dict) -> np.ndarray:
     """Numbers of `runs.packed`, read as its docstring says."""
     planes = np.frombuffer(zlib.decompress(b64decode(found["code"])), np.uint8)
@@ -375,12 +369,6 @@ def test_the_panel_offers_first_what_was_fitted(read: Page) -> None:
     (panel,) = [a["srcdoc"] or "" for tag, a in read.tags if tag == "iframe"]
     values = json.loads(re.search(r'id="live">(.*?)</script>', panel)[1])["parameters"]
     assert {each["symbol"] for each in values if each["main"]} == {"G1", "Z10", "omega"}
-
-
-def test_the_headline_is_the_verdict(read: Page, assessments, validation) -> None:
-    assert verdict(assessments, validation).headline in read.words.replace(
-        "\N{NO-BREAK SPACE}", " "
-    )
 
 
 def test_truth_stands_beside_the_estimates(write, assessments, read: Page) -> None:
@@ -550,10 +538,3 @@ def test_a_report_is_printed(page: Path, tmp_path: Path, browsed) -> None:
     assert len(re.findall(rb"/Type /Page\b", content)) >= 5
     with pytest.raises(FileError, match=r"ends in '.txt'; a printed report is written as \.pdf"):
         print_report(page, tmp_path / "fit.txt")
-
-
-def test_without_a_browser_it_says_so(page: Path, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(FileError, match=r"No browser was found .* install Chromium"):
-        print_report(page, tmp_path / "fit.pdf")
-    assert not list(tmp_path.glob("*.pdf"))

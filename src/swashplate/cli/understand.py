@@ -34,7 +34,6 @@ from swashplate.errors import DomainError, InputError
 from swashplate.tables import FIGURE, TABLE, quantity
 
 if TYPE_CHECKING:
-    from swashplate.analysis.limits import LimitShares
     from swashplate.analysis.monte_carlo import Bands
 
 ERROR = 0.1
@@ -79,7 +78,8 @@ def limits(
     Options:
       command MANEUVER|FILE: A maneuver or a log, as in 'swashplate simulate': what limits the drive
           under it. Without one, what the drive can do at all.
-      error: Error within which a sine counts as followed, rms by rms, above 0 and below 1.
+      error: Error within which a sine counts as followed, rms by rms, above 0 and below 1; by
+          default 0.1.
       frequencies --frequency HZ: Frequency of a sine to follow, up to 64; may be repeated. By
           default 0.02 to 1.
 
@@ -164,25 +164,11 @@ def _say_shares(
         return
     if sampling.start == "rest" and not sampling.clip:
         say(found.eased_sentence())
-        note(f"See more of it: {_whatif_words(drive.drive, command, sampling, found)}")
-
-
-def _whatif_words(drive: str, command: str, sampling: Sampling, found: LimitShares) -> str:
-    """The command that shows more of what easing the first limit buys."""
-    assert found.first is not None
-    words = ["swashplate", "whatif", drive]
-    for name, factor in found.first.eased_by.items():
-        words += ["--scale", f"{name}={factor:.6g}"]
-    words += ["--maneuver", command]
-    for name, given, usual in (
-        ("--rate", f"{sampling.rate:g}", "512"),
-        ("--interpolation", sampling.interpolation, None),
-        ("--time-column", sampling.time_column, "time"),
-        ("--column", sampling.column, "voltage"),
-    ):
-        if given is not None and given != usual:
-            words += [name, given]
-    return shlex.join(words)
+    if sampling == Simulating():  # a log or another rate: the reader knows how to type it
+        words = ["swashplate", "whatif", drive.drive]
+        for lever, factor in first.eased_by.items():
+            words += ["--scale", f"{lever}={factor:.6g}"]
+        note(f"See more of it: {shlex.join([*words, '--maneuver', command])}")
 
 
 def _list_levers(asked: bool) -> None:
