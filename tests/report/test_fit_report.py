@@ -22,7 +22,6 @@ from swashplate.identification.setup import Setup
 from swashplate.identification.solving import StartResult
 from swashplate.identification.validation import Measures, predict
 from swashplate.identification.verdict import verdict
-from swashplate.report.figures import plot_fit
 from swashplate.report.fit_report import print_report, write_fit_report, write_validation_report
 from swashplate.report.fit_report.runs import (
     off_scale,
@@ -475,25 +474,6 @@ def test_a_page_that_cannot_be_written_leaves_the_old_one(
     with pytest.raises(InputError, match="'brake' belongs to no stage; there are card, pump"):
         write(profiles=[profile])
     assert [each.read_text() for each in tmp_path.iterdir()] == ["old"]
-
-
-def test_a_fit_at_a_glance(assessments, fitted: Fit) -> None:
-    values = {name: v for each in fitted.stages for name, v in each.values.items()}
-    about = {"G1_plus": 2.0 * values["G1_plus"], "Z10": values["Z10"]}
-    run = next(each for each in assessments[1].runs if each.channel == "counts")
-    speed, command, estimates = plot_fit(run, assessments, about).axes
-    measured, simulated = (line.get_ydata() for line in speed.lines)
-    np.testing.assert_allclose(measured, np.degrees(run.experiment["counts"].values))
-    np.testing.assert_allclose(simulated, np.degrees(run.simulated))
-    assert command.get_ylabel() == "voltage (V)"
-    assert [text.get_text() for text in estimates.get_yticklabels()] == ["G1_plus", "Z10"]
-    bars = [line for line in estimates.lines if len(line.get_xdata()) == 2]
-    # half of twice itself, and itself
-    assert np.mean(bars[0].get_xdata()) == pytest.approx(-50.0, abs=1.0)
-    assert np.mean(bars[1].get_xdata()) == pytest.approx(0.0, abs=1.0)
-    assert bars[0].get_color() != bars[1].get_color()
-    with pytest.raises(InputError, match="nothing to draw"):
-        plot_fit(run, assessments, {})
 
 
 ZOOM = """<script>

@@ -53,7 +53,6 @@ from swashplate.tables import (
 
 if TYPE_CHECKING:
     from swashplate.campaign import Campaign
-    from swashplate.drive import Drive
     from swashplate.identification.assessment import Judged
     from swashplate.identification.fitting import Search
     from swashplate.identification.solving import Progress, StartResult
@@ -536,7 +535,7 @@ def demo(*, out: Path = Path("demo"), seed: Seed = 1) -> None:
         tables = [estimates_table(each, truth=truth.parameters) for each in found.assessments]
         begin("writing the report")
         lines = [*_written(found, out), _reported(found, out, truth.parameters)]
-        lines.append(_result_drawn(found, truth, out))
+        lines.append(_result_drawn(found, out))
         spent = _spent(begun, searched, judged)
     note(f"Campaign:  {path}")
     show(*tables)
@@ -551,21 +550,15 @@ def demo(*, out: Path = Path("demo"), seed: Seed = 1) -> None:
         note(line)
 
 
-def _result_drawn(found: Judged, truth: Drive, out: Path) -> str:
-    """Draw a predicted run and the estimates beside the truth; a line that says so."""
-    from swashplate.identification.identifiability import true_values
+def _result_drawn(found: Judged, out: Path) -> str:
+    """Draw a predicted run beside what was measured; a line that says so."""
     from swashplate.identification.validation import with_speeds
-    from swashplate.report.figures import plot_fit, save_figure
+    from swashplate.report.figures import plot_channel, save_figure
 
-    speeds = [
-        each
-        for each in with_speeds(found.predicted)
-        if each.experiment[each.channel].kind == "shaft_speed"
-    ]
-    values = {
-        name: value
-        for each in found.assessments
-        for name, value in true_values(each.stage, truth.parameters).items()
-    }
-    save_figure(plot_fit(speeds[-1], found.assessments, values), out / "result.png")
+    judged = [(each, each.experiment[each.channel]) for each in with_speeds(found.predicted)]
+    run, channel = [pair for pair in judged if pair[1].kind == "shaft_speed"][-1]
+    title = f"{run.experiment.run}: held out, predicted from the voltage"
+    if run.measures.fit_percent is not None:
+        title += f", fit {run.measures.fit_percent:.1f} %"
+    save_figure(plot_channel(channel, run.simulated, title=title), out / "result.png")
     return f"Figure:    {out / 'result.png'}"
