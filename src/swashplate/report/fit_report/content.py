@@ -492,9 +492,9 @@ def _effects(found: Identifiability, shown: Sequence[bool]) -> list[Block]:
 
 
 def _correlations(assessment: Assessment, general: Sequence[bool]) -> list[Block]:
-    """The estimates that move together most, and the residuals' spectral lines, if there are."""
+    """The estimates that move together most, if there are any."""
     try:
-        quoted, lines = assessment.uncertainty.quoted, assessment.uncertainty.lines
+        quoted = assessment.uncertainty.quoted
     except InputError:  # the sentences above say why there are none
         return []
     kept = [k for k, own in enumerate(general) if own and quoted.determined[k]]
@@ -506,14 +506,6 @@ def _correlations(assessment: Assessment, general: Sequence[bool]) -> list[Block
     if made.rows:
         drawing = [Block("table", made, "correlations")]
         blocks.append(Block("details", drawing, "Strongest correlations of the estimates"))
-    if len(lines) > 1:
-        share = "share of the residuals' variance"
-        columns = (Column("channel"), Column("frequency", ".3g", "Hz"), Column(share, ".1%"))
-        made = Table("", columns)
-        for line in lines:
-            made.add(line.channel, line.frequency, line.share)
-        summary = f"The {count(len(lines), 'spectral line')} in the residuals"
-        blocks.append(Block("details", [Block("table", made, "lines")], summary))
     return blocks
 
 
