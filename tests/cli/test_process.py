@@ -146,7 +146,7 @@ def test_ctrl_c_leaves_whole_files_only(tmp_path):
 
 def test_a_pipe_gets_no_bar(capsys: pytest.CaptureFixture[str]) -> None:
     with long_work("Fitting") as shown:
-        shown("card: iteration 3, cost 12", 0.5, "about 2 s left")
+        shown("card: iteration 3, cost 12", 0.5)
     assert capsys.readouterr() == ("", "")
 
 
@@ -175,7 +175,7 @@ def test_its_extras_are_those_of_the_package() -> None:
 
 
 def test_a_wrong_speed_is_said_and_ends_with_code_1(run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "_simulated", lambda: (150.0, 0.1))
+    monkeypatch.setattr(doctor, "_simulated", lambda: 150.0)
     done = run("doctor")
     assert done.exit_code == 1
     assert "150.0 deg/s, but 196.0 deg/s is published" in " ".join(done.stdout.split())

@@ -21,7 +21,6 @@ from swashplate.cli.options import (
 )
 from swashplate.cli.terminal import (
     Outputs,
-    Shown,
     bullets,
     check_free,
     long_work,
@@ -29,7 +28,6 @@ from swashplate.cli.terminal import (
     say,
     show,
     side,
-    waiting,
     working,
 )
 from swashplate.cli.words import (
@@ -54,7 +52,6 @@ from swashplate.tables import (
 if TYPE_CHECKING:
     from swashplate.campaign import Campaign
     from swashplate.identification.assessment import Judged
-    from swashplate.identification.fitting import Search
     from swashplate.identification.solving import Progress, StartResult
     from swashplate.identification.staging import Parameters
     from swashplate.identification.validation import RunQuality
@@ -147,10 +144,9 @@ def fit(
     with working("Starting"):
         from swashplate.executors import Dask, Processes
         from swashplate.identification.assessment import Wanted, judge_fit
+        from swashplate.identification.fitting import Search, refined
         from swashplate.identification.fitting import fit as fitted
-        from swashplate.identification.fitting import refined
         from swashplate.identification.setup import ModelSetup
-        from swashplate.identification.solving import longest_left
         from swashplate.identification.staging import setup_of
     with working(f"Reading {path}"):
         campaign, chosen = campaign_of(path, axis)
@@ -168,12 +164,13 @@ def fit(
     with long_work("Fitting") as shown:
 
         def watch(stage: str, now: Progress) -> None:
-            shown(
-                f"{stage}: iteration {now.iteration}, cost {now.cost:.6g}",
-                left=waiting(longest_left(now), "at most"),
-            )
+            shown(f"{stage}: iteration {now.iteration}, cost {now.cost:.6g}")
 
-        search = _search(starts, seed, executor, out, resume, shown) if starts else None
+        def ended(stage: str, one: StartResult, done: int) -> None:
+            words = f"{stage}: {done} of {starts + 1} starts, the last to cost {one.cost:.6g}"
+            shown(words, done / (starts + 1))
+
+        search = Search(starts, seed, executor, out / "starts", resume, ended) if starts else None
         result = fitted(nominal, runs, plan, loss=loss, search=search, watch=watch)
         if joint and len(plan.stages) > 1 and not result.interrupted:
             result = refined(result, runs, watch=watch)
@@ -209,29 +206,6 @@ def _spent(begun: float, searched: float, judged: float) -> str:
         f"searched for {searched - begun:.2f} s, judged for {judged - searched:.2f} s, wrote for "
         f"{perf_counter() - judged:.2f} s"
     )
-
-
-def _search(
-    starts: int, seed: int, executor: object, out: Path, resume: bool, shown: Shown
-) -> Search:
-    from swashplate.executors import Dask, Processes
-    from swashplate.identification.fitting import Search
-    from swashplate.identification.solving import time_left
-
-    assert isinstance(executor, Processes | Dask)
-    begun: dict[str, tuple[float, int]] = {}
-
-    def watch(stage: str, result: StartResult, done: int) -> None:
-        # results of an earlier run come all at once: the pace counts from the first new one
-        first, kept = begun.setdefault(stage, (perf_counter(), done))
-        left = time_left(done - kept, starts + 1 - done, perf_counter() - first)
-        shown(
-            f"{stage}: {done} of {starts + 1} starts, the last to cost {result.cost:.6g}",
-            done / (starts + 1),
-            waiting(left),
-        )
-
-    return Search(starts, seed, executor, out / "starts", resume, watch)
 
 
 def _say_fit(found: Judged) -> None:
