@@ -14,8 +14,6 @@ REFUSED = {
     "bode hoist --linear-at 0": "so the gain is 0; linearise at +0.2065 V or beyond.",
     "compare hoist slew --maneuver hop --out both.csv": "one of the tests of hoist",
     "compensate hoist --speed-deg-s 200": "hoist cannot settle at 200 deg/s",
-    "limits hoist --error 0": "The error is 0, but must be above 0 and below 1",
-    "limits hoist step:9 --error 0.1": "--error and --frequency belong to the sines",
     "linearize hoist": "give one of --at, --current and --speed-deg-s",
     "linearize hoist --current 1 --input voltage": "needs --at or --speed-deg-s, not",
     "linearize hoist --at 0.1": "lies in the card's dead zone, so the gain is 0; linearise at +0.",
