@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 from swashplate.cli.options import (
     DriveChoice,
     FigureFile,
     Simulating,
     TableFile,
-    argument,
-    option,
 )
 from swashplate.cli.terminal import Outputs, long_work, note, say, show, working
 from swashplate.cli.words import physical_values, simulated
@@ -20,32 +16,12 @@ from swashplate.tables import FIGURE, TABLE
 
 def full_order(
     drive: DriveChoice,
-    command: Annotated[
-        str | None,
-        argument(
-            "MANEUVER|FILE",
-            "A maneuver or a log, as in 'swashplate simulate'. Without one, a table of maneuvers.",
-        ),
-    ] = None,
-    like: Annotated[
-        str | None,
-        option(
-            "Packaged axis whose assumed physical values count; by default the drive's own, or "
-            "else hoist.",
-            metavar="AXIS",
-        ),
-    ] = None,
-    physical: Annotated[
-        list[str] | None,
-        option(
-            "Another physical value: oil_volume=1e-4 in SI, oil_volume=100cm^3 with a unit. May be "
-            "repeated.",
-            metavar="NAME=VALUE",
-        ),
-    ] = None,
+    command: str | None = None,
+    *,
+    like: str | None = None,
+    physical: list[str] | None = None,
     out: TableFile = None,
     plot: FigureFile = None,
-    *,
     sampling: Simulating,
 ) -> None:
     """Check whether one state is enough for a drive and a command.
@@ -54,6 +30,14 @@ def full_order(
     physical values are completed from the drive's parameters and from assumed
     ones. Prints these, the modes, and by how much the speed of the one-state
     model differs. What is assumed can be replaced by what you know.
+
+    Options:
+      command MANEUVER|FILE: A maneuver or a log, as in 'swashplate simulate'. Without one, a table
+          of maneuvers.
+      like AXIS: Packaged axis whose assumed physical values count; by default the drive's own, or
+          else hoist.
+      physical NAME=VALUE: Another physical value: oil_volume=1e-4 in SI, oil_volume=100cm^3 with a
+          unit. May be repeated.
 
     For example:
       swashplate full-order hoist
@@ -67,13 +51,21 @@ def full_order(
         raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
     given = physical_values(physical or ())
     with working("Completing the physical values"):
-        from swashplate.full_order import FullOrderDrive, comparison, physical_set
+        from swashplate.full_order import (
+            TABLE_MANEUVERS,
+            FullOrderDrive,
+            compare,
+            physical_set,
+            validity,
+            validity_table,
+            validity_verdict,
+        )
 
         chosen = drive.chosen
         axis = physical_set.nearest_set(chosen.name) if like is None else like
         full = FullOrderDrive.from_drive(chosen.plain, axis, **given)
-        tables = [physical_set.choices_table(axis, given), comparison.modes_table(full)]
-    head = [*drive.changes, physical_set.assumed_words(axis, given)]
+        tables = [physical_set.choices_table(axis, given), full.modes().table()]
+    head = [*drive.changes]
     if chosen.parameters.refinements:
         listed = ", ".join(chosen.parameters.refinements)
         head.append(f"Left out of both models, which do not know refinements: {listed}.")
@@ -81,26 +73,23 @@ def full_order(
         from swashplate.equations.marching.record import least_substeps
 
         least_substeps(sampling.rate)  # one out of range is refused before anything is sampled
-        with long_work("", len(comparison.TABLE_MANEUVERS)) as begin:
-            found = comparison.validity(full, sampling.rate, begin=begin)
+        with long_work("", len(TABLE_MANEUVERS)) as begin:
+            found = validity(full, sampling.rate, begin=begin)
         files.write(out, "Table", found.write)
         said = f"{len(found.rows)} maneuvers"
-        tables.append(found)
-        verdict, title = [comparison.validity_verdict(found)], drive.title
+        title = drive.title
     else:
         with working("Simulating"):
             name, run = simulated(full.drive, command, sampling)
-            both = comparison.compare(full, run, start=sampling.start)
+            both = compare(full, run, start=sampling.start)
+            found = validity_table(full.physical.name, [(name, both)])
         title = f"{drive.title}, {name}"
         files.write(out, "All signals, in SI", both.write)
         files.draw(plot, "plot_full_order", both, title=f"{title}, five states against one")
         said = f"{both.time.size} samples at {sampling.rate:g} Hz"
-        tables.append(comparison.comparison_table(both))
-        verdict = comparison.comparison_verdict(both)
     note(f"{title}, five states against one: {said}")
     for line in head:
         note(line)
-    show(*tables)
-    for line in verdict:
-        say(line)
+    show(*tables, found)
+    say(validity_verdict(found))
     files.say()

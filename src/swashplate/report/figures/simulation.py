@@ -1,4 +1,4 @@
-"""Figures of simulations: one with its chain of signals, and several compared."""
+"""Figures of simulations: one with all its signals, and several compared."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ SIGNAL_UNITS = {
 
 
 class Panel(NamedTuple):
-    """What one panel of the chain shows: signals in SI, drawn in the units that people read."""
+    """What one panel shows: signals in SI, drawn in the units that people read."""
 
     words: str
     si: str
@@ -85,7 +85,7 @@ def plot_simulation(
     window: tuple[float, float] | None = None,
     title: str | None = None,
 ) -> Figure:
-    """Figure of the chain's signals over time, with the active limits shaded.
+    """Figure of the drive's signals over time, with the active limits shaded.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
     title : str, optional
         By default the name of the physical set.
     """
-    full, differ = found.full, found.difference
+    full = found.full
     machine = full.plant.machine
 
     def holding(limit: Limit, held: Flags) -> tuple[tuple[Limit, Array], ...]:
@@ -200,8 +200,8 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
         else Panel("voltage", "V", (Trace(found.voltage, INK),))
     )
     error = (
-        Panel("difference", "% of top", (Trace(100.0 * found.error / differ.top_speed, INK),))
-        if differ.moves
+        Panel("difference", "% of top", (Trace(100.0 * found.error / found.top_speed, INK),))
+        if found.moves
         else Panel("difference", "rad/s", (Trace(found.error, INK),))
     )
     speeds = (
