@@ -310,7 +310,8 @@ def test_sources_of_several_are_linked_into_one_program(tmp_path):
     link = ["cc", "-std=c99", f"-I{include}", "main.c", *objects, "-lm", "-o", program]
     subprocess.run(link, cwd=tmp_path, check=True)
     said = subprocess.run([program, *words], capture_output=True, text=True, check=True).stdout
-    assert [line.split() for line in said.splitlines()] == [["3.0", repr(x)] for x in expected]
+    lines = [line.split() for line in said.splitlines()]
+    assert [(version, float(speed)) for version, speed in lines] == [("3.0", x) for x in expected]
 
 
 # --- libraries ------------------------------------------------------------------------------------
