@@ -42,7 +42,9 @@ class Machine {
   /** Signals (by name) over a run, and its limits, a byte a sample; or what is wrong. */
   simulate(run) {
     const { voltage, step, steady } = run;
-    const wanted = data.outputs.filter(({ name }) => run.shown.some((each) => each.signal === name || each.also === name));
+    // what the run's channels are compared with, and the speed
+    const names = new Set(["shaft_speed", ...run.shown.flatMap((each) => [each.signal, each.also])]);
+    const wanted = data.outputs.filter(({ name }) => names.has(name));
     const wrong = this.c.swp_page_begin(voltage.length, step, wanted.length);
     if (wrong) return { wrong: this.sentence(wrong) };
     wanted.forEach(({ number }, k) => this.c.swp_page_select(k, number));
