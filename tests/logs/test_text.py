@@ -124,12 +124,6 @@ def test_missing_and_infinite_numbers(text):
     assert log.read(["u"])["u"].tolist() == [math.inf, -math.inf, math.inf, -math.inf, 1.0]
 
 
-def test_an_empty_line_in_a_single_column_is_an_empty_cell(text):
-    numbers = text("voltage\n0.5\n\n1.5\n\n\n").read(["voltage"])["voltage"]
-    assert numbers.size == 3
-    assert math.isnan(numbers[1])
-
-
 def test_only_what_is_asked_for_must_be_numbers(text):
     log = text("time,note,voltage\n0,on,1\n1,,2\n")
     assert {name: array.tolist() for name, array in log.read(["voltage", "time"]).items()} == {
@@ -152,8 +146,6 @@ def test_a_cell_in_quotes_may_hold_the_delimiter(text):
     ("content", "options", "expected"),
     [
         ("0,1\n1,2\n", {"delimiter": ","}, {"column 1": [0.0, 1.0], "column 2": [1.0, 2.0]}),
-        ("0,1\n1,2\n", {"decimal": ",", "delimiter": "none"}, {"column 1": [0.1, 1.2]}),
-        ("0,1\n1,2\n", {"decimal": ","}, {"column 1": [0.1, 1.2]}),
         ("a;b\n1,234;5\n", {"decimal": ","}, {"a": [1.234], "b": [5.0]}),
         ("a~b\n1~2\n", {"delimiter": "~"}, {"a": [1.0], "b": [2.0]}),
         ("a\tb\n1\t2\n", {"delimiter": "tab"}, {"a": [1.0], "b": [2.0]}),

@@ -86,7 +86,8 @@ class Campaign(Result):
         """
         file = read_campaign_file(path)
         folder = Path(path).parent if logs is None else Path(logs)
-        experiments, ignored, names = [], [], run_names(path, file)
+        experiments, ignored = list[Experiment](), list[str]()
+        names = run_names(path, file)
         for number, (name, run) in enumerate(zip(names, file.runs, strict=True), 1):
             if run.role == "ignore":
                 ignored.append(name)

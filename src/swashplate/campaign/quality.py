@@ -90,8 +90,10 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
         Channels whose sign says nothing, see `unsigned_currents`.
     """
     drive, found = experiment.input, list[Quality]()
-    for name, signal in {"input": drive, **experiment.channels}.items():
-        stamps, lost, used = stamp_statistics(signal.time), None, np.ones(signal.time.size, bool)
+    signals: dict[str, InputSignal | Channel] = {"input": drive, **experiment.channels}
+    for name, signal in signals.items():
+        stamps, lost = stamp_statistics(signal.time), None
+        used = np.ones(signal.time.size, np.bool_)
         if isinstance(signal, Channel):
             used = signal.used
             limits, findings = signal.limits, _of_channel(experiment, signal, name not in unsigned)
