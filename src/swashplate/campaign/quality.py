@@ -48,6 +48,8 @@ SPIKE_SHARE = 0.1
 """A spike is farther than this share of what lasts from it as well, in range or beyond."""
 NEIGHBOURS = 11
 """Samples of the running median: up to five in a row may be a spike."""
+GROSS = 2.0
+"""Distance from the median, over all that a channel moves, from which a spike is gross. [1]"""
 QUIET = 0.3
 """So long the input stands still before a spike within the range of what lasts. [s]"""
 NAMED = 6
@@ -235,7 +237,9 @@ def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
     """
     met: dict[tuple[str, str], list[tuple[Array, float]]] = {}
     for each in experiments:
-        driven = each.input.values - each.input.values[0]
+        # a log that is cut out of a motion begins away from rest
+        rest = each.input.values[0] if each.input.kind == "other" else 0.0
+        driven = each.input.values - rest
         down = float(driven.min() / np.abs(driven).max()) if np.any(driven) else 0.0
         for channel in each.of_kind("signed_current"):
             if channel.used.any():
@@ -298,6 +302,30 @@ def spikes(channel: Channel, drive: InputSignal) -> list[tuple[float, float, flo
         for group in groups
         if group.size and group[-1] - group[0] < NEIGHBOURS // 2
     ]
+
+
+def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str, bool]]:
+    """Channels with spikes, by run and name, and the line that leaves them out.
+
+    Beside the sentence, whether a spike is gross: farther beyond all that lasts than the channel
+    moves in any run, so that squared errors would be the spike's.
+    """
+    said, moves = dict[tuple[str, str], str](), dict[str, float]()
+    for each in experiments:
+        for name, channel in each.channels.items():
+            kept = channel.used
+            for begin, end, _ in spikes(channel, each.input):
+                kept &= (channel.time < begin) | (channel.time > end)
+            if kept.any():
+                moves[name] = max(moves.get(name, 0.0), float(np.ptp(channel.values[kept])))
+            for sentence in _spike_findings(each, channel):
+                said[each.name, name] = f"{each.name}: '{name}' has {sentence}"
+    runs, found = {each.name: each for each in experiments}, {}
+    for (run, name), sentence in said.items():
+        values = runs[run][name].values[runs[run][name].used]
+        far = float(np.abs(values - np.median(values)).max())
+        found[run, name] = sentence, far > GROSS * moves.get(name, 0.0)
+    return found
 
 
 def _spike_findings(experiment: Experiment, channel: Channel) -> Iterator[str]:
