@@ -154,7 +154,7 @@ def jacobian(
     if to.size < count:
         out[:count][~np.isin(np.arange(count), to)] = 0.0
     sink = _sink(out, to, (count, 0), observed)
-    _march(instance, observed, own, tuple(columns[c] for c in to), sink)
+    _march(instance, observed, own, tuple(columns[c] for c in to.tolist()), sink)
     return Jacobian((*columns, *observed.own_columns), out, sink.squares)
 
 
@@ -179,7 +179,7 @@ def triangle(
     to = np.flatnonzero(np.ones(count) if moved is None else moved)
     places = np.concatenate([to, np.arange(count, len(names) + 1)])
     sink = _sink(aligned(places.size, ROWS), np.arange(to.size), (to.size, places.size), observed)
-    _march(instance, observed, own, tuple(columns[c] for c in to), sink)
+    _march(instance, observed, own, tuple(columns[c] for c in to.tolist()), sink)
     factor = np.zeros((len(names) + 1, len(names) + 1))
     factor[np.ix_(places, places)] = sink.factor
     if not np.isfinite(factor).all():

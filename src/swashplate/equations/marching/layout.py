@@ -196,9 +196,9 @@ class Layout:
             if not any(terms) and starts.isdisjoint(group.states):
                 continue
             each = []
-            for path, stored, own in zip(group.states, group.stored, terms, strict=True):
+            for path, stored, moving in zip(group.states, group.stored, terms, strict=True):
                 result = self._row() if stored else self._idle
-                made, place = self._sum(own, whole=True), self.tangents
+                made, place = self._sum(moving, whole=True), self.tangents
                 self.tangents += 1
                 self.places.setdefault((i, path), {})[c] = place
                 each.append((made.row if made else self._constant(0.0), result, place))
