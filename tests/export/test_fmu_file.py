@@ -21,7 +21,7 @@ import pytest
 from swashplate import DomainError, Drive, FileError, InputError, export
 from swashplate.equations import Definition, equation
 from swashplate.export import libraries
-from swashplate.models.pump import shaft_speed
+from swashplate.models.displacement_control import Pump, stopped_spool
 
 fmpy = pytest.importorskip("fmpy")
 from fmpy.validation import validate_fmu  # noqa: E402
@@ -30,17 +30,15 @@ HERE = Path(__file__).parent
 
 
 class Seal(NamedTuple):
-    """A seal of the motor."""
+    """A seal of the spool."""
 
-    seal_loss: Annotated[float, Definition("speed lost at the seal", "rad/s", lower=0.0)] = 0.0
+    seal_loss: Annotated[float, Definition("share of the stroke lost", "1", lower=0.0)] = 0.0
 
 
 @equation
-def sealed_speed(
-    swash_angle: float, leakage: float, Z10: float, Z11: float, seal_loss: float
-) -> float:
-    """The package's speed less what the seal takes."""
-    return Z10 * swash_angle - Z11 - leakage - seal_loss
+def sealed_spool(position: float, p: Pump, seal_loss: float) -> float:
+    """The package's position of the spool less what the seal takes."""
+    return min(max(position, -p.Z14), p.Z14) * (1.0 - seal_loss)
 
 
 LINUX = sys.platform == "linux" and fmpy.platform == "linux64"
@@ -425,7 +423,7 @@ def test_other_machines_give_equal_bits(name):
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
 @pytest.mark.skipif(not LINUX, reason="the importer would take another folder")
 def test_an_equation_of_ones_own_is_compiled(hoist, tmp_path):
-    drive = hoist.with_equation(shaft_speed, sealed_speed, Seal).replace(seal_loss=0.02)
+    drive = hoist.with_equation(stopped_spool, sealed_spool, Seal).replace(seal_loss=0.02)
     path = export.fmu(drive, tmp_path / "own.fmu", platforms=["linux64"])
     assert validate_fmu(str(path)) == []
     assert start_of(described(path), "seal_loss") == "0.02"

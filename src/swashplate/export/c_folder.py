@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swashplate.drive import Drive
 from swashplate.equations.c_source import Exported, c_name, interface, literal
 from swashplate.equations.c_source.model import Writer
-from swashplate.equations.fields import numbers_of
+from swashplate.equations.fields import declared_by, numbers_of
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Instance, called
 from swashplate.equations.marching.use import instance_of as instance_of_model
@@ -25,7 +25,6 @@ from swashplate.models.card import stable_step
 from swashplate.models.displacement_control import steep_stops
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import (
-    PATHS,
     check_filter_stability,
     instance_of,
     models_of,
@@ -41,7 +40,12 @@ def exported_drive(drive: Drive | None = None) -> Exported:
     """The drive as it is in C; with equations of one's own if the drive has some."""
     equations = () if drive is None else drive.parameters.equations
     model = models_of(equations).drive
-    columns = {path: column for column, path in PATHS.items()}
+    columns = {
+        f"{model.prefix(i)}{path}": column
+        for i, part in enumerate(model.parts)
+        for each in declared_by(part.parameters)
+        for path, column in zip(each.fields, each.columns, strict=True)
+    }
     return Exported(
         model,
         "swp",

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
-from typing import get_type_hints
+from typing import Any, get_type_hints
 
 from swashplate.equations.c_source.text import c_name, fields_of, indented, literal
 from swashplate.equations.c_source.unit import Unit
@@ -20,7 +20,7 @@ from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.part import HOLDS, PartCode
 from swashplate.equations.marching.run import Instance
 from swashplate.equations.model import Equation, Link, Model, Tap, Window, arguments_of
-from swashplate.equations.syntax import plain
+from swashplate.equations.syntax import is_named_tuple, plain
 
 OWN = """
 number_at put_at is_finite all_finite in_range number_of placed seen constant_window before_all
@@ -195,6 +195,11 @@ class Writer:
             "P": self.P,
             "samples": exported.widest,
         }
+        for part in self.model.parts:
+            for equation in (part.step, part.sample, part.constants):
+                named = get_type_hints(plain(equation)).get("p") if equation is not None else None
+                if named is not None:
+                    self.unit.wider |= dict(_wider(named, part.parameters))
         for part in self.model.parts:  # structs of the header come before those of the functions
             for kind in (part.parameters, part.options, part.given, part.state, part.signals):
                 if kind is not None:
@@ -478,6 +483,16 @@ class Writer:
 def path_of(path: str) -> str:
     """A path of Python's as one of C's."""
     return ".".join(c_name(each) for each in path.split("."))
+
+
+def _wider(named: Any, kind: Any) -> Iterator[tuple[Any, Any]]:
+    """Classes that equations name, and those with more fields that a part has in their place."""
+    if named is not kind:
+        yield named, kind
+        fields = dict(fields_of(kind))
+        for name, hint in fields_of(named):
+            if is_named_tuple(hint):
+                yield from _wider(hint, fields[name])
 
 
 # --- feedthrough ----------------------------------------------------------------------------------

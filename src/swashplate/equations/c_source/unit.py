@@ -51,6 +51,9 @@ class Unit:
     """Names in C, by function and what it is made for."""
     texts: list[str] = field(default_factory=list)
     under_way: list[Any] = field(default_factory=list)
+    wider: dict[Any, Any] = field(default_factory=dict)
+    """Class of named tuples that stands for another wherever equations name that one: parameters
+    with those of an equation of one's own among them."""
 
     def add(self, function: Any) -> str:
         """Translate an equation and all that it calls; its name in C.
@@ -138,7 +141,7 @@ class Unit:
         if origin in (typing.Union, types.UnionType) and set(args) == {bool, type(None)}:
             return FLAG
         if is_named_tuple(hint):
-            return Kind("struct", hint)
+            return Kind("struct", self.wider.get(hint, hint))
         if origin is tuple:
             args = (args[0],) * self.longest if args[-1] is Ellipsis else args
             return Kind("tuple", None, tuple(self.kind(each, where) for each in args))
