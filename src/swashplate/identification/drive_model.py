@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
+from swashplate.campaign.schema import SIGNALS as SIGNALS
 from swashplate.equations.marching.observation import ObservedRecord
 from swashplate.equations.marching.record import SLOWEST, SOURCE_RATE, Record, even_rate, record_of
 from swashplate.errors import DomainError, InputError, ParameterError
@@ -251,18 +252,6 @@ def _signed_channel(experiment: Experiment) -> tuple[Channel, Array]:
 Part = Literal["card", "pump", "chain"]
 """What of the drive is simulated: the card alone, pump and motor over a current, or all."""
 
-SIGNALS: Mapping[ChannelKind, str] = {
-    "signed_current": "current",
-    "rectified_current": "current_sum",
-    "current_plus": "current_positive",
-    "current_minus": "current_negative",
-    "shaft_speed": "shaft_speed",
-    "position": "shaft_position",
-    "encoder_counts": "shaft_position",
-    "stroker_pressure": "stroker_pressure",
-    "swash_angle": "swash_angle",
-    "spool_position": "spool_position",
-}
 CURRENTS: tuple[ChannelKind, ...] = (
     "signed_current",
     "rectified_current",
