@@ -17,7 +17,6 @@ from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.triangle import combine
 from swashplate.simulation.residuals import (
     ALL_COLUMNS,
-    OBSERVABLE,
     PUMP_COLUMNS,
     Own,
     jacobian,
@@ -29,6 +28,8 @@ from swashplate.simulation.run import simulate_drive
 RATE = 512.0
 SWING = maneuvers.sine(3.0, 0.8, start=0.05, length=3.0, settle=0.4).sample(RATE)
 CARD = ("current", "current_sum", "current_positive", "current_negative")
+PUMP = ("shaft_speed", "shaft_position", "stroker_pressure", "swash_angle", "spool_position")
+OBSERVABLE = (*CARD, *PUMP)
 
 
 def steps(*levels: float) -> np.ndarray:
@@ -372,6 +373,8 @@ def test_refusals(hoist: Drive) -> None:
     observed = observed_at_samples(HARD, signals=["shaft_speed"])
     with pytest.raises(InputError, match="Z16_plus is asked for twice"):
         jacobian(hoist.parameters, observed, ["Z16", "Z16_plus"])
+    with pytest.raises(InputError, match="drive has no signal 'torque'"):
+        residuals(hoist.parameters, observed_at_samples(HARD, signals=["torque"]))
     with pytest.raises(ParameterError, match="no parameter 'Z99'"):
         triangle(hoist.parameters, observed, ["Z99"])
     with pytest.raises(InputError, match="start_pressure is a column, so Own needs a value"):
