@@ -36,6 +36,7 @@ from swashplate.simulation.instance import (
     pump_options,
     step_limit,
 )
+from swashplate.simulation.result import check_output
 from swashplate.tables import write_whole
 
 Array = NDArray[np.float64]
@@ -59,7 +60,7 @@ class SquaredError(Result):
     weight: ArrayLike = 1.0
     """(n,) or one number; samples of weight 0 do not count, whatever they are."""
     output: str = "shaft_speed"
-    """Signal that is compared; see `Simulation`."""
+    """Signal that is compared; of a drive one of `Simulation`, or ``"current_sum"``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -352,7 +353,7 @@ def simulate_drives(
     records = {"voltage" if by_voltage else "current": record.values}
     models = models_of(parameters.equations)
     model = models.drive if by_voltage else models.pump_drive
-    output_of(model, observed)
+    check_output(observed)
     shared = _Sets(model, by_path, record, records, observed, cost, Path(to) if to else None)
 
     def why(worst: float) -> str:

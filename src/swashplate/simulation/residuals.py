@@ -29,7 +29,7 @@ from swashplate.simulation.instance import (
     instance_of,
     path_of,
 )
-from swashplate.simulation.result import Named, Simulation
+from swashplate.simulation.result import Named, Simulation, check_output
 from swashplate.simulation.run import Driver, simulate_drive, start_states, started_at
 from swashplate.tables import count
 
@@ -139,6 +139,8 @@ def made_ready(
 ) -> Ready:
     """The drive's model with its numbers, for some columns."""
     by_voltage = observed.driven_by == "voltage"
+    for each in observed.observations:
+        check_output(each.signal)
     if by_voltage:
         check_filter_stability(parameters, observed.record.step)
     # what is differentiated by counts, at 0 as well, unless equations have derivatives for that
