@@ -268,18 +268,17 @@ def place(
     base: int,
     plan: Plan,
     r: int,
-    at: int,
-    count: int,
+    where: tuple[int, int, int],
     sink: Sink,
-    to: int,
     done: bool,
 ) -> None:
     """Weighted rows of the problem at some stamps of an observation, from its rows on the grid.
 
     `seen` holds the derivatives that the march gives, and the signal, from the grid's point `base`
-    on; `at` is the first of the stamps, `to` the first place in the rows of the sink. Are these
-    `done`, only what does not come from the march is left.
+    on; `where` is the first of the stamps, how many there are, and the first place in the rows of
+    the sink. Are derivatives `done`, only what does not come from the march is left.
     """
+    at, count, to = where
     derived, long = sink.to.size, sink.rows.shape[1]
     cell, fraction, weight = (
         behind(plan.cell, at),
@@ -344,7 +343,7 @@ def rotate(
         count = 1
         while at + count < end and used + count < long and plan.weight[at + count] != 0.0:
             count += 1
-        place(seen, base, plan, r, at, count, sink, used, False)
+        place(seen, base, plan, r, (at, count, used), sink, False)
         at, used = at + count, used + count
         if used == long:
             absorb(sink.rows, sink.factor, products)
@@ -413,7 +412,7 @@ def deliver(
                     column = behind(out, to)
                     for i in range(0 if not even else end - at, end - at):
                         column[i] *= weight[i]
-            place(rows, base, plan, r, at, end - at, sink, at, straight)
+            place(rows, base, plan, r, (at, end - at, at), sink, straight)
     return used
 
 
