@@ -169,16 +169,6 @@ def test_a_rise_time_belongs_to_a_command_that_goes_one_way(hoist):
 # --- before and after -----------------------------------------------------------------------------
 
 
-def test_figure_9_1(hoist):
-    """Kruse's extrapolation: orifice and pump flow 50 % up, a sine of 9 V and 0.1 Hz."""
-    sine = trial(hoist, maneuvers.sine(9.0, 0.1).sample())
-    result = what_if(hoist, {"orifice": 1.5, "pump": 1.5}, sine)
-    assert np.degrees(result.before.speed_limits) == pytest.approx([196.0, -185.0], abs=0.05)
-    assert np.degrees(result.after.speed_limits) == pytest.approx([294.0, -277.5], abs=0.05)
-    speed = np.degrees(result.after.run.shaft_speed)
-    assert [speed.max(), speed.min()] == pytest.approx([294.0, -277.5], abs=0.05)
-
-
 def test_the_acceleration_limit_goes_with_both(hoist):
     """Z10 Z16 stand in the closed form of the limit: 2.25 times as much."""
     task = trial(hoist, maneuvers.step(9.0).sample())
