@@ -1,5 +1,4 @@
 import re
-import shlex
 import tomllib
 
 import numpy as np
@@ -106,21 +105,6 @@ def test_what_to_change_first(done, number):
     assert "spool stop" not in rows  # it does nothing here
     assert "Change first: in-line orifice: larger bore (Z16)." in text
     assert "falls by 96.6 %" in " ".join(text.split())
-    assert (
-        "\nSee more of it: swashplate whatif luff --scale orifice=1.5 --maneuver sine:9,0.1\n"
-        in text
-    )
-
-
-def test_what_is_to_be_tried_is_the_same_command(done, tmp_path):
-    done("simulate", "hoist", "step:9,stop=3,length=5", "--out", "a log.csv")
-    words = ("a log.csv", "--interpolation", "linear", "--rate", "256")
-    tried = done("limits", "hoist", *words).rstrip().splitlines()[-1]
-    assert tried.endswith("--maneuver 'a log.csv' --rate 256 --interpolation linear")
-    text = done(*shlex.split(tried.removeprefix("See more of it: swashplate ")))
-    assert "hoist, a log.csv" in text
-    for changed in (("--set", "Z16=1e-4"), ("--start", "steady"), ("--clip",)):
-        assert "See more" not in done("limits", "hoist", "step:9,stop=3,length=5", *changed)
 
 
 def test_a_drive_that_does_not_move_still_has_an_envelope(done):

@@ -50,7 +50,6 @@ from .sizing import performance_table as performance_table
 from .sizing import size as size
 from .sizing import smallest_alone as smallest_alone
 from .sizing import smallest_change as smallest_change
-from .sizing import typed_factors as typed_factors
 from .whatif import AS_IS as AS_IS
 from .whatif import CHANGED as CHANGED
 from .whatif import LEVERS as LEVERS

@@ -35,7 +35,6 @@ from swashplate.errors import InputError
 from swashplate.tables import FIGURE, TABLE, quantity
 
 if TYPE_CHECKING:
-    from swashplate.analysis.limits import LimitShares
     from swashplate.analysis.monte_carlo import Bands
 
 LEVEL, SPAN = 0.95, (0.9, 1.1)
@@ -135,30 +134,6 @@ def _say_shares(
         show(shares)
     for sentence in found.sentences():
         say(sentence)
-    first = found.first
-    if first is None or first.eased_error is None or drive.changes:
-        return
-    if sampling.start == "rest" and not sampling.clip:
-        say(found.eased_sentence())
-        note(f"See more of it: {_whatif_words(drive.drive, command, sampling, found)}")
-
-
-def _whatif_words(drive: str, command: str, sampling: Sampling, found: LimitShares) -> str:
-    """The command that shows more of what easing the first limit buys."""
-    assert found.first is not None
-    words = ["swashplate", "whatif", drive]
-    for name, factor in found.first.eased_by.items():
-        words += ["--scale", f"{name}={factor:.6g}"]
-    words += ["--maneuver", command]
-    for name, given, usual in (
-        ("--rate", f"{sampling.rate:g}", "512"),
-        ("--interpolation", sampling.interpolation, None),
-        ("--time-column", sampling.time_column, "time"),
-        ("--column", sampling.column, "voltage"),
-    ):
-        if given is not None and given != usual:
-            words += [name, given]
-    return shlex.join(words)
 
 
 def _list_levers(asked: bool) -> None:
@@ -325,9 +300,8 @@ def size(
         say("The drive meets it as it is; nothing needs to be changed.")
     elif not drive.changes:  # whatif begins at a drive as its file has it
         words = ["swashplate", "whatif", drive.drive]
-        typed = sizing.typed_factors(found, drive.chosen, required, follow)
-        for name, factor in typed.items():
-            words += ["--scale", f"{name}={factor:.9g}"]
+        for name, factor in found.factors.items():
+            words += ["--scale", f"{name}={factor:.9g}"] if factor != 1.0 else []
         note(f"See it over a command: {shlex.join(words)}")
     files.say()
 
