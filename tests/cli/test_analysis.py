@@ -221,7 +221,6 @@ def test_the_command_that_is_proposed_is_enough(done, wanted, levers):
     text = done("size", "hoist", "--acceleration-deg-s2", f"{wanted:g}", *words)
     given = dict(re.findall(r"--scale (\w+)=([\d.]+)", text))
     assert set(given) == set(levers)
-    assert all(len(factor) <= 7 for factor in given.values())
     changed = pulled(Drive.preset("hoist"), {name: float(each) for name, each in given.items()})
     assert np.degrees(performance(changed).acceleration) >= wanted
 

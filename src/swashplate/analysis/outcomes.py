@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.analysis.capability import saturation
 from swashplate.drive import Drive
 from swashplate.equations.marching.lanes import LANES
 from swashplate.errors import InputError
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 REST = 0.5  # A command that rests at 0 V this long lets the drive settle at its creep. [s]
-STOPPED = 1.0 - 1e-9  # Part of the speed limit from which the plate counts as at its stop.
 TURNED = 0.05  # Part of its range by which a command may turn back and still go one way.
 
 # --- a command to judge drives by -----------------------------------------------------------------
@@ -128,14 +128,9 @@ def proportional_speed(drive: Drive, voltage: ArrayLike, *, limited: bool = True
 
 def speed_per_volt(drive: Drive, sign: float) -> float:
     """Speed limit of a direction by the voltage that first reaches it. [(rad/s)/V]"""
-    low, high = 0.0, FULL_VOLTAGE
+    saturated = saturation(drive, sign)
     limit = abs(drive.steady_speed(float(np.copysign(FULL_VOLTAGE, sign))))
-    for _ in range(4):  # each pass narrows the place a hundredfold
-        volts = np.linspace(low, high, 101)
-        stopped = np.abs(drive.steady_speed(np.copysign(volts, sign))) >= STOPPED * limit
-        first = max(int(np.argmax(stopped)), 1)
-        low, high = float(volts[first - 1]), float(volts[first])
-    return limit / high
+    return limit / (FULL_VOLTAGE if saturated is None else abs(saturated))
 
 
 # --- outcomes -------------------------------------------------------------------------------------

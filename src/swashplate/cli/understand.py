@@ -301,7 +301,7 @@ def size(
     elif not drive.changes:  # whatif begins at a drive as its file has it
         words = ["swashplate", "whatif", drive.drive]
         for name, factor in found.factors.items():
-            words += ["--scale", f"{name}={factor:.9g}"] if factor != 1.0 else []
+            words += ["--scale", f"{name}={factor!r}"] if factor != 1.0 else []
         note(f"See it over a command: {shlex.join(words)}")
     files.say()
 
