@@ -63,5 +63,4 @@ from .whatif import one_at_a_time as one_at_a_time
 from .whatif import outcome_table as outcome_table
 from .whatif import pulled as pulled
 from .whatif import pulled_columns as pulled_columns
-from .whatif import ranges_of as ranges_of
 from .whatif import what_if as what_if

@@ -327,21 +327,6 @@ def levers_table() -> Table:
 # --- each lever by itself -------------------------------------------------------------------------
 
 
-def ranges_of(levers: Sequence[str], span: float = 0.1) -> dict[str, Range]:
-    """Factors 1 - span and 1 + span for each lever.
-
-    Raises
-    ------
-    InputError
-        For an unknown lever, none, or a span that is not between 0 and 1.
-    """
-    if not 0.0 < span < 1.0:
-        raise InputError(f"The span {span:g} of the factors must lie between 0 and 1.")
-    ranges = {find_lever(name).name: (1.0 - span, 1.0 + span) for name in levers}
-    check_ranges(ranges)
-    return ranges
-
-
 @dataclass(frozen=True, eq=False)
 class OneAtATime(Result):
     """Outcomes with each lever moved down and up by itself."""
@@ -390,7 +375,7 @@ def one_at_a_time(
     drive : Drive
         As it is.
     ranges : mapping of str to (float, float)
-        Lower and upper factor by lever, see `ranges_of`. [1]
+        Lower and upper factor by lever, such as ``{"orifice": (0.9, 1.1)}``. [1]
     trial : Trial
         The command.
     outcomes : sequence of str
