@@ -93,15 +93,6 @@ def test_recorded_can_end_at_a_whole_sample():
     assert cut.sample(10.0).tolist() == [1.0] * 11
 
 
-def test_recorded_file(tmp_path):
-    path = tmp_path / "log.csv"
-    path.write_text("t [ms],stick [mV]\n0,0\n500,4000\n2000,-1500\n", "utf-8")
-    m = maneuvers.recorded_file(path, interpolation="linear", column="stick", time_column="t")
-    assert m.name == "log.csv"
-    assert m.length == 2.0
-    assert m([0.25, 2.0]).tolist() == [2.0, -1.5]
-
-
 def test_hoist_has_the_thirteen_runs_of_the_source():
     runs = maneuvers.source_tests("hoist")
     sizes = {name: run.sample().size for name, run in runs.items()}

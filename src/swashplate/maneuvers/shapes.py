@@ -4,14 +4,12 @@ import inspect
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from swashplate.errors import InputError
-from swashplate.logs import TextOptions, read_series
 from swashplate.maneuvers.pieces import (
     Array,
     Line,
@@ -310,41 +308,6 @@ def recorded(
     return Maneuver(
         f"recorded {times.size} rows", end, (Piece(0.0, curve),), float(np.abs(volts).max())
     )
-
-
-def recorded_file(
-    path: str | Path,
-    *,
-    interpolation: Literal["previous", "linear"],
-    length: float | None = None,
-    column: str = "voltage",
-    time_column: str = "time",
-    options: TextOptions | None = None,
-) -> Maneuver:
-    """Voltage from a log's file, of any format that `logs.open_log` reads; see `recorded`.
-
-    Parameters
-    ----------
-    path : path
-        A log; a unit may stand in its header, as in ``voltage [mV]``.
-    column, time_column : str
-        Names of the columns.
-    interpolation, length :
-        As in `recorded`.
-    options : TextOptions, optional
-        How a text file is written, where that cannot be recognised from it.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read, a number is missing or time stamps do not increase; it names
-        file, column and row.
-    InputError
-        If a column is missing or its unit wrong, or as in `recorded`.
-    """
-    time, voltage = read_series(path, column, "V", time_column=time_column, options=options)
-    recording = recorded(time, voltage, interpolation=interpolation, length=length)
-    return replace(recording, name=Path(path).name)
 
 
 # --- source ---------------------------------------------------------------------------------------
