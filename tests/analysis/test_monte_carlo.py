@@ -119,7 +119,7 @@ def test_refusals(hoist):
     drawn = pumps(hoist, 0.1, 2)
     with pytest.raises(InputError, match="level 1 of a band"):
         bands(drawn, VOLTAGE, level=1.0)
-    with pytest.raises(InputError, match="takes too much memory: draw 1 drives at most"):
+    with pytest.raises(InputError, match="take too much memory: take 1 drives at most"):
         bands(drawn, np.zeros(100_000_000))
 
 

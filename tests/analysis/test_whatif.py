@@ -15,7 +15,6 @@ from swashplate.analysis import (
     find_outcomes,
     one_at_a_time,
     outcome_matrix,
-    outcomes,
     proportional_speed,
     pulled,
     pulled_columns,
@@ -114,11 +113,10 @@ def test_other_outcomes_by_hand():
     assert all(np.isnan(of(still, name)) for name in ("rise_time", "response_time", "overshoot"))
 
 
-def test_a_batch_is_what_single_runs_are(hoist, monkeypatch):
-    monkeypatch.setattr(outcomes, "SAMPLES_AT_ONCE", 8 * 5121)  # two blocks
+def test_a_batch_is_what_single_runs_are(hoist):
     task, chosen = trial(hoist, maneuvers.step(9.0).sample()), tuple(OUTCOMES.values())
     z16 = hoist.parameters.numbers["Z16_plus"] * np.linspace(0.8, 1.2, 11)
-    found = batch_outcomes(hoist, {"Z16_plus": z16}, task, chosen, threads=2)
+    found = batch_outcomes(hoist, {"Z16_plus": z16}, task, chosen)
     for k in (0, 7, 10):
         run = hoist.replace(Z16_plus=float(z16[k])).simulate(task.voltage)
         single = outcome_matrix(run.shaft_speed[None, :], task, chosen)[0]

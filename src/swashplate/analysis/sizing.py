@@ -23,7 +23,7 @@ Slack = Callable[[Array], Array]
 
 # --- search ---------------------------------------------------------------------------------------
 
-SCANNED = 5  # ln₂ of the points of a Sobol sequence that are tried besides the corners.
+SCANNED = 6  # ln₂ of the points of a Sobol sequence that are tried besides the corners.
 MOST_CORNERS = 64
 FINEST = 1e-9  # Part of the way to which an end is bisected.
 ALONG = 33  # Points along a single factor's range.

@@ -366,7 +366,6 @@ def one_at_a_time(
     trial: Trial,
     *,
     outcomes: Sequence[str],
-    threads: int | None = None,
 ) -> OneAtATime:
     """Move each lever down and up by itself.
 
@@ -380,8 +379,6 @@ def one_at_a_time(
         The command.
     outcomes : sequence of str
         Names in `outcomes.OUTCOMES`.
-    threads : int, optional
-        One a core by default.
 
     Raises
     ------
@@ -395,7 +392,7 @@ def one_at_a_time(
         factors[name][1 + 2 * number : 3 + 2 * number] = pair
     columns = pulled_columns(drive.parameters.numbers, factors)
     chosen = find_outcomes(outcomes)
-    found = batch_outcomes(drive, columns, trial, chosen, threads=threads)
+    found = batch_outcomes(drive, columns, trial, chosen)
     if 0 in found.failures:
         raise InputError(f"The drive as it is cannot follow this command: {found.failures[0]}")
     names = [AS_IS, *(f"{name} x {f:g}" for name, pair in ranges.items() for f in pair)]
