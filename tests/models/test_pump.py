@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from swashplate.equations.equation import interpreted as plainly
 from swashplate.equations.library import (
     TAN_22_5,
     arctangent,
@@ -142,10 +143,10 @@ def test_pressure_cannot_be_pumped_beyond_the_supply() -> None:
 def test_the_prime_movers_speed_scales_flow_and_speed(pump: Pump) -> None:
     p = pump._replace(Z12=0.02, load_inertia=5e3, motor_leakage=1e-6)
     options = options_of(p)
-    k = model.pump_constants(p, H, options)
+    k = plainly(model.pump_constants)(p, H, options)
     state = model.PumpState(4e5)
-    slow = model.pump_sample(state, inputs_of(p, 0.6), p, k, H, options)
-    fast = model.pump_sample(state, inputs_of(p, 0.6, pump_speed=1.5), p, k, H, options)
+    slow = plainly(model.pump_sample)(state, inputs_of(p, 0.6), p, k, H, options)
+    fast = plainly(model.pump_sample)(state, inputs_of(p, 0.6, pump_speed=1.5), p, k, H, options)
     assert fast.shaft_speed == pytest.approx(1.5 * slow.shaft_speed, rel=1e-14)
     assert fast.motor_torque == pytest.approx(1.5 * slow.motor_torque, rel=1e-14)
     assert fast.swash_angle == slow.swash_angle
@@ -155,10 +156,10 @@ def test_a_load_alone_moves_torque_and_pressure_drop_but_no_speed(pump: Pump) ->
     """With a stiff line and no leakage the flow sets the speed, whatever the load."""
     p = pump._replace(load_torque=3e4, motor_constant=250.0)
     options = options_of(p)
-    k = model.pump_constants(p, H, options)
+    k = plainly(model.pump_constants)(p, H, options)
     state = model.PumpState(4e5)
-    loaded = model.pump_sample(state, inputs_of(p, 0.6), p, k, H, options)
-    free = model.pump_sample(state, inputs_of(p, 0.6, load_torque=0.0), p, k, H, options)
+    loaded = plainly(model.pump_sample)(state, inputs_of(p, 0.6), p, k, H, options)
+    free = plainly(model.pump_sample)(state, inputs_of(p, 0.6, load_torque=0.0), p, k, H, options)
     assert loaded.shaft_speed == free.shaft_speed
     assert loaded.motor_torque - free.motor_torque == pytest.approx(3e4)
     assert loaded.motor_pressure_drop == pytest.approx(250.0 * 3e4)
@@ -166,11 +167,11 @@ def test_a_load_alone_moves_torque_and_pressure_drop_but_no_speed(pump: Pump) ->
 
 def test_a_weaker_supply_makes_the_pump_slower(pump: Pump) -> None:
     options = PumpOptions()
-    k = model.pump_constants(pump, H, options)
+    k = plainly(model.pump_constants)(pump, H, options)
     rises = []
     for share in (1.0, 0.5):
         inputs = inputs_of(pump, 0.7, supply_pressure=share * pump.Z9)
-        state = model.pump_rest(pump, k, options, inputs)
-        signals = model.pump_sample(state, inputs, pump, k, H, options)
-        rises.append(model.pump_step(state, signals, inputs, pump, k, H, options).pressure)
+        state = plainly(model.pump_rest)(pump, k, options, inputs)
+        signals = plainly(model.pump_sample)(state, inputs, pump, k, H, options)
+        rises.append(plainly(model.pump_step)(state, signals, inputs, pump, k, H, options).pressure)
     assert rises[1] / rises[0] == pytest.approx(sqrt(0.5), rel=1e-3)
