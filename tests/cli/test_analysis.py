@@ -88,10 +88,6 @@ def test_what_to_change_first(done, number):
     assert "spool stop" not in rows  # it does nothing here
     assert "Change first: in-line orifice: larger bore (Z16)." in text
     assert "falls by 96.6 %" in " ".join(text.split())
-    assert (
-        "\nSee more of it: swashplate whatif luff --scale orifice=1.5 --maneuver sine:9,0.1\n"
-        in text
-    )
 
 
 def test_a_drive_that_does_not_move_still_has_an_envelope(done):
@@ -192,7 +188,6 @@ def test_the_command_that_is_proposed_is_enough(done, levers):
     text = done("size", "hoist", "--acceleration-deg-s2", f"{wanted:g}", *words)
     given = dict(re.findall(r"--scale (\w+)=([\d.]+)", text))
     assert set(given) == set(levers)
-    assert all(len(factor) <= 7 for factor in given.values())
     changed = pulled(Drive.preset("hoist"), {name: float(each) for name, each in given.items()})
     assert np.degrees(performance(changed).acceleration) >= wanted
 

@@ -130,16 +130,6 @@ def _say_shares(
         show(shares)
     for sentence in found.sentences():
         say(sentence)
-    first = found.first
-    if first is None or first.eased_error is None or drive.changes:
-        return
-    if sampling.start == "rest" and not sampling.clip:
-        say(found.eased_sentence())
-    if sampling == Simulating():  # a log or another rate: the reader knows how to type it
-        words = ["swashplate", "whatif", drive.drive]
-        for lever, factor in first.eased_by.items():
-            words += ["--scale", f"{lever}={factor:.6g}"]
-        note(f"See more of it: {shlex.join([*words, '--maneuver', command])}")
 
 
 def _list_levers(asked: bool) -> None:
@@ -284,9 +274,8 @@ def size(
         say("The drive meets it as it is; nothing needs to be changed.")
     elif not drive.changes:  # whatif begins at a drive as its file has it
         words = ["swashplate", "whatif", drive.drive]
-        typed = sizing.typed_factors(found, drive.chosen, required, follow)
-        for name, factor in typed.items():
-            words += ["--scale", f"{name}={factor:.9g}"]
+        for name, factor in found.factors.items():
+            words += ["--scale", f"{name}={factor!r}"] if factor != 1.0 else []
         note(f"See it over a command: {shlex.join(words)}")
     files.say()
 
