@@ -99,9 +99,8 @@ def residual_test(
 
     Notes
     -----
-    The band of the cross-correlation is 1.96 √(Σ ρ_r ρ_u/n): two coloured signals without any
-    relation show large correlations by chance (Bartlett's formula), and a band of 1.96/√n would
-    call every one of them a finding.
+    The band of the cross-correlation is 1.96 √(Σ ρ_r ρ_u/n), Bartlett's: two coloured signals
+    without any relation show large correlations by chance.
     """
     if time.size < 8:
         raise InputError(f"{time.size} samples show no correlation; at least 8 are needed.")
@@ -188,36 +187,31 @@ class Measures(NamedTuple):
         """1 - NRMSE²."""
         return None if self.nrmse is None else 1.0 - self.nrmse**2
 
-    @property
-    def sentence(self) -> str:
-        """The verdict for a table's cell or a line of text."""
-        if self.fit_percent is None:
-            return f"RMSE {self.rmse:.4g}; what was measured is constant, so there is no fit %"
-        return f"RMSE {self.rmse:.4g}, fit {self.fit_percent:.1f} %, R² {self.r_squared:.4f}"
 
-
-def measures(measured: Array, simulated: Array, weight: Array | None = None) -> Measures:
-    """Measures of one channel of one run.
+def measures(*runs: tuple[Array, Array, Array | None]) -> Measures:
+    """Measures of one channel over one run, or over several, about the mean of all.
 
     Parameters
     ----------
-    measured, simulated : (n,) arrays
-        In the channel's unit.
-    weight : (n,) array, optional
-        Factors on the squared errors, of which those that are 0 say which samples do not count. The
-        others weigh nothing here: a window of weight ten would otherwise pass for the whole run.
+    *runs : (measured, simulated, weight)
+        (n,) samples in the channel's unit, and factors on the squared errors, None for none. Those
+        that are 0 say which samples do not count. The others weigh nothing here: a window of weight
+        ten would otherwise pass for the whole run.
 
     Raises
     ------
     InputError
-        If lengths differ, no sample counts, one that does is not finite, or a weight is negative.
+        If no sample counts, or one that does is not finite.
     """
-    return pooled_measures([(measured, simulated, weight)])
-
-
-def pooled_measures(runs: list[tuple[Array, Array, Array | None]]) -> Measures:
-    """Measures of one channel over several runs, each about the mean of all; else as `measures`."""
-    parts = [_counting(*run) for run in runs]
+    parts = []
+    for of_one in runs:
+        used = np.ones(of_one[0].shape, np.bool_) if of_one[2] is None else of_one[2] > 0.0
+        for what, samples in (("measured", of_one[0]), ("simulated", of_one[1])):
+            bad = used & ~np.isfinite(samples)
+            if bad.any():
+                row = int(np.argmax(bad)) + 1
+                raise InputError(f"Sample {row} of what was {what} is not finite; ignore it.")
+        parts.append((of_one[0][used], of_one[1][used]))
     measured, simulated = (np.concatenate(column) for column in zip(*parts, strict=True))
     if not measured.size:
         raise InputError("No sample counts: all are ignored or have weight 0.")
@@ -227,26 +221,6 @@ def pooled_measures(runs: list[tuple[Array, Array, Array | None]]) -> Measures:
     about[np.abs(about) <= 4.0 * np.finfo(np.float64).eps * abs(mean)] = 0.0
     rmse, spread = (float(np.sqrt(np.mean(each**2))) for each in (simulated - measured, about))
     return Measures(measured.size, rmse, spread)
-
-
-def _counting(measured: Array, simulated: Array, weight: Array | None) -> tuple[Array, Array]:
-    """The samples that count."""
-    factor = np.ones(measured.shape) if weight is None else weight
-    if measured.shape != simulated.shape or measured.shape != factor.shape:
-        raise InputError(
-            f"{measured.size} measured and {simulated.size} simulated samples with {factor.size} "
-            "weights cannot be compared; simulate at the measurement's stamps."
-        )
-    if not (factor >= 0.0).all():
-        raise InputError(
-            "A weight is negative or not a number; a factor on a squared error is 0 or more."
-        )
-    used = factor > 0.0
-    for what, samples in (("measured", measured), ("simulated", simulated)):
-        if not np.isfinite(samples[used]).all():
-            row = int(np.flatnonzero(used & ~np.isfinite(samples))[0])
-            raise InputError(f"Sample {row + 1} of what was {what} is not finite; ignore it.")
-    return measured[used], simulated[used]
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,7 +258,7 @@ def compared(experiment: Experiment, name: str, simulated: Array) -> RunQuality:
     if np.count_nonzero(used) >= 8:
         time, residual = channel.time[used], (simulated - channel.values)[used]
         test = residual_test(time, residual, experiment.input.at(time))
-    found = measures(channel.values, simulated, channel.weight)
+    found = measures((channel.values, simulated, channel.weight))
     return RunQuality(experiment, name, simulated, found, test)
 
 
@@ -359,13 +333,12 @@ def pooled(qualities: Iterable[RunQuality]) -> dict[str, Measures]:
     channels: dict[str, list[RunQuality]] = {}
     for each in qualities:
         channels.setdefault(each.channel, []).append(each)
-    made = {}
-    for name, alike in channels.items():
-        parts: list[tuple[Array, Array, Array | None]] = [
-            (q.experiment[name].values, q.simulated, q.experiment[name].weight) for q in alike
-        ]
-        made[name] = pooled_measures(parts)
-    return made
+    return {
+        name: measures(
+            *((q.experiment[name].values, q.simulated, q.experiment[name].weight) for q in alike)
+        )
+        for name, alike in channels.items()
+    }
 
 
 def ignored_windows(channel: Channel) -> tuple[tuple[float, float], ...]:
@@ -404,6 +377,6 @@ def _speed_quality(quality: RunQuality) -> RunQuality | None:
         experiment,
         speed.name,
         same.speed,
-        measures(speed.values, same.speed, speed.weight),
+        measures((speed.values, same.speed, speed.weight)),
         None,
     )
