@@ -13,7 +13,7 @@ import numpy as np
 
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.experiment_design import Advice, Gain
+from swashplate.identification.experiment_design import Advice, Gain, Outlook
 from swashplate.identification.identifiability import GAUGES, SCALES, moved_columns, true_values
 from swashplate.identification.intervals import Estimate
 from swashplate.identification.setup import ModelParameters
@@ -37,7 +37,6 @@ from swashplate.units import chosen_unit, display_unit
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Channel, Experiment
     from swashplate.identification.assessment import Assessment
-    from swashplate.identification.excitation import Outlook
     from swashplate.identification.fitting import Fit, StageFit
     from swashplate.identification.resampling import Bootstrap, CrossValidation
     from swashplate.identification.unknowns import Unknown
@@ -184,6 +183,8 @@ def meaning_of(name: str, stage: StageFit | None = None) -> str:
         return "number of the state at the first sample" if name.startswith("start.") else ""
     if name == START_PRESSURE:
         return "stroking pressure at the first sample"
+    if name.startswith("start_current_"):
+        return "current of the card at the first sample"
     if name.startswith("force_"):
         return _force_words(name, stage)
     definition = CATALOGUE.get(COLUMNS.get(name, name))
@@ -462,7 +463,7 @@ def folds_tables(found: CrossValidation, assessments: Sequence[Assessment]) -> l
 
 # --- information of runs and of tests to come -----------------------------------------------------
 
-_LETTERS = {"most": "#", "some": "+", "unseen": "o", "none": "."}
+_LETTERS = {"most": "#", "some": "+", "none": "."}
 
 
 def outlook_table(look: Outlook, runs: Sequence[str]) -> Table:
@@ -473,19 +474,17 @@ def outlook_table(look: Outlook, runs: Sequence[str]) -> Table:
             Column("stage", of="f"),
             Column("parameter"),
             Column("needs", wrap=True),
-            Column("s", ".3g"),
             Column("effect", ".3g"),
             Column("runs"),
             *(Column(run, ".6g", of="f") for run in runs),
         ),
     )
-    for k, name in enumerate(look.names):
-        letters = {r: _LETTERS[m] for r, m in zip(look.simulations, look.marks(name), strict=True)}
+    for name in look.names:
+        letters = {run: _LETTERS[m] for run, m in zip(look.runs, look.marks(name), strict=True)}
         marks = "".join(letters.get(run, "-") for run in runs)
-        seconds = float(look.seconds[:, k].sum())
         shares = look.shares[:, look.linearised.variables.index(name)]
-        parts = {run: float(share) for run, share in zip(look.simulations, shares, strict=True)}
-        cells = (look.need(name), seconds, look.effect(name), marks)
+        parts = {run: float(share) for run, share in zip(look.runs, shares, strict=True)}
+        cells = (look.need(name), look.effect(name), marks)
         made.add(look.stage.name, name, *cells, *(parts.get(run) for run in runs))
     return made
 

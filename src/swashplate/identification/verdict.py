@@ -12,8 +12,7 @@ import numpy as np
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.identification.data_checks import contradicting_runs
-from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.excitation import acting, simulated_run
+from swashplate.identification.drive_model import DriveModel, limits_reached
 from swashplate.identification.identifiability import WIDE
 from swashplate.identification.lack_of_fit import (
     LOSS,
@@ -745,20 +744,19 @@ def _validity(assessments: Sequence[Assessment], tested: Sequence[Experiment]) -
     said, stage = f"Holds for {_maneuvers(tested)}", assessments[-1].stage
     if not isinstance(stage.problem.model, DriveModel):
         return f"{said}."
-    parameters, longest = stage.drive.parameters, dict[str, float]()
+    parameters, reached = stage.drive.parameters, set[str]()
     try:
         for each in _fitted_runs(assessments):
-            for name, seconds in acting(simulated_run(each, parameters), parameters).items():
-                longest[name] = max(longest.get(name, 0.0), seconds)
+            reached |= limits_reached(each, parameters)
     except (DomainError, InputError):
         return f"{said}."
-    never, one_way = [], []
-    for prefix, words in LIMITS.items():
-        if not any(s > 0.0 for name, s in longest.items() if name.startswith(prefix)):
-            never.append(words)
-            continue
-        for sign, way in (("plus", "positive"), ("minus", "negative")):
-            if longest.get(f"{prefix}_{sign}", 1.0) == 0.0:
-                one_way.append(f"{words} in {way} direction")
-    never += one_way
+    never = [
+        words for name, words in LIMITS.items() if not any(r.startswith(name) for r in reached)
+    ]
+    never += [
+        f"{LIMITS[name]} in {way} direction"
+        for name in ("Z13", "Z16")
+        for side, other, way in (("plus", "minus", "positive"), ("minus", "plus", "negative"))
+        if f"{name}_{side}" not in reached and f"{name}_{other}" in reached
+    ]
     return f"{said}; never reached: {listed(never)}." if never else f"{said}."

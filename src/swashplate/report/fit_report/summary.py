@@ -68,7 +68,7 @@ def numbers_of(drive: Drive) -> Array:
         command[0] = 0.0
         run = drive.simulate(command, RATE, start="steady")
         top = float(drive.steady_speed(way * FULL_VOLTAGE))
-        made[0, column] = dead_zone(drive, way).inside
+        made[0, column] = dead_zone(drive, way)[0]
         made[1, column], made[5, column] = top, rest
         if top == rest:
             continue
