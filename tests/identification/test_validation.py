@@ -86,7 +86,7 @@ def test_white_noise_passes() -> None:
     found = residual_test(TIME, WHITE, COMMAND)
     assert found.white
     assert not found.follows
-    assert found.verdict.startswith("The residuals are white and do not follow the input")
+    assert found.verdict.startswith("The residuals are white and do not follow the input.")
     assert found.autocorrelation[0] == 1.0
     assert found.white_band == pytest.approx(1.96 / np.sqrt(N))
     assert np.mean(np.abs(found.autocorrelation[1:]) < found.white_band) > 0.9
@@ -96,8 +96,8 @@ def test_a_missed_delay_is_found_where_it_is() -> None:
     late = np.interp(TIME - 0.1, TIME, COMMAND)
     found = residual_test(TIME, 0.5 * late + 0.2 * WHITE, COMMAND)
     assert found.peak[0] == pytest.approx(0.1, abs=0.01)
-    assert "follow the input" in found.verdict
-    assert "0.1 s after it" in found.verdict
+    assert found.follows
+    assert "+0.1 s after it" in found.verdict
 
 
 def test_unrelated_slow_signals_are_rarely_called_related() -> None:
@@ -135,16 +135,11 @@ def test_cross_correlation_by_hand() -> None:
 
 
 @pytest.mark.parametrize(
-    ("residual", "command", "said"),
-    [
-        (np.zeros(N), COMMAND, "exactly zero"),
-        (np.full(N, 0.5), COMMAND, "0.5 throughout"),
-        (WHITE, np.full(N, 3.0), "the input is constant and explains nothing"),
-    ],
+    ("residual", "command"), [(np.zeros(N), COMMAND), (WHITE, np.full(N, 3.0))]
 )
-def test_constants_are_verdicts(residual: np.ndarray, command: np.ndarray, said: str) -> None:
+def test_constants_follow_nothing(residual: np.ndarray, command: np.ndarray) -> None:
     found = residual_test(TIME, residual, command)
-    assert said in found.verdict
+    assert not found.follows
     assert np.isfinite(found.autocorrelation).all()
     assert np.isfinite(found.cross_correlation).all()
 

@@ -58,8 +58,6 @@ class ResidualTest(Result):
     input."""
     duration: float
     """Time over which the residuals stay correlated; 0 if they are white. [s]"""
-    verdict: str
-    """In words."""
 
     @property
     def white(self) -> bool:
@@ -76,6 +74,18 @@ class ResidualTest(Result):
     def follows(self) -> bool:
         """Whether the residuals follow the input by as much as counts as model error."""
         return abs(self.peak[1]) >= min(max(FOLLOWS, BANDS * self.cross_band), SURE)
+
+    @property
+    def verdict(self) -> str:
+        """Both in words."""
+        (lag, value), own = self.peak, f"stay correlated over {self.duration:.2g} s"
+        own = "are white" if self.white else own
+        if not self.follows:
+            return f"The residuals {own} and do not follow the input."
+        return (
+            f"The residuals {own} and follow the input (correlation {value:+.2f}, {lag:+.2g} s "
+            "after it): the model leaves out something that the input causes."
+        )
 
 
 def residual_test(
@@ -104,7 +114,6 @@ def residual_test(
     """
     if time.size < 8:
         raise InputError(f"{time.size} samples show no correlation; at least 8 are needed.")
-    first = float(residual[0])
     grid = grid_of(time)
     most = max(int(LONGEST * grid.size), 1)
     shown = min(most, max(int(longest / grid.step), 1))
@@ -127,31 +136,7 @@ def residual_test(
     both = np.concatenate([-lags[:0:-1], lags])
     white = DEVIATIONS / float(np.sqrt(time.size))
     duration = length * grid.step
-    made = ResidualTest(lags, own[: shown + 1], white, both, cross, band, duration, "")
-    return replace(made, verdict=_in_words(made, first))
-
-
-def _in_words(test: ResidualTest, first: float) -> str:
-    if not test.autocorrelation[1:].any():
-        what = "exactly zero" if first == 0.0 else f"{first:.4g} throughout"
-        return f"The residuals are {what}: there is no noise to test."
-    colour = (
-        "The residuals are white"
-        if test.white
-        else f"The residuals stay correlated over {test.duration:.2g} s"
-    )
-    if not test.cross_correlation.any():
-        return f"{colour}; the input is constant and explains nothing."
-    lag, value = test.peak
-    if not test.follows:
-        return f"{colour} and do not follow the input (correlation {value:+.2f})."
-    when = (
-        f"{abs(lag):.2g} s {'after' if lag > 0.0 else 'before'} it" if lag else "at the same time"
-    )
-    return (
-        f"{colour} and follow the input (correlation {value:+.2f} {when}): the model leaves out "
-        "something that the input causes."
-    )
+    return ResidualTest(lags, own[: shown + 1], white, both, cross, band, duration)
 
 
 def _autocorrelation(samples: Array, grid: Grid, lags: int) -> tuple[Array, Array]:

@@ -297,8 +297,8 @@ def _convergence(assessments: Sequence[Assessment], planned: Sequence[str]) -> I
             state = "not converged"
             failure = f"stage {name} did not converge ({solution.message})"
         yield Criterion(f"convergence of {name}", state, "converged", why, "use", failure)
-    done = {each.stage.stage.name for each in assessments}
-    missing = [name for name in planned if name not in done] if assessments else []
+    done = [each.stage.stage.name for each in assessments]
+    missing = [name for name in planned if name not in done] if done else []
     if missing:
         failure = f"{listed(missing)} {'were' if len(missing) > 1 else 'was'} never fitted"
         yield Criterion("stages", f"{len(missing)} missing", "all", why, "use", failure)
@@ -307,17 +307,13 @@ def _convergence(assessments: Sequence[Assessment], planned: Sequence[str]) -> I
 def _followed(qualities: Sequence[RunQuality], which: str) -> Criterion:
     """That each channel follows the movement at all."""
     errors = {k: m.nrmse for k, m in pooled(qualities).items() if m.nrmse is not None}
-    clauses = [
-        f"{name} "
-        + (
-            "is simulated no better than by its mean"
-            if error >= 1.0
-            else "misses at least half of the movement"
-        )
-        + f" in the {which} runs (fit {100.0 * (1.0 - error):z.0f} %)"
-        for name, error in errors.items()
-        if error >= POOR
-    ]
+    clauses = []
+    for name, error in errors.items():
+        words = "misses at least half of the movement"
+        words = "is simulated no better than by its mean" if error >= 1.0 else words
+        if error >= POOR:
+            fits = 100.0 * (1.0 - error)
+            clauses.append(f"{name} {words} in the {which} runs (fit {fits:z.0f} %)")
     return Criterion(
         f"RMSE / standard deviation, {which}",
         percent(max(errors.values(), default=0.0)),
