@@ -326,6 +326,34 @@ def pooled(qualities: Iterable[RunQuality]) -> dict[str, Measures]:
     }
 
 
+def range_of(qualities: Sequence[RunQuality]) -> float:
+    """Largest less smallest value that was measured of a channel in some runs."""
+    counted = [x.values[x.used] for x in (each.experiment[each.channel] for each in qualities)]
+    return max(float(x.max()) for x in counted) - min(float(x.min()) for x in counted)
+
+
+def part_of_range(qualities: Sequence[RunQuality], channel: str) -> float | None:
+    """RMSE of a channel over the range that was measured of it, all runs together.
+
+    None where nothing moved.
+    """
+    alike = [each for each in qualities if each.channel == channel]
+    reach = range_of(alike)
+    return pooled(alike)[channel].rmse / reach if reach > 0.0 else None
+
+
+def percent(part: float) -> str:
+    """A part in per cent, two digits."""
+    number = 100.0 * part
+    return f"{number:.0f} %" if number >= 9.95 else f"{number:.2g} %"
+
+
+def following(qualities: Sequence[RunQuality], name: str) -> tuple[int, list[float]]:
+    """Runs of a channel that were tested, and correlations of those that follow the input."""
+    tests = [each.test for each in qualities if each.channel == name and each.test is not None]
+    return len(tests), [each.peak[1] for each in tests if each.follows]
+
+
 def ignored_windows(channel: Channel) -> tuple[tuple[float, float], ...]:
     """First and last instant of each stretch of a channel that does not count. [s]"""
     out = np.concatenate([[False], ~channel.used, [False]])
