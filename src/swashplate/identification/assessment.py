@@ -202,6 +202,11 @@ class Judged(Result):
             *(runs_tables(self.predicted) if self.predicted else ()),
         ]
 
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The verdict's headline and all that it says."""
+        return (self.verdict.headline, *self.verdict.sentences, *self.verdict.not_judged)
+
     def name_of(self, profile: StageProfile) -> str:
         """The unknown that a profile is of."""
         stage = next(each for each in self.result.stages if each.stage.name == profile.stage)
