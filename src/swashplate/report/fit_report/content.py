@@ -23,8 +23,8 @@ from swashplate.identification.resampling import CrossValidation
 from swashplate.identification.setup import ModelParameters
 from swashplate.identification.solving import StartResult
 from swashplate.identification.staging import Parameters
-from swashplate.identification.validation import RunQuality, pooled
-from swashplate.identification.verdict import Verdict, percent, starts_of, verdict
+from swashplate.identification.validation import RunQuality, percent, pooled
+from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
 from swashplate.report.fit_report.live import can_run, live_page
