@@ -59,7 +59,7 @@ def excitation(
       swashplate excitation harbour/campaign.toml --setup mine.toml --from worn.toml
       swashplate excitation harbour/campaign.toml --out runs.csv
     """
-    from swashplate.identification.data_checks import check_sound, refuse_unsound
+    from swashplate.identification.data_checks import check_runs, refuse_unsound
     from swashplate.identification.experiment_design import outlook
     from swashplate.identification.fitting import smooth
     from swashplate.identification.staging import setup_of
@@ -72,7 +72,7 @@ def excitation(
         drive = parameters_of(begin) if begin is not None else campaign.drive(chosen).parameters
         runs = runs_to_fit(campaign, chosen)
     with working("Simulating"):
-        doubts = refuse_unsound(check_sound(runs, smooth(drive), plan, rank=False))
+        doubts = refuse_unsound(check_runs(runs, smooth(drive)))
         looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
     names = [each.name for each in runs]
     shown = [outlook_table(look, names) for look in looks]

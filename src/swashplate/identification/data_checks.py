@@ -17,9 +17,8 @@ from swashplate.errors import InputError
 from swashplate.identification.drive_model import SIGNALS, simulated_run
 from swashplate.identification.model import EquationModel
 from swashplate.identification.problem import Problem
-from swashplate.identification.setup import ModelSetup, Setup
+from swashplate.identification.setup import ModelSetup
 from swashplate.identification.solving import Loss
-from swashplate.identification.staging import stage_problem
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.result import Simulation
@@ -72,48 +71,13 @@ refusal, warning = partial(Finding, "refuse"), partial(Finding, "warn")
 # --- what is looked at ----------------------------------------------------------------------------
 
 
-def check_sound(
-    experiments: Sequence[Experiment],
-    nominal: ParameterSet,
-    setup: Setup,
-    *,
-    rank: bool = True,
-) -> tuple[Finding, ...]:
-    """What stands in the way of a fit, before it is tried.
-
-    Parameters
-    ----------
-    experiments : sequence of Experiment
-        The runs to fit.
-    nominal : ParameterSet
-        Where the fit begins.
-    setup : Setup
-        What is free.
-    rank : bool
-        Also see whether anything depends on the unknowns, which needs derivatives;
-        `excitation.outlook` tells it in full.
-
-    Returns
-    -------
-    tuple of Finding
-        What must be refused first. Later checks need what earlier ones found sound, so that not
-        everything that is wrong is always listed at once.
-
-    Raises
-    ------
-    InputError, ParameterError
-        If runs and set-up do not fit each other.
-    DomainError
-        If the model does not hold at the nominal values.
-    """
-    found = check_runs(experiments, nominal)
-    for stage in setup.stages if rank and not _refused(found) else ():
-        found += _rank(f"Stage {stage.name}", stage_problem(stage, nominal, experiments))
-    return tuple(sorted(found, key=lambda each: each.severity != "refuse"))
-
-
 def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list[Finding]:
-    """What is wrong with runs beside each other and beside the nominal drive."""
+    """What stands in the way of a fit: runs beside each other and beside the nominal drive.
+
+    What must be refused comes first. Later checks need what earlier ones found sound, so that not
+    everything that is wrong is always listed at once. Runs or a drive that cannot be simulated are
+    refused in an `InputError` or a `DomainError`.
+    """
     unsigned = unsigned_currents(experiments).items()
     found = [refusal(None, name, f"{said}.") for (_, name), said in unsigned]
     for each in experiments:
@@ -134,15 +98,14 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
             for name, ours in of_channels.items()
         }
         found += check(left)
-    return found
+    return sorted(found, key=lambda each: each.severity != "refuse")
 
 
 def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> tuple[Finding, ...]:
-    """What stands in the way of a fit of a model of one's own, as `check_sound` of a drive.
+    """What stands in the way of a fit of a model of one's own, as `check_runs` of a drive.
 
     Whatever the model: samples that are no numbers, sensors that stand still while their input
-    moves, a run that is there twice, fewer samples than unknowns, and a model of equations on
-    whose unknowns nothing depends.
+    moves, and a run that is there twice.
     """
     found, seen = list[Finding](), dict[bytes, str]()
     for each in experiments:
@@ -166,8 +129,6 @@ def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> tuple[F
                 said = f"{each.name}: '{name}' never changes, though the input does and it moves in"
                 also = "other runs; look at the sensor, or ignore the channel in this run."
                 found.append(warning(each.name, name, f"{said} {also}"))
-    if not _refused(found):
-        found += _rank(setup.name, problem)
     return tuple(sorted(found, key=lambda each: each.severity != "refuse"))
 
 
@@ -535,7 +496,7 @@ def _scales(name: str, ours: Sequence[Motion]) -> list[Finding]:
 # --- what the runs determine ----------------------------------------------------------------------
 
 
-def _rank(where: str, problem: Problem) -> list[Finding]:
+def check_rank(where: str, problem: Problem) -> list[Finding]:
     """Fewer samples than unknowns, or unknowns on which nothing depends."""
     unknowns = problem.unknowns
     if problem.samples < len(unknowns):

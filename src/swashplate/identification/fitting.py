@@ -21,7 +21,8 @@ from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.data_checks import (
     check_model,
-    check_sound,
+    check_rank,
+    check_runs,
     refuse_unsound,
     spike_findings,
 )
@@ -236,7 +237,7 @@ def fit(
                 "A drive needs a Setup, such as load_setup('hoist'), for what is free."
             )
         setup = free
-        doubts += refuse_unsound(check_sound(experiments, smooth(nominal), setup))
+        doubts += refuse_unsound(check_runs(experiments, smooth(nominal)))
         nominal, changed = at_rate_of(experiments, nominal)
         doubts = (*doubts, *changed)
     elif not isinstance(nominal, ModelParameters):
@@ -255,6 +256,7 @@ def fit(
         problem = stage_problem(
             stage, parameters, experiments, threads=threads, uncertain=setup.standard_uncertainty
         )
+        refuse_unsound(check_rank(f"Stage {stage.name}", problem))
         begin: Array | None = None
         results: tuple[StartResult, ...] = ()
         if search is not None and search.starts > 0:

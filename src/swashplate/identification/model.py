@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
 
@@ -189,6 +189,13 @@ def _check(
                 )
 
 
+def refused_channel(experiment: Experiment, name: str, known: Collection[str]) -> InputError:
+    """What to say of a channel that the model does not give."""
+    return InputError(
+        f"{experiment.name}: the model gives no '{name}'; it gives {', '.join(known)}."
+    )
+
+
 OFFSET, CLOCK = "offset ", "clock "
 """What the names begin with of a channel's free zero, and of the time by which the input's clock is
 ahead of the channel's [s]."""
@@ -205,10 +212,13 @@ class EquationModel(ABC):
     _observed: dict[_Key, tuple[object, ObservedRecord]] = field(
         default_factory=dict, repr=False, init=False
     )
+    _chains: dict[tuple[int, tuple[str, ...]], tuple[object, tuple[list[str], Array]]] = field(
+        default_factory=dict, repr=False, init=False
+    )
 
     def __getstate__(self) -> dict[str, object]:
         """Without what can be made again."""
-        return {**self.__dict__, "_observed": {}}
+        return {**self.__dict__, "_observed": {}, "_chains": {}}
 
     @abstractmethod
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
@@ -270,9 +280,11 @@ class EquationModel(ABC):
 
         `weights` are the channels that count, and the factors (m,) on their residuals.
         """
-        known = self.signals_of(experiment)
-        channels = [name for name in weights if name in known]
-        observed = self._record(experiment, {name: weights[name] for name in channels}, names)
+        known, channels = self.signals_of(experiment), list(weights)
+        for name in channels:
+            if name not in known:
+                raise refused_channel(experiment, name, known)
+        observed = self._record(experiment, weights, names)
         columns, chain = self._chain(names, channels, observed)
         shifts = _shifts(values, channels, offsets=True)
         ready = self.ready(values, experiment, observed, columns, shifts)
@@ -282,7 +294,15 @@ class EquationModel(ABC):
     def _chain(
         self, names: Sequence[str], channels: Sequence[str], observed: ObservedRecord
     ) -> tuple[list[str], Array]:
-        """Columns to ask for, and the derivatives of all columns by the names."""
+        """Columns to ask for, and the derivatives of all columns by the names; made once."""
+        key = id(observed), tuple(names)
+        if key not in self._chains:
+            self._chains[key] = (observed, self._chain_of(names, channels, observed))
+        return self._chains[key][1]
+
+    def _chain_of(
+        self, names: Sequence[str], channels: Sequence[str], observed: ObservedRecord
+    ) -> tuple[list[str], Array]:
         moved = [
             {name: 1.0} if name.startswith((OFFSET, CLOCK)) else self.moves(name) for name in names
         ]

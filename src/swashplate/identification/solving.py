@@ -224,7 +224,8 @@ def solve(
     # a robust loss looks at each residual, which the triangular factor has mixed
     memory = _Memory(objective, compressed=loss == "linear")
     vector = np.clip(objective.start if start is None else start, *objective.bounds)
-    start_cost = objective.cost(vector)
+    at_start = memory(vector).residuals
+    start_cost = 0.5 * float(at_start @ at_start)
     iteration = 0
 
     def told(intermediate_result) -> None:  # type: ignore[no-untyped-def]
@@ -246,7 +247,7 @@ def solve(
     try:
         while True:
             found = least_squares(
-                lambda vector: memory(vector).residuals,
+                lambda vector: memory(vector).residuals.copy(),
                 begin,
                 jac=lambda vector, fixed=fixed: np.where(fixed, 0.0, memory(vector).jacobian),
                 bounds=objective.bounds,
