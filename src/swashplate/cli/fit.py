@@ -165,7 +165,6 @@ def fit(
         from swashplate.identification.fitting import fit as fitted
         from swashplate.identification.fitting import refined
         from swashplate.identification.setup import ModelSetup
-        from swashplate.identification.solving import longest_left
         from swashplate.identification.staging import setup_of
     with working(f"Reading {path}"):
         campaign, chosen = campaign_of(path, axis)
@@ -184,8 +183,8 @@ def fit(
 
         def watch(stage: str, now: Progress) -> None:
             shown(
-                f"{stage}: iteration {now.iteration}, cost {now.cost:.6g}",
-                left=waiting(longest_left(now), "at most"),
+                f"{stage}: iteration {now.iteration}, evaluation {now.evaluations} of at most "
+                f"{evaluations}, cost {now.cost:.6g}"
             )
 
         search = _search(starts, seed, executor, out, resume, shown) if starts else None
@@ -239,7 +238,6 @@ def _search(
 ) -> Search:
     from swashplate.executors import Dask, Processes
     from swashplate.identification.fitting import Search
-    from swashplate.identification.solving import time_left
 
     assert isinstance(executor, Processes | Dask)
     begun: dict[str, tuple[float, int]] = {}
@@ -247,7 +245,8 @@ def _search(
     def watch(stage: str, result: StartResult, done: int) -> None:
         # results of an earlier run come all at once: the pace counts from the first new one
         first, kept = begun.setdefault(stage, (perf_counter(), done))
-        left = time_left(done - kept, starts + 1 - done, perf_counter() - first)
+        new, spent = done - kept, perf_counter() - first
+        left = spent / new * (starts + 1 - done) if new else None
         shown(
             f"{stage}: {done} of {starts + 1} starts, the last to cost {result.cost:.6g}",
             done / (starts + 1),

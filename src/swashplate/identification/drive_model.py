@@ -281,8 +281,7 @@ class DriveModel(Result, EquationModel):
 
     Besides columns it knows ``"force_plus_1"`` ... (see `Forces`), ``"start_pressure"`` of an
     experiment [Pa], ``"start_current_plus"`` or ``"..._minus"`` of its card [A], and of each
-    channel ``"offset NAME"`` (its free zero) and ``"clock NAME"`` (by how much the input's clock
-    is ahead of the channel's [s]).
+    channel ``"offset NAME"``, its free zero.
 
     Derivatives are exact, those by refinements as well.
     """
@@ -325,7 +324,7 @@ class DriveModel(Result, EquationModel):
         experiment: Experiment,
         observed: ObservedRecord,
         columns: Sequence[str],
-        shifts: tuple[Sequence[float], Sequence[float]],
+        offsets: Sequence[float],
     ) -> Ready:
         """The drive with numbers; see `EquationModel.ready`."""
         states = {
@@ -334,7 +333,7 @@ class DriveModel(Result, EquationModel):
             if name in values
             for path in self._start_paths(name)
         }
-        own = Own(values.get(START_PRESSURE), *shifts, states)
+        own = Own(values.get(START_PRESSURE), offsets, states=states)
         try:
             return made_ready(self.parameters_at(values), observed, columns, own)
         except InputError as error:  # a filter that is unstable at this step

@@ -7,7 +7,7 @@ and `advise` rank tests to come by what they would add.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
@@ -315,18 +315,12 @@ class Bench(Result):
     sensors: tuple[Sensor, ...]
     """Those of the campaign, or of a fresh plan."""
 
-    _tried: dict[tuple[str, Sensor], Array] = field(default_factory=dict, repr=False)
-
     def rows(self, maneuver: Maneuver, sensor: Sensor) -> Array:
         """(<= K, K) factor of what one sensor would tell in a test, its free zero spent."""
-        key = (maneuver.name, sensor)
-        if key not in self._tried:
-            # what is known beforehand counts once, not once a test
-            free = {k: v.model_copy(update={"prior": None}) for k, v in self.stage.free.items()}
-            stage = self.stage.model_copy(update={"free": free})
-            problem = stage_problem(stage, self.parameters, [_imagined(maneuver, sensor)])
-            self._tried[key] = _machine_rows(problem)
-        return self._tried[key]
+        # what is known beforehand counts once, not once a test
+        free = {k: v.model_copy(update={"prior": None}) for k, v in self.stage.free.items()}
+        stage = self.stage.model_copy(update={"free": free})
+        return _machine_rows(stage_problem(stage, self.parameters, [_imagined(maneuver, sensor)]))
 
     def candidate(
         self, maneuver: Maneuver, sensors: Sequence[Sensor], name: str | None = None

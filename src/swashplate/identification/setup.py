@@ -138,11 +138,6 @@ class Stage(Entry):
     weights_by_input: dict[ChannelKind, tuple[InputWeight, ...]] = Field(
         {}, description="Weights by the size of the command, besides those of the campaign."
     )
-    clock_offsets: dict[ChannelKind, Positive] = Field(
-        {},
-        description="Largest offset of a channel's clock against the input's, free and the same in "
-        "all runs [s].",
-    )
     start_pressure: Positive | None = Field(
         None,
         description="Largest stroking pressure at the first sample, free in each run [Pa]; where "
@@ -253,9 +248,6 @@ class Setup(Entry):
             weights={kind: w for each in self.stages for kind, w in each.weights.items()},
             weights_by_input={
                 kind: w for each in self.stages for kind, w in each.weights_by_input.items()
-            },
-            clock_offsets={
-                kind: most for each in self.stages for kind, most in each.clock_offsets.items()
             },
             start_pressure=max(pressures, default=None),
         )

@@ -39,24 +39,6 @@ from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import START_PRESSURE
 
 
-def check_weights(stage: Stage, experiments: Sequence[Experiment], channels: Sequence[str]) -> None:
-    """Refuse weights that no channel takes, which would be lost in silence.
-
-    Raises
-    ------
-    InputError
-        If the stage has weights, but for no kind of channel that it fits.
-    """
-    weighed = [*stage.weights, *stage.weights_by_input]
-    kinds = {c.kind for e in experiments for name, c in e.channels.items() if name in channels}
-    if weighed and not kinds & set(weighed):
-        raise InputError(
-            f"The stage '{stage.name}' weighs {', '.join(dict.fromkeys(weighed))}, but the runs "
-            f"have {', '.join(sorted(kinds))}: add weights for that, or take a fit "
-            "configuration without."
-        )
-
-
 def weighted(experiment: Experiment, stage: Stage) -> Experiment:
     """The experiment with the stage's own weights multiplied in."""
     if not stage.weights and not stage.weights_by_input:
@@ -140,10 +122,16 @@ def stage_problem(
         raise InputError("part = 'model' needs a model of your own, not a drive.")
     channels = _channels(stage, experiments)
     runs = tuple(each for each in experiments if any(name in each.channels for name in channels))
-    check_weights(stage, runs, channels)
-    forces = None
-    if stage.forces is not None:
-        forces = Forces(stage.forces.plus, stage.forces.minus)
+    weighed = [*stage.weights, *stage.weights_by_input]
+    kinds = {c.kind for each in runs for name, c in each.channels.items() if name in channels}
+    if weighed and not kinds & set(weighed):  # they would be lost in silence
+        raise InputError(
+            f"The stage '{stage.name}' weighs {', '.join(dict.fromkeys(weighed))}, but the runs "
+            f"have {', '.join(sorted(kinds))}: add weights for that, or take a fit "
+            "configuration without."
+        )
+    given = stage.forces
+    forces = None if given is None else Forces(given.plus, given.minus)
     currents = {}
     if stage.part == "pump":
         currents = {
@@ -155,8 +143,10 @@ def stage_problem(
     free = _parameters(stage.free, parameters)
     unknowns = (
         *free,
-        *_forces(stage, forces, parameters),
-        *_clocks(stage, runs, channels),
+        *(
+            bounded(name, value, relative=given.relative, unit="N", log=value > 0.0)
+            for name, value in (forces.values(parameters).items() if forces and given else ())
+        ),
         *_own(stage, runs, channels, parameters),
     )
     return Problem(
@@ -165,26 +155,12 @@ def stage_problem(
         Unknowns(unknowns),
         channels,
         noise_scales(runs, channels),
-        uncertain=uncertain_columns(uncertain, parameters),
+        uncertain=tuple(
+            {c: deviation(each, _nominal(parameters, c)) for c in columns_of([name])}
+            for name, each in uncertain.items()
+        ),
         threads=threads or available_cores(),
     )
-
-
-def uncertain_columns(
-    uncertain: Mapping[str, float | str], parameters: ParameterSet
-) -> tuple[Mapping[str, float], ...]:
-    """Standard uncertainties of a drive's fixed parameters, by columns; see `Problem.uncertain`.
-
-    Raises
-    ------
-    ParameterError
-        If there is no parameter of a name.
-    """
-    made = []
-    for name, each in uncertain.items():
-        columns = columns_of([name])
-        made.append({c: deviation(each, _nominal(parameters, c)) for c in columns})
-    return tuple(made)
 
 
 def with_estimates(parameters: Parameters, problem: Problem, vector: Array) -> Parameters:
@@ -265,38 +241,6 @@ def _nominal(parameters: ParameterSet, column: str) -> float:
     if column in parameters.numbers:
         return parameters.numbers[column]
     return parameters[column].values[0]
-
-
-def _forces(stage: Stage, forces: Forces | None, parameters: ParameterSet) -> list[Unknown]:
-    if forces is None or stage.forces is None:
-        return []
-    return [
-        bounded(name, value, relative=stage.forces.relative, unit="N", log=value > 0.0)
-        for name, value in forces.values(parameters).items()
-    ]
-
-
-def _clocks(
-    stage: Stage, experiments: Sequence[Experiment], channels: Sequence[str]
-) -> list[Unknown]:
-    """Offsets of the channels' clocks, each the same in all runs."""
-    kinds = {
-        name: each.channels[name].kind
-        for each in experiments
-        for name in channels
-        if name in each.channels
-    }
-    idle = [kind for kind in stage.clock_offsets if kind not in kinds.values()]
-    if idle:
-        raise InputError(
-            f"The stage '{stage.name}' frees the clock of {', '.join(idle)}, but fits "
-            f"{', '.join(dict.fromkeys(kinds.values()))}."
-        )
-    return [
-        Unknown(f"clock {name}", 0.0, -stage.clock_offsets[kind], stage.clock_offsets[kind], "s")
-        for name, kind in kinds.items()
-        if kind in stage.clock_offsets
-    ]
 
 
 def _own(

@@ -371,11 +371,8 @@ def _setup_section(
             made.add(key, words)
     blocks = [Block("table", made, "notes")]
     for each in stages:
-        bounds = tables.bounds_table(each)
         blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
         blocks += listed_block(_stage_words(each))
-        summary = f"Bounds of {count(len(bounds.rows), 'parameter')}"
-        blocks.append(Block("details", [Block("table", bounds, "bounds")], summary))
     return Section("setup", "Configuration", blocks)
 
 
