@@ -156,14 +156,6 @@ def test_a_run_begins_where_a_channel_does() -> None:
     assert values == pytest.approx(TRUTH._asdict(), rel=1e-7)
 
 
-def test_what_is_fixed_or_given_need_not_be_unknown() -> None:
-    by_p = OwnModel(valve, Valve(0.4, 9.0, 0.13), given=Load())
-    assert found(problem(by_p, trial("a"), free=FREE[1:2]))["gain"] == pytest.approx(1.5)
-    fixed = {"lag": 0.4, "delay": 0.13}
-    made = problem(OWN, trial("a"), free=FREE[1:2], fixed=fixed)
-    assert found(made)["gain"] == pytest.approx(1.5)
-
-
 @pytest.mark.parametrize("hold", ["previous", "linear"])
 def test_uneven_stamps_are_put_on_a_grid(hold) -> None:
     """What was logged at jittered stamps, marched at a rate of one's own."""
