@@ -378,6 +378,7 @@ def _say_verdict(verdict: Verdict) -> None:
     from swashplate.identification.tables import criteria_table
 
     show(criteria_table(verdict))
+    bullets(verdict.not_judged)
     if verdict.assumed:
         say("Assumed, cannot be checked from these logs:")
     bullets(verdict.assumed)

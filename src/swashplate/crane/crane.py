@@ -664,7 +664,7 @@ def _inverse(drive: Drive) -> InverseMap:
 @lru_cache(maxsize=64)
 def _edges(drive: Drive) -> tuple[float | None, float | None]:
     """Voltages of a drive's dead zone, negative and positive. [V]"""
-    return dead_zone(drive, -1.0).outside, dead_zone(drive, 1.0).outside
+    return dead_zone(drive, -1.0)[1], dead_zone(drive, 1.0)[1]
 
 
 @lru_cache(maxsize=64)

@@ -375,7 +375,7 @@ def residual_table(qualities: Sequence[RunQuality]) -> Table:
         if (test := each.test) is None:
             continue
         lag, value = test.peak
-        star = "*" if abs(value) > test.cross_band else ""
+        star = "*" if test.follows else ""
         run = each.experiment
         start = (run.name, run.role, each.channel, test.duration, value, star)
         made.add(*start, test.cross_band, lag, test.verdict)
@@ -383,12 +383,13 @@ def residual_table(qualities: Sequence[RunQuality]) -> Table:
 
 
 def criteria_table(verdict: Verdict) -> Table:
-    """The acceptance criteria, those that are not met first."""
+    """The acceptance criteria, those that are not met first, then those that were not judged."""
     columns = (Column("criterion", wrap=True), Column("value", "s"), Column("limit", "s"))
     made = Table("Acceptance criteria", (*columns, Column(""), Column("reason", of="p")))
-    for each in sorted(verdict.criteria, key=lambda each: each.passed):
-        met = "met" if each.passed else "NOT MET"
-        made.add(each.name, each.value, each.limit, met, each.reason, look=not each.passed)
+    order = ("not met", "not judged", "met")
+    for each in sorted(verdict.criteria, key=lambda each: order.index(each.state)):
+        state = "NOT MET" if each.failure else each.state
+        made.add(each.name, each.value, each.limit, state, each.reason, look=state != "met")
     return made
 
 
