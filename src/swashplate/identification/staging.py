@@ -130,8 +130,13 @@ def stage_problem(
             f"have {', '.join(sorted(kinds))}: add weights for that, or take a fit "
             "configuration without."
         )
-    given = stage.forces
-    forces = None if given is None else Forces(given.plus, given.minus)
+    forces, of_forces = None, list[Unknown]()
+    if stage.forces is not None:
+        forces, factors = Forces(stage.forces.plus, stage.forces.minus), stage.forces.relative
+        of_forces = [
+            bounded(name, value, relative=factors, unit="N", log=value > 0.0)
+            for name, value in forces.values(parameters).items()
+        ]
     currents = {}
     if stage.part == "pump":
         currents = {
@@ -143,10 +148,7 @@ def stage_problem(
     free = _parameters(stage.free, parameters)
     unknowns = (
         *free,
-        *(
-            bounded(name, value, relative=given.relative, unit="N", log=value > 0.0)
-            for name, value in (forces.values(parameters).items() if forces and given else ())
-        ),
+        *of_forces,
         *_own(stage, runs, channels, parameters),
     )
     return Problem(
