@@ -10,12 +10,12 @@ from swashplate import Drive
 from swashplate.campaign import rig
 from swashplate.campaign.campaign import Campaign
 from swashplate.identification.assessment import assess
+from swashplate.identification.drive_model import stage_problem
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.intervals import Handed, slopes_by_earlier, with_handed
 from swashplate.identification.noise import Covariance
 from swashplate.identification.setup import load_setup
 from swashplate.identification.solving import solve
-from swashplate.identification.staging import stage_problem
 from swashplate.maneuvers import source_tests
 
 

@@ -11,11 +11,11 @@ from swashplate import Channel, DomainError, Experiment, FileError, InputError, 
 from swashplate.campaign import rig
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.executors import Processes, Serial, Threads
+from swashplate.identification.drive_model import stage_problem
 from swashplate.identification.model import Linearised
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.setup import Free, Stage
 from swashplate.identification.solving import Progress, StartResult, sobol_starts, solve, solve_from
-from swashplate.identification.staging import stage_problem
 from swashplate.identification.unknowns import Unknown, Unknowns, bounded
 
 GAIN, LAG = 3.0, 0.7

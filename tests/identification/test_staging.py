@@ -9,10 +9,9 @@ import pytest
 
 from swashplate import Campaign, Channel, Drive, Experiment
 from swashplate.campaign import InputSignal, Source, rig
-from swashplate.identification.drive_model import DriveModel, at_rate_of
+from swashplate.identification.drive_model import DriveModel, at_rate_of, stage_problem
 from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import Free, Setup, Stage, load_setup, setup_names
-from swashplate.identification.staging import stage_problem
 from swashplate.identification.unknowns import Unknown
 from swashplate.maneuvers import source_tests, step
 

@@ -15,12 +15,12 @@ import pytest
 from swashplate import Campaign, Channel, Drive, FileError, InputError, maneuvers
 from swashplate.campaign import Source, rig
 from swashplate.identification.assessment import StageProfile, assess
+from swashplate.identification.drive_model import stage_problem
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.profile import Point, Profile
 from swashplate.identification.resampling import CrossValidation, Fold, HeldRun
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import StartResult
-from swashplate.identification.staging import stage_problem
 from swashplate.identification.validation import Measures, predict, run_qualities
 from swashplate.identification.verdict import verdict
 from swashplate.report.figures import plot_fit

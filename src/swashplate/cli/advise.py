@@ -60,9 +60,9 @@ def excitation(
       swashplate excitation harbour/campaign.toml --out runs.csv
     """
     from swashplate.identification.data_checks import check_runs, refuse_unsound
+    from swashplate.identification.drive_model import setup_of
     from swashplate.identification.experiment_design import outlook
     from swashplate.identification.fitting import smooth
-    from swashplate.identification.staging import setup_of
     from swashplate.identification.tables import outlook_table
 
     files = Outputs((out, TABLE))
@@ -192,10 +192,10 @@ def _bench(
     free: Sequence[str],
     noise: Sequence[str],
 ) -> Bench:
+    from swashplate.identification.drive_model import setup_of
     from swashplate.identification.experiment_design import bench
     from swashplate.identification.fitting import smooth
     from swashplate.identification.setup import load_setup
-    from swashplate.identification.staging import setup_of
 
     if file_kind(Path(word)) != "campaign":
         if axis is not None:

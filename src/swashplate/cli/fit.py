@@ -57,9 +57,9 @@ if TYPE_CHECKING:
     from swashplate.campaign import Campaign
     from swashplate.drive import Drive
     from swashplate.identification.assessment import Judged
+    from swashplate.identification.drive_model import Parameters
     from swashplate.identification.fitting import Search
     from swashplate.identification.solving import Progress, StartResult
-    from swashplate.identification.staging import Parameters
     from swashplate.identification.validation import RunQuality
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
@@ -162,10 +162,9 @@ def fit(
     with working("Starting"):
         from swashplate.executors import Dask, Processes
         from swashplate.identification.assessment import Wanted, judge_fit
+        from swashplate.identification.drive_model import setup_of
         from swashplate.identification.fitting import fit as fitted
-        from swashplate.identification.fitting import refined
         from swashplate.identification.setup import ModelSetup
-        from swashplate.identification.staging import setup_of
     with working(f"Reading {path}"):
         campaign, chosen = campaign_of(path, axis)
         runs = runs_to_fit(campaign, chosen)
@@ -198,7 +197,9 @@ def fit(
             watch=watch,
         )
         if joint and len(plan.stages) > 1 and not result.interrupted:
-            result = refined(result, runs, max_evaluations=evaluations, watch=watch)
+            # from where the stages ended: from afar a joint fit is often caught on its way
+            ended, whole = result.parameters, plan.joint()
+            result = fitted(ended, runs, whole, max_evaluations=evaluations, watch=watch)
     searched = perf_counter()
     if result.interrupted and starts:
         last = result.stages[-1]
@@ -586,9 +587,8 @@ def demo(
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
     from swashplate.identification.assessment import Wanted, judge_fit
-    from swashplate.identification.fitting import fit
+    from swashplate.identification.fitting import drawn, fit
     from swashplate.identification.setup import load_setup
-    from swashplate.identification.staging import drawn
     from swashplate.identification.tables import estimates_table, runs_tables, truth_count
 
     if not (out / "virtual" / "truth").is_dir():  # an earlier demo is replaced, nothing else

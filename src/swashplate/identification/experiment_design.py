@@ -21,7 +21,13 @@ from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Sou
 from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import CURRENTS, SIGNALS, DriveModel, Forces
+from swashplate.identification.drive_model import (
+    CURRENTS,
+    SIGNALS,
+    DriveModel,
+    Forces,
+    stage_problem,
+)
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import uncertainty
 from swashplate.identification.problem import (
@@ -32,8 +38,7 @@ from swashplate.identification.problem import (
     triangular_factor,
     whitening,
 )
-from swashplate.identification.setup import Free, Setup, Stage
-from swashplate.identification.staging import stage_problem
+from swashplate.identification.setup import Forces, Free, Setup, Stage
 from swashplate.identification.unknowns import Unknowns
 from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, find
@@ -175,7 +180,7 @@ def outlook(
     Raises
     ------
     InputError, ParameterError
-        If runs and set-up do not fit each other, see `staging.stage_problem`.
+        If runs and set-up do not fit each other, see `drive_model.stage_problem`.
     DomainError
         If the model does not hold at the nominal values.
     """

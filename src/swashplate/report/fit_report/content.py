@@ -17,11 +17,11 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
 from swashplate.identification.assessment import Assessment, StageProfile, assess, motion_of
+from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.resampling import CrossValidation
 from swashplate.identification.setup import ModelParameters
 from swashplate.identification.solving import StartResult
-from swashplate.identification.staging import Parameters
 from swashplate.identification.validation import RunQuality, pooled
 from swashplate.identification.verdict import Verdict, percent, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
