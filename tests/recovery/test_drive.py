@@ -64,7 +64,7 @@ def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Pat
 
 def test_counts_and_noise_leave_small_errors(tmp_path: Path) -> None:
     setup = load_setup("hoist")
-    truth = drawn("hoist", setup, seed=5)
+    truth = drawn(Drive.preset("hoist"), setup, seed=5)
     tests = rig.run("hoist", severity="realistic", truth=truth, seed=2)
     campaign = Campaign.from_toml(rig.write(tests, tmp_path / "virtual"))
     result = fit(campaign.drive("hoist").parameters, campaign.select(role="fit"), setup)

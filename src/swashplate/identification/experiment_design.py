@@ -25,7 +25,6 @@ from swashplate.identification.drive_model import (
     CURRENTS,
     SIGNALS,
     DriveModel,
-    Forces,
     stage_problem,
 )
 from swashplate.identification.identifiability import Identifiability, identifiability
