@@ -188,8 +188,8 @@ def fit(
         )
         if joint and len(plan.stages) > 1 and not result.interrupted:
             # from where the stages ended: from afar a joint fit is often caught on its way
-            ended, whole = result.parameters, plan.joint()
-            result = fitted(ended, runs, whole, max_evaluations=evaluations, watch=watch)
+            staged, whole = result.parameters, plan.joint()
+            result = fitted(staged, runs, whole, max_evaluations=evaluations, watch=watch)
     searched = perf_counter()
     if result.interrupted and starts:
         last = result.stages[-1]
