@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from swashplate.identification.staging import stage_problem
 from tests.identification.linear import unknowns_of
 from tests.identification.test_own_model_fit import FREE, NOISE, RUNS, servo
 
@@ -15,7 +16,6 @@ from swashplate.identification.lack_of_fit import lack_of_fit
 from swashplate.identification.noise import Covariance
 from swashplate.identification.setup import Setup, load_setup, setup_text
 from swashplate.identification.solving import solve
-from swashplate.identification.staging import stage_problem
 from swashplate.maneuvers import source_tests
 
 DOUBTS = {"Z9": "3 %", "tau": 1e-3}

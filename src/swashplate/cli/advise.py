@@ -54,10 +54,10 @@ def excitation(
       swashplate excitation harbour/campaign.toml --setup mine.toml --from worn.toml
       swashplate excitation harbour/campaign.toml --out runs.csv
     """
-    from swashplate.identification.data_checks import check_sound, refuse_unsound
+    from swashplate.identification.data_checks import check_runs, refuse_unsound
+    from swashplate.identification.drive_model import setup_of
     from swashplate.identification.experiment_design import outlook
     from swashplate.identification.fitting import smooth
-    from swashplate.identification.staging import setup_of
     from swashplate.identification.tables import outlook_table
 
     files = Outputs((out, TABLE))
@@ -67,7 +67,7 @@ def excitation(
         drive = parameters_of(begin) if begin is not None else campaign.drive(chosen).parameters
         runs = runs_to_fit(campaign, chosen)
     with working("Simulating"):
-        doubts = refuse_unsound(check_sound(runs, smooth(drive), plan, rank=False))
+        doubts = refuse_unsound(check_runs(runs, smooth(drive)))
         looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
     names = [each.name for each in runs]
     shown = [outlook_table(look, names) for look in looks]
@@ -176,10 +176,10 @@ def _bench(
     free: Sequence[str],
 ) -> Bench:
     from swashplate.drive import Drive
+    from swashplate.identification.drive_model import setup_of
     from swashplate.identification.experiment_design import bench, default_sensors
     from swashplate.identification.fitting import smooth
     from swashplate.identification.setup import load_setup
-    from swashplate.identification.staging import setup_of
 
     if file_kind(Path(word)) != "campaign":
         if axis is not None:

@@ -52,8 +52,8 @@ from swashplate.tables import (
 if TYPE_CHECKING:
     from swashplate.campaign import Campaign
     from swashplate.identification.assessment import Judged
+    from swashplate.identification.drive_model import Parameters
     from swashplate.identification.solving import Progress, StartResult
-    from swashplate.identification.staging import Parameters
     from swashplate.identification.validation import RunQuality
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
@@ -147,10 +147,10 @@ def fit(
     with working("Starting"):
         from swashplate.executors import Dask, Processes
         from swashplate.identification.assessment import Wanted, judge_fit
-        from swashplate.identification.fitting import Search, refined
+        from swashplate.identification.drive_model import setup_of
+        from swashplate.identification.fitting import Search
         from swashplate.identification.fitting import fit as fitted
         from swashplate.identification.setup import ModelSetup
-        from swashplate.identification.staging import setup_of
     with working(f"Reading {path}"):
         campaign, chosen = campaign_of(path, axis)
         runs = runs_to_fit(campaign, chosen)
@@ -167,7 +167,10 @@ def fit(
     with long_work("Fitting") as shown:
 
         def watch(stage: str, now: Progress) -> None:
-            shown(f"{stage}: iteration {now.iteration}, cost {now.cost:.6g}")
+            shown(
+                f"{stage}: iteration {now.iteration}, evaluation {now.evaluations} of at most "
+                f"{evaluations}, cost {now.cost:.6g}"
+            )
 
         def ended(stage: str, one: StartResult, done: int) -> None:
             words = f"{stage}: {done} of {starts + 1} starts, the last to cost {one.cost:.6g}"
@@ -184,7 +187,9 @@ def fit(
             watch=watch,
         )
         if joint and len(plan.stages) > 1 and not result.interrupted:
-            result = refined(result, runs, max_evaluations=evaluations, watch=watch)
+            # from where the stages ended: from afar a joint fit is often caught on its way
+            staged, whole = result.parameters, plan.joint()
+            result = fitted(staged, runs, whole, max_evaluations=evaluations, watch=watch)
     searched = perf_counter()
     if result.interrupted and starts:
         last = result.stages[-1]
@@ -494,9 +499,8 @@ def demo(*, out: Path = Path("demo"), seed: Seed = 1) -> None:
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
     from swashplate.identification.assessment import Wanted, judge_fit
-    from swashplate.identification.fitting import fit
+    from swashplate.identification.fitting import drawn, fit
     from swashplate.identification.setup import load_setup
-    from swashplate.identification.staging import drawn
     from swashplate.identification.tables import estimates_table, runs_tables, truth_count
 
     if not (out / "virtual" / "truth").is_dir():  # an earlier demo is replaced, nothing else

@@ -20,6 +20,7 @@ from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
 from swashplate.errors import FileError, InputError
+from swashplate.identification.drive_model import Parameters, stage_problem, with_estimates
 from swashplate.identification.fitting import Fit, StageFit, smooth
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import (
@@ -42,7 +43,6 @@ from swashplate.identification.resampling import (
 )
 from swashplate.identification.setup import ModelParameters, ModelSetup, Setup
 from swashplate.identification.solving import Solution, StartResult
-from swashplate.identification.staging import Parameters, stage_problem, with_estimates
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict, run_qualities
 from swashplate.identification.verdict import LIMITS, REQUIRED, Verdict, verdict

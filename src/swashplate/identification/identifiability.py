@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space, qr
 
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import DriveModel
+from swashplate.identification.drive_model import DriveModel, true_value
 from swashplate.identification.problem import TOLERANCE, triangular_factor, whitening
-from swashplate.identification.staging import true_value
 from swashplate.identification.unknowns import Unknowns
 from swashplate.models.displacement_control import (
     FORCE,

@@ -15,13 +15,17 @@ from scipy.fft import irfft, next_fast_len, rfft
 from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
-from swashplate.identification.drive_model import DriveModel, simulated_current
+from swashplate.identification.drive_model import (
+    DriveModel,
+    Parameters,
+    simulated_current,
+    stage_problem,
+)
 from swashplate.identification.fitting import Fit, Search, StageFit, fit, smooth
 from swashplate.identification.noise import grid_of, noise_colours, unweighted, without_lines
 from swashplate.identification.problem import LinearisedFit, Problem
 from swashplate.identification.setup import Setup
 from swashplate.identification.solving import Loss, solve
-from swashplate.identification.staging import Parameters, stage_problem
 from swashplate.identification.unknowns import Unknowns
 from swashplate.identification.validation import Measures, predict, with_speeds
 from swashplate.parameters.parameter_set import ParameterSet

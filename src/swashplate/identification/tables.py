@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from swashplate.identification.assessment import Assessment
     from swashplate.identification.fitting import Fit, StageFit
     from swashplate.identification.resampling import Bootstrap, CrossValidation
-    from swashplate.identification.unknowns import Unknown
     from swashplate.identification.validation import Measures, RunQuality
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
@@ -177,8 +176,6 @@ def meaning_of(name: str, stage: StageFit | None = None) -> str:
     kind, _, channel = name.partition(" ")
     if kind == "offset":
         return f"free zero of {channel}"
-    if kind == "clock":
-        return f"lead of the input's clock before that of {channel}"
     if stage is not None and stage.stage.part == "model":
         return "number of the state at the first sample" if name.startswith("start.") else ""
     if name == START_PRESSURE:
@@ -257,33 +254,6 @@ def fixed_line(fit: Fit) -> str:
     plain_names = (n.removesuffix("_plus").removesuffix("_minus") for n in fit.nominal.numbers)
     kept = [name for name in dict.fromkeys(plain_names) if not _is_moved(name, moved)]
     return f"Fixed at their nominal values: {', '.join(kept) or 'none'}."
-
-
-def bounds_table(fit: StageFit) -> Table:
-    """Within which bounds each unknown could move, and what was known of it beforehand."""
-    made = Table(
-        f"Bounds of stage {fit.stage.name}",
-        (
-            Column("parameter"),
-            Column("start", ".5g"),
-            Column("lowest", ".5g"),
-            Column("highest", ".5g"),
-            UNIT,
-            Column("moved by"),
-            Column("prior"),
-        ),
-        si=True,
-    )
-    for each in fit.problem.unknowns:
-        if each.run is None:
-            by = "logarithm" if each.log else "value"
-            made.add(each.name, each.start, each.low, each.high, by, _prior(each), unit=each.unit)
-    return made
-
-
-def _prior(unknown: Unknown) -> str:
-    prior = unknown.prior
-    return "" if prior is None else f"{plain(prior.mean)} ± {plain(prior.deviation)}"
 
 
 # --- runs -----------------------------------------------------------------------------------------

@@ -13,11 +13,10 @@ from scipy.fft import irfft, next_fast_len, rfft
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.speed import speed_of
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import SIGNALS, DriveModel, current_record
+from swashplate.identification.drive_model import SIGNALS, DriveModel, Parameters, current_record
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import ModelParameters
-from swashplate.identification.staging import Parameters
 from swashplate.parameters.parameter_set import HasParameters, set_of
 from swashplate.results import Result
 

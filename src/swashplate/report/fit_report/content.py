@@ -17,12 +17,12 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
 from swashplate.identification.assessment import Assessment, Judged, StageProfile, motion_of
+from swashplate.identification.drive_model import Parameters
 from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.identifiability import Identifiability
 from swashplate.identification.resampling import CrossValidation
 from swashplate.identification.setup import ModelParameters
 from swashplate.identification.solving import StartResult
-from swashplate.identification.staging import Parameters
 from swashplate.identification.validation import RunQuality, percent, pooled
 from swashplate.identification.verdict import Verdict, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
@@ -348,11 +348,8 @@ def _setup_section(
             made.add(key, words)
     blocks = [Block("table", made, "notes")]
     for each in stages:
-        bounds = tables.bounds_table(each)
         blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
         blocks += listed_block(_stage_words(each))
-        summary = f"Bounds of {count(len(bounds.rows), 'parameter')}"
-        blocks.append(Block("details", [Block("table", bounds, "bounds")], summary))
     return Section("setup", "Configuration", blocks)
 
 
