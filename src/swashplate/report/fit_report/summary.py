@@ -14,10 +14,18 @@ from swashplate.analysis import dead_zone, drives, limit_shares
 from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
-from swashplate.identification.acceptance import POOR, following, percent, range_of
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.validation import Measures, RunQuality, pooled
-from swashplate.identification.verdict import CARRIES_OVER, Grade, Verdict, weak_unknowns
+from swashplate.identification.verdict import (
+    CARRIES_OVER,
+    POOR,
+    Grade,
+    Verdict,
+    following,
+    percent,
+    range_of,
+    weak_unknowns,
+)
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.fit_report.page import Block, Section, listed_block, text
 from swashplate.report.fit_report.runs import ShownRun
@@ -257,7 +265,7 @@ def _next(
     runs: Sequence[ShownRun],
     findings: int,
 ) -> list[str | Markup]:
-    failed = [each.failure for each in judged.criteria if not each.passed]
+    failed = [each.failure for each in judged.criteria if each.failure]
     said: list[str | Markup] = [f"Settle first: {words}." for words in failed[:3]]
     if findings:
         link = Markup('Look into the <a href="#data">{}</a> on the logs.')
