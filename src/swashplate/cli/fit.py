@@ -11,12 +11,7 @@ import typer
 
 from swashplate.cli.options import (
     AxisName,
-    CampaignPath,
-    OwnModel,
     Required,
-    Seed,
-    SetupWord,
-    StartWord,
     option,
 )
 from swashplate.cli.terminal import (
@@ -81,14 +76,14 @@ CAMPAIGN = Path("campaign.toml")
 
 
 def fit(
-    path: CampaignPath = CAMPAIGN,
+    path: Path = CAMPAIGN,
     *,
     out: Path = Path("fitted"),
     axis: AxisName = None,
-    setup: SetupWord = None,
-    model: OwnModel = None,
+    setup: str | None = None,
+    model: Path | None = None,
     joint: bool = False,
-    begin: StartWord = None,
+    begin: str | None = None,
     starts: int = 0,
     evaluations: Annotated[
         int, option("Evaluations of the model that a search may take.", min=1)
@@ -96,7 +91,7 @@ def fit(
     folds: int = 0,
     bootstrap: int = 0,
     profile: list[str] | None = None,
-    seed: Seed = 0,
+    seed: int = 0,
     jobs: int = 0,
     dask: str | None = None,
     resume: bool = False,
@@ -318,10 +313,10 @@ def _say_verdict(verdict: Verdict) -> None:
 
 def validate(
     drive: str,
-    path: CampaignPath = CAMPAIGN,
+    path: Path = CAMPAIGN,
     *,
     axis: AxisName = None,
-    model: OwnModel = None,
+    model: Path | None = None,
     role: Role = "validate",
     out: Path | None = None,
     require: Required = 10.0,
@@ -407,9 +402,9 @@ def _validation_written(
 
 def report(
     fitted: Path,
-    path: CampaignPath = CAMPAIGN,
+    path: Path = CAMPAIGN,
     *,
-    model: OwnModel = None,
+    model: Path | None = None,
     pdf: Path | None = None,
     data: Path | None = None,
     truth: str | None = None,
@@ -477,7 +472,7 @@ def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -
     return stored
 
 
-def demo(*, out: Path = Path("demo"), seed: Seed = 1) -> None:
+def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
     """Identify a virtual hoist from its tests, and compare it with the truth.
 
     Draws a hoist that differs from the published one, logs the 13 tests of
