@@ -86,7 +86,7 @@ def fit(
     begin: str | None = None,
     starts: int = 0,
     evaluations: Annotated[
-        int, option("Evaluations of the model that a search may take.", min=1)
+        int, option("Evaluations of the model that a search may take.", min=1, metavar="N")
     ] = MOST_EVALUATIONS,
     folds: int = 0,
     bootstrap: int = 0,

@@ -36,7 +36,9 @@ def argument(metavar: str, help: str) -> Any:
     return typer.Argument(metavar=metavar, help=help, show_default=False)
 
 
-AxisName = Annotated[str | None, option("The axis, where the campaign has several.")]
+AxisName = Annotated[
+    str | None, option("The axis, where the campaign has several.", metavar="NAME")
+]
 TableFile = Annotated[
     Path | None, option("Write all numbers, in SI, to a .csv or .parquet file.", metavar="FILE")
 ]
@@ -67,7 +69,7 @@ SHARED = """
       your own TOML file; by default the one of the axis's drive.
   start: Start from rest at 0 V, or settled at the first voltage.
   time_column NAME: Column of the time in FILE.
-  units: Units to show, such as rpm,bar; m/min is of rope, with --drum.
+  units UNIT,UNIT: Units to show, such as rpm,bar; m/min is of rope, with --drum.
   values --set NAME=VALUE: Another value for a parameter: Z16=1.2e-4 in SI, Z16=1.2e-4/1.5e-4 for
       plus and minus, Z16_plus=0.12mm with a unit. May be repeated.
 """
@@ -228,7 +230,9 @@ def _described(given: inspect.Parameter, entries: Mapping[str, re.Match[str]]) -
         flags, metavar, words = own[2].split(), own[3], " ".join(own[4].split())
         flags = flags or ([f"--{given.name}"] if kind is bool else [])
         least = {"min": 0} if kind is int else {}
-        more = option(words, *flags, metavar=metavar or ("N" if kind is int else None), **least)
+        # a switch takes nothing, which Typer would show as <bool>
+        metavar = metavar or {bool: " ", int: "N", float: "X"}.get(kind)
+        more = option(words, *flags, metavar=metavar, **least)
         is_option = given.kind is inspect.Parameter.KEYWORD_ONLY
         kind = Annotated[kind, more if is_option else argument(metavar, words)]
     return given.replace(annotation=kind, kind=inspect.Parameter.KEYWORD_ONLY)
