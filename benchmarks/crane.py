@@ -7,8 +7,7 @@ from processes import limited
 from table import Row, duration
 from timing import alone
 
-from swashplate.crane import Crane, Seaway, Stick, control, judge, load_motion
-from swashplate.crane.study import Case, Study, commands_of, outcomes, station
+from swashplate.crane import Crane, Seaway, Stick, Study, control, judge, load_motion
 
 ROPE, OPEN, CLOSED, SEAWAY = 1e-3, 6e-3, 12e-3, 1.2e-3
 THOUSAND, JUDGED = 15.0, 10.0
@@ -34,10 +33,9 @@ def crane_rows() -> Iterator[Row]:
     yield row("crane: open loop, three drives, 60 s", plain, OPEN)
     closed = alone(lambda: crane.simulate(stick, sea=ship, control=MEANT, **how), 9)
     yield row("crane: closed loop in a seaway, 60 s", closed, CLOSED)
-    pose = station(90.0, 45.0, 27.0, {})
-    commands, first = commands_of(crane, Stick.rest(120.0), pose, 40.0)
-    study = Study((Case((crane,), MEANT, "inverse", pose),), Seaway("ss3"), commands, first)
-    many = alone(lambda: outcomes(study, range(1000)), 1)
+    study = Study.of(crane, MEANT, {}, seeds=range(1000))
+    case = study.cases()["identified"]
+    many = alone(lambda: study.outcomes([case]), 1)
     yield row("crane: 1,000 seaways of 120 s, closed loop, all cores", many, THOUSAND)
     judged = alone(lambda: judge(crane, MEANT, seeds=range(200), remedies=False), 1)
     yield row("crane: judgment, 200 seaways, 2 sets of drives, all cores", judged, JUDGED)

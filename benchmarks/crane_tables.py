@@ -7,27 +7,31 @@ The other crane is a prototype that shares no code with this one; its numbers ar
 
 import argparse
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from swashplate.crane import (
+    SEA_STATES,
     Crane,
     Estimate,
     Hull,
     Seaway,
     Setup,
     Spectrum,
+    Start,
     Stick,
+    Study,
     TransferFunctions,
     control,
     load_motion,
     read_veres,
 )
 from swashplate.crane.control import Control
-from swashplate.crane.crane import Actuation
 from swashplate.crane.judgment import mean_of
-from swashplate.crane.study import Case, Study, commands_of, outcomes, station
+from swashplate.crane.stepper import Actuation
+from swashplate.crane.study import NONE, Case
 from swashplate.executors import Threads
 
 PAGE = Path(__file__).parent.parent / "docs" / "crane-checks.md"
@@ -43,6 +47,16 @@ CLIPPED = FEEDBACK | control.ShipCompensation() | control.Clip()
 ALONE = FEEDBACK | control.Clip(0.25)
 """Designed for ideal drives; clipped at 0.8 of what the luff can follow; feedback alone."""
 
+PEAK = 3.3
+"""Peak factor of the other crane's seas, as its ships' motions say."""
+MOTIONS = {  # sway, heave [m], roll [deg] of the other crane, significant single amplitudes
+    ("S175", "ss3"): (0.22, 0.46, 0.08),
+    ("S175", "ss3-swell"): (0.32, 0.48, 0.19),
+    ("S175", "ss4"): (0.56, 1.07, 0.23),
+    ("rolls at 13 s", "ss3"): (None, None, 0.6),
+    ("rolls at 13 s", "ss3-swell"): (None, None, 1.8),
+    ("rolls at 13 s", "ss4"): (None, None, 1.9),
+}
 SEAS = {  # none, ideal, meant at FACTORS, clipped at FACTORS, feedback alone [deg RMS]
     "ss3": (
         *(2.49, 0.00, 10.87, 1.12, 0.11, 0.07, 0.07),
@@ -65,9 +79,9 @@ ROLLING = (  # none, ideal, meant at OTHERS, clipped at OTHERS
 
 def cases(crane: Crane, factors: tuple[float, ...], alone: bool) -> dict[str, Case]:
     """Variants by name."""
-    how = station(90.0, 45.0, 27.0, {})
+    how: Start = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0}
     made = {
-        "no control": Case((crane,), None, "inverse", how),
+        NONE: Case((crane,), None, "inverse", how),
         "ideal drives": Case((crane,), MEANT, "ideal", how),
     }
     for name, law in (("meant for ideal", MEANT), ("clipped", CLIPPED)):
@@ -80,20 +94,29 @@ def cases(crane: Crane, factors: tuple[float, ...], alone: bool) -> dict[str, Ca
 
 
 def measured(
-    crane: Crane, sea: Seaway, found: Mapping[str, Case], seeds: range, brake: bool = True
+    crane: Crane,
+    sea: Seaway,
+    found: Mapping[str, Case],
+    seeds: range,
+    brake: bool = True,
+    length: float = LENGTH,
 ) -> dict[str, np.ndarray]:
     """(n,) root mean square swing of each variant in each seaway. [deg]"""
-    all_cases = [each._replace(how={**each.how, "brake": brake}) for each in found.values()]
-    commands, first = commands_of(crane, Stick.rest(LENGTH), all_cases[0].how, START)
-    study = Study(tuple(all_cases), sea, commands, first)
-    values = np.degrees(outcomes(study, seeds, Threads(2))[..., 0])
+    all_cases = [each._replace(where={**each.where, "brake": brake}) for each in found.values()]
+    study = Study.of(
+        crane,
+        MEANT,
+        {"sea": sea, "length": length, "start": START, "executor": Threads(2)},
+        seeds=seeds,
+    )
+    values = np.degrees(study.outcomes(all_cases)[..., 0])
     return {name: values[:, k] for k, name in enumerate(found)}
 
 
 def seaway_rows(
     found: Mapping[str, np.ndarray], others: tuple[float, ...], random: np.random.Generator
 ) -> Iterator[str]:
-    """A row for each variant: our mean and interval, the other's, and where such means of 4 lie."""
+    """A row for each variant: our mean and interval, our first four seaways, the other's four."""
     none = found["no control"]
     for (name, values), other in zip(found.items(), others, strict=True):
         mean = mean_of(values)
@@ -103,8 +126,8 @@ def seaway_rows(
         within = "yes" if low - 0.005 <= other <= high + 0.005 else "no"
         less = "" if name == "no control" else interval(mean_of(values - none), "+.2f")
         yield (
-            f"| {name} | {interval(mean, '.2f')} | {less} | {other:g} | {low:.2f} to {high:.2f} "
-            f"| {within} |"
+            f"| {name} | {interval(mean, '.2f')} | {less} | {low:.2f} to {high:.2f} "
+            f"| {values[:4].mean():.2f} | {other:g} | {within} |"
         )
 
 
@@ -117,39 +140,68 @@ def interval(estimate: Estimate, spec: str) -> str:
 def seaway_tables(crane: Crane, count: int) -> Iterator[str]:
     """Swing of a load kept abeam in beam seas."""
     head = (
-        "| variant | this crane, mean (95 %) | less no control (95 %) | other crane, 4 seaways | "
-        "95 % of means of 4 of ours | within |\n|---|---|---|--:|---|---|"
+        "| variant | this crane, mean (95 %) | less no control (95 %) | 95 % of means of 4 "
+        "| seaways 0 to 3 | other crane, 4 seaways | within |\n|---|---|---|---|--:|--:|---|"
     )
     random, seeds = np.random.default_rng(0), range(count)
+    hulls: dict[str, Hull | TransferFunctions] = {"rolls at 13 s": Seaway().ship}
     if S175.exists():
-        hull = read_veres(S175)
+        hulls["S175"] = read_veres(S175)
+    yield from motion_rows(hulls)
+    if S175.exists():
+        hull = hulls["S175"]
         variants = cases(crane, FACTORS, True)
         for name, others in SEAS.items():
             print(name, flush=True)
-            found = measured(crane, Seaway(name, ship=hull), variants, seeds)
+            found = measured(crane, Seaway(peaked(name), ship=hull), variants, seeds)
             yield f"\n### S175, {name}, {count} seaways\n\n{head}"
             yield from seaway_rows(found, others, random)
-        yield from switch_rows(crane, count, hull)
     print("rolling hull", flush=True)
-    found = measured(crane, Seaway("ss3"), cases(crane, OTHERS, False), seeds)
+    found = measured(crane, Seaway(peaked("ss3")), cases(crane, OTHERS, False), seeds)
     yield f"\n### Hull that rolls at 13 s, ss3, {count} seaways\n\n{head}"
     yield from seaway_rows(found, ROLLING, random)
+    yield from switch_rows(crane, count, hulls)
 
 
-def switch_rows(crane: Crane, count: int, hull: Hull | TransferFunctions) -> Iterator[str]:
-    """No control with one switch changed at a time: brake, peak of the spectrum."""
+def peaked(name: str) -> Spectrum:
+    """A sea state with the other crane's peak."""
+    return replace(SEA_STATES[name], peak_factor=PEAK)
+
+
+def motion_rows(hulls: Mapping[str, Hull | TransferFunctions]) -> Iterator[str]:
+    """Significant amplitudes of sway, heave and roll in beam seas, by integration."""
+    yield "\n### Motions abeam, significant single amplitudes: this / other\n"
+    yield "| hull | sea | γ | sway [m] | heave [m] | roll [deg] |\n|---|---|--:|--:|--:|--:|"
+    omega = np.linspace(0.25, 2.5, 2001)
+    for (hull, name), others in MOTIONS.items():
+        for sea in (SEA_STATES[name], peaked(name)) if hull in hulls else ():
+            response = hulls[hull].response(omega, np.full(omega.size, 0.5 * np.pi))[1:4]
+            power = np.trapezoid(np.abs(response) ** 2 * sea.density(omega), omega)
+            sizes = 2.0 * np.sqrt(power) * (1.0, 1.0, np.degrees(1.0))
+            cells = [
+                f"{size:.3f} / {'–' if other is None else format(other, 'g')}"
+                for size, other in zip(sizes, others, strict=True)
+            ]
+            yield f"| {hull} | {name} | {sea.peak_factor:g} | {' | '.join(cells)} |"
+
+
+def switch_rows(
+    crane: Crane, count: int, hulls: Mapping[str, Hull | TransferFunctions]
+) -> Iterator[str]:
+    """No control with one switch changed at a time: peak of the spectrum, brake, length."""
     none = {"no control": cases(crane, (1.0,), False)["no control"]}
-    yield "\n### No control, one switch changed\n\n| sea | as above | no brake | γ = 3.3 | both |"
-    yield "|---|--:|--:|--:|--:|"
-    for name in SEAS:
-        plain = Seaway(name, ship=hull)
-        peaked = Spectrum(plain.spectrum.height, plain.spectrum.period, 3.3)
-        cells = [
-            interval(mean_of(measured(crane, sea, none, range(count), brake)["no control"]), ".2f")
-            for sea in (plain, Seaway(peaked, ship=hull))
-            for brake in (True, False)
-        ]
-        yield f"| {name} | {cells[0]} | {cells[1]} | {cells[2]} | {cells[3]} |"
+    yield "\n### No control, one switch changed\n"
+    yield "| hull | sea | as above | γ = 1 | no brake | 120 s |\n|---|---|--:|--:|--:|--:|"
+    for hull, name in [each for each in MOTIONS if each[0] in hulls]:
+        ship = hulls[hull]
+        runs = (
+            measured(crane, Seaway(peaked(name), ship=ship), none, range(count)),
+            measured(crane, Seaway(name, ship=ship), none, range(count)),
+            measured(crane, Seaway(peaked(name), ship=ship), none, range(count), brake=False),
+            measured(crane, Seaway(peaked(name), ship=ship), none, range(count), length=120.0),
+        )
+        cells = [interval(mean_of(each["no control"]), ".2f") for each in runs]
+        yield f"| {hull} | {name} | {' | '.join(cells)} |"
 
 
 # --- residual swing -------------------------------------------------------------------------------
@@ -224,19 +276,24 @@ def maneuver_table(crane: Crane, count: int) -> Iterator[str]:
         until={"slew_deg": 90.0, "boom_deg": 52.7, "rope_m": 23.0},
     )  # fmt: skip
     yield "\n### Slew to 90°, luff from 38° to 52.7°, hoist from 28 m to 23 m"
-    yield f"\nIn {count} seaways of ss3 abeam, RMS from the stick's end on.\n"
-    yield "| drives | control | calm, residual | other | slew ends | seaways, RMS (95 %) | other |"
-    yield "|---|---|--:|--:|--:|--:|--:|"
+    yield f"\nIn {count} seaways of ss3 abeam with γ = {PEAK}, RMS from the stick's end on.\n"
+    yield (
+        "| drives | control | calm, residual | other | slew ends | seaways, RMS (95 %) "
+        "| seaways 0 to 3 | other |"
+    )
+    yield "|---|---|--:|--:|--:|--:|--:|--:|"
     for actuation, name, law, calm, sea in MANEUVERS:
         how: Setup = {"control": law, "actuation": actuation, "boom_deg": 38.0, "rope_m": 28.0}
         run = crane.simulate(stick, **how)
         swing = [
-            crane.simulate(stick, sea=Seaway("ss3", seed=seed), **how).rms_deg(run.stick_end)
+            crane.simulate(stick, sea=Seaway(peaked("ss3"), seed=seed), **how).rms_deg(
+                run.stick_end
+            )
             for seed in range(count)
         ]
         yield (
             f"| {actuation} | {name} | {run.residual_deg:.2f} | {calm:g} | {run.slew_deg[-1]:.2f}° "
-            f"| {interval(mean_of(np.array(swing)), '.2f')} | {sea:g} |"
+            f"| {interval(mean_of(np.array(swing)), '.2f')} | {np.mean(swing[:4]):.2f} | {sea:g} |"
         )
 
 

@@ -20,7 +20,7 @@ from swashplate.crane import (
     residuals,
     sectors,
 )
-from swashplate.crane.judgment import mean_of, share_of
+from swashplate.crane.judgment import mean_of
 from swashplate.crane.study import PUMPS
 from swashplate.errors import InputError
 from swashplate.executors import Processes, Serial, Threads
@@ -104,11 +104,6 @@ def test_intervals_against_published_tables():
     found = mean_of(np.array([1.0, 2.0, 3.0, 4.0, 5.0, np.nan]))
     assert found.value == 3.0
     assert found.high - found.value == pytest.approx(2.776 * 0.5**0.5, abs=1e-3)
-    # Clopper and Pearson: 0 of 20 and 5 of 20
-    none = share_of(np.zeros(20, dtype=bool))
-    assert (none.low, none.high) == pytest.approx((0.0, 0.1684), abs=1e-4)
-    some = share_of(np.arange(20) < 5)
-    assert (some.low, some.high) == pytest.approx((0.0866, 0.4910), abs=1e-4)
 
 
 def test_a_stopped_run_counts_as_worse(crane):
@@ -129,8 +124,6 @@ def test_axes_follow_what_speed_and_acceleration_allow(crane):
     allowed = np.minimum(0.454 / omega, 0.110 / omega**2)
     np.testing.assert_allclose(found.amplitude[:, 2], allowed, rtol=0.01)
     assert found.amplitude[1, 2] == pytest.approx(0.157, abs=1e-3)
-    assert (found.simulated[:2] > found.amplitude[:2, 2]).all()
-    assert found.simulated[0] < found.simulated[1]
     # the hull that rolls at 13 s asks for this much along the boom, of the same model
     asked = [found.seas[each].amplitude[2] for each in ("ss3", "ss3-swell", "ss4")]
     np.testing.assert_allclose(asked, [0.75, 1.65, 2.1], rtol=0.06)
@@ -247,3 +240,5 @@ def test_what_makes_no_study_is_said(crane):
         follow(crane, [0.0])
     with pytest.raises(InputError, match="Heights of waves must be one or more finite"):
         operability(crane, MEANT, heights=[-1.0])
+    with pytest.raises(InputError, match="This study has no slew_deg; it has boom_deg"):
+        sectors(crane, MEANT, slew_deg=90.0)

@@ -5,8 +5,7 @@ from math import cos, hypot, pi, radians, sin, sqrt
 import numpy as np
 import pytest
 
-from swashplate.crane import Crane, Suspension, load_motion
-from swashplate.crane.crane import Pose
+from swashplate.crane import Crane, Pose, Suspension, load_motion
 from swashplate.crane.kinematics import (
     Boom,
     Shafts,

@@ -17,6 +17,7 @@ from swashplate.crane import (
     Stick,
     read_capytaine,
     read_csv,
+    read_ship,
     read_veres,
     read_wamit,
     ship_motion,
@@ -236,13 +237,13 @@ def write_capytaine(path, kind, sign=-1.0):
 
 @pytest.mark.parametrize("program", ["wamit", "capytaine 4", "capytaine 3"])
 def test_files_of_other_programs_go_with_the_water_in_a_long_wave(tmp_path, program):
-    path = tmp_path / "ship"
+    path = tmp_path / ("ship.4" if program == "wamit" else "ship.nc")
     if program == "wamit":
         path.write_text("\n".join(wamit_lines()), "utf-8")
-        ship = read_wamit(path, 80.0)
+        ship = read_ship(path, 80.0)
     else:
         write_capytaine(path, int(program[-1]))
-        ship = read_capytaine(path)
+        ship = read_ship(path)
     assert ship.headings.size == 5
     assert ship.frequencies == pytest.approx(OMEGAS)
     for heading in (*HEADINGS, -90.0, 210.0):
@@ -346,6 +347,8 @@ def test_tables_that_lack_something_or_mean_something_else_are_refused(tmp_path)
         (lambda: Spectrum(1.0, 60.0), "has little energy between waves of 2.51 and 25.1 s"),
         (lambda: Seaway("ss9"), "There is no sea 'ss9'; there are ss2, ss3"),
         (lambda: Hull(0.0, 20.0, 9.0), "The hull's length is 0"),
+        (lambda: read_ship("hull.4"), "hull.4: a .4 of WAMIT, and no other file, needs the length"),
+        (lambda: read_ship("hull.dat"), "hull.dat: transfer functions are read from .re1 of VERES"),
         (lambda: Seaway("ss3").motion(100, 500.0), "multiple of 8 samples a second"),
     ],
 )

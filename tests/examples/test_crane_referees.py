@@ -25,3 +25,16 @@ def test_mujocos_equations_lead_the_load_along_the_same_path(run_example):
     assert apart[0] < 0.3
     # second order: a quarter of the distance at twice the rate
     assert apart[0] / apart[1] == pytest.approx(4.0, rel=0.05)
+
+
+@pytest.mark.slow
+def test_predictive_control_swings_less_than_the_clip_and_within_its_step(run_example):
+    pytest.importorskip("osqp", reason="the example needs osqp")
+    printed = run_example("crane_mpc", "--seeds", "1", "--length", "80").printed
+    swing = {
+        name: [float(each) for each in re.findall(rf"{name} +([\d.]+) deg", printed)]
+        for name in ("shaper", "clip", "predictive")
+    }
+    assert swing["predictive"][1] < swing["clip"][1] < swing["shaper"][1]
+    taken = [float(each) for each in re.findall(r"takes ([\d.]+) ms", printed)]
+    assert max(taken) < 1000.0 * 100 / 512  # a step lasts 100 samples

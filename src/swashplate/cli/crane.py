@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,36 +17,7 @@ from swashplate.tables import FIGURE, TABLE, Form
 if TYPE_CHECKING:
     from swashplate.crane import Crane, CraneRun, Judgment, Seaway
     from swashplate.crane.control import Control
-    from swashplate.executors import Executor
 
-SHOW_EXAMPLES = """\
-Examples:
-  swashplate crane show tg3637
-  swashplate crane show tg3637 --toml > mine.toml
-"""
-RUN_EXAMPLES = """\
-Examples:
-  swashplate crane run tg3637 --slew 1 --until slew_deg=45
-  swashplate crane run tg3637 --slew 1 --until slew_deg=45 --variant volts:zv-joint \\
-      --variant inverse:zv-joint --variant inverse:zv-tip --plot slew.png
-  swashplate crane run tg3637 --sea ss3,90,1 --at slew_deg=90 --at rope_m=27 \\
-      --variant inverse --variant inverse:feedback=0.2+ship+clip
-"""
-JUDGE_EXAMPLES = """\
-Examples:
-  swashplate crane judge tg3637 --sea ss3 --seeds 50
-  swashplate crane judge tg3637 --drives ideal,identified --scale luff.orifice=3 --out judge.html
-  swashplate crane judge tg3637 --drive luff=fitted --drives identified,drawn
-"""
-FOLLOW_EXAMPLES = """\
-Examples:
-  swashplate crane follow tg3637 --plot follow.png
-  swashplate crane follow tg3637 --sea ss3 --at boom_deg=60
-"""
-SECTORS_EXAMPLES = """\
-Examples:
-  swashplate crane sectors tg3637 --sea ss3 --plot sectors.png
-"""
 PAGE = Form("a page", (".html",))
 MEANT = "feedback=0.2/0.2+ship+loop=1.5"
 """The controller that is judged by default, as it is designed for ideal drives."""
@@ -53,7 +25,7 @@ VARIANTS = """\
 Drives behind the stick and, after a colon, control: inverse, volts or ideal; zv-joint, zvd-tip,
 ei-tip and the like, feedback=GAIN/DELAY, ship, clip=M, loop=GAIN, joined by +. May be repeated.\
 """
-START = {"slew_deg": 0.0, "boom_deg": 45.0, "rope_m": 20.0}
+START = ("slew_deg", "boom_deg", "rope_m")
 
 app = typer.Typer(
     help="Whole cranes: boom, rope and load behind three drives, on a ship.",
@@ -61,20 +33,15 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 
-HELD = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0}
-"""Where a load is kept while seaways pass."""
 CraneWord = Annotated[str, argument("CRANE|FILE.toml", "A packaged crane, tg3637, or your own.")]
-
-
-SeaWord = Annotated[
-    str,
-    option("A sea and its heading, 90 abeam: ss2, ss3, ss3-swell, ss4.", metavar="SEA[,HEADING]"),
-]
 ShipFile = Annotated[
-    Path | None,
-    option("The ship's transfer functions: .re1 of VERES, or .csv.", metavar="FILE"),
+    str | None,
+    option(
+        "The ship's transfer functions: .re1 of VERES, .nc of Capytaine, .csv, or .4 of WAMIT with "
+        "its ULEN, hull.4,175.",
+        metavar="FILE[,ULEN]",
+    ),
 ]
-ControlWord = Annotated[str, option("Control, as of 'run' behind the colon.", metavar="CONTROL")]
 DriveWords = Annotated[
     list[str] | None,
     option(
@@ -82,18 +49,78 @@ DriveWords = Annotated[
         metavar="AXIS=SET",
     ),
 ]
-HeldAt = Annotated[
+At = Annotated[
     list[str] | None,
-    option("Where the load is kept: slew_deg=90, boom_deg=45, rope_m=27.", metavar="NAME=VALUE"),
+    option(
+        "Where it begins: slew_deg, boom_deg, rope_m, as rope_m=25. May be repeated.",
+        metavar="NAME=VALUE",
+    ),
 ]
-Seeds = Annotated[int, option("Number of seaways.", min=1)]
+
+
+@dataclass(frozen=True)
+class Studied:
+    """What a study of seaways is about."""
+
+    crane: CraneWord
+    control: Annotated[str, option("Control, as of 'run' behind the colon.", metavar="CONTROL")] = (
+        MEANT
+    )
+    sea: Annotated[
+        str,
+        option(
+            "A sea and its heading, 90 abeam: ss2, ss3, ss3-swell, ss4.", metavar="SEA[,HEADING]"
+        ),
+    ] = "ss3,90"
+    ship: ShipFile = None
+    seeds: Annotated[
+        int | None, option("Number of seaways; judge takes 200 by default.", min=1)
+    ] = None
+    drives: Annotated[
+        str | None,
+        option(
+            "ideal: follow at once; identified: the crane's own; drawn: from the errors of the "
+            "fits given with --drive. A verdict is on the last.",
+            metavar="NAMES",
+            show_default="ideal,identified",
+        ),
+    ] = None
+    drive: DriveWords = None
+    scale: Annotated[
+        list[str] | None,
+        option(
+            "Drives with a lever or parameter moved, judged last: luff.orifice=1.5. May be "
+            "repeated.",
+            metavar="AXIS.NAME=FACTOR",
+        ),
+    ] = None
+    at: At = None
+
+    def asked(self) -> tuple[Crane, Control, dict[str, Any]]:
+        """The crane, the controller, and keywords of a study."""
+        crane, law = _crane(self.crane, self.drive or ()), control_of(self.control)
+        if law is None:
+            raise InputError("--control is empty: there is nothing to judge.")
+        how: dict[str, Any] = {"sea": _seaway(self.sea, self.ship), **_pose(self.at)}
+        if self.seeds is not None:
+            how["seeds"] = range(self.seeds)
+        if self.drives is not None or self.scale:
+            how["drives"] = _drives(
+                crane, self.drives or "ideal,identified", self.drive or (), self.scale or ()
+            )
+        return crane, law, how
 
 
 def show_crane(
     crane: CraneWord,
     toml: Annotated[bool, option("Print the file, to begin your own from.", "--toml")] = False,
 ) -> None:
-    """Show a crane's geometry: values, which are assumed, and where they come from."""
+    """Show a crane's geometry: values, which are assumed, and where they come from.
+
+    For example:
+      swashplate crane show tg3637
+      swashplate crane show tg3637 --toml > mine.toml
+    """
     if toml:
         from swashplate.crane.crane import preset_text
         from swashplate.documents import read_text
@@ -123,10 +150,7 @@ def run(
         float | None, option("Time for which an axis without target moves.", metavar="S")
     ] = None,
     length: Annotated[float, option("Length of the run.", metavar="S")] = 60.0,
-    at: Annotated[
-        list[str] | None,
-        option("Where it begins: slew_deg=0, boom_deg=45, rope_m=20.", metavar="NAME=VALUE"),
-    ] = None,
+    at: At = None,
     sea: Annotated[
         str | None,
         option(
@@ -149,12 +173,19 @@ def run(
         Path | None, option("Write the scene that moves: .html.", metavar="FILE")
     ] = None,
 ) -> None:
-    """Run a crane, once or with several variants of control and drives.
+    r"""Run a crane, once or with several variants of control and drives.
 
     The stick's commands are parts of the full speeds. Without a controller they
     are wanted speeds; with 'volts', as on the crane, 10 V for 1. The residual
     swing is the largest one for 25 s, from 4 s after the stick has returned and
     the controller has ended its command.
+
+    For example:
+      swashplate crane run tg3637 --slew 1 --until slew_deg=45
+      swashplate crane run tg3637 --slew 1 --until slew_deg=45 --variant volts:zv-joint \
+          --variant inverse:zv-joint --variant inverse:zv-tip --plot slew.png
+      swashplate crane run tg3637 --sea ss3,90,1 --at slew_deg=90 --at rope_m=27 \
+          --variant inverse --variant inverse:feedback=0.2+ship+clip
     """
     files = Outputs((out, TABLE), (plot, FIGURE), (scene, PAGE))
     with working("Simulating"):
@@ -162,7 +193,6 @@ def run(
 
         chosen = _crane(crane, drive or ())
         targets = _numbers("--until", until, "slew_deg=45")
-        begin = _pose(START, at)
         stick = Stick.trapezoid(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
         )
@@ -170,7 +200,7 @@ def run(
         runs: dict[str, CraneRun] = {}
         for word in variant or ["inverse"]:
             actuation, _, law = word.partition(":")
-            how: dict[str, Any] = {"actuation": actuation, "control": control_of(law), **begin}
+            how: dict[str, Any] = {"actuation": actuation, "control": control_of(law), **_pose(at)}
             runs[word] = chosen.simulate(stick, sea=seaway, brake=brake, **how)
         table = run_table(runs)
     if out is not None and len(runs) > 1:
@@ -184,29 +214,7 @@ def run(
 
 
 def judge(
-    crane: CraneWord,
-    control: ControlWord = MEANT,
-    sea: SeaWord = "ss3,90",
-    ship: ShipFile = None,
-    seeds: Seeds = 200,
-    drives: Annotated[
-        str,
-        option(
-            "ideal: follow at once; identified: the crane's own; drawn: from the errors of the "
-            "fits given with --drive. The verdict is on the last.",
-            metavar="NAMES",
-        ),
-    ] = "ideal,identified",
-    drive: DriveWords = None,
-    scale: Annotated[
-        list[str] | None,
-        option(
-            "Drives with a lever or parameter moved, judged last: luff.orifice=1.5. May be "
-            "repeated.",
-            metavar="AXIS.NAME=FACTOR",
-        ),
-    ] = None,
-    at: HeldAt = None,
+    study: Studied,
     allowed: Annotated[
         float, option("Seaways in which control may be worse than none, in %.", metavar="%")
     ] = 5.0,
@@ -229,23 +237,22 @@ def judge(
     Every variant goes through the same seaways. Control fails if it makes the
     swing worse than none in more than 5 % of them; the exit code is then 1, and
     a larger orifice of the luff drive and a clip are tried.
+
+    For example:
+      swashplate crane judge tg3637 --sea ss3 --seeds 50
+      swashplate crane judge tg3637 --scale luff.orifice=3 --out judge.html
+      swashplate crane judge tg3637 --drive luff=fitted --drives identified,drawn
     """
     files = Outputs((out, Form("a verdict", (".html", ".csv", ".parquet"))), (plot, FIGURE))
-    chosen = _crane(crane, drive or ())
-    law = control_of(control)
-    if law is None:
-        raise InputError("--control is empty: there is nothing to judge.")
-    sets = _drives(chosen, drives, drive or (), scale or ())
-    executor = _executor(dask)
-    how: dict[str, Any] = _pose(HELD, at)
+    chosen, law, how = study.asked()
+    if dask is not None:
+        from swashplate.executors import Dask
+
+        how["executor"] = Dask(dask)
     with long_work("Seaways") as shown:
-
-        def progress(done: int, of: int) -> None:
-            shown(f"{done} of {of} seaways", done / of)
-
         found = chosen.judge(
-            law, sea=_seaway(sea, ship), seeds=range(seeds), drives=sets, allowed=allowed / 100.0,
-            remedies=remedies, executor=executor, progress=progress, **how,
+            law, allowed=allowed / 100.0, remedies=remedies, **how,
+            progress=lambda done, of: shown(f"{done} of {of} seaways", done / of),
         )  # fmt: skip
     files.write(out, "Verdict", lambda path: _write_judgment(found, path))
     files.draw(plot, "plot_judgment", found)
@@ -267,17 +274,21 @@ def follow(
     ] = None,
     ship: ShipFile = None,
     drive: DriveWords = None,
-    at: HeldAt = None,
+    at: At = None,
     out: TableFile = None,
     plot: FigureFile = None,
 ) -> None:
-    """Show the largest sines of the tip that each axis can follow, and what seas ask for."""
+    """Show the largest sines of the tip that each axis can follow, and what seas ask for.
+
+    For example:
+      swashplate crane follow tg3637 --plot follow.png
+      swashplate crane follow tg3637 --sea ss3 --at boom_deg=60
+    """
     files = Outputs((out, TABLE), (plot, FIGURE))
     with working("Simulating"):
         chosen = _crane(crane, drive or ())
-        seaway = _seaway(sea or "ss3", ship)
         names: dict[str, Any] = {} if sea is None else {"seas": (sea.split(",")[0],)}
-        found = chosen.follow(seaway=seaway, **names, **_pose(HELD, at))
+        found = chosen.follow(seaway=_seaway(sea or "ss3", ship), **names, **_pose(at))
     files.write(out, "Amplitudes, in SI", found.tables()[0].write)
     files.draw(plot, "plot_follow", found)
     note(chosen.title)
@@ -285,45 +296,67 @@ def follow(
     files.say()
 
 
-def sectors(
-    crane: CraneWord,
-    control: ControlWord = MEANT,
-    sea: SeaWord = "ss3,90",
-    ship: ShipFile = None,
-    seeds: Seeds = 4,
-    step: Annotated[
-        float, option("Between two bearings.", metavar="DEG", min=1.0, max=180.0)
-    ] = 15.0,
-    drives: Annotated[
-        str, option("ideal, identified, drawn; as of 'judge'.", metavar="NAMES")
-    ] = "ideal,identified",
-    drive: DriveWords = None,
-    scale: Annotated[
-        list[str] | None, option("Drives changed, as of 'judge'.", metavar="AXIS.NAME=FACTOR")
-    ] = None,
-    at: HeldAt = None,
-    out: TableFile = None,
-    plot: FigureFile = None,
-) -> None:
-    """Show the swing over the bearing of the boom, without control and with it."""
-    files = Outputs((out, TABLE), (plot, FIGURE))
-    chosen = _crane(crane, drive or ())
-    law = control_of(control)
-    if law is None:
-        raise InputError("--control is empty: there is nothing to compare.")
-    sets, pose = _drives(chosen, drives, drive or (), scale or ()), _pose(HELD, at)
-    del pose["slew_deg"]
-    bearings = [step * k for k in range(round(360.0 / step))]
-    with long_work("Seaways") as shown:
-        found = chosen.sectors(
-            law, sea=_seaway(sea, ship), seeds=range(seeds), drives=sets, bearings=bearings,
-            progress=lambda done, of: shown(f"{done} of {of} seaways", done / of), **pose,
-        )  # fmt: skip
-    files.write(out, "Swing, in SI", found.table().write)
-    files.draw(plot, "plot_sectors", found)
-    note(chosen.title)
-    show(found.table())
-    files.say()
+SWEEPS = {
+    "sectors": """Show the swing over the bearing of the boom, without control and with it.
+
+    Bearings are in degrees from the bow to starboard, in 4 seaways by default.
+
+    For example:
+      swashplate crane sectors tg3637 --over 0,45,90,135,180 --plot sectors.png
+    """,
+    "operability": """Show the swing over the height of the waves, without control and with it.
+
+    Significant heights are in m, at a peak period of 7.5 s, in 40 seaways by
+    default; of --sea the heading counts. The figure shows the share of seaways
+    with less than 3 degrees.
+
+    For example:
+      swashplate crane operability tg3637 --over 0.3,0.6,0.9 --plot operability.png
+    """,
+    "orifices": """Show the swing over the size of the luff drive's in-line orifice.
+
+    Factors are on the identified orifice, in 20 seaways by default, beside ideal
+    drives and no control.
+
+    For example:
+      swashplate crane orifices tg3637 --over 1,1.5,2,3 --plot orifices.png
+    """,
+}
+"""Commands that sweep a quantity, with their help."""
+
+
+def _sweep(name: str, text: str) -> None:
+    """Register a command that sweeps a quantity."""
+    grid, figure = {
+        "sectors": ("bearings", "plot_sectors"),
+        "operability": ("heights", "plot_operability"),
+        "orifices": ("factors", "plot_orifice"),
+    }[name]
+
+    def sweep(
+        study: Studied,
+        over: Annotated[
+            str | None, option("Points of the sweep, joined by commas.", metavar="NUMBERS")
+        ] = None,
+        out: TableFile = None,
+        plot: FigureFile = None,
+    ) -> None:
+        files = Outputs((out, TABLE), (plot, FIGURE))
+        chosen, law, how = study.asked()
+        if over is not None:
+            how[grid] = [_number(f"--over {over}", each) for each in over.split(",")]
+        with long_work("Seaways") as shown:
+            found = getattr(chosen, name)(
+                law, **how, progress=lambda done, of: shown(f"{done} of {of} seaways", done / of)
+            )
+        files.write(out, "Swing, in SI", found.table().write)
+        files.draw(plot, figure, found)
+        note(chosen.title)
+        show(found.table())
+        files.say()
+
+    sweep.__doc__ = text
+    command(app, name)(sweep)
 
 
 def control_of(words: str) -> Control | None:
@@ -369,12 +402,12 @@ def _crane(word: str, drives: Any) -> Crane:
     return chosen.with_drive(**changed)
 
 
-def _pose(usual: dict[str, float], given: list[str] | None) -> dict[str, float]:
-    """Where a run begins."""
-    made = usual | _numbers("--at", given, "rope_m=25")
-    strange = [each for each in made if each not in usual]
+def _pose(given: list[str] | None) -> dict[str, float]:
+    """Where a run begins, as far as it is given."""
+    made = _numbers("--at", given, "rope_m=25")
+    strange = [each for each in made if each not in START]
     if strange:
-        raise InputError(f"--at has no {strange[0]}; it has {', '.join(usual)}.")
+        raise InputError(f"--at has no {strange[0]}; it has {', '.join(START)}.")
     return made
 
 
@@ -412,14 +445,8 @@ def _drawn(crane: Crane, given: Any) -> tuple[Crane, ...]:
     return crane.drawn(**{axis: stored_draws(place) for axis, place in folders.items()})
 
 
-def _executor(dask: str | None) -> Executor:
-    from swashplate.executors import Dask, Threads
-
-    return Threads() if dask is None else Dask(dask)
-
-
-def _seaway(text: str | None, ship: Path | None) -> Seaway | None:
-    from swashplate.crane import Seaway, read_csv, read_veres
+def _seaway(text: str | None, ship: str | None) -> Seaway | None:
+    from swashplate.crane import Seaway, read_ship
 
     if text is None:
         if ship is not None:
@@ -433,8 +460,9 @@ def _seaway(text: str | None, ship: Path | None) -> Seaway | None:
     seed = int(numbers[1]) if len(numbers) > 1 else 0
     if ship is None:
         return Seaway(name, heading, seed)
-    read = read_csv if ship.suffix.lower() == ".csv" else read_veres
-    return Seaway(name, heading, seed, read(ship))
+    path, _, unit = ship.partition(",")
+    length = _number(f"--ship {ship}", unit) if unit else None
+    return Seaway(name, heading, seed, read_ship(path, length))
 
 
 def _numbers(what: str, given: list[str] | None, example: str) -> dict[str, float]:
@@ -470,8 +498,9 @@ def _write(runs: dict[str, CraneRun], path: Path) -> None:
     write_table(next(iter(runs.values())).to_polars(), path)
 
 
-command(app, "show", SHOW_EXAMPLES)(show_crane)
-command(app, "run", RUN_EXAMPLES)(run)
-command(app, "judge", JUDGE_EXAMPLES)(judge)
-command(app, "follow", FOLLOW_EXAMPLES)(follow)
-command(app, "sectors", SECTORS_EXAMPLES)(sectors)
+command(app, "show")(show_crane)
+command(app, "run")(run)
+command(app, "judge")(judge)
+command(app, "follow")(follow)
+for _name, _text in SWEEPS.items():
+    _sweep(_name, _text)

@@ -1,8 +1,5 @@
 from . import control as control
 from .crane import Crane as Crane
-from .crane import CraneStepper as CraneStepper
-from .crane import Pose as Pose
-from .crane import Setup as Setup
 from .following import Demand as Demand
 from .following import Followable as Followable
 from .following import follow as follow
@@ -22,8 +19,14 @@ from .sea import SEA_STATES as SEA_STATES
 from .sea import Seaway as Seaway
 from .sea import Spectrum as Spectrum
 from .sea import ship_motion as ship_motion
+from .stepper import CraneStepper as CraneStepper
+from .stepper import Pose as Pose
+from .stepper import Setup as Setup
+from .stepper import Start as Start
 from .stick import Stick as Stick
 from .study import Residuals as Residuals
+from .study import Study as Study
+from .study import StudySetup as StudySetup
 from .study import Sweep as Sweep
 from .study import operability as operability
 from .study import orifices as orifices
@@ -33,5 +36,6 @@ from .transfer_functions import Hull as Hull
 from .transfer_functions import TransferFunctions as TransferFunctions
 from .transfer_functions import read_capytaine as read_capytaine
 from .transfer_functions import read_csv as read_csv
+from .transfer_functions import read_ship as read_ship
 from .transfer_functions import read_veres as read_veres
 from .transfer_functions import read_wamit as read_wamit

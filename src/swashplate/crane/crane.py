@@ -6,39 +6,25 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from importlib.resources import files
-from math import cos, degrees, inf, isfinite, radians, sin
+from math import cos, degrees, isfinite, radians, sin
 from pathlib import Path
 from types import MappingProxyType
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    Literal,
-    NamedTuple,
-    Protocol,
-    TypedDict,
-    Unpack,
-    get_args,
-)
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, Unpack
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from swashplate.analysis.capability import dead_zone
 from swashplate.analysis.compensation import InverseMap, inverse_map
-from swashplate.crane.control import Control, settings_of
+from swashplate.crane.control import Control
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
 from swashplate.crane.linear import LinearCrane, linearize
-from swashplate.crane.loop import BOOM_OUT, DIRECT, FINE, ROPE_OUT, Fixed, Loop
 from swashplate.crane.result import CraneRun
-from swashplate.crane.rope import AIR, Air, Suspension, too_fast
 from swashplate.crane.sea import Seaway
+from swashplate.crane.stepper import RATE, CraneStepper, Pose, Setup, motion_of
 from swashplate.crane.stick import AXES, Stick
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
-from swashplate.errors import DomainError, InputError, ParameterError
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.errors import InputError, ParameterError
 from swashplate.tables import Column, Table
 from swashplate.units import to_si
 
@@ -47,15 +33,6 @@ if TYPE_CHECKING:
     from swashplate.crane.following import Followable
     from swashplate.crane.judgment import Judgment
     from swashplate.crane.study import Sweep
-
-Array = NDArray[np.float64]
-Actuation = Literal["ideal", "volts", "inverse"]
-"""In the order of `loop.IDEAL` and the others."""
-
-ACTUATIONS = (*get_args(Actuation), "direct")
-QUICKEST = 0.4
-"""Largest part of a rope's pull by which a leaking drive may lower it within a sample: at 0.7 they
-would swing against each other from sample to sample."""
 
 
 class Fitted(Protocol):
@@ -68,9 +45,6 @@ class Fitted(Protocol):
 
 
 DriveLike = Drive | Fitted | str | Path
-
-RATE = 512.0
-"""Samples a second of the loop: the packaged drives' own. [Hz]"""
 
 
 class Quantity(BaseModel):
@@ -130,74 +104,6 @@ class CraneFile(BaseModel):
     title: str = ""
     drives: Annotated[dict[Literal["hoist", "slew", "luff"], str], Field(min_length=3)]
     geometry: Quantities
-
-
-class Pose(NamedTuple):
-    """Where a run begins: slew and boom in rad, rope below the tip in m."""
-
-    slew: float
-    boom: float
-    rope: float
-
-
-class Setup(TypedDict, total=False):
-    """How a run is set up: keywords of `Crane.simulate` and `Crane.stepper`.
-
-    Attributes
-    ----------
-    control : Control, optional
-        Controller, of `swashplate.crane.control`; by default the stick's commands as they are.
-    actuation : {"inverse", "volts", "ideal", "direct"}
-        What makes speeds of wanted speeds: the real drives behind their inverse maps or behind
-        10 V for full speed, or drives that follow at once within their limits of speed. A stepper
-        also takes voltages, with "direct".
-    slew_deg, boom_deg, rope_m : float
-        Where it begins: slew from forward to starboard, boom's elevation, rope below the tip; by
-        default 0, 45 and 20.
-    load : float, optional
-        Its mass, by default the safe load. [kg]
-    suspension : Suspension, optional
-        Elastic rope, hook with slings; by default a point on a rigid rope.
-    loaded : bool
-        Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
-        which they take a sample later as their ``load_torque``. Off by default, as their tests were
-        without load; drives feel it by their ``motor_leakage`` and ``line_stiffness``. What the
-        boom weighs is not in it.
-    drag_area : float
-        C_d A of the load. [m²]
-    wind : (float, float)
-        Forward and to port. [m/s]
-    brake : bool
-        Whether a brake holds the hoist 0.3 s after its command has returned to the dead zone; on by
-        default.
-    """
-
-    control: Control | None
-    actuation: Actuation | Literal["direct"]
-    slew_deg: float
-    boom_deg: float
-    rope_m: float
-    load: float | None
-    suspension: Suspension
-    loaded: bool
-    drag_area: float
-    wind: tuple[float, float]
-    brake: bool
-
-
-DEFAULTS: Setup = {
-    "control": None,
-    "actuation": "inverse",
-    "slew_deg": 0.0,
-    "boom_deg": 45.0,
-    "rope_m": 20.0,
-    "load": None,
-    "suspension": Suspension(),
-    "loaded": False,
-    "drag_area": 0.0,
-    "wind": (0.0, 0.0),
-    "brake": True,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -425,17 +331,22 @@ class Crane:
         DomainError
             If boom or rope meet a limit, or a drive leaves its domain.
         """
-        how = DEFAULTS | setup
-        loop, pose, halves = self._loop(how)
-        commands, end = stick.sample(self, pose, RATE)
-        ship = _motion(sea, len(commands))
-        out, ended = loop.take(commands, ship)
-        if ended != FINE:
-            raise self._stopped(loop, ended)
+        stepper = CraneStepper(self, setup)
+        commands, end = stick.sample(self, stepper.pose, RATE)
+        ship = motion_of(sea, len(commands))
         return CraneRun(
-            self, commands, ship, out, RATE, pose, how["actuation"], end, halves, loop.fixed.mass,
-            loop.rows,
-        )  # fmt: skip
+            crane=self,
+            stick=commands,
+            ship=ship,
+            out=stepper.take(commands, ship),
+            rate=RATE,
+            pose=stepper.pose,
+            actuation=stepper.actuation,
+            stick_end=end,
+            halves=stepper.halves,
+            mass=stepper.mass,
+            rows=stepper.rows,
+        )
 
     def stepper(self, **setup: Unpack[Setup]) -> CraneStepper:
         """The crane one sample at a time, for loops that the user writes.
@@ -443,7 +354,7 @@ class Crane:
         Parameters are those of `simulate`; with ``actuation="direct"`` the commands are the drives'
         voltages. [V]
         """
-        return CraneStepper(self, self._loop(DEFAULTS | setup)[0])
+        return CraneStepper(self, setup)
 
     def linearize(self, boom_deg: float = 45.0, rope_m: float = 20.0) -> LinearCrane:
         """The linear crane at a boom and rope; see `swashplate.crane.linearize`."""
@@ -473,85 +384,11 @@ class Crane:
 
         return operability(self, control, **how)
 
-    def _loop(self, how: Setup) -> tuple[Loop, Pose, int]:
-        """The loop of a complete setup, where it begins, and half periods of its shaper."""
-        strange = [each for each in how if each not in DEFAULTS]
-        if strange:
-            raise InputError(f"A run has no {strange[0]}; its setup has {', '.join(DEFAULTS)}.")
-        pose = Pose(radians(how["slew_deg"]), radians(how["boom_deg"]), how["rope_m"])
-        actuation, area, control = how["actuation"], how["drag_area"], how["control"]
-        if actuation not in ACTUATIONS:
-            raise InputError(f"actuation is '{actuation}'; it is {', '.join(ACTUATIONS[:-1])}.")
-        if not (isfinite(area) and area >= 0.0):
-            raise InputError(f"drag_area is {area:g} m², but must be at least 0.")
-        load = self.safe_load if how["load"] is None else how["load"]
-        if not (isfinite(load) and load > 0.0):
-            raise InputError(f"The load is {load:g} kg, but must be above 0.")
-        suspension = how["suspension"]
-        settings, law, halves = settings_of(control)
-        mode = ACTUATIONS.index(actuation)
-        if mode == DIRECT and control is not None:
-            raise InputError("With direct actuation the voltages are given: leave control out.")
-        if how["loaded"]:
-            self._check_loaded(actuation, load + suspension.hook, suspension)
-        edges = _edges(self.hoist)
-        low, high = self.boom_limits
-        forward, port = how["wind"]
-        fixed = Fixed(
-            self.geometry,
-            self.home(pose),
-            Air(AIR * area / (2.0 * load), Vector(float(forward), float(port), 0.0)),
-            settings,
-            mode,
-            bool(how["brake"]),
-            (edges[0] or -FULL_VOLTAGE, edges[1] or FULL_VOLTAGE),
-            (sin(low), sin(high)),
-            self.rope_limits,
-            load + suspension.hook,
-            bool(how["loaded"]),
-            suspension.hanging(load, self.rope_limits[0], RATE),
-        )
-        drives = (self.hoist, self.slew, self.luff)
-        return Loop(drives, tuple(map(_inverse, drives)), fixed, law, RATE), pose, halves
+    def orifices(self, control: Control | Mapping[str, Control], **how: Any) -> Sweep:
+        """Swing over the luff drive's orifice; see `swashplate.crane.orifices`."""
+        from swashplate.crane.study import orifices
 
-    def _check_loaded(self, actuation: str, mass: float, suspension: Suspension) -> None:
-        """Refuse loads on drives that feel none, or that answer them faster than a sample."""
-        if actuation == "ideal":
-            raise InputError("Ideal drives follow at once, whatever the load: leave out 'loaded'.")
-        lost = {axis: _speed_lost(getattr(self, axis)) for axis in AXES}
-        if not any(lost.values()) and not any(_has_line(getattr(self, axis)) for axis in AXES):
-            raise InputError(
-                f"No drive of {self.name} feels a load: give one a motor_leakage or a "
-                "line_stiffness, as crane.hoist.replace(motor_leakage=1e-6), or leave out 'loaded'."
-            )
-        if suspension.stiffness < inf:
-            return
-        for axis, arm in (("hoist", self.geometry.hoist), ("luff", self.geometry.luff)):
-            answer = 0.5 * RATE * mass * arm * arm * lost[axis]
-            if answer > QUICKEST:
-                raise InputError(
-                    f"The {axis} of {self.name} gives way to {mass:g} kg on a rigid rope within a "
-                    f"sample, since its motor_leakage costs {lost[axis]:.3g} rad/s for each N m: "
-                    "take an elastic rope, suspension=Suspension(stiffness=6e7)."
-                )
-
-    def _stopped(self, loop: Loop, ended: int) -> DomainError | InputError:
-        """What has stopped a run."""
-        state = loop.state
-        time = state.sample / loop.rate
-        if ended == ROPE_OUT:
-            low, high = self.rope_limits
-            return DomainError(
-                f"{self.name}: at {time:.2f} s the rope is {state.rope:.2f} m long, but can be "
-                f"{low:g} to {high:g} m; hoist or lower less, or start elsewhere."
-            )
-        if ended == BOOM_OUT:
-            low, high = map(degrees, self.boom_limits)
-            return DomainError(
-                f"{self.name}: at {time:.2f} s the boom meets the limits of its travel, {low:g} to "
-                f"{high:g} deg; luff less, or start elsewhere."
-            )
-        return InputError(too_fast(state.rope, time, loop.rate))
+        return orifices(self, control, **how)
 
     def table(self) -> Table:
         """Geometry with status and source; what is assumed is marked."""
@@ -569,73 +406,6 @@ class Crane:
             look = each.status == "assumed"
             made.add(name.replace("_", " "), text, each.unit, each.status, each.source, look=look)
         return made
-
-
-class CraneStepper:
-    """A crane that takes commands and gives signals, the same numbers as `Crane.simulate`."""
-
-    def __init__(self, crane: Crane, loop: Loop) -> None:
-        self._crane, self._loop = crane, loop
-
-    def step(
-        self, command: tuple[float, float, float], ship: ArrayLike | None = None
-    ) -> dict[str, float]:
-        """Advance by one sample; the first call gives the sample at time zero.
-
-        Parameters
-        ----------
-        command : (float, float, float)
-            Of hoist, slew and luff, -1 to 1, or voltages with direct actuation. [V]
-        ship : (6,) array_like, optional
-            Surge, sway, heave [m], roll, pitch, yaw [rad].
-
-        Returns
-        -------
-        dict
-            Signals by name, SI: voltages, speeds and angles of the shafts, tip, load, pull, rope.
-
-        Raises
-        ------
-        InputError, DomainError
-            As `Crane.simulate`, and for a command out of range.
-        """
-        most = FULL_VOLTAGE if self._loop.fixed.actuation == DIRECT else 1.0
-        commands = np.array([command], dtype=np.float64)
-        if commands.shape != (1, 3) or not (np.abs(commands) <= most).all():
-            raise InputError(f"A crane takes three commands of at most ±{most:g}.")
-        motion = np.zeros((1, 1)) if ship is None else np.array([ship], dtype=np.float64)
-        if motion.shape not in ((1, 1), (1, 6)) or not np.isfinite(motion).all():
-            raise InputError("The ship's motion is six finite numbers.")
-        return self.named(self.take(commands, motion)[0])
-
-    def named(self, row: Array) -> dict[str, float]:
-        """Signals of a row that `take` returns, by name."""
-        return dict(zip(self._loop.rows, row.tolist(), strict=True))
-
-    def take(self, commands: Array, ship: Array) -> Array:
-        """Advance by many samples at once.
-
-        Parameters
-        ----------
-        commands : (n, 3) array
-            As of `step`.
-        ship : (n, 6) array
-            Motion of the ship [m], [rad]; (n, 1) if it does not move.
-
-        Returns
-        -------
-        (n, 24) array
-            Signals, a column for each that `step` returns.
-
-        Raises
-        ------
-        InputError, DomainError
-            As `Crane.simulate`.
-        """
-        out, ended = self._loop.take(commands, ship)
-        if ended != FINE:
-            raise self._crane._stopped(self._loop, ended)
-        return out
 
 
 def _crane_of(
@@ -659,25 +429,6 @@ def _drive_of(given: DriveLike) -> Drive:
 @lru_cache(maxsize=512)
 def _inverse(drive: Drive) -> InverseMap:
     return inverse_map(drive)
-
-
-@lru_cache(maxsize=64)
-def _edges(drive: Drive) -> tuple[float | None, float | None]:
-    """Voltages of a drive's dead zone, negative and positive. [V]"""
-    return dead_zone(drive, -1.0)[1], dead_zone(drive, 1.0)[1]
-
-
-@lru_cache(maxsize=64)
-def _speed_lost(drive: Drive) -> float:
-    """Speed that a drive loses at once for each N m of load. [rad/s/(N m)]"""
-    still, pulled = (
-        float(drive.simulate([0.0], load_torque=torque).shaft_speed[0]) for torque in (0.0, 1e5)
-    )
-    return (still - pulled) / 1e5
-
-
-def _has_line(drive: Drive) -> bool:
-    return "line" in drive.parameters.options
 
 
 def preset_text(name: str) -> str:
@@ -727,23 +478,3 @@ def _check(name: str, si: Mapping[str, tuple[float, ...]]) -> None:
         raise ParameterError(
             f"{name}: rope_limits are {short:g} and {long:g} m, but must rise from above 0."
         )
-
-
-def _motion(sea: Seaway | ArrayLike | None, count: int) -> Array:
-    """The ship's motion over so many samples; one column if it is at rest."""
-    if sea is None:
-        return np.zeros((count, 1))
-    if isinstance(sea, Seaway):
-        return sea.motion(count, RATE)
-    made = np.ascontiguousarray(sea, dtype=np.float64)
-    if made.ndim != 2 or made.shape[1] != 6 or not np.isfinite(made).all():
-        raise InputError(
-            "The ship's motion has rows of six finite numbers: surge, sway, heave [m], roll, "
-            "pitch, yaw [rad]."
-        )
-    if len(made) < count:
-        raise InputError(
-            f"The stick is {(count - 1) / RATE:g} s long, but the ship's motion only "
-            f"{(len(made) - 1) / RATE:g} s at {RATE:g} Hz."
-        )
-    return made[:count]

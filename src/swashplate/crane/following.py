@@ -10,10 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.crane import RATE, Crane, Pose
+from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Boom, Vector, reach_rate, tip_of
 from swashplate.crane.loop import half_clip
 from swashplate.crane.sea import BAND, SEA_STATES, Seaway
+from swashplate.crane.stepper import Pose
 from swashplate.crane.stick import AXES
 from swashplate.errors import InputError
 from swashplate.results import Result
@@ -40,9 +41,6 @@ class Followable(Result):
     amplitude: Array
     """(n, 3) min(v/ω, a/ω²) of the hook's height by the hoist, of the tip across the boom by the
     slew, and along it by the luff. [m]"""
-    simulated: Array
-    """(n,) of the luff: amplitude up to which its simulated drive, behind its inverse map, reaches
-    0.9 of the wanted sine. [m]"""
     seas: Mapping[str, Demand]
     crane: Crane = field(repr=False)
     pose: Pose
@@ -52,21 +50,14 @@ class Followable(Result):
     def tables(self) -> list[Table]:
         """Amplitudes over the period, and what seas ask for."""
         heads = [Column(each, ".3f", "m") for each in AXES]
-        made = Table("Largest sine that an axis can follow", [Column("period", ".1f", "s"), *heads])
-        made = replace(made, columns=[*made.columns, Column("luff, simulated", ".3f", "m")])
-        for row in zip(self.periods, self.amplitude, self.simulated, strict=True):
-            made.add(float(row[0]), *map(float, row[1]), float(row[2]))
+        made = Table("Largest sine an axis can follow", [Column("period", ".1f", "s"), *heads])
+        for period, amplitudes in zip(self.periods, self.amplitude, strict=True):
+            made.add(float(period), *map(float, amplitudes))
         columns = (Column("sea"), Column("period", ".1f", "s"), *heads)
-        asked = Table("What seas ask of them, significant single amplitude", columns)
+        asked = Table("What seas ask, significant amplitudes", columns)
         for name, each in self.seas.items():
             asked.add(name, each.period, *each.amplitude)
         return [made, asked]
-
-
-FOLLOWED = 0.9
-"""Part of a sine's amplitude that counts as followed."""
-RATIOS = np.geomspace(0.25, 4.0, 13)
-"""Amplitudes that are simulated, to those that the limits of speed and acceleration allow."""
 
 
 def follow(
@@ -109,13 +100,9 @@ def follow(
         [[_largest(crane, axis, rate, 2.0 * pi / t) for axis, rate in zip(AXES, rates, strict=True)]
          for t in times]
     )  # fmt: skip
-    simulated = np.array(
-        [_simulated(crane, t, x / rates[2]) * rates[2]
-         for t, x in zip(times, amplitude[:, 2], strict=True)]
-    )  # fmt: skip
     base = seaway or Seaway()
     asked = {name: demand(crane, pose, replace(base, sea=name)) for name in seas}
-    return Followable(times, amplitude, simulated, asked, crane, pose)
+    return Followable(times, amplitude, asked, crane, pose)
 
 
 def _largest(crane: Crane, axis: str, rate: float, omega: float) -> float:
@@ -124,29 +111,6 @@ def _largest(crane: Crane, axis: str, rate: float, omega: float) -> float:
     low, high = inverse.limits
     speed, acceleration = rate * min(high, -low), rate * min(inverse.acceleration)
     return float(half_clip(0.0, speed, acceleration, 1.0, omega))
-
-
-def _simulated(crane: Crane, period: float, reference: float) -> float:
-    """Amplitude of the luff's shaft up to which a sine reaches its part. [rad]"""
-    omega, cycles = 2.0 * pi / period, 6
-    time = np.arange(round(cycles * period * RATE)) / RATE
-    late = time >= (cycles - 3) * period
-    gains = []
-    for ratio in RATIOS:
-        wanted = ratio * reference * omega * np.cos(omega * time)
-        run = crane.luff.simulate(crane.inverse("luff").voltage(wanted, clip=True), RATE)
-        turned = np.exp(-1j * omega * time[late])
-        gains.append(
-            2.0 * abs(np.mean(run.shaft_speed[late] * turned)) / (ratio * reference * omega)
-        )
-    enough = np.flatnonzero(np.array(gains) >= FOLLOWED)
-    if not enough.size:
-        return float("nan")
-    last = int(enough[-1])
-    if last + 1 == RATIOS.size:
-        return float(RATIOS[-1] * reference)
-    share = (gains[last] - FOLLOWED) / (gains[last] - gains[last + 1])
-    return float(RATIOS[last] + share * (RATIOS[last + 1] - RATIOS[last])) * reference
 
 
 def demand(crane: Crane, pose: Pose, seaway: Seaway) -> Demand:

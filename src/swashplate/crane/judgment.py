@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import reduce
 from math import pi, sqrt
 from operator import or_
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,25 +18,9 @@ from swashplate.crane.crane import Crane
 from swashplate.crane.following import follow
 from swashplate.crane.result import CraneRun
 from swashplate.crane.rope import GRAVITY
-from swashplate.crane.sea import Seaway
-from swashplate.crane.stick import AXES, Stick
-from swashplate.crane.study import (
-    BUILT,
-    IDEAL,
-    NONE,
-    PUMPS,
-    Case,
-    Progress,
-    Sea,
-    Study,
-    cases_of,
-    commands_of,
-    outcomes,
-    seaway_of,
-    station,
-)
+from swashplate.crane.stick import AXES
+from swashplate.crane.study import COUNTED, IDEAL, NONE, PUMPS, Case, Study, StudySetup
 from swashplate.errors import InputError
-from swashplate.executors import Executor
 from swashplate.results import Tabular
 from swashplate.simulation.result import Limit
 from swashplate.tables import Column, Table, count, listed
@@ -87,17 +71,6 @@ def mean_of(values: Array) -> Estimate:
     return Estimate(mean, mean - half, mean + half)
 
 
-def share_of(happened: NDArray[np.bool_]) -> Estimate:
-    """Share of trials in which something happened, with the exact interval (Clopper, Pearson)."""
-    from scipy.special import betaincinv
-
-    n, k = happened.size, int(happened.sum())
-    tail = 0.5 - 0.5 * LEVEL
-    low = float(betaincinv(k, n - k + 1, tail)) if k else 0.0
-    high = float(betaincinv(k + 1, n - k, 1.0 - tail)) if k < n else 1.0
-    return Estimate(k / n, low, high)
-
-
 class Remedy(NamedTuple):
     """A change with which control passes."""
 
@@ -105,7 +78,7 @@ class Remedy(NamedTuple):
     """In words: ``"luff orifice ×1.5"``."""
     size: float
     """Factor on the orifice, or size of the clip. [m]"""
-    worse: Estimate
+    worse: float
     """Share of seaways in which control is then worse than none."""
     swing: Estimate
     """Root mean square swing then. [rad]"""
@@ -115,17 +88,12 @@ class Remedy(NamedTuple):
 class Judgment(Tabular):
     """Variants of control and drives in the same seaways, and what follows."""
 
-    crane: Crane = field(repr=False)
-    cases: Mapping[str, Case] = field(repr=False)
+    study: Study
+    """Crane, seaways, stick, and from when on swing counts."""
+    cases: Mapping[str, Case]
     """By name, the crane without control first."""
-    sea: Seaway
-    seeds: tuple[int, ...]
-    values: Array = field(repr=False)
-    """(n, m, 17) of seaways and cases, see `study.outcomes`."""
-    stick: Stick
-    """What the operator does in each seaway."""
-    start: float
-    """From when on swing counts. [s]"""
+    values: Array
+    """(n, m, 17) of seaways and cases, `study.COUNTED`."""
     allowed: float
     """Share of seaways in which control may be worse than none."""
     remedies: tuple[Remedy, ...] = ()
@@ -135,7 +103,7 @@ class Judgment(Tabular):
     figure = "plot_judgment"
 
     def __repr__(self) -> str:
-        return f"Judgment({count(len(self.seeds), 'seaway')}, {', '.join(self.names)})"
+        return f"Judgment({count(len(self.study.seeds), 'seaway')}, {', '.join(self.names)})"
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -170,32 +138,32 @@ class Judgment(Tabular):
         """Mean paired difference of the root mean square swing to another variant. [rad]"""
         return mean_of(self.rms(name) - self.rms(other))
 
-    def worse(self, name: str) -> Estimate:
+    def worse(self, name: str) -> float:
         """Share of seaways in which a variant swings more than no control, or was stopped."""
-        return share_of(_worse(self.rms(name), self.rms(NONE)))
+        return float(_worse(self.rms(name), self.rms(NONE)).mean())
 
     def acting(self, name: str, axis: str, limit: Limit) -> float:
         """Mean share of time for which a limit of a drive acts; NaN if every run was stopped."""
-        column = 2 + AXES.index(axis) * len(PUMPS) + PUMPS.index(limit)
+        column = COUNTED.index(f"{axis}_{str(limit.name).lower()}")
         return mean_of(self.values[:, self._place(name), column]).value
 
     @property
     def passed(self) -> bool:
         """Whether the judged variant is worse than none in no more seaways than allowed."""
-        return self.worse(self.judged).value <= self.allowed
+        return self.worse(self.judged) <= self.allowed
 
     def verdict(self) -> str:
         """What the judged variant amounts to, and what would do if it fails."""
-        share, n = self.worse(self.judged), len(self.seeds)
+        share, n = self.worse(self.judged), len(self.study.seeds)
         none, own = (np.degrees(mean_of(self.rms(each)).value) for each in (NONE, self.judged))
         if self.passed:
             return (
                 f"With the drives '{self.judged}' the controller brings the swing from {none:.2f} "
-                f"to {own:.2f} deg RMS and makes it worse than none in {_percent(share.value)} of "
+                f"to {own:.2f} deg RMS and makes it worse than none in {_percent(share)} of "
                 f"{count(n, 'seaway')}."
             )
         said = (
-            f"The controller makes swing worse than none in {_percent(share.value)} of "
+            f"The controller makes swing worse than none in {_percent(share)} of "
             f"{count(n, 'seaway')} ({none:.2f} deg RMS without, {own:.2f} with it)"
         )
         said += f"{self._cause()}."
@@ -228,26 +196,26 @@ class Judgment(Tabular):
         DomainError
             If the run was stopped.
         """
-        if seed not in self.seeds:
+        if seed not in self.study.seeds:
             raise InputError(f"There is no seaway {seed} in this judgment.")
         case = self.cases[self.names[self._place(name)]]
-        crane = case.cranes[self.seeds.index(seed) % len(case.cranes)]
-        sea, law = replace(self.sea, seed=seed), case.control
-        how: dict[str, Any] = {"actuation": case.actuation, **case.how}
-        return crane.simulate(self.stick, sea=sea, control=law, **how)
+        crane = case.cranes[self.study.seeds.index(seed) % len(case.cranes)]
+        sea, law = replace(self.study.sea, seed=seed), case.control
+        how: dict[str, Any] = {"actuation": case.actuation, **case.where}
+        return crane.simulate(self.study.stick, sea=sea, control=law, **how)
 
     @property
     def typical(self) -> int:
         """Seed of the seaway in which the judged variant swings as in half of them."""
         order = np.argsort(self.rms(self.judged))
-        return self.seeds[int(order[len(order) // 2])]
+        return self.study.seeds[int(order[len(order) // 2])]
 
     def tables(self) -> list[Table]:
         """Swing of each variant, paired differences, limits, and what was tried."""
         return [self._swings(), self._differences(), self._limits(), *self._remedies()]
 
     def _swings(self) -> Table:
-        title = f"Swing in {count(len(self.seeds), 'seaway')}, means with 95 % intervals"
+        title = f"Swing in {count(len(self.study.seeds), 'seaway')}, means with 95 % intervals"
         columns = (
             *(Column("variant"), *_interval(".2f", "rms")),
             Column("largest", ".2f", "rad", none="–"),
@@ -256,7 +224,7 @@ class Judgment(Tabular):
         made = Table(title, columns, "largest: median over the seaways of the largest swing")
         for name in self.names:
             rms, largest = self.rms(name), self.largest(name)
-            worse = None if name == NONE else self.worse(name).value
+            worse = None if name == NONE else self.worse(name)
             look = worse is not None and worse > self.allowed
             middle = float(np.nanmedian(largest)) if np.isfinite(largest).any() else np.nan
             stopped = int(np.isnan(rms).sum())
@@ -289,30 +257,29 @@ class Judgment(Tabular):
         said = f"tried on the crane's own drives; a clip with a position loop of {LOOP.gain:g} /s"
         made = Table("What would do", columns, said)
         for each in self.remedies:
-            made.add(each.what, each.worse.value, *each.swing)
+            made.add(each.what, each.worse, *each.swing)
         return [made]
 
     def to_polars(self) -> polars.DataFrame:
         """Numbers of every variant in every seaway, SI, shares of time of limits."""
         import polars as pl
 
-        heads = [f"{axis}_{str(each.name).lower()}" for axis in AXES for each in PUMPS]
         rows = [
-            {"seed": seed, "variant": name}
-            | dict(zip(("rms_swing", "largest_swing", *heads), values.tolist(), strict=True))
-            for seed, found in zip(self.seeds, self.values, strict=True)
+            {"seed": seed, "variant": name} | dict(zip(COUNTED, values.tolist(), strict=True))
+            for seed, found in zip(self.study.seeds, self.values, strict=True)
             for name, values in zip(self.names, found, strict=True)
         ]
         return pl.DataFrame(rows)
 
     def sentences(self) -> tuple[str, ...]:
         """The verdict, and what it rests on."""
-        assumed = sum(each.status == "assumed" for each in self.crane.quantities.values())
+        quantities, study = self.study.crane.quantities, self.study
+        assumed = sum(each.status == "assumed" for each in quantities.values())
         rests = (
-            f"Swing counts from {self.start:g} s to {self.stick.length:g} s of each seaway. "
+            f"Swing counts from {study.start:g} s to {study.stick.length:g} s of each seaway. "
             f"Control fails if it is worse than none in more than {_percent(self.allowed)} of them."
         )
-        crane = f"{assumed} of {len(self.crane.quantities)} quantities of the crane are assumed."
+        crane = f"{assumed} of {len(quantities)} quantities of the crane are assumed."
         return (self.verdict(), rests, *([crane] if assumed else []))
 
 
@@ -335,55 +302,25 @@ def judge(
     crane: Crane,
     control: Control | Mapping[str, Control],
     *,
-    sea: Sea = "ss3",
-    seeds: Sequence[int] = range(200),
-    drives: Sequence[str] | Mapping[str, str | Crane | Sequence[Crane]] = (IDEAL, BUILT),
-    stick: Stick | None = None,
-    length: float = 120.0,
-    start: float = 40.0,
-    slew_deg: float = 90.0,
-    boom_deg: float = 45.0,
-    rope_m: float = 27.0,
     allowed: float = 0.05,
     remedies: bool = True,
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-    **more: Any,
+    **setup: Unpack[StudySetup],
 ) -> Judgment:
-    """Judge control on several sets of drives over seeded seaways.
+    """Judge control on several sets of drives over seeded seaways, by default 200.
 
     Parameters
     ----------
     crane : Crane
     control : Control or mapping of str to Control
         One controller, or several by name.
-    sea : str, Spectrum or Seaway
-        Sea state; a seaway gives heading, ship and spreading as well.
-    seeds : sequence of int
-        A seaway for each.
-    drives : sequence of str, or mapping of str to str, Crane or sequence of Crane
-        ``"ideal"``, which follow at once within their limits of speed, ``"identified"``, the
-        crane's own; by name also other cranes, or several of which each seaway takes the next, see
-        `Crane.drawn`. The verdict is on the last.
-    stick : Stick, optional
-        What the operator does; by default nothing, the crane holds its load in place.
-    length : float
-        Of each run if there is no stick. [s]
-    start : float
-        From when on swing counts. [s]
-    slew_deg, boom_deg, rope_m : float
-        Where each run begins.
     allowed : float
         Share of seaways in which control may be worse than none.
     remedies : bool
         Whether to look for a larger orifice of the luff and for a clip that would do on the crane's
         own drives, if control fails.
-    executor : Executor, optional
-        Of `swashplate.executors`; threads by default. The numbers do not depend on it.
-    progress : callable, optional
-        Called with seaways done and their number.
-    **more
-        Further keywords of `Crane.stepper`: load, drag_area, wind, brake.
+    **setup
+        Seaways, drives, stick, where each run begins: see `StudySetup`. The verdict is on the last
+        of the drives.
 
     Raises
     ------
@@ -392,38 +329,26 @@ def judge(
     """
     if not 0.0 <= allowed < 1.0:
         raise InputError(f"allowed is {allowed:g}, but is a share of seaways: 0 to below 1.")
-    how = station(slew_deg, boom_deg, rope_m, more)
-    cases = {NONE: Case((crane,), None, "inverse", how), **cases_of(crane, control, drives, how)}
-    script = Stick.rest(length) if stick is None else stick
-    commands, first = commands_of(crane, script, how, start)
-    study = Study(tuple(cases.values()), seaway_of(sea), commands, first)
-    values = outcomes(study, seeds, executor, progress)
-    made = Judgment(
-        crane, cases, study.sea, tuple(seeds), values, script, start, allowed
-    )  # fmt: skip
+    study = Study.of(crane, control, setup, seeds=range(200))
+    cases = study.cases()
+    made = Judgment(study, cases, study.outcomes(list(cases.values())), allowed)
     if made.passed or not remedies or cases[made.judged].actuation == IDEAL:
         return made
-    found, tried = _search(made, study, executor)
-    return Judgment(
-        crane, cases, study.sea, tuple(seeds), values, script, start, allowed, found, tried
-    )  # fmt: skip
+    found, tried = _search(made)
+    return replace(made, remedies=found, tried=tried)
 
 
-def _search(
-    judged: Judgment, study: Study, executor: Executor | None
-) -> tuple[tuple[Remedy, ...], tuple[str, ...]]:
+def _search(judged: Judgment) -> tuple[tuple[Remedy, ...], tuple[str, ...]]:
     """The smallest factor on the luff's orifice and the largest clip with which control passes."""
     case = judged.cases[judged.judged]
-    law = case.control
+    law, where = case.control, case.where
     assert law is not None
     if len(case.cranes) == 1:  # factors are of the crane as it is built, whatever was judged
-        case = case._replace(cranes=(judged.crane,))
+        case = case._replace(cranes=(judged.study.crane,))
     stages = [each for each in law.stages if not isinstance(each, Clip | PositionLoop)]
-    rope = case.how["rope_m"]
-    reach = follow(
-        case.cranes[0], [2.0 * pi * sqrt(rope / GRAVITY)], seas=(), boom_deg=case.how["boom_deg"],
-        rope_m=rope,
-    ).amplitude[0, 2]  # fmt: skip
+    period = 2.0 * pi * sqrt(where["rope_m"] / GRAVITY)
+    boom, rope = where["boom_deg"], where["rope_m"]
+    reach = follow(case.cranes[0], [period], seas=(), boom_deg=boom, rope_m=rope).amplitude[0, 2]
 
     def larger(factor: float) -> tuple[str, float, Case]:
         cranes = tuple(
@@ -440,25 +365,23 @@ def _search(
     tried: list[str] = []
     for trials in (map(larger, FACTORS), map(clipped, SHARES)):
         for what, size, trial in trials:
-            values = _trial(judged, study, trial, executor)
+            values = _trial(judged, trial)
             if values is None:
                 tried.append(what)
                 continue
-            worse = share_of(_worse(values, judged.rms(NONE)))
+            worse = float(_worse(values, judged.rms(NONE)).mean())
             found.append(Remedy(what, float(size), worse, mean_of(values)))
             break
     return tuple(found), tuple(tried)
 
 
-def _trial(judged: Judgment, study: Study, case: Case, executor: Executor | None) -> Array | None:
+def _trial(judged: Judgment, case: Case) -> Array | None:
     """Root mean square swing of a trial in all seaways [rad]; None as soon as it has failed."""
-    none, seeds = judged.rms(NONE), judged.seeds
+    none, count = judged.rms(NONE), len(judged.study.seeds)
     made = np.zeros(0)
-    alone = study._replace(cases=(case,))
-    for first in range(0, len(seeds), BLOCK):
-        some = seeds[first : first + BLOCK]
-        values = outcomes(alone, some, executor, number=first)[:, 0, 0]
-        made = np.concatenate([made, values])
-        if _worse(made, none[: made.size]).sum() > judged.allowed * len(seeds):
+    for first in range(0, count, BLOCK):
+        some = range(first, min(first + BLOCK, count))
+        made = np.concatenate([made, judged.study.outcomes([case], some)[:, 0, 0]])
+        if _worse(made, none[: made.size]).sum() > judged.allowed * count:
             return None
     return made

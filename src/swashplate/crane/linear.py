@@ -79,7 +79,7 @@ def linearize(crane: Crane, boom_deg: float = 45.0, rope_m: float = 20.0) -> Lin
     InputError
         For a boom or rope beyond the crane's limits.
     """
-    from swashplate.crane.crane import Pose
+    from swashplate.crane.stepper import Pose
 
     crane.home(Pose(0.0, radians(boom_deg), rope_m))
     g, boom = crane.geometry, Boom(cos(radians(boom_deg)), sin(radians(boom_deg)))

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.analysis.compensation import InverseMap
-from swashplate.crane.control import GIVES, SEEN, Law, Settings
+from swashplate.crane.control import Settings
 from swashplate.crane.kinematics import (
     Boom,
     Geometry,
@@ -45,15 +45,12 @@ from swashplate.crane.rope import (
     Air,
     Hanging,
     Hung,
-    first_step,
-    hung_start,
-    hung_step,
+    hanging_load,
     moved,
     rope_step,
     size,
 )
-from swashplate.drive import Drive
-from swashplate.equations import Machine, compiled_step, equation, inlined, kernel
+from swashplate.equations import Machine, equation, inlined, kernel
 from swashplate.equations.code import generating
 from swashplate.parameters.rules import FULL_VOLTAGE
 
@@ -111,9 +108,9 @@ class Fixed(NamedTuple):
     """Limits of the rope. [m]"""
     mass: float
     """Of load and hook. [kg]"""
+    hanging: Hanging
     loaded: bool
     """Whether the rope's tension loads the drives."""
-    hanging: Hanging
 
 
 class Plant(NamedTuple):
@@ -304,11 +301,11 @@ def _no_law(*_: Any) -> float:
 
 @generating
 def loop_of(
-    hoist: Any, slew: Any, luff: Any, law: Any, loaded: bool, hangs: bool, hooked: bool
+    hoist: Any, slew: Any, luff: Any, law: Any, loaded: bool, hooked: bool
 ) -> Callable[..., tuple[State, int]]:
     """The compiled loop over given steps of three drives and of a law, None for no law.
 
-    `loaded` drives feel the rope; a load that `hangs` has a suspension, perhaps with a hook.
+    `loaded` drives feel the rope; a `hooked` load hangs on slings below a hook.
     """
     own = law is not None
     advance_law = law if own else inlined(_no_law)
@@ -328,7 +325,6 @@ def loop_of(
         operator, wish, aim = state.operator, state.wish, state.aim
         boom, rope, in_ship = state.boom, state.rope, state.in_ship
         tip, hung, torques = state.tip, state.hung, state.torques
-        load, before = hung.load, hung.before
         still, brake = state.still, state.brake
         volts, omega, limits = np.zeros(3), np.zeros(3), np.zeros(3)
         r = Rotation(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -363,9 +359,8 @@ def loop_of(
                 memory[4, sample & last] = lead.y
                 path_x = shaped(memory, 3, sample, half, settings.tip)
                 path_y = shaped(memory, 4, sample, half, settings.tip)
-                swing_x, swing_y = load.x - tip.x, load.y - tip.y
-                if hooked:  # what the direction of the rope tells
-                    swing_x, swing_y = hung.hook.x - tip.x, hung.hook.y - tip.y
+                # what the direction of the rope tells
+                swing_x, swing_y = hung.hook.x - tip.x, hung.hook.y - tip.y
                 memory[5, sample & last] = swing_x
                 memory[6, sample & last] = swing_y
                 x, y = 0.0, 0.0
@@ -454,35 +449,20 @@ def loop_of(
             if not (fixed.boom[0] <= boom.sin <= fixed.boom[1] and boom.cos > 0.0):
                 ended = BOOM_OUT
                 break
-            pull = GRAVITY
-            if hangs:
-                if sample == 0:
-                    hung = hung_start(following, Vector(0.0, 0.0, 0.0), rope, fixed.hanging, h)
-                else:
-                    square = h * h
-                    if sample == 1:
-                        square = 0.5 * square
-                        led = moved(following, -1.0, tip)
-                        led = Vector(led.x, led.y, led.z + shorter)
-                        hung = Hung(
-                            hung.load, moved(hung.load, -1.0, led), hung.hook,
-                            moved(hung.hook, -1.0, led), hung.pull, hung.stretch,
-                        )  # fmt: skip
-                    hung = hung_step(
-                        hung, tip, following, rope, fixed.hanging, fixed.air, h, square
-                    )
-                load, pull = hung.load, hung.pull
-            elif sample == 0:
-                load = Vector(following.x, following.y, following.z - rope)
-                before = load
-            else:
-                if sample == 1:
-                    led = moved(following, -1.0, tip)
-                    v = Vector(led.x / h, led.y / h, (led.z + shorter) / h)
-                    made = first_step(load, v, tip, following, rope, fixed.air, h)
-                else:
-                    made = rope_step(load, before, tip, following, rope, fixed.air, h)
-                before, load, pull = load, made.position, made.pull
+            square = h * h
+            if sample == 0:
+                hung = hanging_load(following, Vector(0.0, 0.0, 0.0), rope, fixed.hanging, h)
+            elif sample == 1:  # it has moved with the tip
+                square = 0.5 * square
+                led = moved(following, -1.0, tip)
+                led = Vector(led.x, led.y, led.z + shorter)
+                hung = Hung(
+                    hung.load, moved(hung.load, -1.0, led), hung.hook, moved(hung.hook, -1.0, led),
+                    hung.pull, hung.stretch,
+                )  # fmt: skip
+            if sample > 0:
+                hung = rope_step(hung, tip, following, rope, fixed.hanging, fixed.air, h, square)
+            load, pull = hung.load, hung.pull
             if pull < 0.0:
                 ended = TOO_FAST
                 break
@@ -496,20 +476,17 @@ def loop_of(
             out[m, 17], out[m, 18] = path_x, path_y
             out[m, 19], out[m, 20] = boom.cos, boom.sin
             out[m, 21], out[m, 22], out[m, 23] = limits[0], limits[1], limits[2]
-            rope_end = hung.hook if hooked else load
             if hooked:
                 k = out.shape[1] - 3
-                out[m, k], out[m, k + 1], out[m, k + 2] = rope_end.x, rope_end.y, rope_end.z
+                out[m, k], out[m, k + 1], out[m, k + 2] = hung.hook.x, hung.hook.y, hung.hook.z
             if loaded:
                 tension = fixed.mass * pull
-                rope_along = moved(rope_end, -1.0, tip)
+                rope_along = moved(hung.hook, -1.0, tip)
                 force = moved(Vector(0.0, 0.0, 0.0), tension / size(rope_along), rope_along)
                 if moving:
                     force = to_ship(r, force)
                 torques = shaft_torques(force, home.slew + shafts.slew, boom, tension, g)
             sample += 1
-        if not hangs:
-            hung = Hung(load, before, load, before, 0.0, 0.0)
         end = State(
             sample, shafts, speeds, operator, wish, aim, boom, rope, in_ship, tip, hung, torques,
             still, brake,
@@ -519,111 +496,9 @@ def loop_of(
     return loop
 
 
-# --- a loop that remembers ------------------------------------------------------------------------
-
-
 def inverse_of(inverse: InverseMap) -> Inverse:
     """An inverse map as the loop takes it."""
     branches = (*inverse.minus, *inverse.plus)
     a, b, c, d = (np.ascontiguousarray(each, dtype=np.float64) for each in branches)
     low, high = inverse.limits
     return Inverse(a, b, c, d, inverse.creep, low, high, min(inverse.acceleration))
-
-
-class Loop:
-    """A crane in its loop, from a beginning on: its kernel and all that it remembers.
-
-    Parameters
-    ----------
-    drives : sequence of Drive
-        Hoist, slew, luff.
-    inverses : sequence of InverseMap
-        Of the drives.
-    fixed : Fixed
-        Geometry, controller and the rest.
-    law : Law, optional
-        A law of one's own.
-    rate : float
-        Samples a second. [Hz]
-    """
-
-    def __init__(
-        self,
-        drives: tuple[Drive, ...],
-        inverses: tuple[InverseMap, ...],
-        fixed: Fixed,
-        law: Law | None,
-        rate: float,
-    ) -> None:
-        self.fixed, self.rate, self._law = fixed, rate, law
-        self._h = 1.0 / rate
-        given = ("voltage", "load_torque") if fixed.loaded else ("voltage",)
-        left = ("shaft_speed", "limits")
-        self._steps = [drive.compiled_step(left, inputs=given, rate=rate) for drive in drives]
-        machines = [each.machine() for each in self._steps]
-        own, picks = machines[0], np.zeros(0, dtype=np.int64)
-        if law is not None:
-            seen = law.model.external
-            self._steps.append(compiled_step(law.model, law.values, seen, GIVES, rate))
-            own = self._steps[3].machine()
-            picks = np.array([SEEN.index(each) for each in seen], dtype=np.int64)
-        hoist_step, slew_step, luff_step = (each.step for each in self._steps[:3])
-        law_step = self._steps[3].step if law is not None else None
-        hooked, elastic = fixed.hanging.sling > 0.0, fixed.hanging.stiffness > 0.0
-        self._loop = loop_of(
-            hoist_step, slew_step, luff_step, law_step, fixed.loaded, hooked or elastic, hooked
-        )
-        self.rows = ROWS + (TORQUES if fixed.loaded else ()) + (HOOK if hooked else ())
-        g, home = fixed.geometry, fixed.home
-        zero, boom = Shafts(0.0, 0.0, 0.0), boom_at(0.0, g, home)
-        tip = tip_of(home.slew, boom, g)
-        weight = fixed.mass * GRAVITY
-        torques = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
-        self.state = State(
-            0, zero, zero, zero, zero, zero, boom, home.rope, tip, tip,
-            Hung(tip, tip, tip, tip, 0.0, 0.0), torques, 0.0, 0.0,
-        )  # fmt: skip
-        longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * rate + 4.0
-        memory = np.zeros((7, 1 << int(longest).bit_length()))
-        memory[3:5] = [[tip.x], [tip.y]]
-        hoist, slew, luff = map(inverse_of, inverses)
-        self._plant = Plant(
-            (hoist, slew, luff),
-            (machines[0], machines[1], machines[2]),
-            own,
-            picks,
-            memory,
-            np.full(4, np.inf),
-        )
-
-    def take(self, stick: Array, ship: Array) -> tuple[Array, int]:
-        """The next samples.
-
-        Parameters
-        ----------
-        stick : (n, 3) array
-            Commands of hoist, slew and luff, -1 to 1; voltages if these are given [V].
-        ship : (n, 6) array
-            Motion of the ship, (n, 1) if it does not move. [m], [rad]
-
-        Returns
-        -------
-        out : (n, 24) array
-            Columns as in `rows`.
-        ended : int
-            `FINE`, or why it ended at the state's sample.
-
-        Raises
-        ------
-        DomainError
-            If a drive or a law leaves its domain.
-        """
-        out = np.empty((len(stick), len(self.rows)))
-        plant = self._plant
-        self.state, ended = self._loop(self._h, self.fixed, self.state, plant, stick, ship, out)
-        machines = (*plant.drives, plant.law)
-        for step, machine, worst in zip(
-            self._steps, machines, plant.margins.tolist(), strict=False
-        ):
-            step.check(machine, worst, "command")
-        return out, ended

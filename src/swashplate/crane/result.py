@@ -22,7 +22,8 @@ from swashplate.tables import Column, Table
 if TYPE_CHECKING:
     import polars
 
-    from swashplate.crane.crane import Crane, Pose
+    from swashplate.crane.crane import Crane
+    from swashplate.crane.stepper import Pose
 
 Array = NDArray[np.float64]
 

@@ -45,15 +45,6 @@ class Air(NamedTuple):
     """Velocity of the air. [m/s]"""
 
 
-class Load(NamedTuple):
-    """The load after a step."""
-
-    position: Vector
-    """[m]"""
-    pull: float
-    """Tension of the rope over this step for each kilogram of load, 0 where it is slack. [N/kg]"""
-
-
 @equation
 def air_drag(vx: float, vy: float, vz: float, air: Air) -> Vector:
     """Deceleration by the air at a velocity of the load, -k |v - w| (v - w). [m/s²]"""
@@ -93,77 +84,6 @@ def multiplier_of(free: Vector, along: Vector, length: float) -> float:
     bad = o > 0.0 and (root < 0.0 or ed <= 0.0)
     taut = o > 0.0 and not bad
     return TOO_FAST if bad else o / (ed + sqrt(root)) if taut else 0.0
-
-
-@equation
-def constrained(free: Vector, along: Vector, tip: Vector, length: float, pulls: float) -> Load:
-    """The load on or within the sphere around its tip.
-
-    Parameters
-    ----------
-    free : Vector
-        e, where an unconstrained step ends, seen from the new tip. [m]
-    along : Vector
-        d, from the old tip to the load, along which the rope has pulled. [m]
-    tip, length :
-        p and L at the step's end. [m]
-    pulls : float
-        What the pull is for each μ |d|: 1/h², 2/h² in the first step. [1/s²]
-    """
-    multiplier = multiplier_of(free, along, length)
-    bad = multiplier < 0.0
-    position = Vector(
-        tip.x + free.x - multiplier * along.x,
-        tip.y + free.y - multiplier * along.y,
-        tip.z + free.z - multiplier * along.z,
-    )
-    return Load(position, TOO_FAST if bad else multiplier * size(along) * pulls)
-
-
-@equation
-def rope_step(
-    now: Vector, before: Vector, tip: Vector, following: Vector, length: float, air: Air, h: float
-) -> Load:
-    """The load one step later.
-
-    Parameters
-    ----------
-    now, before : Vector
-        Load at n and n - 1. [m]
-    tip, following : Vector
-        Tip at n and n + 1. [m]
-    length : float
-        Rope at n + 1. [m]
-    air : Air
-        Drag and wind.
-    h : float
-        Step. [s]
-    """
-    dx, dy, dz = now.x - before.x, now.y - before.y, now.z - before.z
-    without = Vector(0.0, 0.0, 0.0)
-    drag = air_drag(dx / h, dy / h, dz / h, air) if air.drag > 0.0 else without
-    free = Vector(
-        now.x + dx + h * h * drag.x - following.x,
-        now.y + dy + h * h * drag.y - following.y,
-        now.z + dz + h * h * (drag.z - GRAVITY) - following.z,
-    )
-    along = Vector(now.x - tip.x, now.y - tip.y, now.z - tip.z)
-    return constrained(free, along, following, length, 1.0 / (h * h))
-
-
-@equation
-def first_step(
-    start: Vector, v: Vector, tip: Vector, following: Vector, length: float, air: Air, h: float
-) -> Load:
-    """The load after the first step, from its place and velocity [m/s]; else as `rope_step`."""
-    drag = air_drag(v.x, v.y, v.z, air)
-    free = Vector(
-        start.x + h * v.x + 0.5 * h * h * drag.x - following.x,
-        start.y + h * v.y + 0.5 * h * h * drag.y - following.y,
-        start.z + h * v.z + 0.5 * h * h * (drag.z - GRAVITY) - following.z,
-    )
-    along = Vector(start.x - tip.x, start.y - tip.y, start.z - tip.z)
-    return constrained(free, along, following, length, 2.0 / (h * h))
 
 
 # --- elastic rope, hook and slings ----------------------------------------------------------------
@@ -325,7 +245,7 @@ def hook_pulls(
 
 
 @equation
-def hung_step(
+def rope_step(
     now: Hung,
     tip: Vector,
     following: Vector,
@@ -335,10 +255,25 @@ def hung_step(
     h: float,
     square: float,
 ) -> Hung:
-    """Load and hook one step later; arguments as of `rope_step`, and h², half of it at first.
+    """Load and hook one step later.
 
-    The elastic rope pulls by its stretch at n, so that the step stays explicit and, undamped,
-    symplectic; a rigid one and the slings by their multipliers.
+    Parameters
+    ----------
+    now : Hung
+        At n and n - 1. [m]
+    tip, following : Vector
+        Tip at n and n + 1. [m]
+    length : float
+        Rope at n + 1. [m]
+    s, air :
+        Suspension, drag and wind.
+    h, square : float
+        Step [s], and h², half of it in the first step. [s²]
+
+    Notes
+    -----
+    x = 2 x_n - x_(n-1) + h² a - μ d, with the rope's multiplier μ. An elastic rope pulls by its
+    stretch at n, so that the step stays explicit and, undamped, symplectic.
     """
     weight, still = Vector(0.0, 0.0, -GRAVITY), Vector(0.0, 0.0, 0.0)
     v = moved(now.load, -1.0, now.before)
@@ -359,15 +294,15 @@ def hung_step(
         u = multiplier_of(rope, d, length)
     hook = moved(moved(hook, -u, d), s.ratio * w, b)
     load = moved(load, -w, b) if hooked else hook
-    stretch = size(moved(hook, -1.0, following)) - length
-    pull = u * size(d) / (square * (1.0 + s.ratio))
+    stretch, pull = 0.0, u * size(d) / (square * (1.0 + s.ratio))
     if elastic:
+        stretch = size(moved(hook, -1.0, following)) - length
         pull = elastic_pull(stretch, now.stretch, length, s, h)
     return Hung(load, now.load, hook, now.hook, TOO_FAST if u < 0.0 or w < 0.0 else pull, stretch)
 
 
 @equation
-def hung_start(tip: Vector, v: Vector, length: float, s: Hanging, h: float) -> Hung:
+def hanging_load(tip: Vector, v: Vector, length: float, s: Hanging, h: float) -> Hung:
     """Load and hook that hang below a tip and move with it at a velocity. [m/s]"""
     stretch = GRAVITY * length / s.stiffness if s.stiffness > 0.0 else 0.0
     hook = moved(tip, -(length + stretch), Vector(0.0, 0.0, 1.0))
@@ -380,28 +315,6 @@ def hung_start(tip: Vector, v: Vector, length: float, s: Hanging, h: float) -> H
 
 @kernel
 def _march(
-    tip: Array, length: Array, v: Vector, air: Air, h: float, load: Array, pull: Array
-) -> int:
-    """Fill the paths of load and pull behind their first sample; the sample that failed, or 0."""
-    before = Vector(load[0, 0], load[0, 1], load[0, 2])
-    now = before
-    at = Vector(tip[0, 0], tip[0, 1], tip[0, 2])
-    for n in range(1, tip.shape[0]):
-        following = Vector(tip[n, 0], tip[n, 1], tip[n, 2])
-        if n == 1:
-            made = first_step(now, v, at, following, length[n], air, h)
-        else:
-            made = rope_step(now, before, at, following, length[n], air, h)
-        if made.pull < 0.0:
-            return n
-        before, now, at = now, made.position, following
-        load[n, 0], load[n, 1], load[n, 2] = now.x, now.y, now.z
-        pull[n] = made.pull
-    return 0
-
-
-@kernel
-def _march_hung(
     tip: Array, length: Array, start: Hung, s: Hanging, air: Air, h: float, out: Array
 ) -> int:
     """Fill load, hook and pull behind the first sample; the sample that failed, or 0."""
@@ -410,7 +323,7 @@ def _march_hung(
         if n > 0:
             following = Vector(tip[n, 0], tip[n, 1], tip[n, 2])
             square = 0.5 * h * h if n == 1 else h * h
-            now = hung_step(now, at, following, length[n], s, air, h, square)
+            now = rope_step(now, at, following, length[n], s, air, h, square)
             at = following
             if now.pull < 0.0:
                 return n
@@ -477,37 +390,14 @@ def load_motion(
     rope = np.ascontiguousarray(np.broadcast_to(np.asarray(length, dtype=np.float64), len(path)))
     if not (np.isfinite(path).all() and np.isfinite(rope).all() and rope.min() > 0.0):
         raise InputError("Tip and rope must be finite everywhere, and the rope longer than 0 m.")
-    load, pull = np.empty_like(path), np.full(len(path), GRAVITY)
-    load[0] = path[0] - (0.0, 0.0, rope[0]) if start is None else start
     # second-order difference of the first samples
     slope = (4.0 * path[1] - 3.0 * path[0] - path[min(2, len(path) - 1)]) * rate / 2.0
     v = slope if velocity is None else np.asarray(velocity, dtype=np.float64)
     air = Air(float(drag), Vector(*map(float, np.asarray(wind))))
-    if suspension is not None:
-        return _hung(path, rope, Vector(*map(float, v)), air, rate, start, suspension, mass)
-    failed = _march(path, rope, Vector(*map(float, v)), air, 1.0 / rate, load, pull)
-    if failed:
-        raise InputError(too_fast(float(rope[failed]), failed / rate, rate))
-    pull[0] = pull[1]
-    return LoadMotion(load, pull)
-
-
-def _hung(
-    path: Array,
-    rope: Array,
-    v: Vector,
-    air: Air,
-    rate: float,
-    start: ArrayLike | None,
-    suspension: Suspension,
-    mass: float,
-) -> LoadMotion:
-    """Path of a load in a suspension."""
     if not (isfinite(mass) and mass > 0.0):
         raise InputError(f"The load is {mass:g} kg, but must be above 0.")
-    s, h = suspension.hanging(mass, float(rope.min()), rate), 1.0 / rate
-    tip = Vector(*path[0].tolist())
-    now = hung_start(tip, v, float(rope[0]), s, h)
+    s, h = (suspension or Suspension()).hanging(mass, float(rope.min()), rate), 1.0 / rate
+    now = hanging_load(Vector(*path[0].tolist()), Vector(*v.tolist()), float(rope[0]), s, h)
     if start is not None:
         load = np.asarray(start, dtype=np.float64)
         line = load - path[0]
@@ -517,15 +407,17 @@ def _hung(
                 f"The load starts {far:g} m from the tip, but hangs on slings of {s.sling:g} m."
             )
         hook = load - s.sling / far * line
-        back = np.array(v) * h
-        a, b, c, d = (Vector(*each.tolist()) for each in (load, load - back, hook, hook - back))
+        places = (load, load - v * h, hook, hook - v * h)
         stretch = far - s.sling - float(rope[0])
         pull = float(elastic_pull(stretch, stretch, float(rope[0]), s, h))
-        now = Hung(a, b, c, d, pull if s.stiffness > 0.0 else GRAVITY, stretch)
+        a, b, c, d = (Vector(*each.tolist()) for each in places)
+        now = Hung(a, b, c, d, pull, stretch)
     out = np.empty((len(path), 7))
-    failed = _march_hung(path, rope, now, s, air, h, out)
+    failed = _march(path, rope, now, s, air, h, out)
     if failed:
         raise InputError(too_fast(float(rope[failed]), failed / rate, rate))
+    if not s.stiffness > 0.0:
+        out[0, 6] = out[1, 6]
     return LoadMotion(out[:, :3], out[:, 6], out[:, 3:6] if s.sling > 0.0 else None)
 
 

@@ -15,7 +15,8 @@ from swashplate.errors import InputError
 from swashplate.results import Result
 
 if TYPE_CHECKING:
-    from swashplate.crane.crane import Crane, Pose
+    from swashplate.crane.crane import Crane
+    from swashplate.crane.stepper import Pose
 
 Array = NDArray[np.float64]
 

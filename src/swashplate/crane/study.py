@@ -9,16 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import atan2, radians, sqrt
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.whatif import pulled
 from swashplate.crane.control import Control
-from swashplate.crane.crane import RATE, Actuation, Crane, Pose
+from swashplate.crane.crane import Crane
 from swashplate.crane.loop import ROWS
 from swashplate.crane.sea import Seaway, Spectrum
+from swashplate.crane.stepper import RATE, Actuation, Start, pose_of
 from swashplate.crane.stick import AXES, Stick
 from swashplate.equations import kernel
 from swashplate.errors import DomainError, InputError
@@ -28,16 +29,60 @@ from swashplate.simulation.result import Limit
 from swashplate.tables import Column, Table
 
 Array = NDArray[np.float64]
-Sea = str | Spectrum | Seaway
-Progress = Callable[[int, int], None]
-"""Called with the number of seaways that are done, and of all."""
+Drives = Sequence[str] | Mapping[str, str | Crane | Sequence[Crane]]
+"""Drives of a study, by words or names."""
 
 PUMPS = (Limit.DEAD_ZONE, Limit.ORIFICE, Limit.SPOOL, Limit.SWASH_STOP, Limit.RELIEF)
 """Limits that the loop leaves of each drive, in the order of its bits."""
+COUNTED = (
+    *("rms_swing", "largest_swing"),
+    *(f"{axis}_{str(limit.name).lower()}" for axis in AXES for limit in PUMPS),
+)
+"""What is kept of a run: swing [rad], shares of time for which limits act."""
 IDEAL, BUILT = "ideal", "identified"
 """Drives that follow at once, and the crane's own."""
+NONE = "no control"
+"""The crane as it is built, under the operator's stick alone."""
 
 # --- many runs ------------------------------------------------------------------------------------
+
+
+class StudySetup(Start, total=False):
+    """How a study is set up: keywords of `judge`, `sectors`, `operability` and `orifices`.
+
+    Those of `Start` say where each run begins; by default the load hangs abeam, boom at 45 deg,
+    rope 27 m.
+
+    Attributes
+    ----------
+    sea : str, Spectrum or Seaway
+        Sea state, by default "ss3"; a seaway gives heading, ship and spreading as well.
+    seeds : sequence of int
+        A seaway for each.
+    drives : sequence of str, or mapping of str to str, Crane or sequence of Crane
+        ``"ideal"``, which follow at once within their limits of speed, ``"identified"``, the
+        crane's own; by name also other cranes, or several of which each seaway takes the next, see
+        `Crane.drawn`. By default the first two.
+    stick : Stick, optional
+        What the operator does; by default nothing, the crane keeps its load in place.
+    length : float
+        Of each run if there is no stick, 120 s. [s]
+    start : float
+        From when on swing counts, 40 s. [s]
+    executor : Executor, optional
+        Of `swashplate.executors`; threads by default. The numbers do not depend on it.
+    progress : callable, optional
+        Called with seaways done and their number.
+    """
+
+    sea: str | Spectrum | Seaway
+    seeds: Sequence[int]
+    drives: Drives
+    stick: Stick | None
+    length: float
+    start: float
+    executor: Executor | None
+    progress: Callable[[int, int], None] | None
 
 
 class Case(NamedTuple):
@@ -47,14 +92,19 @@ class Case(NamedTuple):
     """One, or cranes of which each seaway takes the next."""
     control: Control | None
     actuation: Actuation
-    how: Mapping[str, Any]
-    """Keywords of `Crane.stepper`: where it begins, load, brake."""
+    where: Start
+    """Where it begins, load, brake."""
     height: float = 1.0
     """Factor on the height of the waves."""
 
+    def stepper(self, number: int) -> Any:
+        """The crane of a seaway by its number."""
+        crane = self.cranes[number % len(self.cranes)]
+        return crane.stepper(control=self.control, actuation=self.actuation, **self.where)
 
-class Study(NamedTuple):
-    """What all seaways of a study share."""
+
+class _Runs(NamedTuple):
+    """What a worker needs to know of a study."""
 
     cases: tuple[Case, ...]
     sea: Seaway
@@ -63,71 +113,143 @@ class Study(NamedTuple):
     """Sample from which on swing counts."""
 
 
-def outcomes(
-    study: Study,
-    seeds: Sequence[int],
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-    *,
-    number: int = 0,
-) -> Array:
-    """Swing and limits of all cases in all seaways.
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A study as it is asked for: controllers, drives, seaways, stick, where each run begins."""
 
-    Parameters
-    ----------
-    study : Study
-    seeds : sequence of int
-        Of the seaways.
-    executor : Executor, optional
-        Where they run, by default in threads; the numbers do not depend on it.
-    progress : callable, optional
-    number : int
-        Of the first seaway, by which those of several cranes are taken.
+    crane: Crane
+    laws: Mapping[str, Control]
+    drives: Mapping[str, str | Crane | Sequence[Crane]]
+    sea: Seaway
+    seeds: tuple[int, ...]
+    stick: Stick
+    start: float
+    where: Start
+    executor: Executor
+    progress: Callable[[int, int], None] | None
 
-    Returns
-    -------
-    (n, m, 17) array
-        Of seaways and cases: root mean square and largest swing [rad], then for hoist, slew and
-        luff the share of time for which each of `PUMPS` acts; NaN where a run met a limit of the
-        crane's travel or left the model's domain.
+    @classmethod
+    def of(
+        cls,
+        crane: Crane,
+        control: Control | Mapping[str, Control],
+        setup: StudySetup,
+        *,
+        seeds: Sequence[int],
+        fixed: tuple[str, ...] = (),
+    ) -> Study:
+        """A study from keywords of a user.
 
-    Raises
-    ------
-    InputError, ParameterError
-        If a case cannot begin as it is asked to.
-    """
-    if not len(seeds):
-        raise InputError("A study of seaways needs at least one seed.")
-    for case in study.cases:  # said here, once, and not by a worker
-        _stepper(case, 0)
-    made = np.full((len(seeds), len(study.cases), 2 + len(AXES) * len(PUMPS)), np.nan)
-    items = list(enumerate(seeds, number))
-    for done, (k, values) in enumerate((executor or Threads()).run(_of_seaway, study, items), 1):
-        made[k] = values
-        if progress is not None:
-            progress(done, len(seeds))
-    return made
+        Parameters
+        ----------
+        crane : Crane
+        control : Control or mapping of str to Control
+        setup : StudySetup
+        seeds : sequence of int
+            Taken by default.
+        fixed : tuple of str
+            Keywords that this kind of study does not take.
+
+        Raises
+        ------
+        InputError
+            For unknown keywords, seeds, drives or a start that make no study.
+        """
+        known = [each for each in StudySetup.__annotations__ if each not in fixed]
+        strange = [each for each in setup if each not in known]
+        if strange:
+            raise InputError(f"This study has no {strange[0]}; it has {', '.join(known)}.")
+        own: dict[str, Any] = dict(setup)
+        laws = dict(control) if isinstance(control, Mapping) else {"": control}
+        drives = own.pop("drives", (IDEAL, BUILT))
+        sets = dict(drives) if isinstance(drives, Mapping) else {each: each for each in drives}
+        if not laws or not sets:
+            raise InputError("A study needs at least one controller and one set of drives.")
+        chosen = tuple(own.pop("seeds", seeds))
+        if not chosen:
+            raise InputError("A study of seaways needs at least one seed.")
+        sea = own.pop("sea", "ss3")
+        length, start = own.pop("length", 120.0), own.pop("start", 40.0)
+        stick = own.pop("stick", None) or Stick.rest(length)
+        if not 0.0 <= start < stick.length:
+            raise InputError(
+                f"Swing counts from {start:g} s on, but a run is {stick.length:g} s long: begin "
+                "earlier or take a longer one."
+            )
+        executor, progress = own.pop("executor", None) or Threads(), own.pop("progress", None)
+        where: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0} | own
+        seaway = sea if isinstance(sea, Seaway) else Seaway(sea)
+        return cls(
+            crane, laws, sets, seaway, chosen, stick, start, where, executor, progress
+        )  # fmt: skip
+
+    def cases(self, **moved: Unpack[Start]) -> dict[str, Case]:
+        """Cases by name, with other keywords of where they begin: none, controllers by drives.
+
+        Raises
+        ------
+        InputError
+            For drives that are neither ``"ideal"``, ``"identified"`` nor cranes.
+        """
+        where: Start = {**self.where, **moved}
+        made = {NONE: Case((self.crane,), None, "inverse", where)}
+        for law, stages in self.laws.items():
+            for name, given in self.drives.items():
+                cranes: tuple[Crane, ...] = (self.crane,)
+                if isinstance(given, str) and given not in (IDEAL, BUILT):
+                    raise InputError(
+                        f"There are no drives '{given}'; there are {IDEAL}, {BUILT}, or cranes by "
+                        "name."
+                    )
+                if not isinstance(given, str):
+                    cranes = (given,) if isinstance(given, Crane) else tuple(given)
+                if not cranes:
+                    raise InputError(f"The drives '{name}' are an empty list of cranes.")
+                actuation: Actuation = "ideal" if given == IDEAL else "inverse"
+                made[f"{law}, {name}" if law else name] = Case(cranes, stages, actuation, where)
+        return made
+
+    def outcomes(self, cases: Sequence[Case], seeds: range | None = None) -> Array:
+        """Swing and limits of all cases in the seaways, or in some of them by their numbers.
+
+        Returns
+        -------
+        (n, m, 17) array
+            Of seaways and cases, `COUNTED`; NaN where a run met a limit of the crane's travel or
+            left the model's domain.
+
+        Raises
+        ------
+        InputError, ParameterError
+            If a case cannot begin as it is asked to.
+        """
+        for case in cases:  # said here, once, and not by a worker
+            case.stepper(0)
+        pose = pose_of(cases[0].where)
+        commands, _ = self.stick.sample(self.crane, pose, RATE)
+        runs = _Runs(tuple(cases), self.sea, commands, round(self.start * RATE))
+        numbers = range(len(self.seeds)) if seeds is None else seeds
+        made = np.full((len(numbers), len(cases), len(COUNTED)), np.nan)
+        items = [(n, self.seeds[n]) for n in numbers]
+        for done, (k, values) in enumerate(self.executor.run(_of_seaway, runs, items), 1):
+            made[k] = values
+            if self.progress is not None and seeds is None:
+                self.progress(done, len(numbers))
+        return made
 
 
-def _stepper(case: Case, number: int) -> Any:
-    crane = case.cranes[number % len(case.cranes)]
-    return crane.stepper(control=case.control, actuation=case.actuation, **case.how)
-
-
-def _of_seaway(study: Study, item: tuple[int, int]) -> Array:
+def _of_seaway(runs: _Runs, item: tuple[int, int]) -> Array:
     """Outcomes of all cases in one seaway."""
     number, seed = item
-    motion = replace(study.sea, seed=seed).motion(len(study.commands), RATE)
-    made = np.full((len(study.cases), 2 + len(AXES) * len(PUMPS)), np.nan)
-    for row, case in zip(made, study.cases, strict=True):
-        stepper = _stepper(case, number)
+    motion = replace(runs.sea, seed=seed).motion(len(runs.commands), RATE)
+    made = np.full((len(runs.cases), len(COUNTED)), np.nan)
+    for row, case in zip(made, runs.cases, strict=True):
+        waves = motion if case.height == 1.0 else case.height * motion
         try:
-            out = stepper.take(
-                study.commands, motion if case.height == 1.0 else case.height * motion
-            )
+            out = case.stepper(number).take(runs.commands, waves)
         except (DomainError, InputError):  # stopped: by the travel's limits, or the tip too fast
             continue
-        _counted(out, study.first, row)
+        _counted(out, runs.first, row)
     return made
 
 
@@ -156,72 +278,14 @@ def _counted(out: Array, first: int, made: Array) -> None:
     made[2:] /= count
 
 
-def cases_of(
-    crane: Crane,
-    control: Control | Mapping[str, Control],
-    drives: Sequence[str] | Mapping[str, str | Crane | Sequence[Crane]],
-    how: Mapping[str, Any],
-) -> dict[str, Case]:
-    """Cases by name: controllers by drives, in this order.
-
-    Raises
-    ------
-    InputError
-        For drives that are neither ``"ideal"``, ``"identified"`` nor cranes.
-    """
-    laws = dict(control) if isinstance(control, Mapping) else {"": control}
-    sets = dict(drives) if isinstance(drives, Mapping) else {each: each for each in drives}
-    if not laws or not sets:
-        raise InputError("A study needs at least one controller and one set of drives.")
-    made = {}
-    for law, stages in laws.items():
-        for name, given in sets.items():
-            if isinstance(given, str) and given not in (IDEAL, BUILT):
-                raise InputError(
-                    f"There are no drives '{given}'; there are {IDEAL}, {BUILT}, or cranes by name."
-                )
-            if isinstance(given, str):
-                cranes: tuple[Crane, ...] = (crane,)
-            else:
-                cranes = (given,) if isinstance(given, Crane) else tuple(given)
-            if not cranes:
-                raise InputError(f"The drives '{name}' are an empty list of cranes.")
-            actuation: Actuation = "ideal" if given == IDEAL else "inverse"
-            made[f"{law}, {name}" if law else name] = Case(cranes, stages, actuation, how)
-    return made
-
-
-def seaway_of(sea: Sea) -> Seaway:
-    """A seaway, by default abeam and of the crane ship's hull."""
-    return sea if isinstance(sea, Seaway) else Seaway(sea)
-
-
-def commands_of(
-    crane: Crane, stick: Stick, how: Mapping[str, Any], start: float
-) -> tuple[Array, int]:
-    """Commands of a study, and the sample from which on swing counts."""
-    if not 0.0 <= start < stick.length:
-        raise InputError(
-            f"Swing counts from {start:g} s on, but a run is {stick.length:g} s long: begin "
-            "earlier or take a longer one."
-        )
-    commands, _ = stick.sample(crane, pose_of(how), RATE)
-    return commands, round(start * RATE)
-
-
-def station(
-    slew_deg: float, boom_deg: float, rope_m: float, more: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Keywords of `Crane.stepper` for where a crane begins, and others."""
-    return {"slew_deg": slew_deg, "boom_deg": boom_deg, "rope_m": rope_m, **more}
-
-
-def pose_of(how: Mapping[str, Any]) -> Pose:
-    """The pose of these keywords."""
-    return Pose(radians(how["slew_deg"]), radians(how["boom_deg"]), how["rope_m"])
-
-
 # --- over bearing, wave height and the luff's orifice ---------------------------------------------
+
+SHOWN = {
+    "bearing": ("plot_sectors", ".0f", "rad"),
+    "height": ("plot_operability", ".2f", "m"),
+    "orifice": ("plot_orifice", ".2f", ""),
+}
+"""Figure of each quantity that is swept, and its column."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,9 +306,7 @@ class Sweep(Result):
     @property
     def figure(self) -> str:  # type: ignore[override]
         """The figure that shows it."""
-        return {"bearing": "plot_sectors", "height": "plot_operability"}.get(
-            self.what, "plot_orifice"
-        )
+        return SHOWN[self.what][0]
 
     def mean(self) -> Array:
         """(n, variants) mean over the seaways of the root mean square swing. [rad]"""
@@ -256,8 +318,7 @@ class Sweep(Result):
 
     def table(self) -> Table:
         """Mean of the root mean square swing, a row for each point."""
-        first = {"bearing": (".0f", "rad"), "height": (".2f", "m")}.get(self.what, (".2f", ""))
-        columns = [Column(self.what, *first)]
+        columns = [Column(self.what, *SHOWN[self.what][1:])]
         columns += [Column(each, ".2f", "rad", none="stopped") for each in self.names]
         made = Table("Swing, RMS, mean over seaways", columns)
         for x, row in zip(self.grid, self.mean(), strict=True):
@@ -265,77 +326,30 @@ class Sweep(Result):
         return made
 
 
-NONE = "no control"
-"""The crane as it is built, under the operator's stick alone."""
-Drives = Sequence[str] | Mapping[str, str | Crane | Sequence[Crane]]
-"""Drives of a study, by words or names."""
-
-
-def _swept(
-    what: str,
-    grid: Array,
-    points: Sequence[Mapping[str, Case]],
-    crane: Crane,
-    sea: Seaway,
-    *,
-    seeds: Sequence[int],
-    spans: tuple[float, float],
-    executor: Executor | None,
-    progress: Progress | None,
-) -> Sweep:
+def _swept(study: Study, what: str, grid: Array, points: Sequence[Mapping[str, Case]]) -> Sweep:
     """Swing of the cases of all points, in the same seaways."""
     cases = [each for point in points for each in point.values()]
-    length, start = spans
-    commands, first = commands_of(crane, Stick.rest(length), cases[0].how, start)
     # what does not depend on the point is simulated once
-    single = list(dict.fromkeys(map(id, cases)))
-    by_id = {id(each): each for each in cases}
-    study = Study(tuple(by_id[each] for each in single), sea, commands, first)
-    found = outcomes(study, seeds, executor, progress)[..., :2]
-    values = found[:, [single.index(id(each)) for each in cases]]
+    single = {id(each): each for each in cases}
+    found = study.outcomes(list(single.values()))[..., :2]
+    values = found[:, [list(single).index(id(each)) for each in cases]]
     names = tuple(points[0])
-    shaped = values.reshape(len(seeds), grid.size, len(names), 2)
-    return Sweep(what, grid, names, shaped, crane, sea)
+    shaped = values.reshape(len(values), grid.size, len(names), 2)
+    return Sweep(what, grid, names, shaped, study.crane, study.sea)
 
 
 def sectors(
     crane: Crane,
     control: Control | Mapping[str, Control],
     *,
-    sea: Sea = "ss3",
     bearings: ArrayLike = tuple(range(0, 360, 15)),
-    seeds: Sequence[int] = range(4),
-    drives: Drives = (IDEAL, BUILT),
-    length: float = 120.0,
-    start: float = 40.0,
-    boom_deg: float = 45.0,
-    rope_m: float = 27.0,
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-    **more: Any,
+    **setup: Unpack[StudySetup],
 ) -> Sweep:
-    """Swing over the bearing of the boom, at rest there, without control and with it.
-
-    Parameters are those of `judge`; `bearings` [deg] from the bow to starboard.
-    """
+    """Swing over the bearing of the boom [deg], from the bow to starboard, in 4 seaways."""
+    study = Study.of(crane, control, setup, seeds=range(4), fixed=("slew_deg",))
     grid = _rising("Bearings", bearings)
-    points = []
-    for bearing in grid:
-        how = station(float(bearing), boom_deg, rope_m, more)
-        none = Case((crane,), None, "inverse", how)
-        points.append({NONE: none, **cases_of(crane, control, drives, how)})
-    spans = length, start
-    return _swept(
-        "bearing",
-        np.radians(grid),
-        points,
-        crane,
-        seaway_of(sea),
-        seeds=seeds,
-        spans=spans,
-        executor=executor,
-        progress=progress,
-    )
+    points = [study.cases(slew_deg=float(each)) for each in grid]
+    return _swept(study, "bearing", np.radians(grid), points)
 
 
 def operability(
@@ -344,42 +358,18 @@ def operability(
     *,
     heights: ArrayLike = (0.1, 0.2, 0.3, 0.45, 0.6, 0.9, 1.2),
     period: float = 7.5,
-    sea: Sea = "ss3",
-    seeds: Sequence[int] = range(40),
-    drives: Drives = (IDEAL, BUILT),
-    length: float = 120.0,
-    start: float = 40.0,
-    slew_deg: float = 90.0,
-    boom_deg: float = 45.0,
-    rope_m: float = 27.0,
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-    **more: Any,
+    **setup: Unpack[StudySetup],
 ) -> Sweep:
-    """Swing over the significant height of waves of one peak period.
+    """Swing over the significant height of waves [m] of one peak period [s], in 40 seaways.
 
-    Parameters are those of `judge`; `heights` [m], `period` [s]; of `sea` ship and heading count.
+    Of `sea` ship and heading count.
     """
+    study = Study.of(crane, control, setup, seeds=range(40))
     grid = _rising("Heights of waves", heights, 0.0)
-    how = station(slew_deg, boom_deg, rope_m, more)
-    found = {NONE: Case((crane,), None, "inverse", how), **cases_of(crane, control, drives, how)}
-    points = [
-        {name: each._replace(height=float(height)) for name, each in found.items()}
-        for height in grid
-    ]
-    base = replace(seaway_of(sea), sea=Spectrum(1.0, period))
-    spans = length, start
-    return _swept(
-        "height",
-        grid,
-        points,
-        crane,
-        base,
-        seeds=seeds,
-        spans=spans,
-        executor=executor,
-        progress=progress,
-    )
+    found = study.cases().items()
+    points = [{name: case._replace(height=float(h)) for name, case in found} for h in grid]
+    unit = replace(study, sea=replace(study.sea, sea=Spectrum(1.0, period)))
+    return _swept(unit, "height", grid, points)
 
 
 def orifices(
@@ -387,46 +377,23 @@ def orifices(
     control: Control | Mapping[str, Control],
     *,
     factors: ArrayLike = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 3.0, 5.0),
-    sea: Sea = "ss3",
-    seeds: Sequence[int] = range(20),
-    length: float = 120.0,
-    start: float = 40.0,
-    slew_deg: float = 90.0,
-    boom_deg: float = 45.0,
-    rope_m: float = 27.0,
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-    **more: Any,
+    **setup: Unpack[StudySetup],
 ) -> Sweep:
-    """Swing over the size of the luff drive's in-line orifice, beside ideal drives and no control.
+    """Swing over factors on the luff drive's in-line orifice, in 20 seaways.
 
-    Parameters are those of `judge`; `factors` on the orifice of the crane's luff drive. Ideal
-    drives have the first controller.
+    Beside the crane's own drives there are ideal ones, under the first controller, and no control.
     """
+    study = Study.of(crane, control, setup, seeds=range(20), fixed=("drives",))
     grid = _rising("Factors on the orifice", factors, 0.0)
-    how = station(slew_deg, boom_deg, rope_m, more)
-    laws = control if isinstance(control, Mapping) else {"control": control}
-    common = {
-        NONE: Case((crane,), None, "inverse", how),
-        "ideal drives": Case((crane,), next(iter(laws.values())), "ideal", how),
-    }
+    laws = {name or "control": law for name, law in study.laws.items()}
+    ideal = Case((crane,), next(iter(laws.values())), "ideal", study.where)
+    common = {NONE: study.cases()[NONE], "ideal drives": ideal}
     points = []
     for factor in grid:
         changed = crane.with_drive(luff=pulled(crane.luff, {"orifice": float(factor)}))
-        own = {name: Case((changed,), law, "inverse", how) for name, law in laws.items()}
+        own = {name: Case((changed,), law, "inverse", study.where) for name, law in laws.items()}
         points.append({**common, **own})
-    spans = length, start
-    return _swept(
-        "orifice",
-        grid,
-        points,
-        crane,
-        seaway_of(sea),
-        seeds=seeds,
-        spans=spans,
-        executor=executor,
-        progress=progress,
-    )
+    return _swept(study, "orifice", grid, points)
 
 
 def _rising(what: str, given: ArrayLike, above: float = -np.inf) -> Array:

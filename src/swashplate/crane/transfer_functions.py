@@ -209,6 +209,38 @@ def _weights(grid: Array, at: Array) -> list[tuple[NDArray[np.int64], Array]]:
 # --- files ----------------------------------------------------------------------------------------
 
 
+def read_ship(path: str | Path, length: float | None = None) -> TransferFunctions:
+    """Motion transfer functions of a file by its ending: ``.re1``, ``.4``, ``.nc`` or ``.csv``.
+
+    Parameters
+    ----------
+    path : path
+        Of VERES, WAMIT, Capytaine, or a table as of `read_csv`.
+    length : float, optional
+        WAMIT's ULEN, without which a ``.4`` cannot be read. [m]
+
+    Raises
+    ------
+    FileError, InputError
+        For another ending, a length that is missing or that no other file takes, and as the
+        reader of each format.
+    """
+    kind = Path(path).suffix.lower()
+    if (kind == ".4") != (length is not None):
+        raise InputError(
+            f"{path}: a .4 of WAMIT, and no other file, needs the length ULEN of its run."
+        )
+    if length is not None:
+        return read_wamit(path, length)
+    readers = {".re1": read_veres, ".nc": read_capytaine, ".csv": read_csv}
+    if kind not in readers:
+        raise InputError(
+            f"{path}: transfer functions are read from .re1 of VERES, .4 of WAMIT, .nc of "
+            "Capytaine, and .csv."
+        )
+    return readers[kind](path)
+
+
 def read_veres(path: str | Path) -> TransferFunctions:
     """Motion transfer functions of a VERES file, ``.re1``.
 

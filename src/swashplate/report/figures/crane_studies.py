@@ -160,12 +160,10 @@ def plot_operability(result: Sweep, *, limit_deg: float = 3.0, title: str = "") 
 def plot_follow(result: Followable, *, title: str = "") -> Figure:
     """Figure of the amplitude that each axis can follow over the period, with seas as points."""
     looks = strokes(("hoist, up", "slew, across the boom", "luff, along the boom"))
-    looks["luff, simulated"] = Stroke(next(reversed(looks.values())).color, "dashed")
     pose = result.pose
     said = f"boom at {np.degrees(pose.boom):.0f}°; points: what holding the tip asks of the luff"
     figure, ax = _panel(result.crane, title or "What the axes can follow", looks, said)
-    lines = [*result.amplitude.T, result.simulated]
-    for (color, dashes), values in zip(looks.values(), lines, strict=True):
+    for (color, dashes), values in zip(looks.values(), result.amplitude.T, strict=True):
         ax.plot(result.periods, values, color=color, linestyle=dashes, linewidth=1.4)
     for name, each in result.seas.items():
         ax.plot(each.period, each.amplitude[2], "D", color=INK, ms=4.5)
@@ -223,17 +221,18 @@ def plot_sectors(result: Sweep, *, title: str = "") -> Figure:
 def plot_judgment(result: Judgment, *, title: str = "") -> Figure:
     """Figure of a judgment: swing of every variant in every seaway, and what limits its drives."""
     names = list(reversed(result.names))
-    words = title or f"Swing in {len(result.seeds)} seaways"
+    words = title or f"Swing in {len(result.study.seeds)} seaways"
     figure, (ax,) = sheet([0.42 * len(names) + 0.3], words, lines=1)
     said = "bars: mean with its 95 % interval"
-    remark(ax, seaway_words(result.sea), said, assumed(result.crane), right=True)
+    study = result.study
+    remark(ax, seaway_words(study.sea), said, assumed(study.crane), right=True)
     edge = 1.05 * float(np.degrees(np.nanmax(result.values[..., 0])))
     random = np.random.default_rng(0)
     labels: list[str] = []
     for row, name in enumerate(names):
         values = np.degrees(result.rms(name))
         known = values[np.isfinite(values)]
-        share = result.worse(name).value if name in result.names[1:] else 0.0
+        share = result.worse(name) if name in result.names[1:] else 0.0
         color = VERMILION if share > result.allowed else BLUE
         spread = row + random.uniform(-0.25, 0.25, known.size)
         ax.plot(known, spread, "o", color=color, ms=2.6, alpha=0.35, mew=0.0)

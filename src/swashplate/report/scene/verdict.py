@@ -46,7 +46,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     FileError
         If the file cannot be written.
     """
-    crane = judgment.crane
+    crane, study = judgment.study.crane, judgment.study
     swings, differences, limits, *remedies = judgment.tables()
     sections = [
         _summary(judgment, remedies),
@@ -58,7 +58,7 @@ def write_judgment(judgment: Judgment, path: str | Path) -> None:
     content = {
         "what": "Crane",
         "title": crane.title or crane.name,
-        "facts": f"{seaway_words(judgment.sea)} · {count(len(judgment.seeds), 'seaway')} · "
+        "facts": f"{seaway_words(study.sea)} · {count(len(study.seeds), 'seaway')} · "
         f"{count(len(judgment.names) - 1, 'variant')} beside no control",
         "virtual": False,
         "date": f"{date.today():%d %B %Y}",
@@ -107,11 +107,10 @@ def _limits(judgment: Judgment, limits: Table) -> Section:
     """What limits the drives, and what they can follow."""
     if not limits.rows:
         return Section("limits", "Limits of the drives", [])
-    how = judgment.cases[judgment.judged].how
-    keys = ("slew_deg", "boom_deg", "rope_m")
-    followable = judgment.crane.follow(
-        np.linspace(4.0, 14.0, 21), seaway=judgment.sea, **{key: how[key] for key in keys}
-    )
+    how = judgment.cases[judgment.judged].where
+    pose = {key: how[key] for key in ("slew_deg", "boom_deg", "rope_m")}
+    study, periods = judgment.study, np.linspace(4.0, 14.0, 21)
+    followable = study.crane.follow(periods, seaway=study.sea, **pose)
     caption = (
         "Largest sine of the tip that each axis can follow, and what seas ask of the luff: a point "
         "above the luff's line is more than it has"
@@ -136,12 +135,12 @@ def _example(judgment: Judgment) -> Section:
 
 def _basis(judgment: Judgment) -> Section:
     """Crane, pose, controllers."""
-    crane, said = judgment.crane, []
+    crane, said = judgment.study.crane, []
     for name, case in judgment.cases.items():
         if name != NONE:
             drives = "ideal drives" if case.actuation == IDEAL else count(len(case.cranes), "crane")
             said.append(f"{name}: {case.control!r}, {drives}.")
-    how = judgment.cases[NONE].how
+    how = judgment.cases[NONE].where
     pose = (
         f"Boom at {how['slew_deg']:g}° from the bow to starboard and {how['boom_deg']:g}° up, rope "
         f"{how['rope_m']:g} m."
