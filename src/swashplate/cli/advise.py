@@ -35,6 +35,7 @@ LEGEND = (
 
 def excitation(
     path: Path = Path("campaign.toml"),
+    *,
     axis: AxisName = None,
     setup: str | None = None,
     begin: str | None = None,
