@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -49,7 +48,6 @@ if TYPE_CHECKING:
     from swashplate.identification.assessment import Judged
     from swashplate.identification.solving import Progress, StartResult
     from swashplate.identification.staging import Parameters
-    from swashplate.identification.validation import RunQuality
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -362,10 +360,17 @@ def validate(
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
         judged = verdict((), predicted, required=require / 100.0)
         qualities = with_speeds(predicted)
-    lines = []
     if out is not None:
+        from swashplate.identification.assessment import versions
+        from swashplate.report.fit_report import write_validation_report
+
         with working("Writing the report"):
-            lines = _validation_written(parameters, campaign, predicted, judged, out, drive)
+            made_folder(out)
+            joined(tables.runs_tables(qualities)).write(out / "measures.csv")
+            page, notes = out / "report.html", {**versions(), "drive from": drive}
+            write_validation_report(
+                parameters, campaign, page, predicted, judged=judged, notes=notes
+            )
     virtual = " (virtual)" if campaign.virtual else ""
     note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
     show(*tables.runs_tables(qualities))
@@ -373,32 +378,10 @@ def validate(
     show(tables.residual_table(predicted))
     say(RESIDUALS)
     bullets(judged.sentences)
-    for line in lines:
-        note(line)
+    if out is not None:
+        note(f"Measures:  {out / 'measures.csv'}")
+        note(f"Report:    {out / 'report.html'}")
     _say_verdict(judged)
-
-
-def _validation_written(
-    parameters: Parameters,
-    campaign: Campaign,
-    predicted: Sequence[RunQuality],
-    judged: Verdict,
-    out: Path,
-    drive: str,
-) -> list[str]:
-    """Write the report and its tables; lines that say so."""
-    from swashplate.identification.assessment import versions
-    from swashplate.identification.tables import runs_tables
-    from swashplate.identification.validation import with_speeds
-    from swashplate.report.fit_report import write_validation_report
-
-    made_folder(out)
-    joined(runs_tables(with_speeds(predicted))).write(out / "measures.csv")
-    notes = {**versions(), "drive from": drive}
-    write_validation_report(
-        parameters, campaign, out / "report.html", predicted, judged=judged, notes=notes
-    )
-    return [f"Measures:  {out / 'measures.csv'}", f"Report:    {out / 'report.html'}"]
 
 
 def report(

@@ -234,7 +234,7 @@ def _described(given: inspect.Parameter, entries: Mapping[str, re.Match[str]]) -
         metavar = metavar or {bool: " ", int: "N", float: "X"}.get(kind)
         more = option(words, *flags, metavar=metavar, **least)
         is_option = given.kind is inspect.Parameter.KEYWORD_ONLY
-        kind = Annotated[kind, more if is_option else argument(metavar, words)]
+        kind = Annotated[kind, more if is_option else argument(own[3] or given.name.upper(), words)]
     return given.replace(annotation=kind, kind=inspect.Parameter.KEYWORD_ONLY)
 
 
