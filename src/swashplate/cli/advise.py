@@ -9,9 +9,6 @@ from typing import TYPE_CHECKING
 
 from swashplate.cli.options import (
     AxisName,
-    CampaignPath,
-    SetupWord,
-    StartWord,
     TableFile,
 )
 from swashplate.cli.terminal import Outputs, note, say, show, working
@@ -37,10 +34,11 @@ LEGEND = (
 
 
 def excitation(
-    path: CampaignPath = Path("campaign.toml"),
+    path: Path = Path("campaign.toml"),
+    *,
     axis: AxisName = None,
-    setup: SetupWord = None,
-    begin: StartWord = None,
+    setup: str | None = None,
+    begin: str | None = None,
     out: TableFile = None,
 ) -> None:
     """Show before a fit which parameters the runs determine, and what to fix.
@@ -94,7 +92,7 @@ def advise(
     *,
     drive: str | None = None,
     axis: AxisName = None,
-    setup: SetupWord = None,
+    setup: str | None = None,
     free: list[str] | None = None,
     maneuver: list[str] | None = None,
     top: int = 10,

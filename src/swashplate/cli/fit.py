@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -11,12 +10,7 @@ import typer
 
 from swashplate.cli.options import (
     AxisName,
-    CampaignPath,
-    OwnModel,
     Required,
-    Seed,
-    SetupWord,
-    StartWord,
     option,
 )
 from swashplate.cli.terminal import (
@@ -54,7 +48,6 @@ if TYPE_CHECKING:
     from swashplate.identification.assessment import Judged
     from swashplate.identification.drive_model import Parameters
     from swashplate.identification.solving import Progress, StartResult
-    from swashplate.identification.validation import RunQuality
     from swashplate.identification.verdict import Verdict
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -81,20 +74,22 @@ CAMPAIGN = Path("campaign.toml")
 
 
 def fit(
-    path: CampaignPath = CAMPAIGN,
+    path: Path = CAMPAIGN,
     *,
     out: Path = Path("fitted"),
     axis: AxisName = None,
-    setup: SetupWord = None,
-    model: OwnModel = None,
+    setup: str | None = None,
+    model: Path | None = None,
     joint: bool = False,
-    begin: StartWord = None,
+    begin: str | None = None,
     starts: int = 0,
-    evaluations: int = MOST_EVALUATIONS,
+    evaluations: Annotated[
+        int, option("Evaluations of the model that a search may take.", min=1, metavar="N")
+    ] = MOST_EVALUATIONS,
     folds: int = 0,
     bootstrap: int = 0,
     profile: list[str] | None = None,
-    seed: Seed = 0,
+    seed: int = 0,
     jobs: int = 0,
     dask: str | None = None,
     resume: bool = False,
@@ -322,10 +317,10 @@ def _say_verdict(verdict: Verdict) -> None:
 
 def validate(
     drive: str,
-    path: CampaignPath = CAMPAIGN,
+    path: Path = CAMPAIGN,
     *,
     axis: AxisName = None,
-    model: OwnModel = None,
+    model: Path | None = None,
     role: Role = "validate",
     out: Path | None = None,
     require: Required = 10.0,
@@ -370,10 +365,17 @@ def validate(
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
         judged = verdict((), predicted, required=require / 100.0)
         qualities = with_speeds(predicted)
-    lines = []
     if out is not None:
+        from swashplate.identification.assessment import versions
+        from swashplate.report.fit_report import write_validation_report
+
         with working("Writing the report"):
-            lines = _validation_written(parameters, campaign, predicted, judged, out, drive)
+            made_folder(out)
+            joined(tables.runs_tables(qualities)).write(out / "measures.csv")
+            page, notes = out / "report.html", {**versions(), "drive from": drive}
+            write_validation_report(
+                parameters, campaign, page, predicted, judged=judged, notes=notes
+            )
     virtual = " (virtual)" if campaign.virtual else ""
     note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
     show(*tables.runs_tables(qualities))
@@ -381,39 +383,17 @@ def validate(
     show(tables.residual_table(predicted))
     say(RESIDUALS)
     bullets(judged.sentences)
-    for line in lines:
-        note(line)
+    if out is not None:
+        note(f"Measures:  {out / 'measures.csv'}")
+        note(f"Report:    {out / 'report.html'}")
     _say_verdict(judged)
-
-
-def _validation_written(
-    parameters: Parameters,
-    campaign: Campaign,
-    predicted: Sequence[RunQuality],
-    judged: Verdict,
-    out: Path,
-    drive: str,
-) -> list[str]:
-    """Write the report and its tables; lines that say so."""
-    from swashplate.identification.assessment import versions
-    from swashplate.identification.tables import runs_tables
-    from swashplate.identification.validation import with_speeds
-    from swashplate.report.fit_report import write_validation_report
-
-    made_folder(out)
-    joined(runs_tables(with_speeds(predicted))).write(out / "measures.csv")
-    notes = {**versions(), "drive from": drive}
-    write_validation_report(
-        parameters, campaign, out / "report.html", predicted, judged=judged, notes=notes
-    )
-    return [f"Measures:  {out / 'measures.csv'}", f"Report:    {out / 'report.html'}"]
 
 
 def report(
     fitted: Path,
-    path: CampaignPath = CAMPAIGN,
+    path: Path = CAMPAIGN,
     *,
-    model: OwnModel = None,
+    model: Path | None = None,
     pdf: Path | None = None,
     data: Path | None = None,
     truth: str | None = None,
@@ -481,7 +461,7 @@ def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -
     return stored
 
 
-def demo(*, out: Path = Path("demo"), seed: Seed = 1) -> None:
+def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
     """Identify a virtual hoist from its tests, and compare it with the truth.
 
     Draws a hoist that differs from the published one, logs the 13 tests of

@@ -29,7 +29,6 @@ from swashplate.tables import (
     listed,
     percent,
     plain,
-    quantity,
     spread,
 )
 from swashplate.units import chosen_unit, display_unit
@@ -342,19 +341,6 @@ def ignored_words(experiment: Experiment, channel: Channel) -> str:
     return "; ".join(said) or "nothing"
 
 
-def conditions(runs: Sequence[Experiment], channel: str) -> str:
-    """Initial states and ignored windows of several runs in a few words, for beside a fit %."""
-    starts = list(dict.fromkeys(start_words(each) for each in runs))
-    parts = [ignored_words(each, each[channel]) for each in runs]
-    left_out = [words for words in dict.fromkeys(parts) if words != "nothing"]
-    ignored = "nothing ignored"
-    if len(left_out) == 1 and "nothing" not in parts:
-        ignored = f"ignored {left_out[0]}"
-    elif left_out:
-        ignored = "ignored windows differ by run and stand in the table of runs"
-    return f"start {listed(starts)}; {ignored}"
-
-
 def residual_table(qualities: Sequence[RunQuality]) -> Table:
     """How long residuals stay correlated, and how far they follow the input."""
     made = Table(
@@ -509,14 +495,6 @@ def _error(error: float) -> str:
 
 
 # --- sentences ------------------------------------------------------------------------------------
-
-
-def measures_words(name: str, unit: str, found: Measures) -> str:
-    """``current: fit 96.1 % (RMSE 7.6 mA, R² 0.9985)``."""
-    rmse = f"RMSE {quantity(found.rmse, unit)}"
-    if found.fit_percent is None or found.r_squared is None:
-        return f"{name}: {rmse}; what was measured is constant, so there is no fit %"
-    return f"{name}: fit {found.fit_percent:.2f} % ({rmse}, R² {found.r_squared:.4f})"
 
 
 def scales_words(fit: StageFit) -> str:
