@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from swashplate.identification.staging import stage_problem
+from swashplate.identification.drive_model import stage_problem
 from tests.identification.linear import unknowns_of
 from tests.identification.test_own_model_fit import FREE, NOISE, RUNS, servo
 
