@@ -226,9 +226,11 @@ def candidates(assessments):
 
 def white(fit):
     """s²(JᵀJ)⁻¹."""
-    from swashplate.identification.noise import white_noise_covariance
+    from swashplate.identification.noise import covariance_of
 
-    return white_noise_covariance(fit), np.zeros(fit.variables.count)
+    matrix = fit.squares / fit.spare_samples * (fit.whitening @ fit.whitening.T)
+    free = np.full(fit.variables.count, float(fit.spare_samples))
+    return covariance_of(fit, matrix, free), np.zeros(fit.variables.count)
 
 
 def autocovariance(fit):

@@ -5,10 +5,14 @@ Each is what the commands beside its name leave behind; nothing is drawn by hand
 
 import shlex
 import shutil
-import subprocess
 import sys
+from contextlib import chdir
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+from typer.testing import CliRunner
+
+from swashplate.cli import app
 
 IMAGES = Path(__file__).parent / "images"
 FIGURES = {
@@ -50,14 +54,10 @@ def make(name: str) -> None:
             if len(words) == 1:
                 made = Path(folder) / words[0]
                 continue
-            done = subprocess.run(
-                [sys.executable, "-m", "swashplate", *words],
-                cwd=folder,
-                check=False,
-                stdout=subprocess.DEVNULL,
-            )
-            if done.returncode not in (0, 1):  # 1: a verdict that fails, and yet has its figure
-                raise SystemExit(f"{' '.join(words)} ends with {done.returncode}.")
+            with chdir(folder):
+                done = CliRunner().invoke(app, words)
+            if done.exit_code not in (0, 1):  # 1: a verdict that fails, and yet has its figure
+                raise SystemExit(f"{' '.join(words)} ends with {done.exit_code}.\n{done.output}")
         shutil.copyfile(made, IMAGES / name)
 
 

@@ -172,13 +172,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", type=Path, help="folder with the trials")
     parser.add_argument("--figure", type=Path, help="draw the last trial here")
+    parser.add_argument("--cylinder", choices=("boom", "stick", "bucket"), help="only this one")
     parser.add_argument("--spread", action="store_true", help="fit to every two others as well")
     options = parser.parse_args()
     tests = Campaign.from_toml(CAMPAIGN, logs=options.data)
-    figure, wins = Figure(figsize=(11, 8), layout="constrained"), 0
+    axes = (options.cylinder,) if options.cylinder else tests.axes
+    figure, wins, scored = Figure(figsize=(11, 8), layout="constrained"), 0, 0
     print("| cylinder | trial left out | moves [mm] | straight line [mm] | valve [mm] | |")
     print("|---|---|---|---|---|---|")
-    for number, axis in enumerate(tests.axes, start=1):
+    for number, axis in enumerate(axes, start=1):
         for left_out in tests.select(axis=axis):
             others = [each for each in tests.select(axis=axis) if each is not left_out]
             errors = [moved(left_out, fitted(name, axis, others)) for name in ("line", "valve")]
@@ -188,16 +190,16 @@ def main() -> None:
                 pairs = (fitted("valve", axis, pair) for pair in combinations(others, 2))
                 found = sorted([own, *(rms(moved(left_out, each)) for each in pairs)])
                 spread = f" ({found[0]:.2f} to {found[-1]:.2f})"
-            lost, wins = "" if own < line else "lost", wins + (own < line)
+            lost, wins, scored = "" if own < line else "lost", wins + (own < line), scored + 1
             of = f"{rms(moved(left_out)):.2f} | {line:.2f} | {own:.2f}{spread}"
             print(f"| {axis} | {left_out.run} | {of} | {lost} |", flush=True)
         position = left_out["position"]
-        plot = figure.add_subplot(3, 1, number, title=left_out.name, ylabel="position [mm]")
+        plot = figure.add_subplot(len(axes), 1, number, title=left_out.name, ylabel="position [mm]")
         plot.plot(position.time, 1e3 * position.values, color="0.3", label="measured")
         predicted = position.values[: errors[1].size] + errors[1]
         plot.plot(position.time[: predicted.size], 1e3 * predicted, label="predicted")
         plot.legend()
-    print(f"\nThe valve is the better one in {wins} of {len(tests)}.")
+    print(f"\nThe valve is the better one in {wins} of {scored}.")
     if options.figure:
         figure.savefig(options.figure, dpi=150)
 

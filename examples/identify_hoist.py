@@ -17,7 +17,7 @@ import numpy as np
 from swashplate import Campaign, Drive
 from swashplate.campaign import rig
 from swashplate.identification.assessment import assess
-from swashplate.identification.excitation import outlook
+from swashplate.identification.experiment_design import outlook
 from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import load_setup
 from swashplate.identification.staging import drawn, true_value

@@ -3,9 +3,9 @@
 #
 #     .venv/bin/python examples/limits_of_a_crane.py [drive.toml] [--figure limits.png]
 #
-# What can it do at all? Which of its limits costs a working cycle most? Which sines does it follow?
-# What would a change of the costliest component bring, and how large a change is needed? For the
-# packaged hoist, or for a parameter file of your own, such as the `drive.toml` of a fit.
+# What can it do at all? Which of its limits costs a working cycle most? What would a change of the
+# costliest component bring, and how large a change is needed? For the packaged hoist, or for a
+# parameter file of your own, such as the `drive.toml` of a fit.
 
 # %%
 import argparse
@@ -18,7 +18,6 @@ from swashplate.analysis import (
     WIDEST,
     Requirements,
     envelope,
-    largest_sine,
     limit_shares,
     performance,
     size,
@@ -60,19 +59,6 @@ print(
 )
 for share in shares.shares[:3]:
     print(f"{share.limit:12s} {100 * share.error_share:5.1f} %, {share.component}")
-
-# %% [markdown]
-# ## Sines that it follows
-# The largest amplitude within an error of 10 %, commanded through the inverse of the steady map.
-# For a command that is known ahead the lag does no harm.
-
-# %%
-sines = largest_sine(drive, [0.05, 0.1, 0.2, 0.5])
-for frequency, ahead, in_time in zip(sines.frequencies, sines.shifted, sines.in_time, strict=True):
-    print(
-        f"{frequency:.2f} Hz: {np.degrees(in_time):5.1f} deg/s, "
-        f"{np.degrees(ahead):5.1f} deg/s where the lag does no harm"
-    )
 
 # %% [markdown]
 # ## What if it were better

@@ -21,7 +21,6 @@ from swashplate.analysis import (
     Requirements,
     envelope,
     inverse_map,
-    largest_sine,
     limit_shares,
     one_at_a_time,
     ranges_of,
@@ -118,7 +117,6 @@ def analyses(drive: Drive) -> list[Any]:
         what_if(drive, {"orifice": 1.5}, once),
         size(drive, Requirements(speed=3.5), {"pump": (1.0, 2.0)}),
         inverse_map(drive),
-        largest_sine(drive, (0.1,)),
         one_at_a_time(drive, ranges_of(["orifice"]), once, outcomes=["final_speed", "rise_time"]),
     ]
 

@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 
 from swashplate import DomainError, Drive, InputError, Limit, maneuvers
-from swashplate.analysis import REMOVALS, limit_shares, limit_timeline
+from swashplate.analysis import limit_shares
 
 SINE = maneuvers.sine(9.0, 0.1).sample()
 
@@ -67,7 +67,6 @@ def test_what_to_change_first(name: str, command: str, limit: str) -> None:
     assert found.first.limit == limit
     errors = [share.error for share in found.shares]
     assert errors == sorted(errors)
-    assert {share.limit for share in found.shares} <= {each.limit for each in REMOVALS}
 
 
 def test_shares_are_what_a_changed_drive_gains(hoist: Drive) -> None:
@@ -155,14 +154,6 @@ def test_a_command_outside_the_domain_is_refused() -> None:
     assert "overpowers the feedback spring" in share.failure
 
 
-def test_records_with_stamps_and_starts(hoist: Drive) -> None:
-    time, volts = np.array([0.0, 1.0, 3.0]), np.array([2.0, 9.0, 2.0])
-    found = limit_shares(hoist, volts, 256.0, time=time, interpolation="previous", start="steady")
-    expected = hoist.simulate(volts, 256.0, time=time, interpolation="previous", start="steady")
-    np.testing.assert_array_equal(found.run.shaft_speed, expected.shaft_speed)
-    assert found.wanted.size == expected.time.size
-
-
 def test_table(hoist: Drive, tmp_path) -> None:
     found = limit_shares(hoist, SINE)
     found.write(tmp_path / "shares.csv")
@@ -194,28 +185,3 @@ def test_a_dead_zone_beyond_the_jump_is_eased_as_well() -> None:
     (share,) = (each for each in found.shares if each.limit == "dead zone")
     assert share.eased_by == pytest.approx({"dead_zone": 0.0, "Z17": 0.27473 / 0.30})
     assert share.eased_error == pytest.approx(share.error, rel=1e-12)
-
-
-# --- when they act --------------------------------------------------------------------------------
-
-
-def test_spans_hold_what_the_flags_say(hoist: Drive) -> None:
-    run = hoist.simulate(maneuvers.step(9.0).sample())
-    found = limit_timeline(run)
-    assert found.limits == (Limit.DEAD_ZONE, Limit.CURRENT_RATE, Limit.ORIFICE, Limit.SWASH_STOP)
-    for limit, spans, share in zip(found.limits, found.spans, found.shares, strict=True):
-        within = [(run.time >= begin) & (run.time <= end) for begin, end in spans]
-        np.testing.assert_array_equal(np.any(within, axis=0), run.active(limit))
-        assert share == pytest.approx(run.active(limit).mean())
-    # the plate reaches its stop once and leaves it once
-    (stop,) = found.spans[3]
-    assert 2.4 < stop[0] < 2.6
-    assert 6.0 < stop[1] < 6.25
-
-
-def test_ends_of_the_record_and_no_limit() -> None:
-    neutral = Drive.preset("neutral")
-    found = limit_timeline(neutral.replace(Z17=0.5).simulate(np.zeros(2), 512.0))
-    np.testing.assert_array_equal(found.spans[0], [[0.0, 1.0 / 512.0]])
-    found = limit_timeline(neutral.simulate(np.full(10, 2.0), start="steady"))
-    assert found.limits == found.spans == found.shares == ()

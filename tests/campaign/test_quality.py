@@ -67,21 +67,6 @@ def test_what_a_log_shows(
         assert found["current"].findings == ()
 
 
-def test_a_channel_that_freezes(campaign_folder: Path) -> None:
-    noise = np.random.default_rng(0).normal(0.0, 1.0, 400)
-
-    def freeze(table: np.ndarray) -> np.ndarray:
-        time = 10.0 * np.arange(400)
-        long = np.column_stack([time, 4000.0 * (time >= 500), 400.0 + noise, np.zeros(400)])
-        long[:, 3] = -40.0 * np.maximum(np.arange(400) - 50, 0)
-        long[200:350, 2] = long[200, 2]
-        return long
-
-    found = qualities(rewrite(campaign_folder / "campaign.toml", freeze))
-    assert found["current"].stuck == pytest.approx(1.49)
-    assert "stands still for 1.49 s" in found["current"].findings[0]
-
-
 def test_clipping_at_the_ends_of_the_range(edited: Edit) -> None:
     path = edited('unit = "mA"', 'unit = "mA"\nlimits = [0.0, 400.0]')
     # 50 samples at 0 and 51 at 400 mA

@@ -98,7 +98,7 @@ def test_a_pause_in_the_log_is_found(tmp_path: Path) -> None:
 
 def test_people_at_a_joystick_are_no_maneuver(excavator: Campaign) -> None:
     for experiment in (*excavator.select(role="fit"), *excavator.select(role="validate")):
-        assert experiment.maneuver == "free"
+        assert experiment.maneuver == "unnamed motion"
 
 
 def test_the_electro_hydrostatic_actuator(tmp_path: Path) -> None:

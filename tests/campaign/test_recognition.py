@@ -90,11 +90,11 @@ CREEP[2000:2200] += np.linspace(0.0, 0.3, 200)
         ((SINE.time()[1793:10752], SINE.sample()[1793:10752]), "V", "sine -4 V 0.2 Hz"),
         (of(maneuvers.step(4.0), part=slice(2000)), "V", "step +4 V"),
         ((grid(20.0, 512.0), 0.02 * NOISE), "V", "rest"),
-        ((grid(20.0, 512.0), 0.02 * NOISE), "%", "free"),
-        ((grid(20.0, 512.0), 2.0 * NOISE), "V", "free"),
+        ((grid(20.0, 512.0), 0.02 * NOISE), "%", "unnamed motion"),
+        ((grid(20.0, 512.0), 2.0 * NOISE), "V", "unnamed motion"),
         # a glitch is no part of a maneuver
-        ((maneuvers.sine(6.5, 0.1).time(), GLITCHES), "V", "free"),
-        ((maneuvers.step(4.0).time(), CREEP), "V", "free"),
+        ((maneuvers.sine(6.5, 0.1).time(), GLITCHES), "V", "unnamed motion"),
+        ((maneuvers.step(4.0).time(), CREEP), "V", "unnamed motion"),
     ],
 )
 def test_names_of_records(record: tuple, unit: str, name: str) -> None:
@@ -124,7 +124,7 @@ FREE = {
 def test_what_is_no_maneuver_is_free(name: str) -> None:
     time = grid(FREE[name].length, 512.0)
     found = recognise(time, readback(FREE[name](time)))
-    assert found.kind == found.name == "free"
+    assert found.name == "unnamed motion"
 
 
 REAL = sorted((SHARED / "data" / "excavator").glob("*.csv"))
@@ -138,7 +138,7 @@ def test_a_joystick_is_free_and_a_step_a_step() -> None:
         for column, zero in neutral.items():
             found = recognise(table["Time"], table[column] - zero, unit="%")
             if path.name.startswith("manual"):
-                assert found.kind == "free"
+                assert found.kind == "unnamed"
             elif path.name.startswith("steps_boom") and column == "Boom Cmd":
                 assert found.name == "step -5.07 %"
             else:
@@ -223,7 +223,7 @@ def test_any_record_has_an_answer(
     random = np.random.default_rng(seed)
     time = np.cumsum(random.uniform(0.001, 0.1, size))
     found = recognise(time, make(random, size))
-    assert found.kind in ("rest", "step", "stairs", "ramp", "sine", "free")
+    assert found.kind in ("rest", "step", "stairs", "ramp", "sine", "unnamed")
 
 
 @pytest.mark.parametrize(

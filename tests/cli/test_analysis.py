@@ -86,7 +86,7 @@ def test_the_improvement(done, number):
 
 def test_the_envelope_that_is_printed(done, number):
     """The numbers of the model description."""
-    text = done("limits", "hoist", "--frequency", "0.3")
+    text = done("limits", "hoist")
     assert "hoist: what it can do" in text
     for place, (volts, speed, acceleration) in enumerate(
         ((7.87, 196.0, 136.8), (-7.41, -185.0, -177.8))
@@ -95,9 +95,6 @@ def test_the_envelope_that_is_printed(done, number):
         assert number(text, "speed limit", place) == pytest.approx(speed, abs=0.05)
         assert number(text, "acceleration at rest", place) == pytest.approx(acceleration, abs=0.05)
     assert number(text, "creep at 0 V") == pytest.approx(3.09, abs=0.005)
-    assert "Largest sine followed within 10 %" in text
-    assert number(text, "0.3") > 50.0
-    assert text.rstrip().endswith("none")
 
 
 def test_what_to_change_first(done, number):
@@ -129,15 +126,13 @@ def test_what_is_to_be_tried_is_the_same_command(done, tmp_path):
 def test_a_drive_that_does_not_move_still_has_an_envelope(done):
     text = done("limits", "hoist", "--set", "Z17=5")
     assert "gain, mean" in text
-    assert "No sine can be commanded: No positive command up to 10 V moves hoist" in text
 
 
 def test_changes_are_said_and_count(done, number):
-    text = done("limits", "hoist", "--scale", "Z16=1.5", "--scale", "Z10=1.5", "--error", "0.2")
+    text = done("limits", "hoist", "--scale", "Z16=1.5", "--scale", "Z10=1.5")
     assert "Z16 (opening at which the orifice limits the flow)" in text
     # figure 9.1: orifice and pump half as large again
     assert number(text, "speed limit") == pytest.approx(294.0, abs=0.5)
-    assert "within 20 %" in text
 
 
 # --- linearize ------------------------------------------------------------------------------------

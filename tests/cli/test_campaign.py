@@ -211,7 +211,9 @@ def test_refinements_and_backlash_change_the_logs(done: Words, tmp_path: Path) -
 
 def test_rig_refusals(refused: Words, done: Words) -> None:
     assert "no parameter 'wobble'" in refused("rig", "hoist", "--out", "x", "--set", "wobble=1")
-    assert "backlash must not" in refused("rig", "hoist", "--out", "x", "--backlash-deg", "-1")
+    assert "backlash must be 0 or more" in refused(
+        "rig", "hoist", "--out", "x", "--backlash-deg", "-1"
+    )
     assert "no packaged set, file or folder 'crane'" in refused("rig", "crane", "--out", "x")
     done("rig", "slew", "--out", "y", *SHORT)
     assert "empty" in refused("rig", "slew", "--out", "y", *SHORT)

@@ -19,31 +19,24 @@ def cells(text: str, row: str) -> list[str]:
 def test_a_run(done, number):
     text = done("full-order", "hoist", "step:9")
     assert text.startswith("hoist, step 9 V, five states against one: 5121 samples at 512 Hz\n")
-    assert "16 of 16 physical values are assumed, as of the packaged hoist" in text
+    assert "16 of 16 physical values are assumed, as of the packaged hoist" in " ".join(
+        text.split()
+    )
     assert cells(text, "oil_volume") == ["200", "cm³", "assumed"]
     assert cells(text, "spool_frequency") == ["40", "Hz", "assumed"]
     assert cells(text, "load_inertia") == ["150", "kg", "m²", "assumed"]
     # Z10 Z13
-    assert number(text, "top speed") == round(float(np.degrees(12.396 * 0.27596)), 2)
+    assert number(text, "step 9 V") == round(float(np.degrees(12.396 * 0.27596)), 2)
     # docs/full-order.md: 0.26 %, 0.12 % and 0.08 %
-    assert number(text, "largest difference", 1) == pytest.approx(0.26, abs=0.006)
-    assert number(text, "rms difference", 1) == pytest.approx(0.12, abs=0.006)
-    step_error = "step error of the march at 512 Hz"
-    assert number(text, step_error, 1) == pytest.approx(0.08, abs=0.006)
-    assert number(text, "largest difference") == pytest.approx(1.96 * 0.261, abs=2e-3)
-    assert cells(text, "within 1 %") == ["yes"]
-    assert cells(text, "within 0.1 %") == ["no"]
-    assert "One state is enough here: within 1 % of the top speed, at most 0.26 %" in text
+    assert cells(text, "step 9 V")[1:] == ["0.26", "0.12", "0.08", "yes"]
+    assert "One state is enough, to 1 % of the top speed." in text
 
 
-def test_the_load_that_is_given(done, number):
+def test_the_load_that_is_given(done):
     load = ("--physical", "load_torque=2kN*m", "--physical", "load_inertia=0")
     text = done("full-order", "hoist", "step:4", *load)
     assert "14 of 16 physical values are assumed" in text
     assert cells(text, "load_torque") == ["2000", "N", "m", "given"]
-    # 2π over 25.1 l a turn times 2 kN m
-    drop = f"{2.0 * np.pi / 25.1e-3 * 2e3 / 1e6:.3f}"
-    assert cells(text, "motor pressure drop, MPa") == [drop, "to", drop]
 
 
 def test_too_fast_for_one_state(done):
@@ -52,17 +45,15 @@ def test_too_fast_for_one_state(done):
     volts = 6.5 * np.sin(2.0 * np.pi * 3.0 * times)
     pl.DataFrame({"time": times, "voltage": volts}).write_csv("sine.csv")
     text = done("full-order", "hoist", "sine.csv", "--interpolation", "linear")
-    assert "One state is not enough here: up to 4." in text
-    assert cells(text, "within 1 %") == ["no"]
+    assert "One state is not enough, to 1 % of the top speed." in text
+    assert cells(text, "sine.csv")[-1] == "no"
 
 
 def test_nothing_moves(done):
     text = done("full-order", "hoist", "rest:2", "--set", "Z18=0")
-    assert "The shaft does not move under this command" in text
-    assert "within 1 %" not in text
+    assert "The shaft does not move, so nothing can be said" in text
     text = done("full-order", "slew", "--set", "Z17=5")
     assert text.count("does not move") == 12
-    assert "The shaft does not move under any of these" in " ".join(text.split())
 
 
 def test_the_table_is_the_documented_one(done):
@@ -77,7 +68,7 @@ def test_the_table_is_the_documented_one(done):
         shown = [float(each) for each in found[1:4]]
         assert shown == pytest.approx([float(each) for each in numbers], abs=0.011)
         assert " ".join(found[4:]) == within
-    said = "One state is enough for 10 of 11, to 1 % of the top speed; not for sine 6.5 V 3 Hz."
+    said = "One state is enough for 10 of 11, to 1 %; not for sine 6.5 V 3 Hz."
     assert said in " ".join(text.split())
 
 
@@ -87,8 +78,8 @@ def test_files(done, tmp_path):
     assert "Figure: run.png" in text
     table = pl.read_parquet(tmp_path / "run.parquet")
     difference = table["reduced_shaft_speed"] - table["shaft_speed"]
-    (largest,) = re.findall(r"^largest difference +([\d.]+)", text, re.MULTILINE)
-    assert np.degrees(difference.abs().max()) == pytest.approx(float(largest), abs=1e-4)
+    top, largest = map(float, cells(text, "step 4 V")[:2])
+    assert np.degrees(difference.abs().max()) == pytest.approx(top * largest / 100.0, rel=0.01)
     assert table["voltage"].max() == 4.0
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
     assert "Table: table.csv" in done("full-order", "slew", "--out", "table.csv")
@@ -102,5 +93,5 @@ def test_a_drive_of_one_s_own(done, tmp_path):
     lines = text.splitlines()
     assert lines[0].startswith("mine, step 4 V, five states")
     assert lines[1].startswith("Z15 (")
-    assert lines[3] == "Left out of both models, which do not know refinements: spool_friction."
+    assert lines[2] == "Left out of both models, which do not know refinements: spool_friction."
     assert cells(text, "spool_mass") == ["10", "g", "assumed"]

@@ -74,21 +74,24 @@ def table() -> list[list[str]]:
 
 @logs
 @pytest.mark.slow
-def test_the_table_and_the_figure_of_the_page(
+def test_a_cylinder_of_the_pages_table_and_its_figure(
     excavator: ModuleType,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     figure = tmp_path / "excavator.png"
-    monkeypatch.setattr(sys, "argv", ["excavator.py", str(DATA), "--figure", str(figure)])
+    # the boom has a trial that the valve loses; the other two cylinders take as long again each
+    words = [str(DATA), "--cylinder", "boom", "--figure", str(figure)]
+    monkeypatch.setattr(sys, "argv", ["excavator.py", *words])
     excavator.main()
     assert figure.stat().st_size > 20_000
     printed = capsys.readouterr().out
     rows = re.findall(r"^\| (boom|stick|bucket) \|(.*)\|$", printed, re.MULTILINE)
-    assert len(rows) == len(table()) == 12
+    assert len(table()) == 12
+    boom = [row for row in table() if row[0] == "boom"]
     wins = 0
-    for (axis, cells), stated in zip(rows, table(), strict=True):
+    for (axis, cells), stated in zip(rows, boom, strict=True):
         trial, moved, line, valve, lost = (cell.strip() for cell in cells.split("|"))
         assert [axis, trial, lost] == [*stated[:2], stated[5]]
         # the last digit, and where the solver stops on another processor
@@ -96,5 +99,5 @@ def test_the_table_and_the_figure_of_the_page(
             assert float(number) == pytest.approx(float(said.split(" ")[0]), abs=0.021)
         assert (float(valve) < float(line)) == (lost == "")
         wins += lost == ""
-    assert f"The valve is the better one in {wins} of 12." in printed
-    assert wins == 10
+    assert wins == 3
+    assert "The valve is the better one in 3 of 4." in printed

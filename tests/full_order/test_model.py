@@ -7,14 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swashplate import DomainError, FullOrderDrive, InputError
+from swashplate import DomainError, FullOrderDrive, InputError, PhysicalSet
+from swashplate.equations.equation import interpreted
 from swashplate.equations.marching.jacobian import jacobian, residuals
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
 from swashplate.full_order import path_of
 from swashplate.models.displacement_control import Solenoids
 from swashplate.models.full_order import Substeps
-from swashplate.models.machine import Machine
+from swashplate.models.machine import ATMOSPHERE, Machine, mixture_modulus, oil_modulus
 
 Array = np.ndarray
 
@@ -168,3 +169,24 @@ def test_names_of_parameters() -> None:
     assert path_of("omega_plus") == "card.plus.omega"
     with pytest.raises(InputError, match="five states has no parameter 'Z6'"):
         path_of("Z6")
+
+
+def test_air_makes_the_oil_soft_by_hand() -> None:
+    # 1 % of air at 1.01325 MPa is 0.1 % of the oil's volume; 1/B_e = (1/1 GPa + 0.001/1.01325 MPa)
+    # over 1.001: 1.987e-9/Pa
+    oil = PhysicalSet.preset("hoist").machine._replace(bulk_modulus=1e9, air_fraction=0.01)
+    mixture, modulus = interpreted(mixture_modulus), interpreted(oil_modulus)
+    compressed = (1e-9 + 1e-3 / (10.0 * ATMOSPHERE)) / 1.001
+    assert mixture(10.0 * ATMOSPHERE, oil) == pytest.approx(1.0 / compressed, rel=1e-14)
+    assert mixture(1e12, oil) == pytest.approx(1e9, rel=1e-6)
+    assert mixture(ATMOSPHERE, oil._replace(air_fraction=1.0)) == pytest.approx(
+        2.0 * ATMOSPHERE, rel=1e-3
+    )
+    # the mean of both ends of the cylinder, the same for both signs
+    valve = oil._replace(supply_pressure=8e6)
+    ends = [mixture(4e6 + half + ATMOSPHERE, valve) for half in (1e6, -1e6)]
+    assert modulus(2e6, valve, True) == pytest.approx(sum(ends) / 2.0, rel=1e-14)
+    assert modulus(-2e6, valve, True) == modulus(2e6, valve, True)
+    assert modulus(2e6, valve, None) == 1e9
+    # ends cannot fall below the reservoir
+    assert modulus(9e6, valve, True) > mixture(ATMOSPHERE, valve) / 2.0

@@ -226,10 +226,8 @@ def test_the_inertia_that_agrees_is_said() -> None:
 
 def test_refinements_are_refused() -> None:
     rough = Drive.preset("hoist").replace(spool_friction=1.0)
-    with pytest.raises(InputError, match="Full-order drives do not know refinements, but spool_f"):
+    with pytest.raises(InputError, match="five states do not know refinements, but .* spool_f"):
         FullOrderDrive.from_drive(rough)
-    with pytest.raises(InputError, match="hoist: Full-order drives .* spool_friction is on; take"):
-        FullOrderDrive(rough, PhysicalSet.preset("hoist"))
     assert FullOrderDrive.from_drive(rough.plain).drive == Drive.preset("hoist")
 
 
@@ -238,12 +236,7 @@ def test_changes() -> None:
     stops = hoist.replace(swash_stop=0.2)
     assert stops["swash_stop"].value == (0.2, 0.2)
     assert stops["swash_stop"].status == "user"
-    small = hoist.scaled(0.01)
-    assert small.numbers["swash_inertia"] == pytest.approx(0.01 * hoist.numbers["swash_inertia"])
-    assert small.numbers["spool_damping"] == pytest.approx(0.1 * hoist.numbers["spool_damping"])
     assert pickle.loads(pickle.dumps(hoist)) == hoist
-    with pytest.raises(ParameterError, match="epsilon is 0, but must be above 0"):
-        hoist.scaled(0.0)
     n = hoist.numbers
     past = atan(n["control_arm"] / n["swash_arm"]) + 0.01  # where the arm lies at 90°
     with pytest.raises(ParameterError, match="turn the feedback arm past 90°"):

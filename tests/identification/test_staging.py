@@ -1,5 +1,6 @@
 """From a set-up to its problem: Kruse's weights, clocks and pressures that are free."""
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,8 @@ from swashplate.identification.drive_model import DriveModel, at_rate_of
 from swashplate.identification.fitting import fit, smooth
 from swashplate.identification.setup import Free, Setup, Stage, load_setup, setup_names
 from swashplate.identification.staging import stage_problem
-from swashplate.maneuvers import source_tests
+from swashplate.identification.unknowns import Unknown
+from swashplate.maneuvers import source_tests, step
 
 
 @pytest.fixture(scope="module")
@@ -165,3 +167,49 @@ def test_a_run_cut_out_of_a_motion_begins_with_a_settled_card() -> None:
         off[start] = np.abs(model.simulate({}, run)["current"] - true).max()
     assert off["rest"] > 0.1
     assert off["estimated"] < 0.005
+
+
+@pytest.mark.parametrize("rate", [512.0, None])
+def test_a_run_cut_out_of_a_rising_current_has_a_current_of_its_own(rate: float | None) -> None:
+    """From 0.1 s after a step of 9 V on the rate limit acts: no settled card begins like that."""
+    drive = Drive(replace(smooth(Drive.preset("hoist").parameters), rate=rate))
+    source, random = Source(Path("log.csv"), "u"), np.random.default_rng(1)
+    runs = []
+    for name, volts, first in (("cut", 9.0, 563), ("whole", 9.0, 0)):
+        simulated = drive.simulate(step(volts, start=1.0, stop=4.0, length=6.0).sample(512.0))
+        assert simulated.voltage is not None
+        time, true = simulated.time[first:], simulated.current[first:]
+        signal = InputSignal("voltage", "V", time, simulated.voltage[first:], "linear", source)
+        current = true + random.normal(0.0, 1e-3, time.size)
+        weight = np.ones(time.size)
+        made = Channel("current", "signed_current", "A", time, current, weight, source, noise=1e-3)
+        start = "estimated" if first else "rest"
+        runs.append(Experiment(name, "hoist", name, "fit", start, None, signal, {"current": made}))
+    assert 0.1 < simulated.current[563] < 0.6
+    free = {name: Free(relative=(0.5, 2.0), log=True) for name in ("lim1_plus", "omega_plus")}
+    (found,) = fit(drive, runs, Setup(stages=(Stage(name="card", part="card", free=free),))).stages
+    assert found.values["start_current_plus (cut)"] == pytest.approx(
+        simulated.current[563], abs=0.005
+    )
+    samples = found.problem.samples
+    assert 2.0 * found.solution.cost == pytest.approx(samples, abs=5.0 * np.sqrt(2.0 * samples))
+
+
+def test_a_bound_that_was_reached_is_said_with_the_line_that_moves_it(campaign: Campaign) -> None:
+    drive = Drive(smooth(campaign.drive("hoist").parameters)).scale(lim1=0.6)
+    free = {"lim1": Free(relative=(0.5, 1.3), log=True)}
+    runs = campaign.select(role="fit")
+    setup = Setup(stages=(Stage(name="card", part="card", free=free),))
+    (said,) = (e for e in fit(drive, runs, setup).stages[0].bounds_reached() if "lim1_plus" in e)
+    assert "lim1_plus ended at its upper bound" in said
+    assert "under [stages.free] of the stage 'card'" in said
+    line = tomllib.loads(said.partition("write ")[2].partition(" under ")[0])
+    assert line == {"lim1": {"relative": [0.5, 2.6], "log": True}}
+    widened = Stage(name="card", part="card", free={"lim1": Free(**line["lim1"])})
+    (again,) = fit(drive, runs, Setup(stages=(widened,))).stages
+    assert again.values["lim1_plus"] == pytest.approx(2.2841, rel=0.01)
+    assert not any("lim1_plus" in each for each in again.bounds_reached())
+    unknown = Unknown("V_dz_plus", 0.5, 0.0, 5.0, "V")
+    stage = Stage(name="card", part="card", free={"V_dz": Free(bounds=(0.0, 5.0))})
+    assert stage.widened(unknown, -1) is None
+    assert stage.widened(unknown, 1) == "V_dz = { bounds = [0, 10] } under [stages.free]"

@@ -9,7 +9,6 @@ import pytest
 from swashplate import Drive, Experiment
 from swashplate.campaign.experiment import InputSignal
 from swashplate.identification import Verdict, verdict
-from swashplate.identification.acceptance import Criterion, part_of_range, percent
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.fitting import StageFit
 from swashplate.identification.problem import Problem
@@ -17,6 +16,7 @@ from swashplate.identification.setup import Stage
 from swashplate.identification.solving import StartResult, solve
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, compared
+from swashplate.identification.verdict import Criterion, part_of_range, percent
 
 TIME = np.linspace(0.0, 4.0, 81)
 WAVE = 10.0 * np.sin(2.0 * np.pi * TIME[:-1] / 4.0)
@@ -80,7 +80,7 @@ def test_a_drive_that_hardly_simulates_is_not_usable(
 
 def test_one_run_that_contradicts_the_others_is_named(quality: Make) -> None:
     runs = [quality(WAVE + 0.1 * SWAP, f"run {k}") for k in range(20)]
-    assert criterion(verdict((), runs), "predicted runs worse than mean").passed
+    assert criterion(verdict((), runs), "predicted runs worse than mean").state == "met"
     found = verdict((), [*runs, quality(-WAVE, "turned")])
     assert not found.usable
     failed = criterion(found, "predicted runs worse than mean")

@@ -4,13 +4,12 @@ import os
 import signal
 import sys
 
-import numpy as np
 import polars as pl
 import pytest
-import scipy.io
 
 from swashplate import FileError
-from swashplate.logs import apart, log, open_log
+from swashplate.logs import apart, open_log
+from swashplate.logs.binary import OPENERS
 
 
 def test_what_is_no_file(tmp_path):
@@ -35,14 +34,6 @@ def test_what_is_no_file(tmp_path):
         open_log(tmp_path / ("a" * 300 + ".csv"))
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-def test_a_file_that_must_not_be_read(tmp_path):
-    (tmp_path / "log.csv").write_text("a,b\n1,2\n")
-    (tmp_path / "log.csv").chmod(0)
-    with pytest.raises(FileError, match="cannot be read: Permission denied"):
-        open_log(tmp_path / "log.csv")
-
-
 @pytest.mark.parametrize(
     ("content", "library", "extra"),
     [
@@ -56,7 +47,7 @@ def test_an_extra_that_is_not_installed(tmp_path, monkeypatch, content, library,
     for name in ("nptdms", "asammdf"):
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(FileError, match=rf"needs the library {library}.*'swashplate\[{extra}\]'"):
-        log.opener(extra.upper())(path)
+        OPENERS[extra.upper()](path)
 
 
 @pytest.fixture
@@ -95,31 +86,3 @@ def test_paths_are_relative_to_where_one_is(table, monkeypatch, tmp_path):
     table.rename(tmp_path / "log.csv")
     with pytest.raises(FileError, match="^log.csv ends in"):
         open_log("log.csv")
-
-
-def test_every_byte_of_a_small_table_may_be_damaged(table):
-    """Polars aborts its process at some of these."""
-    content = table.read_bytes()
-    kinds = set()
-    for place in range(4, len(content) - 8, 23):
-        table.write_bytes(content[:place] + b"\xff\xff\xff\x7f" + content[place + 4 :])
-        sentence = "log.parquet."
-        try:
-            read = open_log(table).read(["time"])["time"]
-            kinds.add(read.dtype)
-        except FileError as error:
-            sentence = str(error)
-        assert "log.parquet" in sentence
-        assert sentence.endswith(".")
-    assert kinds == {np.dtype(np.float64)}
-
-
-def test_a_large_file_of_an_old_matlab_is_refused(tmp_path, monkeypatch):
-    path = tmp_path / "log.mat"
-    scipy.io.savemat(path, {"t": np.arange(1e3)})
-    assert log.opener("MATLAB")(path).read(["t"])["t"].size == 1000
-    monkeypatch.setattr("swashplate.logs.arrays._LARGEST", 8000)
-    with pytest.raises(
-        FileError, match=r"up to version 7 are read as a whole.*save it with -v7\.3"
-    ):
-        log.opener("MATLAB")(path)

@@ -57,8 +57,6 @@ def test_layout_is_told_from_the_rows(text, all_of, content, form):
         ("utf-8", ""),
         ("utf-8-sig", ""),
         ("utf-16", ", UTF-16"),
-        ("utf-16-le", ", UTF-16"),
-        ("utf-16-be", ", UTF-16-BE"),
         ("latin-1", ", Latin-1"),
     ],
 )

@@ -65,8 +65,6 @@ def test_a_factor_scales_voltage_and_slope(factor, amplitude, frequency):
 def test_what_cannot_be_joined_is_a_type_error():
     with pytest.raises(TypeError):
         maneuvers.rest(1.0) + 3
-    with pytest.raises(TypeError):
-        3 + maneuvers.spline_return(1.0)
 
 
 def test_voltage_is_zero_outside_and_has_the_shape_of_the_times():
@@ -96,7 +94,6 @@ def test_time_stamps_go_with_the_samples():
         (maneuvers.multisine(5, [0.1, 2], seed=3), "multisine 5 V 0.1 to 2 Hz seed 3"),
         (maneuvers.recorded([0, 1], [0, 1], interpolation="linear"), "recorded 2 rows"),
         (maneuvers.rest(1.0) + maneuvers.step(2.0), "rest 1 s + step 2 V"),
-        (maneuvers.step(2.0) + maneuvers.spline_return(2.5), "step 2 V + return 2.5 s"),
         (0.5 * maneuvers.step(9.0), "0.5 * (step 9 V)"),
         (np.float64(0.5) * maneuvers.step(9.0), "0.5 * (step 9 V)"),
         (-maneuvers.step(9.0), "-(step 9 V)"),
@@ -124,11 +121,6 @@ RETURNING = {
     "stairs": (maneuvers.stairs([3.0, -5.0]), 5.0),
     "chirp": (maneuvers.chirp(4.0, 0.05, 0.1), 57.5),
     "multisine": (maneuvers.multisine(5.0, (0.05, 0.5, 9)), 57.5),
-    "recorded": (
-        maneuvers.recorded([0, 1, 3], [0, 6, 5], interpolation="linear")
-        + maneuvers.spline_return(2.0),
-        3.0,
-    ),
 }
 
 
@@ -155,8 +147,7 @@ def test_return_of_a_fast_command_stays_within_its_amplitude():
 
 
 def test_return_is_the_cubic_of_its_end_conditions():
-    ramp = maneuvers.ramp(2.0, start=0.0, settle=None, length=3.0)
-    m = ramp + maneuvers.spline_return(2.0)
+    m = maneuvers.ramp(2.0, start=0.0, settle=2.0, length=5.0)
     # V = a + b t + c t² + d t³ with V(0) = 6, V'(0) = 2, V(2) = V'(2) = 0.
     c, d = np.linalg.solve([[4.0, 8.0], [4.0, 12.0]], [-10.0, -2.0])
     t = np.linspace(0.0, 2.0, 21)
@@ -170,19 +161,15 @@ def test_any_return_ends_exactly_at_rest(amplitude, frequency, active, settle):
     m = maneuvers.sine(amplitude, frequency, settle=settle, length=length)
     assert m.length == length
     assert (m(length), m.slope(length)) == (0.0, 0.0)
-    hold = maneuvers.stairs([amplitude], dwell=active, settle=None)
-    m = hold + maneuvers.spline_return(settle)
-    assert m.length == hold.length + settle
-    assert (m(m.length), m.slope(m.length)) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(("before", "settle"), [(0.1, 0.2), (0.4, 0.7), (0.2, 7.9), (5.9, 6.2)])
 def test_lengths_are_exact_where_the_return_is_longer_than_what_precedes_it(before, settle):
     # The length is a rounded sum, (0.1 + 0.2) − 0.1 > 0.2, and its last stamp may lie before it,
     # 0.3 < 0.1 + 0.2: at both the return is over, to the last bit.
-    hold = maneuvers.stairs([5.0], dwell=before, start=0.0, settle=None)
+    hold = maneuvers.stairs([5.0], dwell=before, start=0.0, settle=settle)
     sine = maneuvers.sine(3.0, 0.2, start=0.0, settle=settle, length=before + settle)
-    for m in (hold + maneuvers.spline_return(settle), sine):
+    for m in (hold, sine):
         assert m.length == before + settle
         assert (m(m.length), m.slope(m.length)) == (0.0, 0.0)
         assert m.sample(10.0).size == round(10 * (before + settle)) + 1
@@ -261,7 +248,6 @@ def together(parts):
             lambda p: (maneuvers.superpose(p[0][0], p[1][0]), p[0][1] + p[1][1])
         ),
         st.tuples(parts, st.floats(-2.0, 2.0)).map(lambda p: (p[1] * p[0][0], abs(p[1]) * p[0][1])),
-        st.tuples(parts, seconds).map(lambda p: (p[0][0] + maneuvers.spline_return(p[1]), p[0][1])),
     )
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive
-from swashplate.parameters import CATALOGUE, COLUMNS, DEFAULTS, REFINEMENTS, broken_rules
+from swashplate.parameters import CATALOGUE, DEFAULTS, REFINEMENTS, broken_rules
 
 
 def test_every_parameter_says_what_it_is() -> None:
@@ -25,13 +25,6 @@ def test_what_is_switched_on_can_be_estimated() -> None:
             assert 0.0 < each.least < each.upper
         if each.switch:
             assert DEFAULTS[symbol] == 0.0
-
-
-def test_directions() -> None:
-    assert COLUMNS["Z16_minus"] == "Z16"
-    assert COLUMNS["omega_plus"] == "omega"
-    assert COLUMNS["tau"] == "tau"
-    assert len(COLUMNS) == 2 * 13 + 1 + 28
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from swashplate.analysis import (
     trial,
     what_if,
 )
-from swashplate.full_order.comparison import compare
+from swashplate.full_order import compare
 from swashplate.report import figures
 from swashplate.report.lines import COLUMNS, MOST_SPANS, SHADES
 from swashplate.units import shown_in

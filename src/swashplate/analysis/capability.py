@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,18 +34,12 @@ NEARLY_FULL = (1.0 - 1e-9) * FULL_VOLTAGE
 """An edge beyond is none: the speed grows up to full voltage. [V]"""
 
 
-class Edge(NamedTuple):
-    """A voltage up to which something holds on the way from 0 V, and the next one beyond it."""
-
-    inside: float  # [V]
-    outside: float | None  # None where it holds up to full voltage. [V]
-
-
-def edge(holds: Callable[[Array], Mask], end: float) -> Edge:
-    """The last command on the way from 0 V to `end` [V] before something first fails to hold.
+def edge(holds: Callable[[Array], Mask], end: float) -> tuple[float, float | None]:
+    """The last command on the way from 0 V to `end` [V] before something first fails to hold. [V]
 
     `holds` says of commands [V], element by element, whether it does. Both sides of the edge, at
-    most 1e-12 V apart; 0 V inside where it does not even hold there.
+    most 1e-12 V apart: the one inside, 0 V where it does not even hold there, and the one outside,
+    None where it holds up to the end.
     """
     low, high, found = 0.0, end, False
     while abs(high - low) > CLOSE:
@@ -55,15 +49,18 @@ def edge(holds: Callable[[Array], Mask], end: float) -> Edge:
             break
         first, found = int(np.argmax(failed)), True
         if first == 0:
-            return Edge(0.0, float(grid[0]))
+            return 0.0, float(grid[0])
         if (low, high) == (float(grid[first - 1]), float(grid[first])):
             break
         low, high = float(grid[first - 1]), float(grid[first])
-    return Edge(low, high) if found else Edge(end, None)
+    return (low, high) if found else (end, None)
 
 
-def dead_zone(drive: Drive, way: float) -> Edge:
-    """Commands of one way, +1 or -1, whose current stays within Z17, so that no force acts."""
+def dead_zone(drive: Drive, way: float) -> tuple[float, float | None]:
+    """Commands of one way, +1 or -1, up to which the current stays within Z17 and no force acts.
+
+    The last one [V], and the first one beyond [V], None where there is none up to ±10 V.
+    """
     dead = drive.parameters.numbers["Z17"]
     return edge(lambda volts: np.abs(drive.steady_current(volts)) <= dead, way * FULL_VOLTAGE)
 
@@ -71,17 +68,15 @@ def dead_zone(drive: Drive, way: float) -> Edge:
 def saturation(drive: Drive, way: float) -> float | None:
     """Command beyond which the steady speed stays as it is, None where it grows up to ±10 V. [V]"""
     full = drive.steady_speed(way * FULL_VOLTAGE)
-    found = edge(lambda volts: drive.steady_speed(volts) != full, way * FULL_VOLTAGE)
-    if found.outside is None or abs(found.inside) > NEARLY_FULL:
-        return None
-    return found.outside
+    inside, outside = edge(lambda volts: drive.steady_speed(volts) != full, way * FULL_VOLTAGE)
+    return None if abs(inside) > NEARLY_FULL else outside
 
 
 # --- acceleration ---------------------------------------------------------------------------------
 
 AcceleratedBy = Literal["valve", "spool stop", "orifice"]
 
-CODES: tuple[AcceleratedBy, ...] = ("valve", "spool stop", "orifice")
+CODES: tuple[AcceleratedBy, ...] = get_args(AcceleratedBy)
 """What sets the flow to the stroking piston: the opening that the solenoids can give, the spool's
 stop Z14, or the in-line orifice Z16."""
 
@@ -174,13 +169,6 @@ SHORTEST, LONGEST = 8.0, 256.0
 """A step lasts so long at first, and at most, until the speed has come to stay. [s]"""
 
 
-class Times(NamedTuple):
-    """How fast a full step is answered. [s]"""
-
-    rise: float  # From 10 % to 90 % of the change of speed.
-    reach: float  # From the command to 90 % of the change.
-
-
 @dataclass(frozen=True)
 class Way(Result):
     """What a drive can do one way; everything carries that way's sign, gains are positive. SI."""
@@ -190,7 +178,8 @@ class Way(Result):
     """Steady speed just beyond it: nothing slower can be held, save the creep. [rad/s]"""
     gain: float | None
     """Mean slope of the steady map from the dead zone to saturation or ±10 V. [rad/(s V)]"""
-    gain_range: tuple[float, float] | None  # Smallest and largest slope there. [rad/(s V)]
+    smallest_gain: float | None
+    largest_gain: float | None  # Slopes there. [rad/(s V)]
     saturation_voltage: float | None
     """Command beyond which the speed stays; None where it grows up to ±10 V. [V]"""
     top_speed: float  # Steady speed at ±10 V. [rad/s]
@@ -198,8 +187,11 @@ class Way(Result):
     """Speed with the swash plate at its stop, or where Z15 holds the pressure. [rad/s]"""
     acceleration: float  # At rest, under ±10 V. [rad/s²]
     accelerated_by: AcceleratedBy  # What sets it.
-    starting: Times | None  # From rest under a step to ±10 V; None where nothing moves.
-    stopping: Times | None  # From there after the command is gone.
+    starting_rise: float | None
+    """From 10 % to 90 % of a step to ±10 V from rest; None where nothing moves. [s]"""
+    starting_reach: float | None  # From that command to 90 %. [s]
+    stopping_rise: float | None
+    stopping_reach: float | None  # The same after the command is gone. [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +223,7 @@ class Envelope(Tabular):
         )
         made = Table("", (*heads, UNIT))
         for key, words, unit, spec in QUANTITIES:
-            made.add(Cell(key, words), *(_read(way, key) for way in ways), unit=unit, spec=spec)
+            made.add(Cell(key, words), *(getattr(way, key) for way in ways), unit=unit, spec=spec)
             if key == "acceleration":
                 by = (Cell(None, way.accelerated_by) for way in ways)
                 made.add(Cell("accelerated_by", "... set by the"), *by)
@@ -262,16 +254,6 @@ QUANTITIES = (
     ("stopping_reach", "stopping, to 90 %", "s", ""),
 )
 """Rows of the table: name in a file and in words, unit and format."""
-
-
-def _read(way: Way, key: str) -> float | None:
-    step, _, part = key.partition("_")
-    if step in ("starting", "stopping"):
-        return getattr(getattr(way, step), part, None)
-    if key.endswith("_gain"):
-        return None if way.gain_range is None else way.gain_range[key == "largest_gain"]
-    value: float | None = getattr(way, key)
-    return value
 
 
 def envelope(drive: Drive) -> Envelope:
@@ -309,44 +291,43 @@ def envelope(drive: Drive) -> Envelope:
 
 
 def _way(drive: Drive, way: float, limit: float) -> Way:
-    dead, full = dead_zone(drive, way), way * FULL_VOLTAGE
+    (inside, outside), full = dead_zone(drive, way), way * FULL_VOLTAGE
     top = float(drive.steady_speed(full))
     acceleration, by = starting_acceleration(drive, way)
-    if dead.outside is None:  # no command moves it
-        return Way(dead.inside, top, None, None, None, top, limit, acceleration, by, None, None)
+    if outside is None:  # no command moves it
+        return Way(inside, top, *(None,) * 4, top, limit, acceleration, by, *(None,) * 4)
     saturated = saturation(drive, way)
     end = full if saturated is None else saturated
-    volts = np.linspace(dead.outside, end, GAIN_POINTS)
+    volts = np.linspace(outside, end, GAIN_POINTS)
     speeds = drive.steady_speed(volts)
     slopes = np.diff(speeds) / np.diff(volts)
     return Way(
-        dead.inside,
+        inside,
         float(speeds[0]),
         float((speeds[-1] - speeds[0]) / (volts[-1] - volts[0])),
-        (float(slopes.min()), float(slopes.max())),
+        float(slopes.min()),
+        float(slopes.max()),
         saturated,
         top,
         limit,
         acceleration,
         by,
-        _times(drive, 0.0, full),
-        _times(drive, full, 0.0),
+        *_times(drive, 0.0, full),
+        *_times(drive, full, 0.0),
     )
 
 
-def _times(drive: Drive, before: float, after: float) -> Times | None:
-    """Times of a step between two commands that are both settled."""
+def _times(drive: Drive, before: float, after: float) -> tuple[float | None, float | None]:
+    """Times from 10 % to 90 % and to 90 % of a step between two settled commands. [s]"""
     first, last = (float(drive.steady_speed(volts)) for volts in (before, after))
-    if first == last:
-        return None
     length = SHORTEST
-    while length <= LONGEST:
+    while first != last and length <= LONGEST:
         command = np.full(int(length * SOURCE_RATE) + 1, after)
         command[0] = before
         run = drive.simulate(command, start="steady")
         done = (run.shaft_speed - first) / (last - first)
         if done.max() >= HIGH:
             low, high = (float(run.time[np.argmax(done >= part)]) for part in (LOW, HIGH))
-            return Times(high - low, high)
+            return high - low, high
         length *= 2.0
-    return None
+    return None, None

@@ -1,8 +1,8 @@
-"""Inverse of a drive's steady map: dead zone, creep and saturation made up for."""
+"""Inverse of a drive's steady map: dead zone, creep and saturation made up for, what it buys."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.capability import dead_zone, saturation, starting_acceleration
+from swashplate.analysis.outcomes import rms_difference
 from swashplate.drive import Drive
+from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result, short
@@ -19,6 +21,8 @@ from swashplate.tables import UNIT, Column, Form, Table, ending, write_table, wr
 
 if TYPE_CHECKING:
     import polars
+
+    from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
 
@@ -93,22 +97,8 @@ class InverseMap(Result):
     def voltage(self, speed: ArrayLike, *, clip: bool = False) -> Array:
         """Voltage for wanted speeds, element by element; it never falls where the speed rises.
 
-        Parameters
-        ----------
-        speed : array_like
-            Wanted speeds of any shape. [rad/s]
-        clip : bool
-            Take the limit for a speed beyond it instead of refusing it.
-
-        Returns
-        -------
-        array
-            [V]
-
-        Raises
-        ------
-        InputError
-            For a speed beyond the limits, or one that is no finite number.
+        Wanted speeds of any shape [rad/s]; one beyond the limits is refused in an `InputError`, as
+        is one that is no finite number, or with `clip` the limit is taken. [V]
         """
         wanted = _finite(speed)
         low, high = self.limits
@@ -122,12 +112,10 @@ class InverseMap(Result):
             )
         wanted = np.clip(wanted, low, high)
         below, above = self.gap
-        held = np.array([below, self.creep, above])
-        volts = np.array([self.minus.voltage[-1], 0.0, self.plus.voltage[0]])
         # the creep comes first, so that it wins a tie
-        order = np.array([1, 0, 2])
-        away = np.abs(wanted[..., np.newaxis] - held[order])
-        found = volts[order][np.argmin(away, axis=-1)]
+        held = np.array([self.creep, below, above])
+        volts = np.array([0.0, self.minus.voltage[-1], self.plus.voltage[0]])
+        found = volts[np.argmin(np.abs(wanted[..., np.newaxis] - held), axis=-1)]
         found = np.where(wanted > above, np.interp(wanted, *self.plus), found)
         return np.asarray(np.where(wanted < below, np.interp(wanted, *self.minus), found))
 
@@ -180,13 +168,19 @@ class InverseMap(Result):
             }
         )
 
-    def to_toml(self, path: str | Path) -> None:
-        """Write the map for a controller.
+    def write(self, path: str | Path) -> None:
+        """Write the map as .toml for a controller, or as a table (`to_polars`) .csv or .parquet.
 
-        If the file cannot be written (`FileError`), an older one of that name stays as it was.
+        Raises
+        ------
+        FileError
+            For another ending or a place that cannot be written.
         """
         from tomlkit import dumps
 
+        if ending(path, INVERSE_MAP) != ".toml":
+            write_table(self.to_polars(), path)
+            return
         content = {
             "format": 1,
             "drive": self.name,
@@ -201,26 +195,11 @@ class InverseMap(Result):
         }
         write_text(COMMENTS + dumps(content), path)
 
-    def write(self, path: str | Path) -> None:
-        """Write the map as .toml, or the table of `to_polars` as .csv or .parquet.
-
-        Raises
-        ------
-        FileError
-            For another ending or a place that cannot be written.
-        """
-        if ending(path, INVERSE_MAP) == ".toml":
-            self.to_toml(path)
-        else:
-            write_table(self.to_polars(), path)
-
     def tables(self) -> list[Table]:
         """The map, at a few points each way, and between which limits it holds."""
         made = Table("", (Column("speed", "z.3f", "rad/s"), Column("voltage", "z.4f", "V")))
-        for branch in (self.minus, None, self.plus):
-            if branch is None:
-                made.add(self.creep, 0.0)
-                continue
+        rest = Branch(np.array([self.creep]), np.zeros(1))
+        for branch in (self.minus, rest, self.plus):
             size = branch.speed.size
             for n in np.unique(np.linspace(0, size - 1, min(MOST_SHOWN, size)).round().astype(int)):
                 made.add(float(branch.speed[n]), float(branch.voltage[n]))
@@ -306,7 +285,7 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
 
 def _branch(drive: Drive, way: float, points: int) -> Branch:
     """Points of one way, from the lower voltage to the higher."""
-    start = dead_zone(drive, way).outside
+    start = dead_zone(drive, way)[1]
     end = saturation(drive, way)
     end = way * FULL_VOLTAGE if end is None else end
     side = "positive" if way > 0.0 else "negative"
@@ -343,12 +322,108 @@ def _lag(drive: Drive, plus: Branch, minus: Branch) -> float:
     return 0.5 * sum(lags)
 
 
-# --- tables ---------------------------------------------------------------------------------------
-
-
 def wanted_table(found: InverseMap, speeds: Sequence[float]) -> Table:
     """The voltage for each wanted speed. [rad/s]"""
     made = Table("", (Column("wanted speed", "g", "rad/s"), Column("voltage", "z.4f", "V")))
     for speed, voltage in zip(speeds, found.voltage(speeds), strict=True):
         made.add(speed, float(voltage))
     return made
+
+
+# --- what the map buys ----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Improvement(Result):
+    """A wanted speed commanded in several ways, the plainest first."""
+
+    name: str  # Name of the drive.
+    wanted: Array  # (n,). [rad/s]
+    runs: Mapping[str, Simulation]
+    """``"straight line"``, ``"inverse map"`` and ``"inverse map and lead"``."""
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Rms of speed less wanted speed of each way. [rad/s]"""
+        return {k: rms_difference(run.shaft_speed, self.wanted) for k, run in self.runs.items()}
+
+    def table(self, command: str) -> Table:
+        """Errors of the speed under a command, by its name, controller by controller.
+
+        Raises
+        ------
+        InputError
+            If the command asks for standstill only.
+        """
+        rms = self.rms
+        plainest = next(iter(rms.values()))
+        if plainest == 0.0:
+            raise InputError(
+                f"{command} asks for nothing but standstill; take one that moves the drive."
+            )
+        heads = (("Controller",), ("rms", ".3f", "rad/s"), ("largest", ".3f", "rad/s"))
+        columns = (*(Column(*head) for head in heads), Column("rms", ".1%"))
+        made = Table(f"Error of the speed under {command}", columns)
+        for name, run in self.runs.items():
+            largest = float(np.abs(run.shaft_speed - self.wanted).max())
+            made.add(name, rms[name], largest, rms[name] / plainest)
+        return made
+
+
+def proportional_command(inverse: InverseMap, wanted: ArrayLike) -> Array:
+    """Voltage of a controller that knows nothing of the drive but its full speed each way. [V]
+
+    A straight line each way from 0 V at standstill to the saturation voltage at the limit.
+    """
+    speed, (low, high) = np.asarray(wanted, dtype=np.float64), inverse.limits
+    up, down = inverse.plus.voltage[-1] / high, inverse.minus.voltage[0] / low
+    return np.asarray(np.where(speed >= 0.0, up * speed, down * speed))
+
+
+def wanted_of_stick(inverse: InverseMap, voltage: ArrayLike) -> Array:
+    """Speed that a stick asks for: in proportion, ±10 V for the full speed of that way. [rad/s]"""
+    volts, (low, high) = np.asarray(voltage, dtype=np.float64), inverse.limits
+    return np.asarray(np.where(volts >= 0.0, 0.1 * high * volts, -0.1 * low * volts))
+
+
+def improvement(
+    drive: Drive,
+    wanted_speed: ArrayLike,
+    rate: float = SOURCE_RATE,
+    *,
+    inverse: InverseMap | None = None,
+) -> Improvement:
+    """What the inverse map buys: a wanted speed simulated with and without it.
+
+    Parameters
+    ----------
+    drive : Drive
+        What is driven.
+    wanted_speed : (n,) array_like
+        [rad/s]
+    rate : float
+        Its samples a second. [Hz]
+    inverse : InverseMap, optional
+        The map to use, of another drive perhaps, to see what a wrong one does; by default this
+        drive's own.
+
+    Returns
+    -------
+    Improvement
+        Runs by `proportional_command`, `InverseMap.voltage` and `InverseMap.command`.
+
+    Raises
+    ------
+    InputError
+        For a wanted speed beyond the drive's limits, or a record that cannot be simulated.
+    """
+    chosen = inverse_map(drive) if inverse is None else inverse
+    led = chosen.command(wanted_speed, rate)
+    wanted = np.array(wanted_speed, dtype=np.float64)
+    commands = {
+        "straight line": proportional_command(chosen, wanted),
+        "inverse map": chosen.voltage(wanted),
+        "inverse map and lead": led,
+    }
+    runs = {name: drive.simulate(voltage, rate) for name, voltage in commands.items()}
+    return Improvement(drive.name, wanted, runs)

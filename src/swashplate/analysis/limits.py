@@ -1,11 +1,11 @@
-"""Limits: which acts when, and what each of them costs a command."""
+"""Limits of a drive, and what each of them costs a command."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import atan, inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,38 +27,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# --- when -----------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class LimitTimeline(Result):
-    """Stretches of time in which limits act; several can act at once."""
-
-    limits: tuple[Limit, ...]  # Those that act anywhere, in the order of the chain.
-    spans: tuple[Array, ...]  # For each of them beginning and end of every stretch, (m, 2). [s]
-    shares: tuple[float, ...]  # For each of them the share of the samples at which it acts.
-
-
-def limit_timeline(run: Simulation) -> LimitTimeline:
-    """Which limit acts when in a simulation.
-
-    A sample stands for the time up to half way to its neighbours, the first and the last for half
-    as much.
-    """
-    acting = [limit for limit in Limit if run.active(limit).any()]
-    return LimitTimeline(
-        tuple(acting),
-        tuple(_spans(run.active(limit), run.time) for limit in acting),
-        tuple(float(run.active(limit).mean()) for limit in acting),
-    )
-
-
-def _spans(active: NDArray[np.bool_], time: Array) -> Array:
-    turns = np.flatnonzero(np.diff(active, prepend=False, append=False))
-    middles = np.concatenate((time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]))
-    return np.stack((middles[turns[::2]], middles[turns[1::2]]), axis=1)
-
-
 # --- limits that can be taken away ----------------------------------------------------------------
 
 FEEDBACK_ARM = 0.98
@@ -67,88 +35,76 @@ form of the spool ends."""
 WIDEST = 1.5  # Largest angle of a plate without a stop; the model ends at a right angle. [rad]
 
 
-@dataclass(frozen=True)
-class Removal(Result):
+class Removal(NamedTuple):
     """A limit, the component behind it, and the changes that take it away."""
 
     limit: str  # In words.
     component: str  # What would have to change in the machine.
-    changes: Callable[[Drive], Mapping[str, Change]]
-    eased_by: Callable[[Drive], dict[str, float]]
+    changes: Mapping[str, Change] | Callable[[Mapping[str, float]], Mapping[str, Change]]
+    """What takes it away, the same for every drive or of its values."""
+    eased_by: Mapping[str, float] | Callable[[Mapping[str, float]], Mapping[str, float]]
     """Factors on levers that ease the limit under the same command; none where that needs another
     command as well."""
     flag: Limit | None = None
     """How a simulation marks it, None for what acts always or is not marked."""
 
-    def of(self, drive: Drive) -> dict[str, Change]:
-        """The changes that alter anything in this drive; none if it has no such limit."""
-        numbers, made = drive.parameters.numbers, {}
-        for name, value in self.changes(drive).items():
+    def of(self, drive: Drive) -> tuple[dict[str, Change], dict[str, float]]:
+        """The changes that alter anything in this drive, none if it has no such limit; factors."""
+        numbers = drive.parameters.numbers
+        changes = self.changes(numbers) if callable(self.changes) else self.changes
+        eased = self.eased_by(numbers) if callable(self.eased_by) else self.eased_by
+        made = {}
+        for name, value in changes.items():
             both = drive[name].values if name in drive.parameters else (numbers[name],)
             if any(value != old for old in both):
                 made[name] = value
-        return made
+        return made, dict(eased)
 
 
-def _dead_zone(drive: Drive) -> tuple[dict[str, Change], dict[str, float]]:
-    """What takes the dead zone away, and the factors that do the same."""
-    numbers = drive.parameters.numbers
-    dead = numbers["Z17"]
-    # with the card's jump left as it is, a solenoid's dead zone beyond it would stay
-    covered = min(dead, numbers["J_plus"], numbers["J_minus"])
-    eased = {} if covered == dead else {"Z17": covered / dead}
-    return {"V_dz": 0.0, "Z17": covered}, {"dead_zone": 0.0, **eased}
+def _covered(numbers: Mapping[str, float]) -> float:
+    """Dead zone of the solenoids that the card's jump covers: more of it would stay. [A]"""
+    return min(numbers["Z17"], numbers["J_plus"], numbers["J_minus"])
 
 
-def _swash_stop(drive: Drive) -> dict[str, Change]:
-    numbers = drive.parameters.numbers
+def _dead_zone_eased(numbers: Mapping[str, float]) -> dict[str, float]:
+    covered, dead = _covered(numbers), numbers["Z17"]
+    return {"dead_zone": 0.0} | ({} if covered == dead else {"Z17": covered / dead})
+
+
+def _swash_stop(numbers: Mapping[str, float]) -> dict[str, Change]:
     widest = min(atan(FEEDBACK_ARM / numbers["Z3"]), WIDEST)
     return {name: max(widest, numbers[name]) for name in ("Z13_plus", "Z13_minus")}
-
-
-def _removal(
-    limit: str,
-    component: str,
-    changes: Mapping[str, Change],
-    eased_by: dict[str, float],
-    flag: Limit | None = None,
-) -> Removal:
-    """A limit that the same changes take away in any drive."""
-    return Removal(limit, component, lambda _: changes, lambda _: eased_by, flag)
 
 
 REMOVALS = (
     Removal(
         *("dead zone", "card: dead-zone compensation (V_dz, or an inverse map)"),
-        lambda drive: _dead_zone(drive)[0],
-        lambda drive: _dead_zone(drive)[1],
-        Limit.DEAD_ZONE,
+        lambda numbers: {"V_dz": 0.0, "Z17": _covered(numbers)},
+        *(_dead_zone_eased, Limit.DEAD_ZONE),
     ),
-    _removal(
+    Removal(
         *("current rate", "card: faster ramp (lim1, lim2)", {"lim1": inf, "lim2": inf}),
         *({"rate_limits": 1.5}, Limit.CURRENT_RATE),
     ),
-    _removal("final decay", "card: no decay of the current (I_t2)", {"I_t2": 0.0}, {"I_t2": 0.5}),
-    _removal("delay", "card: shorter delay (tau)", {"tau": 0.0}, {"tau": 0.5}),
-    _removal(
+    Removal("final decay", "card: no decay of the current (I_t2)", {"I_t2": 0.0}, {"I_t2": 0.5}),
+    Removal("delay", "card: shorter delay (tau)", {"tau": 0.0}, {"tau": 0.5}),
+    Removal(
         *("orifice", "in-line orifice: larger bore (Z16)", {"Z16": inf}),
         *({"orifice": 1.5}, Limit.ORIFICE),
     ),
-    _removal(
+    Removal(
         *("spool stop", "spool: longer stroke (Z14)", {"Z14": inf}),
         *({"spool_stroke": 1.5}, Limit.SPOOL),
     ),
     Removal(
-        *("swash stop", "pump: larger, or a smaller motor (Z10, Z13)"),
-        _swash_stop,
-        lambda _: {},
+        *("swash stop", "pump: larger, or a smaller motor (Z10, Z13)", _swash_stop, {}),
         Limit.SWASH_STOP,
     ),
-    _removal(
+    Removal(
         *("relief valve", "relief valve: higher setting (Z15)", {"Z15": inf}),
         *({"relief": 1.5}, Limit.RELIEF),
     ),
-    _removal("plussing", "spool: centred at rest (Z18)", {"Z18": 0.0}, {"plussing": 0.0}),
+    Removal("plussing", "spool: centred at rest (Z18)", {"Z18": 0.0}, {"plussing": 0.0}),
 )
 """What can be taken away, in the order of the chain; the plussing, which no force limits, because
 the creep that it makes is an error, too."""
@@ -314,13 +270,14 @@ def limit_shares(
     run = drive.simulate(
         voltage, rate, time=time, interpolation=interpolation, start=start, clip=clip
     )
-    present = {each: changes for each in REMOVALS if (changes := each.of(drive))}
-    built = {each: _changed(drive, changes) for each, changes in present.items()}
-    unlimited, removed = drive, dict[Removal, dict[str, Change]]()
-    for removal, changes in present.items():  # as many at once as the model's domain allows
+    present = [(each, *each.of(drive)) for each in REMOVALS]
+    present = [each for each in present if each[1]]
+    built = {removal.limit: _changed(drive, changes) for removal, changes, _ in present}
+    unlimited, removed = drive, dict[str, dict[str, Change]]()
+    for removal, changes, _ in present:  # as many at once as the model's domain allows
         more = _changed(unlimited, changes)
-        if not isinstance(built[removal], str) and not isinstance(more, str):
-            unlimited, removed[removal] = more, changes
+        if not isinstance(built[removal.limit], str) and not isinstance(more, str):
+            unlimited, removed[removal.limit] = more, changes
     asked = _free_speed(unlimited, run, start) if wanted is None else np.array(wanted, dtype=float)
     if asked.shape != run.shaft_speed.shape or not np.isfinite(asked).all():
         raise InputError(
@@ -339,10 +296,9 @@ def limit_shares(
         return rms_difference(again.shaft_speed, asked), ""
 
     shares = []
-    for removal, changes in present.items():
-        without, failure = error_of(built[removal])
-        others = {k: v for each, c in removed.items() if each is not removal for k, v in c.items()}
-        eased_by = removal.eased_by(drive)
+    for removal, changes, eased_by in present:
+        without, failure = error_of(built[removal.limit])
+        others = [c for limit, c in removed.items() if limit != removal.limit]
         fall = None
         if without is not None:
             fall = (error - without) / error if error > 0.0 else 0.0
@@ -354,7 +310,7 @@ def limit_shares(
                 None if removal.flag is None else time_share(run, removal.flag),
                 without,
                 fall,
-                error_of(_changed(drive, others))[0],
+                error_of(_changed(drive, {k: v for c in others for k, v in c.items()}))[0],
                 eased_by,
                 error_of(_changed(drive, eased_by, pulled))[0] if eased_by else None,
                 failure,

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from json import JSONDecodeError, loads
 from pathlib import Path
 
@@ -38,7 +37,7 @@ class Draws(Result):
     drives: tuple[Drive, ...]
     redrawn: int
     """Draws that were outside the parameters' bounds or the model's domain, and drawn again."""
-    held: tuple[str, ...] = ()
+    fixed: tuple[str, ...] = ()
     """Parameters that stay as fitted: at a bound or not determined by the tests."""
 
     def pulled(self, factors: Mapping[str, float]) -> Draws:
@@ -54,9 +53,9 @@ class Draws(Result):
     def sentences(self) -> tuple[str, ...]:
         """What the draws rest on."""
         said = []
-        if self.held:
+        if self.fixed:
             said.append(
-                f"Not drawn, as fitted in all drives: {', '.join(self.held)}; the bands leave out "
+                f"Not drawn, as fitted in all drives: {', '.join(self.fixed)}; the bands leave out "
                 "what their errors would add."
             )
         if self.redrawn:
@@ -67,44 +66,15 @@ class Draws(Result):
         return tuple(said)
 
 
-def _drawn(once: Callable[[], ParameterSet | None], draws: int) -> tuple[tuple[Drive, ...], int]:
-    """As many drives as wanted, and how often one was drawn again: `once` gave none."""
-    if draws < 1:
-        raise InputError(f"There must be at least one draw, not {draws}.")
-    made: list[Drive] = []
-    redrawn = 0
-    while len(made) < draws:
-        parameters = once()
-        if parameters is not None:
-            made.append(Drive(parameters))
-            continue
-        redrawn += 1
-        if redrawn > MOST_REDRAWN * (len(made) + 10):
-            raise InputError(
-                f"Of {redrawn + len(made)} draws only {len(made)} lie within the bounds "
-                "and the model's domain: the errors are too large for a Monte Carlo; test more, or "
-                "free fewer parameters."
-            )
-    return tuple(made), redrawn
-
-
-@dataclass(frozen=True, eq=False)
-class Deviations:
-    """Errors of one stage's vector."""
-
-    own: Array  # (K, K) covariance of its own noise.
-    slopes: Mapping[int, Array] = field(default_factory=dict)
-    """By the number of an earlier stage (K, K_earlier): by how much its errors move this one's."""
-
-    @cached_property
-    def axes(self) -> tuple[Array, Array]:
-        """(K,) standard deviations along the covariance's own axes, and (K, K) these as columns."""
-        values, directions = np.linalg.eigh(self.own)
-        return np.sqrt(np.maximum(values, 0.0)), directions
-
-
-def draw_deviations(stages: Sequence[Deviations], random: np.random.Generator) -> tuple[Array, ...]:
+def _errors(
+    covariances: Sequence[Array],
+    slopes: Sequence[Mapping[int, Array]],
+    random: np.random.Generator,
+) -> list[Array]:
     """Errors of all stages' vectors, (K,) each, drawn together; stages in the order of the fit.
+
+    `covariances` (K, K) are those of each stage's own noise, `slopes` (K, K_earlier) by the number
+    of an earlier stage by how much its errors move this one's.
 
     Notes
     -----
@@ -112,13 +82,12 @@ def draw_deviations(stages: Sequence[Deviations], random: np.random.Generator) -
     is the quoted covariance, and cov(δ₂, δ₁) = S cov(δ₁).
     """
     drawn: list[Array] = []
-    for each in stages:
-        deviations, directions = each.axes
-        error = directions @ (deviations * random.normal(size=deviations.size))
-        for earlier, slopes in each.slopes.items():
-            error = error + slopes @ drawn[earlier]
-        drawn.append(error)
-    return tuple(drawn)
+    for own, moved in zip(covariances, slopes, strict=True):
+        error = random.multivariate_normal(
+            np.zeros(len(own)), own, check_valid="ignore", method="eigh"
+        )
+        drawn.append(error + sum(slope @ drawn[earlier] for earlier, slope in moved.items()))
+    return drawn
 
 
 def drives(assessments: Sequence[Assessment], draws: int = 200, seed: int = 0) -> Draws:
@@ -146,51 +115,67 @@ def drives(assessments: Sequence[Assessment], draws: int = 200, seed: int = 0) -
     """
     if not assessments:
         raise InputError("A Monte Carlo needs the assessment of at least one stage.")
-    stages = [_deviations(assessments, number) for number in range(len(assessments))]
-    random = np.random.default_rng(seed)
-
-    def once() -> ParameterSet | None:
-        parameters: ParameterSet | None = None
-        for each, error in zip(assessments, draw_deviations(stages, random), strict=True):
-            problem, model = each.stage.problem, each.stage.problem.model
-            assert isinstance(model, DriveModel)
-            vector = each.stage.solution.vector + error
-            low, high = problem.unknowns.bounds
-            if ((vector < low) | (vector > high))[each.uncertainty.own.determined].any():
-                return None
-            begin = model.parameters if parameters is None else parameters
-            try:
-                # a model of its own: the fitted one keeps what it made for other parameters
-                parameters = DriveModel(begin, model.part, forces=model.forces).parameters_at(
-                    problem.unknowns.targets(vector, "")
-                )
-            except DomainError:
-                return None
-        return parameters
-
-    held = tuple(
+    if draws < 1:
+        raise InputError(f"There must be at least one draw, not {draws}.")
+    known = [each.uncertainty for each in assessments]
+    covariances = [each.own.matrix for each in known]
+    slopes = [
+        {
+            earlier: each.slopes
+            for each in found.handed
+            for earlier in range(number)
+            if known[earlier].quoted is each.covariance
+        }
+        for number, found in enumerate(known)
+    ]
+    random, made, redrawn = np.random.default_rng(seed), list[Drive](), 0
+    while len(made) < draws:
+        parameters = _parameters(assessments, _errors(covariances, slopes, random))
+        if parameters is not None:
+            made.append(Drive(parameters))
+            continue
+        redrawn += 1
+        if redrawn > MOST_REDRAWN * (len(made) + 10):
+            raise InputError(
+                f"Of {redrawn + len(made)} draws only {len(made)} lie within the bounds "
+                "and the model's domain: the errors are too large for a Monte Carlo; test more, or "
+                "free fewer parameters."
+            )
+    fixed = tuple(
         unknown.name
         for each in assessments
-        for unknown, known in zip(
+        for unknown, determined in zip(
             each.stage.problem.unknowns, each.uncertainty.own.determined, strict=True
         )
-        if not known and unknown.run is None
+        if not determined and unknown.run is None
     )
-    return Draws(*_drawn(once, draws), held)
+    return Draws(tuple(made), redrawn, fixed)
 
 
-def _deviations(assessments: Sequence[Assessment], number: int) -> Deviations:
-    found = assessments[number].uncertainty
-    slopes = {
-        earlier: each.slopes
-        for each in found.handed
-        for earlier in range(number)
-        if assessments[earlier].uncertainty.quoted is each.covariance
-    }
-    return Deviations(found.own.matrix, slopes)
+def _parameters(assessments: Sequence[Assessment], errors: Sequence[Array]) -> ParameterSet | None:
+    """The set with each stage's vector off by an error, None outside bounds or domain."""
+    parameters: ParameterSet | None = None
+    for each, error in zip(assessments, errors, strict=True):
+        problem, model = each.stage.problem, each.stage.problem.model
+        assert isinstance(model, DriveModel)
+        vector = each.stage.solution.vector + error
+        low, high = problem.unknowns.bounds
+        if ((vector < low) | (vector > high))[each.uncertainty.own.determined].any():
+            return None
+        begin = model.parameters if parameters is None else parameters
+        try:
+            # a model of its own: the fitted one keeps what it made for other parameters
+            parameters = DriveModel(begin, model.part, forces=model.forces).parameters_at(
+                problem.unknowns.targets(vector, "")
+            )
+        except DomainError:
+            return None
+    return parameters
 
 
-STORED = "fit.json"  # File of a fit, in the folder that it wrote.
+# --- drives of a stored fit -----------------------------------------------------------------------
+
+STORED = "fit.json"  # What a fit's folder holds of it.
 
 
 def stored_draws(
@@ -304,19 +289,9 @@ def bands(drawn: Draws, voltage: ArrayLike, rate: float = 512.0, *, level: float
     if run.failures:
         raise DomainError(f"A drawn drive cannot be simulated: {next(iter(run.failures.values()))}")
     assert run.output is not None
-    run.output.sort(axis=0)
-    tail = 0.5 * (1.0 - level)
-    lower, median, upper = (_quantile(run.output, part) for part in (tail, 0.5, 1.0 - tail))
+    parts = 0.5 - 0.5 * level, 0.5, 0.5 + 0.5 * level
+    lower, median, upper = np.quantile(run.output, parts, axis=0, overwrite_input=True)
     return Bands(np.arange(volts.size) / rate, lower, median, upper, level, count)
-
-
-def _quantile(ordered: Array, part: float) -> Array:
-    """(n,) quantile of each column of sorted (m, n) values, between neighbours in proportion."""
-    place = part * (len(ordered) - 1)
-    below = int(place)
-    above = min(below + 1, len(ordered) - 1)
-    between: Array = ordered[below] + (place - below) * (ordered[above] - ordered[below])
-    return between
 
 
 def half_widths(result: WhatIf, draws: Draws, level: float = 0.95) -> Array:

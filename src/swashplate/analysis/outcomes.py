@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -30,7 +30,6 @@ Array = NDArray[np.float64]
 REST = 0.5  # A command that rests at 0 V this long lets the drive settle at its creep. [s]
 STOPPED = 1.0 - 1e-9  # Part of the speed limit from which the plate counts as at its stop.
 TURNED = 0.05  # Part of its range by which a command may turn back and still go one way.
-REACHED = 0.9  # Part of the settled speed that counts as reached.
 
 # --- a command to judge drives by -----------------------------------------------------------------
 
@@ -54,7 +53,7 @@ class Trial(Result):
         return first_move(self.voltage)
 
     @cached_property
-    def held(self) -> int:
+    def last(self) -> int:
         """The last sample at which the command is at its largest, either way."""
         size = np.abs(self.voltage)
         return int(np.flatnonzero(size >= size.max() - 1e-9)[-1])
@@ -65,7 +64,7 @@ class Trial(Result):
 
         Turning back by less than a twentieth of the way is noise.
         """
-        way = self.voltage[self.begin : self.held + 1] * np.sign(self.voltage[self.held])
+        way = self.voltage[self.begin : self.last + 1] * np.sign(self.voltage[self.last])
         return bool((np.maximum.accumulate(way) - way).max() <= TURNED * np.ptp(self.voltage))
 
     @property
@@ -187,7 +186,7 @@ def _reached(speed: Array, trial: Trial, part: float) -> Array:
     """(m,) time from the command's first move to a part of the final speed. [s]"""
     if not trial.goes_straight:
         return np.full(len(speed), np.nan)
-    rising = speed[:, trial.begin : trial.held + 1]
+    rising = speed[:, trial.begin : trial.last + 1]
     final = rising[:, -1]
     share = rising * np.sign(final)[:, None] - part * np.abs(final)[:, None]
     after = np.argmax(share >= 0.0, axis=1)  # the last sample always is
@@ -205,7 +204,7 @@ def _largest_acceleration(speed: Array, trial: Trial) -> Array:
 
 
 def _overshoot(speed: Array, trial: Trial) -> Array:
-    rising = speed[:, trial.begin : trial.held + 1]
+    rising = speed[:, trial.begin : trial.last + 1]
     final = rising[:, -1]
     peak, size = np.where(final > 0.0, rising.max(axis=1), -rising.min(axis=1)), np.abs(final)
     return np.where(size > 0.0, peak / np.where(size > 0.0, size, 1.0) - 1.0, np.nan)
@@ -227,7 +226,7 @@ _ALL = (
     Outcome(
         *("final_speed", "rad/s"),
         "Speed at the last moment at which the command is at its largest.",
-        lambda speed, trial: np.array(speed[:, trial.held]),
+        lambda speed, trial: np.array(speed[:, trial.last]),
     ),
     Outcome(
         *("peak_speed", "rad/s", "Largest speed, either way."),
@@ -274,11 +273,6 @@ OUTCOMES: Mapping[str, Outcome] = {each.name: each for each in _ALL}  # Outcomes
 # --- what a drive can do --------------------------------------------------------------------------
 
 Direction = Literal["both", "positive", "negative"]
-SIGNS: Mapping[Direction, tuple[float, ...]] = {
-    "both": (1.0, -1.0),
-    "positive": (1.0,),
-    "negative": (-1.0,),
-}
 STEP_LENGTH, STEP_RATE = 2.0, 512.0  # Of the full step that shows the largest acceleration. [s, Hz]
 
 
@@ -311,14 +305,23 @@ def performance(
     DomainError
         If the drive leaves the model's domain.
     """
-    signs = SIGNS[direction]
-    speed = min(abs(drive.steady_speed(sign * FULL_VOLTAGE)) for sign in signs)
-    acceleration = min(_acceleration(drive, sign) for sign in signs)
+    signs = [
+        sign
+        for name, sign in (("positive", 1.0), ("negative", -1.0))
+        if direction in (name, "both")
+    ]
+    speed, acceleration = np.inf, np.inf
+    for sign in signs:
+        voltage = np.full(int(STEP_LENGTH * STEP_RATE) + 1, sign * FULL_VOLTAGE)
+        voltage[0] = 0.0
+        speed = min(speed, abs(drive.steady_speed(float(voltage[-1]))))
+        change = sign * np.diff(drive.simulate(voltage, STEP_RATE).shaft_speed)
+        acceleration = min(acceleration, float(change.max() * STEP_RATE))
     error = None
     if follow is not None:
         run = drive.simulate(command_for(drive, follow), follow.rate)
         error = rms_difference(run.shaft_speed, follow.wanted)
-    return Performance(float(speed), acceleration, error)
+    return Performance(speed, acceleration, error)
 
 
 def command_for(drive: Drive, follow: Trial) -> Array:
@@ -326,14 +329,6 @@ def command_for(drive: Drive, follow: Trial) -> Array:
     plus, minus = (max(speed_per_volt(drive, sign), 1e-300) for sign in (1.0, -1.0))
     volts = follow.wanted / np.where(follow.wanted >= 0.0, plus, minus)
     return np.clip(volts, -FULL_VOLTAGE, FULL_VOLTAGE)
-
-
-def _acceleration(drive: Drive, sign: float) -> float:
-    """Largest acceleration in a direction after a full step. [rad/s²]"""
-    voltage = np.full(int(STEP_LENGTH * STEP_RATE) + 1, sign * FULL_VOLTAGE)
-    voltage[0] = 0.0
-    change = np.diff(drive.simulate(voltage, STEP_RATE).shaft_speed)
-    return float((sign * change).max() * STEP_RATE)
 
 
 def rms_difference(speed: Array, other: Array) -> float:
@@ -347,24 +342,12 @@ SAMPLES_AT_ONCE = 2**20
 """Samples of speed that a block of drives holds: 8 MB, whatever the number of drives."""
 
 
-@dataclass(frozen=True, eq=False)
-class BatchOutcomes(Result):
+class BatchOutcomes(NamedTuple):
     """Outcomes of many drives over one command."""
 
-    outcomes: tuple[Outcome, ...]
     values: Array
     """(m, K); NaN where a drive has no such outcome, and in all of a drive that failed."""
     failures: Mapping[int, str]  # Why a drive could not be simulated, by its number.
-
-    def sentences(self) -> Iterator[str]:
-        """What some of the drives that ran have not, and why."""
-        missing = np.isnan(np.delete(self.values, list(self.failures), axis=0)).sum(axis=0)
-        for each, number in zip(self.outcomes, missing, strict=True):
-            if number:
-                yield (
-                    f"{number} of {len(self.values)} variants have no {each.name}: "
-                    f"{each.undefined}."
-                )
 
 
 def batch_outcomes(
@@ -415,11 +398,8 @@ def batch_outcomes(
     size = max(SAMPLES_AT_ONCE // trial.voltage.size // LANES * LANES, LANES)
     with ThreadPoolExecutor(threads or available_cores()) as pool:
         done = list(pool.map(partial(block, size=size), range(0, count, size)))
-    return BatchOutcomes(
-        tuple(outcomes),
-        np.concatenate([kept for kept, _ in done]),
-        {k: why for _, failures in done for k, why in failures.items()},
-    )
+    failures = {k: why for _, failed in done for k, why in failed.items()}
+    return BatchOutcomes(np.concatenate([kept for kept, _ in done]), failures)
 
 
 # --- runs in words --------------------------------------------------------------------------------
@@ -438,19 +418,15 @@ def time_share(run: Simulation, limit: Limit) -> float:
     return float(acts.mean())
 
 
-def _time_shares(run: Simulation) -> dict[str, float]:
-    return {str(limit.name).lower().replace("_", " "): time_share(run, limit) for limit in Limit}
-
-
 def peaks(signal: Array) -> tuple[float, float]:
     """Largest values either way of a signal, in its unit; zero where there is none."""
     return max(float(signal.max()), 0.0), min(float(signal.min()), 0.0)
 
 
-def time_to_reach(run: Simulation, settled_speed: float) -> float | None:
+def _time_to_reach(run: Simulation, settled_speed: float) -> float | None:
     """Time [s] from the command's first move to 90 % of a speed [rad/s], None if never reached."""
     begin = first_move(_voltage(run))
-    reached = run.shaft_speed[begin:] * np.sign(settled_speed) >= REACHED * abs(settled_speed)
+    reached = run.shaft_speed[begin:] * np.sign(settled_speed) >= 0.9 * abs(settled_speed)
     if settled_speed == 0.0 or not reached.any():
         return None
     return float(run.time[begin + np.argmax(reached)] - run.time[begin])
@@ -475,8 +451,9 @@ def run_tables(run: Simulation) -> tuple[Table, Table]:
         section = way == "positive"
         did.add(f"peak current, {way}", current, unit="A", spec="z.4f", section=section)
     held = Table("", (Column("Limit"), Column("share of time", ".1%")))
-    for limit, share in _time_shares(run).items():
-        held.add(limit, share or Cell(0.0, "never"))
+    for limit in Limit:
+        words = str(limit.name).lower().replace("_", " ")
+        held.add(words, time_share(run, limit) or Cell(0.0, "never"))
     return did, held
 
 
@@ -486,7 +463,7 @@ def side_by_side(drives: Mapping[str, Drive], runs: Mapping[str, Simulation]) ->
     volts = float(voltage[np.argmax(np.abs(voltage))])
     positive, negative = zip(*(peaks(run.shaft_speed) for run in runs.values()), strict=True)
     settled = [float(drive.steady_speed(volts)) for drive in drives.values()]
-    times = [time_to_reach(run, each) for run, each in zip(runs.values(), settled, strict=True)]
+    times = [_time_to_reach(run, each) for run, each in zip(runs.values(), settled, strict=True)]
     columns = [Column(label, "z.2f", none="never") for label in runs]
     made = Table("", (Column(""), *columns, UNIT))
     made.add("peak speed, positive", *positive, unit="rad/s")

@@ -24,7 +24,7 @@ Slack = Callable[[Array], Array]
 
 # --- search ---------------------------------------------------------------------------------------
 
-SCANNED = 5  # ln₂ of the points of a Sobol sequence that are tried besides the corners.
+SCANNED = 6  # ln₂ of the points of a Sobol sequence that are tried besides the corners.
 MOST_CORNERS = 64
 FINEST = 1e-9  # Part of the way to which an end is bisected.
 ALONG = 33  # Points along a single factor's range.
@@ -47,35 +47,43 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
 
     Notes
     -----
-    The box is scanned (corners and a Sobol sequence); from the best points on, SLSQP minimises the
-    change under the inequalities, with derivatives by differences; what it finds is drawn towards
-    1, as a whole and factor by factor, as far as the inequalities allow.
+    The box is scanned (each factor alone, corners and a Sobol sequence); from the two best points
+    on, SLSQP minimises the change under the inequalities, with derivatives by differences; what it
+    finds is drawn towards 1, as a whole and factor by factor, as far as the inequalities allow.
     """
+    from scipy.optimize import minimize
+    from scipy.stats.qmc import Sobol
+
     unchanged = np.ones(low.size)
     if _met(slack, unchanged):
         return unchanged
-    points = [unchanged, *_scan(low, high)]
+    scanned = list(Sobol(low.size, scramble=False).random_base2(SCANNED))
+    if 2**low.size <= MOST_CORNERS:
+        scanned += [np.array(corner, dtype=float) for corner in product((0, 1), repeat=low.size)]
+    points = [low + point * (high - low) for point in scanned]
     for k in range(low.size):
         factor = smallest_alone(slack, low, high, k)
         points += [] if factor is None else [_with(unchanged, k, factor)]
-    best = max(points, key=lambda point: float(slack(point).min()))
-    if not _met(slack, best):
-        best = _most_nearly(slack, best, low, high)
-        if not _met(slack, best):
-            return None
-    good = sorted((point for point in [*points, best] if _met(slack, point)), key=_change)
+    good = sorted((point for point in points if _met(slack, point)), key=_change)
     found = [_drawn_in(slack, each) for each in good[:2]]
     for start in list(found):
-        moved = _minimised(
-            *(slack, low, high, start, _change, lambda x: 2.0 * (x - 1.0)), tolerance=1e-10
+        solved = minimize(
+            _change,
+            start,
+            jac=lambda x: 2.0 * (x - 1.0),
+            method="SLSQP",
+            bounds=list(zip(low, high, strict=True)),
+            constraints={"type": "ineq", "fun": lambda x: slack(np.clip(x, low, high))},
+            options={"maxiter": 60, "ftol": 1e-10, "eps": 1e-5},
         )
+        moved = np.clip(solved.x, low, high)
         # SLSQP may have stopped on the wrong side: a little farther from 1
         beyond = np.clip(1.0 + 1.001 * (moved - 1.0), low, high)
         for each in (moved, start + 1.0001 * (moved - start), beyond):
             if _met(slack, each):
                 found.append(_drawn_in(slack, each))
                 break
-    return min(found, key=_change)
+    return min(found, key=_change, default=None)
 
 
 def smallest_alone(slack: Slack, low: Array, high: Array, index: int) -> float | None:
@@ -95,71 +103,26 @@ def smallest_alone(slack: Slack, low: Array, high: Array, index: int) -> float |
     return min(ends, key=lambda factor: abs(factor - 1.0), default=None)
 
 
-def _scan(low: Array, high: Array) -> list[Array]:
-    from scipy.stats.qmc import Sobol
-
-    points = list(Sobol(low.size, scramble=False).random_base2(SCANNED))
-    if 2**low.size <= MOST_CORNERS:
-        points += [np.array(corner, dtype=float) for corner in product((0, 1), repeat=low.size)]
-    return [low + point * (high - low) for point in points]
-
-
-def _minimised(
-    slack: Slack,
-    low: Array,
-    high: Array,
-    start: Array,
-    cost: Callable[[Array], float],
-    slope: Callable[[Array], Array] | None,
-    *,
-    tolerance: float,
-) -> Array:
-    """What SLSQP finds within the box; a number behind the factors is a level below all slacks."""
-    from scipy.optimize import minimize
-
-    size = low.size
-    found = minimize(
-        cost,
-        start,
-        jac=slope,
-        method="SLSQP",
-        bounds=[*zip(low, high, strict=True), *[(None, None)] * (len(start) - size)],
-        constraints={
-            "type": "ineq",
-            "fun": lambda x: slack(np.clip(x[:size], low, high)) - x[size:].sum(),
-        },
-        options={"maxiter": 60, "ftol": tolerance, "eps": 1e-5},
-    )
-    point: Array = np.clip(found.x[:size], low, high)
-    return point
-
-
-def _most_nearly(slack: Slack, start: Array, low: Array, high: Array) -> Array:
-    """The point whose worst slack is largest, by raising a level below all slacks."""
-    level = np.array([*start, float(slack(start).min())])
-    point = _minimised(slack, low, high, level, lambda x: -x[-1], None, tolerance=1e-8)
-    return max((start, point), key=lambda each: float(slack(each).min()))
-
-
 def _drawn_in(slack: Slack, point: Array) -> Array:
     """A point that satisfies, moved towards 1 as a whole and then factor by factor."""
     drawn = _bisected(slack, np.ones(point.size), point)
     for k in range(point.size):
-        alone = _with(drawn, k, 1.0)
-        drawn = alone if _met(slack, alone) else _bisected(slack, alone, drawn)
+        drawn = _bisected(slack, _with(drawn, k, 1.0), drawn)
     return drawn
 
 
-def _bisected(slack: Slack, bad: Array, good: Array) -> Array:
-    """The end of what satisfies, on the way from a point that does to one that does not."""
+def _bisected(slack: Slack, wanted: Array, good: Array) -> Array:
+    """The end of what satisfies, on the way from a point that does to a wanted one."""
+    if _met(slack, wanted):
+        return wanted
     low, high = 0.0, 1.0
     while high - low > FINEST:
         middle = 0.5 * (low + high)
-        if _met(slack, bad + middle * (good - bad)):
+        if _met(slack, wanted + middle * (good - wanted)):
             high = middle
         else:
             low = middle
-    return good if high == 1.0 else bad + high * (good - bad)
+    return good if high == 1.0 else wanted + high * (good - wanted)
 
 
 def _with(point: Array, index: int, factor: float) -> Array:

@@ -390,7 +390,7 @@ def _experiment(
         if encoder is not None and counts is not None:
             if encoder.rolls_over_at is not None:
                 try:
-                    counts = unwrap_counts(counts, encoder.rolls_over_at).counts
+                    counts = unwrap_counts(counts, encoder.rolls_over_at)
                 except InputError as error:
                     raise InputError(f"{read.source}: {error}") from None
             read = replace(read, counts=counts, values=counts * encoder.angle_per_count)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.recognition import Recognised
+from swashplate.campaign.recognition import UNNAMED, Recognised
 from swashplate.campaign.schema import ChannelKind, InitialState, InputKind, Role
 from swashplate.errors import InputError
 from swashplate.results import Result, Tabular, figures
@@ -191,10 +191,10 @@ class Experiment(Tabular):
 
     @property
     def maneuver(self) -> str:
-        """The maneuver, as stated or as recognised: ``"step +4 V"``, ``"free"``."""
+        """The maneuver, as stated or as recognised: ``"step +4 V"``."""
         if self.stated_maneuver is not None:
             return self.stated_maneuver
-        return self.recognised.name if self.recognised is not None else "free"
+        return self.recognised.name if self.recognised is not None else UNNAMED
 
     @property
     def begins(self) -> Literal["rest", "steady"]:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign.quality import spiked
 from swashplate.campaign.schema import ChannelKind
 from swashplate.drive import Drive
 from swashplate.equations.cache import kernel
@@ -155,9 +156,9 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
     ------
     InputError
         If no run has such a channel, the input is no voltage, the speed goes against the command,
-        or too little moves.
+        a channel has gross spikes, or too little moves.
     """
-    runs, unit = [], ""
+    runs, unit, spoilt = [], "", spiked(experiments)
     for each in experiments:
         channel = _moving(each)
         if channel is None:
@@ -168,6 +169,9 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
                 'needs a command in V: write kind = "voltage", unit = "V", and a scale that makes '
                 "its full range ±10 V."
             )
+        sentence, gross = spoilt.get((each.name, channel.name), ("", False))
+        if gross:
+            raise InputError(f"{sentence}.")
         unit = f"{channel.unit}/s" if channel.is_position else channel.unit
         runs.append(_run(each, channel))
     if sum(run.speeds.size for run in runs) < FEWEST:

@@ -1,6 +1,6 @@
 """What measured signals are like, and what someone should look into before a fit.
 
-Rate, jitter, gaps, range, clipping, spikes, stuck and lost samples of each run; of a campaign,
+Rate, jitter, gaps, range, clipping, spikes and lost samples of each run; of a campaign,
 windows that no run takes and currents that have no sign. What is ignored counts for nothing.
 """
 
@@ -21,7 +21,6 @@ from swashplate.campaign.samples import (
     StampStatistics,
     find_lost_counts,
     stamp_statistics,
-    unwrap_counts,
 )
 from swashplate.campaign.schema import applying, inside
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -36,13 +35,8 @@ LONG_GAP = 5.0
 """An interval of more than this many usual ones is worth a look; single lost rows are not."""
 LOST_SHARE = 0.01
 """Nor are they worth one until they are more than this share."""
-STUCK = 1.0
-"""A noisy signal that stays the same to the last bit for longer than this is stuck. [s]"""
-LIVELY = 0.5
-"""Share of the intervals in which a noisy signal changes."""
 AT_REST = 0.25
-"""An input within this share of its largest excursion about its first sample may be at rest, or
-in a dead zone."""
+"""An input within this share of its largest excursion may be at rest, or in a dead zone."""
 NEGATIVE = 0.05
 """Share of its peak below zero that is noise of a rectified current; a signed one goes to about
 minus its peak."""
@@ -54,6 +48,8 @@ SPIKE_SHARE = 0.1
 """A spike is farther than this share of what lasts from it as well, in range or beyond."""
 NEIGHBOURS = 11
 """Samples of the running median: up to five in a row may be a spike."""
+GROSS = 2.0
+"""Distance from the median, over all that a channel moves, from which a spike is gross. [1]"""
 QUIET = 0.3
 """So long the input stands still before a spike within the range of what lasts. [s]"""
 NAMED = 6
@@ -75,9 +71,6 @@ class Quality(Result):
     high: float
     clipped: float
     """Share of the samples at the ends of the instrument's range; NaN where no range is known."""
-    stuck: float | None
-    """Longest time that a noisy signal stands still while the input is away from rest [s]; None
-    for an input and for a signal that is not noisy, such as an encoder."""
     lost_counts: int | None
     """Jumps that no motion explains, None where it is not an encoder."""
     dropped: int
@@ -127,7 +120,6 @@ def _quality(
     clipped: float,
     findings: Iterable[str],
     *,
-    stuck: float | None = None,
     lost: int | None = None,
 ) -> Quality:
     return Quality(
@@ -139,7 +131,6 @@ def _quality(
         float(values.min()),
         float(values.max()),
         clipped,
-        stuck,
         lost,
         signal.dropped,
         float(np.mean(~signal.used)) if isinstance(signal, Channel) else 0.0,
@@ -151,7 +142,7 @@ def _of_channel(experiment: Experiment, channel: Channel, *, signed: bool) -> Qu
     drive, used = experiment.input, channel.used
     stamps, findings = stamp_statistics(channel.time), list[str]()
     time, values = channel.time[used], channel.values[used]
-    clipped, stuck, lost = _share_at(values, channel.limits), None, None
+    clipped, lost = _share_at(values, channel.limits), None
     # the input's stamps are told of once, with the input
     if not np.array_equal(channel.time, drive.time):
         findings += _stamp_findings(stamps)
@@ -163,17 +154,13 @@ def _of_channel(experiment: Experiment, channel: Channel, *, signed: bool) -> Qu
     if channel.counts is not None:
         lost = 0
     if time.size > 1:
-        stuck = _stuck(channel, _away(drive, channel.time))
         if np.ptp(values) == 0.0 and np.ptp(drive.values) > 0.0:
             findings.append("never changes although the input does: is it connected?")
-        elif stuck is not None and stuck > STUCK:
-            findings.append(f"stands still for {stuck:.3g} s while the input is away from rest")
         if channel.counts is not None and time.size >= 8:
             lost = int(find_lost_counts(time, channel.counts[used]).size)
         if lost:
             times = "once" if lost == 1 else f"{lost} times"
             findings.append(f"jumps {times} as no motion does: lost or doubled counts")
-        findings += _rollover_findings(channel)
         findings += _spike_findings(experiment, channel)
         if channel.kind == "rectified_current" and has_sign([values], NEGATIVE):
             findings.append("turns negative, so it is not rectified: should it be signed_current?")
@@ -186,7 +173,6 @@ def _of_channel(experiment: Experiment, channel: Channel, *, signed: bool) -> Qu
     shown = values if values.size else channel.values
     return _quality(
         *(experiment, channel.name, channel, stamps, shown, clipped, findings),
-        stuck=stuck,
         lost=lost,
     )
 
@@ -212,42 +198,6 @@ def _share_at(values: Array, limits: tuple[float, float] | None) -> float:
     if limits is None or not values.size:
         return float("nan")
     return float(np.mean((values <= limits[0]) | (values >= limits[1])))
-
-
-def _away(drive: InputSignal, time: Array) -> Flags:
-    """Whether the input is away from its first level at some instants."""
-    excursion = np.abs(drive.values - drive.values[0])
-    largest = float(excursion.max())
-    if largest == 0.0:
-        return np.zeros(time.size, dtype=np.bool_)
-    away: Flags = np.abs(drive.at(time) - drive.values[0]) > AT_REST * largest
-    return away
-
-
-def _stuck(channel: Channel, away: Flags) -> float | None:
-    """Longest time without any change, of a signal that changes from most samples to the next."""
-    same = np.diff(channel.values) == 0.0
-    lively = np.mean(~same[away[1:]] if away.any() else ~same)
-    if channel.kind == "encoder_counts" or lively < LIVELY:
-        return None
-    counted = away & channel.used
-    still = same & counted[1:] & counted[:-1]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]])))
-    return float(np.max(channel.time[edges[1::2]] - channel.time[edges[::2]], initial=0.0))
-
-
-def _rollover_findings(channel: Channel) -> Iterator[str]:
-    if channel.encoder is None or channel.encoder.rolls_over_at is None or channel.counts is None:
-        return
-    size, used = channel.encoder.rolls_over_at, channel.used
-    rows = unwrap_counts(np.mod(channel.counts, size), modulus=size).doubtful
-    rows = rows[used[rows] & used[rows - 1]]
-    if rows.size:
-        yield (
-            f"{_counted(rows.size, 'step is', 'steps are')} so large that a roll-over more or "
-            f"less may be what happened, the first at {channel.time[rows[0]]:.4g} s: ignore a "
-            "window about it, or cut the run there with two spans"
-        )
 
 
 def _moves_against(drive: InputSignal, channel: Channel) -> bool:
@@ -299,7 +249,9 @@ def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
     """
     met: dict[tuple[str, str], list[tuple[Array, float]]] = {}
     for each in experiments:
-        driven = each.input.values - each.input.values[0]
+        # a log that is cut out of a motion begins away from rest
+        rest = each.input.values[0] if each.input.kind == "other" else 0.0
+        driven = each.input.values - rest
         down = float(driven.min() / np.abs(driven).max()) if np.any(driven) else 0.0
         for channel in each.of_kind("signed_current"):
             if channel.used.any():
@@ -362,6 +314,30 @@ def spikes(channel: Channel, drive: InputSignal) -> list[tuple[float, float, flo
         for group in groups
         if group.size and group[-1] - group[0] < NEIGHBOURS // 2
     ]
+
+
+def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str, bool]]:
+    """Channels with spikes, by run and name, and the line that leaves them out.
+
+    Beside the sentence, whether a spike is gross: farther beyond all that lasts than the channel
+    moves in any run, so that squared errors would be the spike's.
+    """
+    said, moves = dict[tuple[str, str], str](), dict[str, float]()
+    for each in experiments:
+        for name, channel in each.channels.items():
+            kept = channel.used
+            for begin, end, _ in spikes(channel, each.input):
+                kept &= (channel.time < begin) | (channel.time > end)
+            if kept.any():
+                moves[name] = max(moves.get(name, 0.0), float(np.ptp(channel.values[kept])))
+            for sentence in _spike_findings(each, channel):
+                said[each.name, name] = f"{each.name}: '{name}' has {sentence}"
+    runs, found = {each.name: each for each in experiments}, {}
+    for (run, name), sentence in said.items():
+        values = runs[run][name].values[runs[run][name].used]
+        far = float(np.abs(values - np.median(values)).max())
+        found[run, name] = sentence, far > GROSS * moves.get(name, 0.0)
+    return found
 
 
 def _spike_findings(experiment: Experiment, channel: Channel) -> Iterator[str]:
@@ -486,7 +462,6 @@ def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table
             Column("gap", "s"),
             Column("range"),
             Column("clip", "s"),
-            Column("stuck", ".2f"),
             Column("lost", "d"),
             Column("ignored", "s", of="p"),
         ),
@@ -504,7 +479,6 @@ def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table
             _milliseconds(stamps.longest) if stamps.gaps.size else "-",
             _range(each),
             clipped,
-            each.stuck,
             each.lost_counts,
             f"{100.0 * each.ignored:.3g} %",
             look=bool(each.findings),

@@ -1,17 +1,17 @@
 """Maneuvers recognised from nothing but the command that was logged.
 
 `recognise` says which of the package's maneuvers a record is (rest, step, stairs, ramp or sine),
-with its numbers, or that it is none of them: ``"free"``. It never guesses. The name decides which
+with its numbers, or that it is none of them: `UNNAMED`. It never guesses. The name decides which
 windows of a campaign file hold in a run, which runs are dealt into which fold, and what a table of
-errors puts together; the numbers beside it are what the name is made of.
+errors puts together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import floor, log10
-from typing import Literal, NamedTuple, cast
+from typing import Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +20,10 @@ from swashplate.campaign.samples import increasing, signal
 from swashplate.maneuvers.pieces import row
 
 Array = NDArray[np.float64]
-Kind = Literal["rest", "step", "stairs", "ramp", "sine", "free"]
+Kind = Literal["rest", "step", "stairs", "ramp", "sine", "unnamed"]
+
+UNNAMED = "unnamed motion"
+"""What a record is called that is none of the maneuvers: a joystick, a chirp, several in a row."""
 
 SURE = 6.0
 """Standard deviations that noise exceeds by chance less than once in a hundred million samples."""
@@ -57,7 +60,7 @@ class Recognised:
     """
 
     name: str
-    """As `swashplate.maneuvers` names it: ``"step +4 V"``, ``"sine 6.5 V 0.1 Hz"``, ``"free"``."""
+    """As `swashplate.maneuvers` names it, ``"sine 6.5 V 0.1 Hz"``; or `UNNAMED`."""
     frequency: float | None = None
     """Frequency of a sine. [Hz]"""
 
@@ -83,8 +86,8 @@ def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recogn
     Returns
     -------
     Recognised
-        Of kind ``"free"`` wherever none of the maneuvers fits: its RMS over the record must be
-        below 1 % of the peak, noise apart, and below three times that in every fiftieth part.
+        `UNNAMED` wherever none of the maneuvers fits: its RMS over the record must be below 1 % of
+        the peak, noise apart, and below three times that in every fiftieth part.
 
     Raises
     ------
@@ -95,12 +98,11 @@ def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recogn
     -----
     Step, stairs, ramp and sine are those of `swashplate.maneuvers`. How they return to rest is free
     as long as they do, within three quarters of the time that the command took. A sine may begin at
-    any phase, but has a whole period at least, about rest. Chirps, multisines, joysticks and
-    different maneuvers after one another are free.
+    any phase, but has a whole period at least, about rest.
     """
     trace = _trace(time, voltage, unit)
     if unit == "V" and abs(trace.rest) > LARGEST_ZERO:
-        return Recognised("free")
+        return Recognised(UNNAMED)
     if trace.peak <= trace.least:
         return Recognised("rest")
     if trace.time.size >= SHORTEST:
@@ -108,7 +110,7 @@ def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recogn
             found = find(trace, unit)
             if found is not None:
                 return found
-    return Recognised("free")
+    return Recognised(UNNAMED)
 
 
 def roundest(value: float, uncertainty: float) -> float:
@@ -215,108 +217,85 @@ def _rest(values: Array, noise: float) -> tuple[float, float]:
 # --- how a command ends, and whether a model of it will do ----------------------------------------
 
 
-class _Ending(NamedTuple):
-    """What comes after the command: samples `first` to before `last`, then rest."""
+def _ending(trace: _Trace, first: int, began: float) -> tuple[int, int] | None:
+    """Samples `first` to before the second number are neither command nor rest.
 
-    kind: Literal["none", "fall", "return"]
-    first: int
-    last: int
-
-
-def _ending(trace: _Trace, first: int, earliest: float) -> _Ending | None:
-    """How it goes on from the first sample off the curve; `earliest` is where that began. [s]"""
+    `first` is the first sample off the curve of a command that began at an instant [s]. It falls to
+    rest at once or returns to it on a curve of its own; None of what does neither.
+    """
     size = trace.time.size
-    if first >= size:
-        return _Ending("none", size, size)
     moving = np.flatnonzero(np.abs(trace.values[first:]) > trace.tolerance)
     last = first + (int(moving[-1]) + 1 if moving.size else 0)
-    if last - first < trace.jump and last < size:
-        return _Ending("fall", first, last)
+    if first >= size or (last - first < trace.jump and last < size):
+        return first, last
     start, stop = float(trace.time[first]), float(trace.time[min(last, size - 1)])
     if abs(trace.values[-1]) > max(trace.tolerance, 0.05 * trace.peak):
         return None
     tail = trace.values[first:last]
     turns = np.count_nonzero(np.abs(np.diff(np.sign(tail[np.abs(tail) > trace.tolerance]))) > 1)
-    if stop - start > 0.75 * (start - earliest) or turns > 1:
-        return None
-    return _Ending("return", first, last)
+    return None if stop - start > 0.75 * (start - began) or turns > 1 else (first, last)
 
 
 def _fits(
-    trace: _Trace, model: Array, ending: _Ending, jumps: Sequence[tuple[int, int]] = ()
+    trace: _Trace, model: Array, ending: tuple[int, int], jumps: Iterable[tuple[int, int]] = ()
 ) -> bool:
     """Whether the RMS of record less model is small, as a whole and in every part."""
     kept = np.ones(model.size, dtype=np.bool_)
-    if ending.kind != "none":
-        model[ending.last :] = 0.0
-        kept[max(ending.first - 1, 0) : ending.last] = False
+    if ending[0] < model.size:
+        model[ending[1] :] = 0.0
+        kept[max(ending[0] - 1, 0) : ending[1]] = False
     for before, after in jumps:
         kept[before:after] = False
     squares = (trace.values - model)[kept] ** 2
     # one percent of the peak, and noise with a margin for its estimate
     quality = float(np.hypot(0.01 * trace.peak, 1.5 * trace.noise))
-    parts = max(min(50, squares.size // 8), 1)
-    edges = np.linspace(0, squares.size, parts, endpoint=False).astype(np.intp)
-    means = np.add.reduceat(squares, edges) / np.diff(edges, append=squares.size)
+    edges = np.linspace(0, squares.size, max(min(50, squares.size // 8), 1), endpoint=False)
+    starts = edges.astype(np.intp)
+    means = np.add.reduceat(squares, starts) / np.diff(starts, append=squares.size)
     return bool(squares.mean() <= quality**2 and means.max() <= (3.0 * quality) ** 2)
 
 
 # --- steps and stairs -----------------------------------------------------------------------------
 
 
-class _Level(NamedTuple):
-    height: float
-    start: float
-    """When it is reached. [s]"""
-    first: int
-    last: int
-    """Samples from `first` to before `last` are held."""
-
-
 def _stairs(trace: _Trace, unit: str) -> Recognised | None:
     """Levels that are held, with jumps between them, None of other records."""
-    held = _held_levels(trace)
-    if held is None:
+    found = _levels(trace)
+    if found is None:
         return None
-    levels, ending = held
+    levels, ending = found
     model = np.zeros_like(trace.values)
     # of the jump to the first level it is known when it is complete
-    jumps = [(max(levels[0].first - trace.jump, 0), levels[0].first)]
-    for before, level in zip([None, *levels], levels, strict=False):
-        model[level.first : level.last] = level.height
-        if before is not None:
-            jumps.append((before.last, level.first))
-    if ending.kind == "fall":
-        jumps.append((levels[-1].last, ending.first))
-    if not _fits(trace, model, ending, jumps):
+    jumps, before = [], max(levels[0][0] - trace.jump, 0)
+    shown = []
+    for first, last in levels:
+        height = float(trace.values[first:last].mean())
+        model[first:last] = height
+        jumps.append((before, first))
+        before = last
+        error = float(np.hypot(trace.noise / (last - first) ** 0.5, trace.rest_error))
+        shown.append(roundest(height, max(3.0 * error, 0.002 * trace.peak)))
+    fell = ending[0] == ending[1] < trace.time.size
+    if not _fits(trace, model, ending, [*jumps, (before, ending[0])] if fell else jumps):
         return None
-    errors = [
-        np.hypot(trace.noise / (each.last - each.first) ** 0.5, trace.rest_error) for each in levels
-    ]
-    heights = tuple(
-        roundest(each.height, max(3.0 * float(error), 0.002 * trace.peak))
-        for each, error in zip(levels, errors, strict=True)
-    )
     if len(levels) == 1:
-        return Recognised(f"step {heights[0]:+g} {unit}")
-    shown = [*heights, 0.0] if ending.kind == "fall" else heights
+        return Recognised(f"step {shown[0]:+g} {unit}")
+    shown += [0.0] * (ending[0] < trace.time.size and ending[1] - ending[0] < trace.jump)
     return Recognised(f"stairs {'/'.join(f'{height:g}' for height in shown)} {unit}")
 
 
-def _held_levels(trace: _Trace) -> tuple[list[_Level], _Ending] | None:
-    """Levels other than the rest before and after, and the ending."""
+def _levels(trace: _Trace) -> tuple[list[tuple[int, int]], tuple[int, int]] | None:
+    """Samples in which a level other than rest is held, from first to before last; the ending."""
     values, least = trace.values, max(2.0 * trace.tolerance, SMALLEST_JUMP * trace.peak)
     jumps = np.flatnonzero(np.abs(np.diff(values)) > least)
-    if jumps.size == 0:
-        return None
     groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > HELD) + 1)
-    if len(groups) > MOST_JUMPS:
+    if jumps.size == 0 or len(groups) > MOST_JUMPS:
         return None
     if any(group[-1] - group[0] >= trace.jump for group in groups):
         return None
     firsts = [0, *(int(group[-1]) + 1 for group in groups)]
     lasts = [*(int(group[0]) + 1 for group in groups), values.size]
-    levels: list[_Level] = []
+    levels: list[tuple[int, int]] = []
     for bounds in zip(firsts, lasts, strict=True):
         first, last = _trimmed(trace, *bounds)
         final = last == values.size
@@ -324,24 +303,18 @@ def _held_levels(trace: _Trace) -> tuple[list[_Level], _Ending] | None:
         leaves = min(trace.first(np.abs(values[first:last] - sure) > trace.tolerance, first), last)
         if leaves - first < (1 if final else HELD):
             return None
-        level = _Level(float(values[first:leaves].mean()), float(trace.time[first]), first, leaves)
-        resting = abs(level.height) <= trace.tolerance
+        resting = abs(float(values[first:leaves].mean())) <= trace.tolerance
         if leaves < last:
-            if resting or not final:
+            begun = float(trace.time[levels[0][0] if levels else first])
+            ending = None if resting or not final else _ending(trace, leaves, begun)
+            if ending is None or ending[0] - first < HELD:
                 return None
-            start = levels[0].start if levels else level.start
-            ending = _ending(trace, leaves, start)
-            if ending is None:
-                return ending
-            if ending.kind == "none" or ending.first - first < HELD:
-                return None
-            return [*levels, level], ending
+            return [*levels, (first, leaves)], ending
         if final and resting:
-            ending = _Ending("fall", first, first)
-            return (levels, ending) if levels else None
+            return (levels, (first, first)) if levels else None
         if levels or not resting:
-            levels.append(level)
-    return levels, _Ending("none", values.size, values.size)
+            levels.append((first, leaves))
+    return levels, (values.size, values.size)
 
 
 def _trimmed(trace: _Trace, first: int, last: int) -> tuple[int, int]:
@@ -378,16 +351,14 @@ def _ramp(trace: _Trace, unit: str) -> Recognised | None:
             return None
     ending = _ending(trace, leaves, start)
     near = trace.values[leaves + 2 : leaves + 2 + HELD]
-    if (ending is None or ending.kind == "return") and near.size == HELD:
+    if (ending is None or ending[1] - ending[0] >= trace.jump) and near.size == HELD:
         away = np.abs(trace.values[leaves + 2 :] - np.median(near)) > trace.tolerance
         stops = trace.first(away, leaves + 2)
         if time[stops - 1] - time[leaves] >= SHORTEST_HOLD:
             limit = float(trace.values[leaves + 2 : stops].mean())
             ending = _ending(trace, stops, start)
             line = np.minimum(line, limit) if limit > 0.0 else np.maximum(line, limit)
-    if ending is None:
-        return ending
-    if not _fits(trace, line, ending):
+    if ending is None or not _fits(trace, line, ending):
         return None
     shown = roundest(slope, max(3.0 * error, 0.002 * abs(slope)))
     return Recognised(f"ramp {shown:+g} {unit}/s")
@@ -449,8 +420,6 @@ def _sine(trace: _Trace, unit: str) -> Recognised | None:
         return None
     tone = _fitted(trace, tone, first, leaves)
     ending = _ending(trace, leaves, start)
-    if ending is None:
-        return ending
     end = float(trace.time[min(leaves, trace.time.size - 1)])
     if (end - start) * tone.omega < 2.0 * np.pi * 0.99:
         return None
@@ -458,7 +427,7 @@ def _sine(trace: _Trace, unit: str) -> Recognised | None:
         return None
     model = tone(trace.time)
     model[:first] = 0.0
-    if not _fits(trace, model, ending):
+    if ending is None or not _fits(trace, model, ending):
         return None
     hertz = tone.omega / (2.0 * np.pi)
     frequency = roundest(hertz, max(3.0 * tone.error / (2.0 * np.pi), 0.001 * hertz))

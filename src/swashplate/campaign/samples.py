@@ -145,8 +145,6 @@ def signal(name: str, values: ArrayLike, rows: int) -> Array:
 
 WIDEST = 2**53
 """Most readings of a counter that a float64 holds to the count."""
-DOUBTFUL = 0.25
-"""A step larger than this share of a counter may have been another one. [1]"""
 SUSTAINED = 5
 """A speed lasts if the median of this many neighbouring intervals has it."""
 MARGIN = 1.5
@@ -159,16 +157,7 @@ NEAR = 1.05
 """The counts of a turn are the size where they are at most this much more than the range."""
 
 
-class Unwrapped(NamedTuple):
-    """A counter's position without its roll-overs."""
-
-    counts: Array
-    """Position from the first row's reading on. [count]"""
-    doubtful: Rows
-    """Rows whose step is so large that a roll-over more or less may be what happened."""
-
-
-def unwrap_counts(counts: ArrayLike, modulus: int) -> Unwrapped:
+def unwrap_counts(counts: ArrayLike, modulus: int) -> Array:
     """Counts without the roll-overs of a counter: each step is the shortest way round.
 
     Parameters
@@ -177,6 +166,11 @@ def unwrap_counts(counts: ArrayLike, modulus: int) -> Unwrapped:
         Readings, whole numbers from 0 up or, of a signed counter, from -modulus/2 up. [count]
     modulus : int
         How many readings the counter has: 65536 for 16 bits.
+
+    Returns
+    -------
+    array, shape (n,)
+        Position from the first row's reading on. [count]
 
     Raises
     ------
@@ -213,8 +207,7 @@ def unwrap_counts(counts: ArrayLike, modulus: int) -> Unwrapped:
             f"is 0), half the range of a counter of {size}, which may be up or down; cut the "
             "record there."
         )
-    position = readings[0] + np.concatenate([[0.0], np.cumsum(short)])
-    return Unwrapped(position, np.flatnonzero(np.abs(short) > DOUBTFUL * size) + 1)
+    return np.asarray(readings[0] + np.concatenate([[0.0], np.cumsum(short)]))
 
 
 def ambiguous_gaps(time: Array, readings: Array, modulus: int) -> Rows:

@@ -35,10 +35,9 @@ if TYPE_CHECKING:
     from swashplate.parameters.parameter_set import ParameterSet
 
 LEGEND = (
-    "Under 'runs', one letter a run: # gives 20 % or more of the information, + gives less, o "
-    "meets the condition, but in no sample that is used, . does not meet it, - is not fitted "
-    "here. 's' is how long it happens in all runs, 'effect' how much 1 % of the value "
-    "changes all residuals together; 1 is one standard deviation of noise."
+    "Under 'runs', one letter a run: # gives 20 % or more of the information, + gives less, . "
+    "gives none, - is not fitted here. 'effect' is how much 1 % of the value changes all residuals "
+    "together; 1 is one standard deviation of noise."
 )
 
 
@@ -51,9 +50,9 @@ def excitation(
 ) -> None:
     """Show before a fit which parameters the runs determine, and what to fix.
 
-    Simulates the runs with the drive as it is: which thresholds and limits they
-    reach, how much each parameter changes what was measured, and which can
-    change together without effect: those are to be fixed, or tested further.
+    Simulates the runs with the drive as it is: how much each parameter changes
+    what was measured, by which run, and which can change together without
+    effect: those are to be fixed, or tested further.
 
     For example:
       swashplate excitation virtual/campaign.toml
@@ -61,7 +60,7 @@ def excitation(
       swashplate excitation harbour/campaign.toml --out runs.csv
     """
     from swashplate.identification.data_checks import check_sound, refuse_unsound
-    from swashplate.identification.excitation import outlook
+    from swashplate.identification.experiment_design import outlook
     from swashplate.identification.fitting import smooth
     from swashplate.identification.staging import setup_of
     from swashplate.identification.tables import outlook_table

@@ -367,7 +367,13 @@ def guess(
       swashplate guess logs/campaign.toml
       swashplate fit logs/campaign.toml --from logs/start.toml --setup logs/setup.toml
     """
-    from swashplate.campaign import fit_configuration, guess_drive, guess_table, guessed_set
+    from swashplate.campaign import (
+        fit_configuration,
+        guess_drive,
+        guess_table,
+        guessed_set,
+        spiked,
+    )
     from swashplate.drive import Drive
 
     with working(f"Reading {path}"):
@@ -376,6 +382,8 @@ def guess(
         folder = path.parent if out is None else out
         start, setup = folder / "start.toml", folder / "setup.toml"
         check_free(start, setup)
+        for sentence, _ in spiked(runs).values():
+            note(f"! {sentence}.")
         found = guess_drive(runs)
         parameters = guessed_set(found, path.name)
         folder.mkdir(parents=True, exist_ok=True)

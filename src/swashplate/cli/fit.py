@@ -66,6 +66,7 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as of other programs."""
+MOST_EVALUATIONS = 600
 FEWEST_DRAWS = 40
 """Of a bootstrap: one beyond each end of a 95 % interval."""
 STORED = "fit.json"
@@ -102,6 +103,9 @@ def fit(
     ] = False,
     begin: StartWord = None,
     starts: Annotated[int, option("More starts, spread over the bounds.", min=0)] = 0,
+    evaluations: Annotated[
+        int, option("Evaluations of the model that a search may take.", min=1)
+    ] = MOST_EVALUATIONS,
     folds: Annotated[
         int, option("Cross-validate over so many parts of the runs; 0 = off.", min=0)
     ] = 0,
@@ -185,9 +189,17 @@ def fit(
             )
 
         search = _search(starts, seed, executor, out, resume, shown) if starts else None
-        result = fitted(nominal, runs, plan, loss=loss, search=search, watch=watch)
+        result = fitted(
+            nominal,
+            runs,
+            plan,
+            loss=loss,
+            max_evaluations=evaluations,
+            search=search,
+            watch=watch,
+        )
         if joint and len(plan.stages) > 1 and not result.interrupted:
-            result = refined(result, runs, watch=watch)
+            result = refined(result, runs, max_evaluations=evaluations, watch=watch)
     searched = perf_counter()
     if result.interrupted and starts:
         last = result.stages[-1]
@@ -266,6 +278,7 @@ def _say_fit(found: Judged) -> None:
         say(f"{name}: {solution.message} after {solution.evaluations} evaluations.")
         drawn = () if bootstrap is None else bootstrap.sentences()
         bullets(each.identifiability.sentences(), each.uncertainty.sentences(), drawn)
+        bullets(each.stage.bounds_reached())
     for profile in found.profiles:
         bullets(profile.profile.sentences(found.name_of(profile)))
     say(fixed_line(found.result))
@@ -366,6 +379,7 @@ def _say_verdict(verdict: Verdict) -> None:
     from swashplate.identification.tables import criteria_table
 
     show(criteria_table(verdict))
+    bullets(verdict.not_judged)
     if verdict.assumed:
         say("Assumed, cannot be checked from these logs:")
     bullets(verdict.assumed)

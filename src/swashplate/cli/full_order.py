@@ -67,13 +67,21 @@ def full_order(
         raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
     given = physical_values(physical or ())
     with working("Completing the physical values"):
-        from swashplate.full_order import FullOrderDrive, comparison, physical_set
+        from swashplate.full_order import (
+            TABLE_MANEUVERS,
+            FullOrderDrive,
+            compare,
+            physical_set,
+            validity,
+            validity_table,
+            validity_verdict,
+        )
 
         chosen = drive.chosen
         axis = physical_set.nearest_set(chosen.name) if like is None else like
         full = FullOrderDrive.from_drive(chosen.plain, axis, **given)
-        tables = [physical_set.choices_table(axis, given), comparison.modes_table(full)]
-    head = [*drive.changes, physical_set.assumed_words(axis, given)]
+        tables = [physical_set.choices_table(axis, given), full.modes().table()]
+    head = [*drive.changes]
     if chosen.parameters.refinements:
         listed = ", ".join(chosen.parameters.refinements)
         head.append(f"Left out of both models, which do not know refinements: {listed}.")
@@ -81,26 +89,23 @@ def full_order(
         from swashplate.equations.marching.record import least_substeps
 
         least_substeps(sampling.rate)  # one out of range is refused before anything is sampled
-        with long_work("", len(comparison.TABLE_MANEUVERS)) as begin:
-            found = comparison.validity(full, sampling.rate, begin=begin)
+        with long_work("", len(TABLE_MANEUVERS)) as begin:
+            found = validity(full, sampling.rate, begin=begin)
         files.write(out, "Table", found.write)
         said = f"{len(found.rows)} maneuvers"
-        tables.append(found)
-        verdict, title = [comparison.validity_verdict(found)], drive.title
+        title = drive.title
     else:
         with working("Simulating"):
             name, run = simulated(full.drive, command, sampling)
-            both = comparison.compare(full, run, start=sampling.start)
+            both = compare(full, run, start=sampling.start)
+            found = validity_table(full.physical.name, [(name, both)])
         title = f"{drive.title}, {name}"
         files.write(out, "All signals, in SI", both.write)
         files.draw(plot, "plot_full_order", both, title=f"{title}, five states against one")
         said = f"{both.time.size} samples at {sampling.rate:g} Hz"
-        tables.append(comparison.comparison_table(both))
-        verdict = comparison.comparison_verdict(both)
     note(f"{title}, five states against one: {said}")
     for line in head:
         note(line)
-    show(*tables)
-    for line in verdict:
-        say(line)
+    show(*tables, found)
+    say(validity_verdict(found))
     files.say()

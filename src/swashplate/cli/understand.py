@@ -31,15 +31,13 @@ from swashplate.cli.words import (
     simulated,
     trial_of,
 )
-from swashplate.errors import DomainError, InputError
+from swashplate.errors import InputError
 from swashplate.tables import FIGURE, TABLE, quantity
 
 if TYPE_CHECKING:
     from swashplate.analysis.limits import LimitShares
     from swashplate.analysis.monte_carlo import Bands
 
-ERROR = 0.1
-FREQUENCIES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
 LEVEL, SPAN = 0.95, (0.9, 1.1)
 """Of bands, and the factors of a lever that names none."""
 CHOSEN = ("final_speed", "rise_time", "largest_acceleration", "tracking_error", "creep", "travel")
@@ -69,21 +67,6 @@ def limits(
             "Without one, what the drive can do at all.",
         ),
     ] = None,
-    error: Annotated[
-        float | None,
-        option(
-            "Error within which a sine counts as followed, rms by rms, above 0 and below 1.",
-            show_default=f"{ERROR:g}",
-        ),
-    ] = None,
-    frequencies: Annotated[
-        list[float] | None,
-        option(
-            "Frequency of a sine to follow, up to 64; may be repeated. By default 0.02 to 1.",
-            "--frequency",
-            metavar="HZ",
-        ),
-    ] = None,
     out: TableFile = None,
     plot: FigureFile = None,
     *,
@@ -92,55 +75,34 @@ def limits(
     """Show what a drive can do, or what limits it under a command.
 
     Without a command: dead zone, gain, limits of speed and acceleration, rise
-    times, and the largest sine that it follows at each frequency. With one: how
-    often each limit acts, by how much the error falls without it, and so which
-    component to change first. The error is the rms of the speed less that of a
-    drive without limits. The shares need not add up to 100 %.
+    times ('swashplate bode' says how it follows sines). With one: how often each
+    limit acts, by how much the error falls without it, and so which component to
+    change first. The error is the rms of the speed less that of a drive without
+    limits. The shares need not add up to 100 %.
 
     For example:
       swashplate limits hoist
-      swashplate limits hoist --plot envelope.png --error 0.05 --frequency 0.3
+      swashplate limits hoist --plot envelope.png
       swashplate limits luff sine:9,0.1 --plot timeline.png
       swashplate limits mine.toml log.csv --interpolation previous --out shares.csv
     """
     files = Outputs((out, TABLE), (plot, FIGURE))
-    if command is not None and (error is not None or frequencies):
-        raise InputError(
-            "--error and --frequency belong to the sines that a drive can follow, which are said "
-            f"without a command: leave them out, or '{command}'."
-        )
     if command is None:
-        within = ERROR if error is None else error
-        _say_envelope(drive, within, tuple(frequencies or FREQUENCIES), files, out, plot)
+        _say_envelope(drive, files, out, plot)
     else:
         _say_shares(drive, command, sampling, files, out, plot)
     files.say()
 
 
-def _say_envelope(
-    drive: DriveChoice,
-    error: float,
-    frequencies: tuple[float, ...],
-    files: Outputs,
-    out: Path | None,
-    plot: Path | None,
-) -> None:
+def _say_envelope(drive: DriveChoice, files: Outputs, out: Path | None, plot: Path | None) -> None:
     with working("Measuring"):
         from swashplate.analysis.capability import envelope
-        from swashplate.analysis.tracking import largest_sine
 
-        found, refusal = envelope(drive.chosen), ""
-        tables = [found.table()]
-        try:
-            tables.append(largest_sine(drive.chosen, frequencies, error).table())
-        except DomainError as no_inverse:
-            refusal = f"No sine can be commanded: {no_inverse}"
+        found = envelope(drive.chosen)
     files.write(out, "Envelope, in SI", found.write)
     files.draw(plot, "plot_envelope", found)
     drive.note(f"{drive.title}: what it can do")
-    show(*tables)
-    if refusal:
-        say(refusal)
+    show(found.table())
 
 
 def _say_shares(
@@ -256,7 +218,7 @@ def whatif(
       swashplate whatif mine.toml --scale pump=1.2 --maneuver log.csv --interpolation previous
       swashplate whatif --levers
     """
-    from swashplate.analysis.whatif import AS_IS, CHANGED, before_and_after, what_if
+    from swashplate.analysis.whatif import AS_IS, CHANGED, what_if
 
     files = Outputs((out, None), (plot, FIGURE))
     moved = factors_of(factors)
@@ -277,7 +239,6 @@ def whatif(
                 for name, each in drawn.items()
             }
             said = [*_band_sentences(bands), *before.sentences()]
-    made = before_and_after(result, widths)
     title = f"{choice.title}, {name}"
     files.write(out, "Changed drive", result.after.drive.to_toml)
     words = ", ".join(f"{name} x {factor:g}" for name, factor in moved.items())
@@ -285,7 +246,7 @@ def whatif(
     note(title)
     for line in changes_between(result.before.drive.parameters, result.after.drive.parameters):
         note(line)
-    show(made)
+    show(result.table(widths))
     bullets(result.sentences(), said)
     files.say()
 
@@ -459,7 +420,7 @@ def compensate(
       swashplate compensate hoist --speed-deg-s 5 --speed-deg-s -120
       swashplate compensate luff sine:4,0.1 --plot inverse.png
     """
-    from swashplate.analysis import compensation, tracking
+    from swashplate.analysis import compensation
 
     files = Outputs((out, compensation.INVERSE_MAP), (plot, FIGURE))
     with working("Inverting"):
@@ -472,9 +433,9 @@ def compensate(
         if stick is not None:
             name, run = simulated(drive.chosen, stick, sampling)
             assert run.voltage is not None  # the command line simulates voltages only
-            wanted = tracking.wanted_of_stick(found, run.voltage)
-            bought = tracking.improvement(drive.chosen, wanted, run.record.rate, inverse=found)
-            tables.append(tracking.improvement_table(bought, name))
+            wanted = compensation.wanted_of_stick(found, run.voltage)
+            bought = compensation.improvement(drive.chosen, wanted, run.record.rate, inverse=found)
+            tables.append(bought.table(name))
     files.write(out, "Inverse map, in SI", found.write)
     files.draw(plot, "plot_compensation", found, bought)
     drive.note(f"{drive.title}: voltage for a wanted speed")

@@ -297,11 +297,13 @@ def _factor(name: str, numbers: list[float], unit: str) -> Change | None:
 
 def physical_values(words: Sequence[str]) -> dict[str, Change]:
     """Physical values in SI from words such as ``oil_volume=100cm^3``."""
-    from swashplate.full_order.physical_set import chosen_quantity, si_value
+    from swashplate.full_order.physical_set import chosen_quantity
+    from swashplate.units import to_si
 
     def read(name: str, numbers: list[float], unit: str) -> Change:
         quantity = chosen_quantity(name)
-        return _one_or_both([si_value(quantity, x, unit) if unit else x for x in numbers])
+        what = f"{name} ({quantity.name})"
+        return _one_or_both([to_si(x, unit, quantity.unit, what) if unit else x for x in numbers])
 
     return assigned("--physical", words, "oil_volume=1e-4 or oil_volume=100cm^3", read)
 

@@ -324,7 +324,7 @@ def _check_loaded(crane: Crane, actuation: str, mass: float, suspension: Suspens
 @lru_cache(maxsize=64)
 def _edges(drive: Drive) -> tuple[float | None, float | None]:
     """Voltages of a drive's dead zone, negative and positive. [V]"""
-    return dead_zone(drive, -1.0).outside, dead_zone(drive, 1.0).outside
+    return dead_zone(drive, -1.0)[1], dead_zone(drive, 1.0)[1]
 
 
 @lru_cache(maxsize=64)

@@ -1,8 +1,11 @@
-"""A drive with all five states: a physical set behind the card and solenoids of a drive."""
+"""A drive with all five states, its natural modes, and whether one state is enough for it.
+
+A physical set stands behind the card and solenoids of a drive.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, floor
@@ -11,28 +14,40 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate import maneuvers
 from swashplate.drive import Drive
+from swashplate.equations.adjoints import Derived
+from swashplate.equations.code import generating
+from swashplate.equations.derivatives import derive
 from swashplate.equations.equation import interpreted
 from swashplate.equations.marching.jacobian import jacobian
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.part import Stored
-from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, Record, record_of
+from swashplate.equations.marching.record import (
+    SOURCE_RATE,
+    Interpolation,
+    Record,
+    least_substeps,
+    record_of,
+)
 from swashplate.equations.marching.run import Instance, Part, Start, check_start, marched
 from swashplate.errors import DomainError, InputError
-from swashplate.full_order.modes import Modes, modes_of, state_matrix
 from swashplate.full_order.physical_set import PhysicalSet, from_lumped
 from swashplate.models import full_order as model
 from swashplate.models.displacement_control import Solenoids, solenoid_force
 from swashplate.models.drive import Source
-from swashplate.models.full_order import PlantConstants, PlantSignals
+from swashplate.models.full_order import Motion, PlantConstants, PlantOptions, PlantSignals
 from swashplate.models.machine import Machine, fastest_rate
 from swashplate.parameters.parameter_set import Change
+from swashplate.results import Result, Tabular
 from swashplate.simulation.instance import PATHS, card_of, card_options, check_filter_stability
-from swashplate.simulation.result import Named, Signals, signal
+from swashplate.simulation.result import Named, Signals, read_only, signal
+from swashplate.tables import Cell, Column, Table
 
 if TYPE_CHECKING:
     import polars
 
+    from swashplate.maneuvers import Maneuver
     from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
@@ -193,7 +208,12 @@ class FullOrderDrive:
     """Everything behind the solenoids."""
 
     def __post_init__(self) -> None:
-        self.drive.parameters.refuse_refinements("Full-order drives")
+        if self.drive.parameters.refinements:
+            listed = ", ".join(self.drive.parameters.refinements)
+            raise InputError(
+                f"{self.drive.name}: five states do not know refinements, but this drive has "
+                f"{listed}; take it without (its .plain)."
+            )
 
     @classmethod
     def preset(cls, name: str) -> FullOrderDrive:
@@ -220,10 +240,6 @@ class FullOrderDrive:
     def replace(self, **changes: Change) -> FullOrderDrive:
         """With other physical values in SI, e.g. ``replace(load_torque=2e3)``."""
         return replace(self, physical=self.physical.replace(**changes))
-
-    def scaled(self, epsilon: float) -> FullOrderDrive:
-        """With inertias times ε and dampings times √ε; see `PhysicalSet.scaled`."""
-        return replace(self, physical=self.physical.scaled(epsilon))
 
     @property
     def reduced(self) -> Drive:
@@ -367,8 +383,7 @@ class FullOrderDrive:
         first = {"current": float(current)}
         state = self._machine(1).start(first, 1.0 / SOURCE_RATE, "steady").states[1]
         force = float(interpreted(solenoid_force)(float(current), self.plant.solenoids))
-        at = np.array(state.motion)
-        return modes_of(state_matrix(at, force, self.plant.machine, self.options()))
+        return _modes(state.motion, force, self.plant.machine, self.options())
 
     def sensitivities(
         self,
@@ -405,3 +420,242 @@ class FullOrderDrive:
         out, _ = marched(instance, records, step, started, KEPT, "current")
         constants = started.arguments[1]["k"]
         return FullOrderSimulation(self.physical.name, record, self.plant, constants, out)
+
+
+# --- natural modes --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Modes(Result):
+    """Eigenvalues of the linearised model, told apart by the states that take part in them."""
+
+    eigenvalues: NDArray[np.complex128]
+    """All five. [rad/s]"""
+    slow: complex
+    """The pole that the reduced model keeps, -1/τ. [rad/s]"""
+    spool: complex
+    """Spool on the feedback spring, the upper of a pair. [rad/s]"""
+    swash: complex
+    """Swash plate on its return spring and the oil trapped behind the closed valve. [rad/s]"""
+    swash_at_held_pressure: complex
+    """Swash plate on its return spring alone, Kruse's reckoning. [rad/s]"""
+
+    @staticmethod
+    def frequency_hz(mode: complex) -> float:
+        """Undamped natural frequency. [Hz]"""
+        return abs(mode) / (2.0 * np.pi)
+
+    @staticmethod
+    def damping_ratio(mode: complex) -> float:
+        """Damping ratio. [1]"""
+        return -mode.real / abs(mode)
+
+    def table(self) -> Table:
+        """Frequency and damping ratio of each mode."""
+        heads = (Column("Mode"), Column("Hz", ".4g"), Column("damping", ".3f"), Column(""))
+        made = Table("Modes at rest", heads)
+        slow = f"τ = {-1.0 / self.slow.real:.4g} s, " if self.slow.real < 0.0 else ""
+        for name, mode, words in (
+            ("spool", self.spool, "on its feedback spring"),
+            ("swash plate", self.swash, "on its spring and the trapped oil"),
+            ("swash plate, held pressure", self.swash_at_held_pressure, "on its spring alone"),
+            ("slow pole", self.slow, f"{slow}which one state keeps"),
+        ):
+            made.add(name, self.frequency_hz(mode), self.damping_ratio(mode), words)
+        return made
+
+
+@generating
+def _slopes(options: PlantOptions) -> Derived:
+    """Derivatives of the rates by the five states."""
+    return derive(model.free_rates, by="state", options={"options": options})
+
+
+def _modes(at: Motion, force: float, p: Machine, options: PlantOptions) -> Modes:
+    """Modes about a motion, no limit holding.
+
+    The slow pole is the eigenvalue nearest zero. The spool's mode is the one in which position and
+    velocity of the spool take the largest part, by the product of left and right eigenvectors.
+    """
+    matrix, derived = np.zeros((5, 5)), _slopes(options)
+    matrix[0, 1] = matrix[3, 4] = 1.0
+    found = derived.python(at, force, p, options)[len(derived.outputs) :]
+    for (row, column), slope in zip(derived.entries, found, strict=True):
+        matrix[(1, 2, 4)[row], column] = slope
+    values, right = np.linalg.eig(matrix)
+    parts = np.abs(np.linalg.inv(right).T * right)  # (state, mode), free of the states' units
+    slow = int(np.argmin(np.abs(values)))
+    others = [k for k in range(5) if k != slow]
+    by_spool = sorted(others, key=lambda k: -float(parts[:2, k].sum() / parts[:, k].sum()))
+
+    def upper(pair: NDArray[np.number]) -> complex:
+        """The one with positive imaginary part, or the slower of two real ones."""
+        best = np.argmax(pair.imag) if (pair.imag > 0.0).any() else np.argmin(np.abs(pair))
+        return complex(pair[int(best)])
+
+    return Modes(
+        values.astype(np.complex128),
+        complex(values[slow]),
+        upper(values[by_spool[:2]]),
+        upper(values[by_spool[2:]]),
+        upper(np.linalg.eigvals(matrix[3:, 3:])),
+    )
+
+
+# --- one state against five -----------------------------------------------------------------------
+
+FINE_STEPS = 64  # Steps a sample at 512 Hz of the reduced model, whose march is of first order.
+LEAST_FINE_STEPS = 4
+MOST_STEPS = 20_000_000
+"""Steps of a whole record, beyond which a sample gets fewer than `FINE_STEPS`."""
+STILL = 1e-6  # Top speed up to which a drive does not move. [rad/s]
+ENOUGH = 0.01  # Largest difference over the largest speed up to which one state is enough.
+TABLE_MANEUVERS: tuple[tuple[str, Maneuver], ...] = (
+    *((f"step {v:g} V", maneuvers.step(v, length=10.0)) for v in (1.0, 2.0, 4.0, 9.0, -9.0)),
+    ("ramp 1 V/s", maneuvers.ramp(1.0)),
+    *(
+        (
+            f"sine 6.5 V {f:g} Hz",
+            maneuvers.sine(6.5, f, settle=None, length=max(10.0, ceil(4.0 + 2.0 / f))),
+        )
+        for f in (0.05, 0.1, 0.3, 1.0, 3.0)
+    ),
+)
+"""Maneuvers of `validity`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison(Tabular):
+    """Both models over one command, driven by the same current.
+
+    The reduced one is marched in fine steps, so that what is compared are the equations.
+    """
+
+    figure = "plot_full_order"
+
+    full: FullOrderSimulation
+    reduced_speed: Array
+    """Shaft speed of the reduced model. [rad/s]"""
+    step_error: float
+    """Largest error of the reduced model's march at its usual step. [rad/s]"""
+    voltage: Array | None
+    """Command, None where a current was given instead. [V]"""
+
+    @property
+    def time(self) -> Array:
+        """Time stamps. [s]"""
+        return self.full.time
+
+    @property
+    def error(self) -> Array:
+        """Speed of the reduced model less that of the full-order one. [rad/s]"""
+        return self.reduced_speed - self.full.shaft_speed
+
+    @property
+    def top_speed(self) -> float:
+        """Largest speed of the full-order model. [rad/s]"""
+        return float(np.abs(self.full.shaft_speed).max())
+
+    @property
+    def moves(self) -> bool:
+        """Whether the full-order model moves at all."""
+        return self.top_speed > STILL
+
+    @property
+    def relative(self) -> tuple[float, float]:
+        """Largest and rms difference over the top speed, NaN without motion. [1]"""
+        top = self.top_speed if self.moves else float("nan")
+        return float(np.abs(self.error).max() / top), float(np.sqrt(np.mean(self.error**2)) / top)
+
+    def to_polars(self) -> polars.DataFrame:
+        """Table of the full-order model's signals, with command and reduced model's speed."""
+        import polars as pl
+
+        speed = pl.Series("reduced_shaft_speed", self.reduced_speed)
+        made = self.full.to_polars().with_columns(speed)
+        if self.voltage is not None:
+            made.insert_column(1, pl.Series("voltage", self.voltage))
+        return made
+
+
+def compare(full: FullOrderDrive, run: Simulation, *, start: Start = "rest") -> Comparison:
+    """Simulate both models over the current of a run of ``full.drive``.
+
+    The reduced model has the lumps of the full-order one; `start` as in
+    `FullOrderDrive.simulate_current`.
+    """
+    followed = full.follow(run, start=start)
+    record, reduced = followed.record, full.reduced
+    rate = record.rate * record.substeps
+
+    def speed(substeps: int) -> Array:
+        made = reduced.simulate_current(record.values, rate, start=start, substeps=substeps)
+        return np.ascontiguousarray(made.shaft_speed[:: record.substeps])
+
+    least = least_substeps(rate)
+    steps = min(ceil(FINE_STEPS * SOURCE_RATE / rate), MOST_STEPS // record.values.size)
+    fine = speed(max(steps, LEAST_FINE_STEPS, least))
+    step_error = float(np.abs(speed(least) - fine).max())
+    return Comparison(followed, read_only(fine), step_error, run.voltage)
+
+
+def validity(
+    full: FullOrderDrive, rate: float = SOURCE_RATE, *, begin: Callable[[str], object] | None = None
+) -> Table:
+    """For which of `TABLE_MANEUVERS` one state is enough, as `validity_table` has it.
+
+    `begin` is called with the name of each maneuver before it is simulated.
+    """
+
+    def compared() -> Iterable[tuple[str, Comparison]]:
+        for name, maneuver in TABLE_MANEUVERS:
+            if begin is not None:
+                begin(name)
+            yield name, compare(full, full.drive.simulate(maneuver.sample(rate), rate))
+
+    return validity_table(full.physical.name, compared())
+
+
+def validity_table(axis: str, compared: Iterable[tuple[str, Comparison]]) -> Table:
+    """Differences in shaft speed under some commands, and whether one state is enough for them.
+
+    A row for each command: top speed, largest and rms difference and step error of the usual march
+    in per cent of it, and whether the largest difference is within 1 %; none without motion.
+    """
+    made = Table(
+        "Reduced model less full-order one, in % of the top speed",
+        (
+            Column("axis", of="f"),
+            Column("Maneuver", key="maneuver"),
+            Column("top", ".2f", "rad/s", key="top_speed"),
+            Column("largest", ".2f", key="largest_percent"),
+            Column("rms", ".2f", key="rms_percent"),
+            Column("step error", ".2f", key="step_error_percent"),
+            Column("within 1 %", key="within_1_percent"),
+        ),
+    )
+    for name, each in compared:
+        if not each.moves:
+            made.add(axis, name, each.top_speed, *(None,) * 3, Cell(None, "does not move"))
+            continue
+        enough = each.relative[0] <= ENOUGH
+        parts = (*each.relative, each.step_error / each.top_speed)
+        words = Cell(enough, "yes" if enough else "no")
+        made.add(axis, name, each.top_speed, *(100.0 * part for part in parts), words)
+    return made
+
+
+def validity_verdict(table: Table) -> str:
+    """For which commands of a `validity_table` one state is enough, in a sentence."""
+    found = table.to_polars()
+    moving = found.filter(found["within_1_percent"].is_not_null())
+    if not moving.height:
+        return "The shaft does not move, so nothing can be said of one state."
+    beyond = moving.filter(~moving["within_1_percent"])["maneuver"].to_list()
+    within = moving.height - len(beyond)
+    if not beyond:
+        return "One state is enough, to 1 % of the top speed."
+    if not within:
+        return "One state is not enough, to 1 % of the top speed."
+    listed = ", ".join(beyond)
+    return f"One state is enough for {within} of {moving.height}, to 1 %; not for {listed}."

@@ -40,7 +40,7 @@ from swashplate.parameters.parameter_set import (
 )
 from swashplate.parameters.rules import out_of_range, range_sentence
 from swashplate.tables import Column, Table
-from swashplate.units import chosen_unit, to_si, unit_text
+from swashplate.units import chosen_unit, unit_text
 
 QUANTITIES: Mapping[str, Definition] = {
     each.symbol: definition_of(each, "physical") for each in declared_by(Machine)
@@ -202,22 +202,6 @@ class PhysicalSet(Mapping[str, Parameter]):
             entries[name] = Parameter(quantity, value_of(name, quantity, change))
         return replace(self, entries=entries)
 
-    def scaled(self, epsilon: float) -> PhysicalSet:
-        """The set with inertias times ε > 0 and dampings times √ε: the way to the reduced model.
-
-        The frequencies rise by 1/√ε and the damping ratios stay. The load's inertia acts on the
-        swash plate's rate, as a damping does, and is scaled like one.
-        """
-        if not epsilon > 0.0:
-            raise ParameterError(f"epsilon is {epsilon:g}, but must be above 0.")
-        n, root = self.numbers, sqrt(epsilon)
-        inertias = ("spool_mass", "feedback_arm_inertia", "swash_inertia", "piston_mass")
-        dampings = ("spool_damping", "piston_damping", "load_inertia")
-        return self.replace(
-            **{each: n[each] * epsilon for each in inertias},
-            **{each: n[each] * root for each in dampings},
-        )
-
 
 def quantity_of(name: str) -> Definition:
     """What a quantity is; a name that none has is refused."""
@@ -240,16 +224,16 @@ def air_in(numbers: Mapping[str, float]) -> Flag:
 
 def rest_pressure(numbers: Mapping[str, float]) -> float:
     """P0, which holds the load with the plate upright; see `machine.static_pressure`. [Pa]"""
-    return float(interpreted(equations.static_pressure)(_known(numbers)))
+    return float(interpreted(equations.static_pressure)(_machine_of(numbers)))
 
 
 def rest_modulus(numbers: Mapping[str, float]) -> float:
     """Bulk modulus of the oil at that pressure. [Pa]"""
-    pressure, air = rest_pressure(numbers), air_in(numbers)
-    return float(interpreted(equations.oil_modulus)(pressure, _known(numbers), air))
+    machine, air = _machine_of(numbers), air_in(numbers)
+    return float(interpreted(equations.oil_modulus)(rest_pressure(numbers), machine, air))
 
 
-def _known(numbers: Mapping[str, float]) -> Machine:
+def _machine_of(numbers: Mapping[str, float]) -> Machine:
     """A machine of what is known; nothing else may be asked of it."""
     return Machine(*(numbers.get(name, 0.0) for name in Machine._fields))
 
@@ -348,7 +332,7 @@ def from_lumped(
     """
     parameters = set_of(lumped)
     owner = parameters.name if name is None else name
-    assumed = load_choices(nearest_set(parameters.name) if like is None else like)
+    assumed = _entries(_packaged(nearest_set(parameters.name) if like is None else like))
     given = chosen_over(assumed, {**(entries or {}), **chosen})
     for made_from, choice in IN_PLACE_OF.items():
         if made_from in given and choice in given:
@@ -489,17 +473,19 @@ class PhysicalFile(BaseModel):
 
 
 @cache
-def load_preset(name: str) -> PhysicalSet:
-    """A packaged set."""
-    return read_set(_packaged(name), f"{name}.toml")
+def _packaged(name: str) -> PhysicalFile:
+    if name not in AXES:
+        raise ParameterError(
+            f"There is no packaged physical set '{name}'; there are {', '.join(AXES)}."
+        )
+    text = files("swashplate.full_order").joinpath("sets", f"{name}.toml").read_text("utf-8")
+    return validated(parse_toml(text, f"{name}.toml"), PhysicalFile, f"{name}.toml")
 
 
 @cache
-def load_choices(name: str) -> Mapping[str, Parameter]:
-    """What a packaged set assumes; everything else in it follows from the lumps."""
-    origin = f"{name}.toml"
-    contents = validated(parse_toml(_packaged(name), origin), PhysicalFile, origin)
-    return MappingProxyType(_entries(contents))
+def load_preset(name: str) -> PhysicalSet:
+    """A packaged set."""
+    return _set_of(_packaged(name), f"{name}.toml")
 
 
 def nearest_set(name: str) -> str:
@@ -507,17 +493,12 @@ def nearest_set(name: str) -> str:
     return name if name in AXES else AXES[0]
 
 
-def _packaged(name: str) -> str:
-    if name not in AXES:
-        raise ParameterError(
-            f"There is no packaged physical set '{name}'; there are {', '.join(AXES)}."
-        )
-    return files("swashplate.full_order").joinpath("sets", f"{name}.toml").read_text("utf-8")
-
-
 def read_set(text: str, origin: str) -> PhysicalSet:
     """A physical set from TOML text; `origin` names it in errors."""
-    contents = validated(parse_toml(text, origin), PhysicalFile, origin)
+    return _set_of(validated(parse_toml(text, origin), PhysicalFile, origin), origin)
+
+
+def _set_of(contents: PhysicalFile, origin: str) -> PhysicalSet:
     try:
         entries = _entries(contents)
         if contents.lumps is None:
@@ -544,11 +525,6 @@ def dump_set(physical: PhysicalSet) -> str:
     return dumps(text)
 
 
-def si_value(quantity: Definition, number: float, unit: str) -> float:
-    """A quantity's number in SI; a unit that measures something else is refused."""
-    return to_si(number, unit, quantity.unit, f"{quantity.symbol} ({quantity.name})")
-
-
 def _entries(contents: PhysicalFile) -> dict[str, Parameter]:
     known = quantity_of if contents.lumps is None else chosen_quantity
     for name, entry in contents.physical.items():
@@ -571,26 +547,20 @@ SHOWN = {
 
 
 def choices_table(axis: str, given: Mapping[str, Change]) -> Table:
-    """What a physical set is completed from: assumed values, and given ones."""
+    """What a physical set is completed from: assumed values, and given ones, counted."""
     columns = (Column("Physical value"), Column("", "s"), Column(""), Column(""))
     made = Table("What the drive's parameters do not say", columns)
-    entries = chosen_over(load_choices(axis), given)
+    entries = chosen_over(_entries(_packaged(axis)), given)
     for name, entry in entries.items():
         unit, factor = SHOWN.get(entry.unit, (unit_text(entry.unit), 1.0))
         if chosen_unit(entry.unit).factor != 1.0:
             unit, factor = chosen_unit(entry.unit)
         numbers = "/".join(f"{factor * value:.5g}" for value in entry.values)
         made.add(name, numbers, unit, "given" if entry.status == "user" else "assumed")
-    return made
-
-
-def assumed_words(axis: str, given: Mapping[str, Change]) -> str:
-    """How much of the physical set is assumed, in a sentence."""
-    entries = chosen_over(load_choices(axis), given)
     assumed = sum(entry.status != "user" for entry in entries.values())
-    if not assumed:
-        return "All physical values are given."
-    return (
-        f"{assumed} of {len(entries)} physical values are assumed, as of the packaged {axis}; "
-        "--physical gives what you know."
-    )
+    if assumed:
+        made.caption = (
+            f"{assumed} of {len(entries)} physical values are assumed, as of the packaged {axis}; "
+            "--physical gives what you know"
+        )
+    return made

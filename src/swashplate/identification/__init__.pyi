@@ -5,10 +5,10 @@ from .assessment import assess as assess
 from .assessment import judge_fit as judge_fit
 from .assessment import load_fit as load_fit
 from .drive_model import DriveModel as DriveModel
-from .excitation import Outlook as Outlook
-from .excitation import outlook as outlook
+from .experiment_design import Outlook as Outlook
 from .experiment_design import advise as advise
 from .experiment_design import bench as bench
+from .experiment_design import outlook as outlook
 from .fitting import Fit as Fit
 from .fitting import Search as Search
 from .fitting import fit as fit

@@ -20,7 +20,6 @@ from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.documents import read_json
 from swashplate.errors import FileError, InputError
-from swashplate.identification.acceptance import REQUIRED
 from swashplate.identification.fitting import Fit, StageFit, smooth
 from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import (
@@ -46,7 +45,7 @@ from swashplate.identification.solving import Solution, StartResult
 from swashplate.identification.staging import Parameters, stage_problem, with_estimates
 from swashplate.identification.unknowns import Unknown, Unknowns
 from swashplate.identification.validation import RunQuality, predict, run_qualities
-from swashplate.identification.verdict import LIMITS, Verdict, verdict
+from swashplate.identification.verdict import LIMITS, REQUIRED, Verdict, verdict
 from swashplate.parameters.definitions import find
 from swashplate.parameters.files import dump_set, read_set
 from swashplate.parameters.parameter_set import Motion, ParameterSet
@@ -128,7 +127,7 @@ class Assessment(Result):
         unknowns = enumerate(self.stage.problem.unknowns)
         limits = [number for number, each in unknowns if each.targets[0].startswith(tuple(LIMITS))]
         ends = checked_ends(self.stage.problem, self._vector, fit, half, limits)
-        return replace(found, ends=ends)
+        return replace(found, ends=tuple(ends))
 
     @cached_property
     def runs(self) -> tuple[RunQuality, ...]:

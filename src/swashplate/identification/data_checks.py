@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.quality import beyond_the_card, unsigned_currents
-from swashplate.drive import Drive
+from swashplate.campaign.quality import beyond_the_card, spiked, unsigned_currents
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import SIGNALS
-from swashplate.identification.excitation import simulated_run
+from swashplate.identification.drive_model import SIGNALS, simulated_run
 from swashplate.identification.model import EquationModel
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import ModelSetup, Setup
+from swashplate.identification.solving import Loss
 from swashplate.identification.staging import stage_problem
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -44,18 +43,8 @@ ALIKE = 0.5
 other turned round."""
 FACTOR = 1.5
 """By which two runs of one command cannot differ."""
-DOUBTFUL = 1.15
-"""By which they should not."""
 FAR_OFF = 3.0
 """By which a channel should not differ from the nominal drive."""
-LONGEST = 20
-"""Length of the simulated step. [s]"""
-RATE = 512
-"""Its rate. [Hz]"""
-TRIAL = 5.0
-"""Command of the step from which the drive's time constant is taken. [V]"""
-RISEN = 1.0 - float(np.exp(-1.0))
-"""Part of the settled value that is reached after one time constant."""
 FROZEN = 1.0
 """Time for which no position stands still while its drive runs. [s]"""
 DEAD = 0.2
@@ -118,9 +107,6 @@ def check_sound(
         If the model does not hold at the nominal values.
     """
     found = check_runs(experiments, nominal)
-    if not _refused(found):
-        card = all(stage.part == "card" for stage in setup.stages)
-        found += short_runs(experiments, nominal, of_current=card)
     for stage in setup.stages if rank and not _refused(found) else ():
         found += _rank(f"Stage {stage.name}", stage_problem(stage, nominal, experiments))
     return tuple(sorted(found, key=lambda each: each.severity != "refuse"))
@@ -137,7 +123,7 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
     if _refused(found):
         return found
     of_channels = motions(experiments, nominal)
-    for check in (_constant_commands, _still_sensors, _frozen_positions, contradictions):
+    for check in (_still_sensors, _frozen_positions, contradictions):
         said = {(each.run, each.channel) for each in found}
         left = {
             name: [
@@ -209,6 +195,15 @@ def refuse_unsound(findings: Sequence[Finding]) -> tuple[str, ...]:
     return tuple(each.sentence for each in findings)
 
 
+def spike_findings(experiments: Sequence[Experiment], loss: Loss) -> list[Finding]:
+    """Spikes, gross ones to be refused unless a robust loss takes their weight."""
+    found = []
+    for (run, name), (sentence, gross) in spiked(experiments).items():
+        make = refusal if gross and loss == "linear" else warning
+        found.append(make(run, name, f"{sentence}."))
+    return found
+
+
 def _refused(found: Sequence[Finding]) -> bool:
     return any(each.severity == "refuse" for each in found)
 
@@ -261,12 +256,15 @@ def _count(samples: int) -> str:
 
 def idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> list[Finding]:
     """Commands that move nothing."""
-    idle = {}
+    idle, numbers = {}, nominal.numbers
+    symbols = {"voltage": ("V_dz", "V_dz_minus", "V_dz_plus"), "current": ("Z17", "Z17", "Z17")}
     for each in experiments:
-        low, high = _dead_zone(each, nominal)
+        if each.input.kind not in symbols:
+            continue
+        symbol, minus, plus = symbols[each.input.kind]
+        low, high = -numbers[minus], numbers[plus]
         least, most, unit = each.input.values.min(), each.input.values.max(), each.input.unit
         if low <= least and most <= high:
-            symbol = "V_dz" if each.input.kind == "voltage" else "Z17"
             idle[each.name] = (
                 f"its command stays between {least:.3g} and {most:.3g} {unit}, within the dead "
                 f"zone {symbol} ({low:.3g} to {high:.3g} {unit})"
@@ -287,67 +285,6 @@ def idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> l
         warning(run, None, f"{run}: {why}; it shows the drive at rest only.")
         for run, why in idle.items()
     ]
-
-
-def _dead_zone(experiment: Experiment, nominal: ParameterSet) -> tuple[float, float]:
-    """Inputs between which a drive does not answer; none for an input that drives none."""
-    numbers = nominal.numbers
-    if experiment.input.kind == "voltage":
-        return -numbers["V_dz_minus"], numbers["V_dz_plus"]
-    if experiment.input.kind == "current":
-        return -numbers["Z17"], numbers["Z17"]
-    return np.inf, -np.inf
-
-
-def short_runs(
-    experiments: Sequence[Experiment], nominal: ParameterSet, *, of_current: bool
-) -> list[Finding]:
-    """Runs that end before the drive, or its card's current alone, has answered."""
-    lag = time_constant(nominal, of_current=of_current)
-    if lag is None:
-        return []
-    lasting = dict[str, float]()
-    for each in experiments:
-        # from the first command beyond the dead zone to the last sample that counts
-        (low, high), drive = _dead_zone(each, nominal), each.input
-        beyond = np.flatnonzero((drive.values < low) | (drive.values > high))
-        last = [c.time[c.used][-1] for c in each.channels.values() if c.used.any()]
-        if beyond.size and last and max(last) >= drive.time[beyond[0]]:
-            lasting[each.name] = float(max(last) - drive.time[beyond[0]])
-    short = {name: length for name, length in lasting.items() if length < lag}
-    what = "current" if of_current else "speed"
-    needs = f"the drive's {what} needs {lag:.3g} s for 63 % of a {TRIAL:g} V step"
-    if short and len(short) == len(lasting):
-        longest = max(short, key=lambda name: short[name])
-        said = (
-            f"No run is long enough: the longest, {longest}, ends {short[longest]:.3g} s after "
-            "its command"
-        )
-        return [refusal(longest, None, f"{said} begins, and {needs}; record several seconds.")]
-    return [
-        warning(
-            name,
-            None,
-            f"{name} ends {length:.3g} s after its command begins, and {needs}; it tells of the "
-            "beginning alone.",
-        )
-        for name, length in short.items()
-    ]
-
-
-def time_constant(nominal: ParameterSet, *, of_current: bool = False) -> float | None:
-    """Time for 63 % of a 5 V step, delay and rate limits included; None if there is no answer. [s]
-
-    Of the shaft's speed, or of the card's current.
-    """
-    drive = Drive(nominal)
-    steady = drive.steady_current if of_current else drive.steady_speed
-    settled, at_rest = steady(TRIAL), steady(0.0)
-    if not abs(settled - at_rest) > 0.0:
-        return None
-    run = drive.simulate(np.full(LONGEST * RATE + 1, TRIAL), float(RATE))
-    risen = np.flatnonzero((run.current if of_current else run.shaft_speed) / settled >= RISEN)
-    return float(run.time[risen[0]]) if risen.size else None
 
 
 # --- what channels do beside the nominal drive ----------------------------------------------------
@@ -422,46 +359,6 @@ def _rms(values: Array) -> float:
 def _correlation(first: Array, second: Array) -> float:
     size = float(np.linalg.norm(first) * np.linalg.norm(second))
     return float(first @ second) / size if size > 0.0 else 0.0
-
-
-def _constant_commands(of_channels: Mapping[str, Sequence[Motion]]) -> list[Finding]:
-    """Commands that never change."""
-    runs = {each.experiment.name: each.experiment for ours in of_channels.values() for each in ours}
-    constant = [each for each in runs.values() if np.ptp(each.input.values) == 0.0]
-    found = []
-    for each in constant:
-        said = (
-            f"{each.name}: its command is {each.input.values[0]:.3g} {each.input.unit} throughout"
-        )
-        running = [
-            motion.channel.name
-            for ours in of_channels.values()
-            for motion in ours
-            if motion.experiment is each
-            and motion.channel.kind == "shaft_speed"
-            and _runs_from_the_first(motion.measured)
-        ]
-        make = warning
-        if each.start != "rest":
-            make = refusal if len(constant) == len(runs) else warning
-            said += f', and it starts "{each.start}": nothing moves; add commands that change.'
-        elif running:
-            make = refusal
-            said += (
-                f", and '{running[0]}' runs from the first sample on, though it is to start at "
-                'rest; say start = "steady" and add commands that change.'
-            )
-        else:
-            said += ", which counts as a step at the first sample; log from before the command on."
-        found.append(make(each.name, None, said))
-    return found
-
-
-def _runs_from_the_first(speed: Array) -> bool:
-    """Whether the first hundredth of a run is half as fast as the rest, or faster."""
-    few = max(speed.size // 100, 1)
-    rest = float(np.median(speed[few:])) if speed.size > few else 0.0
-    return abs(rest) > 0.0 and float(np.median(speed[:few])) / rest > 0.5
 
 
 def _still_sensors(of_channels: Mapping[str, Sequence[Motion]]) -> list[Finding]:
@@ -550,8 +447,6 @@ def _twins(name: str, ours: Sequence[Motion]) -> list[Finding]:
         for odd in others:
             factor, correlation = _compared(good, odd)
             both = f"{good.experiment.name} and {odd.experiment.name} have the same command, but"
-            farther = f"{both} '{name}' moves {factor:.3g} times as far in the second"
-            make, said = refusal, ""
             if correlation < ALIKE:
                 said = (
                     f"{both} '{name}' has nothing in common: one of them belongs to another test; "
@@ -559,13 +454,12 @@ def _twins(name: str, ours: Sequence[Motion]) -> list[Finding]:
                 )
             elif not 1.0 / FACTOR < factor < FACTOR:
                 said = (
-                    f"{farther}: both cannot be right; mend scale or unit of '{name}' in one of "
-                    "them, or leave it out."
+                    f"{both} '{name}' moves {factor:.3g} times as far in the second: both cannot "
+                    f"be right; mend scale or unit of '{name}' in one of them, or leave it out."
                 )
-            elif not 1.0 / DOUBTFUL < factor < DOUBTFUL:
-                make, said = warning, f"{farther}: was the load or the oil another?"
-            if said:
-                found.append(make(odd.experiment.name, name, said))
+            else:
+                continue
+            found.append(refusal(odd.experiment.name, name, said))
     return found
 
 

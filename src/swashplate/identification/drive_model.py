@@ -22,7 +22,8 @@ from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 from swashplate.simulation.instance import START_PRESSURE, at_every_rate
 from swashplate.simulation.residuals import Own, Ready, made_ready
-from swashplate.simulation.run import check_voltage, simulate_drive
+from swashplate.simulation.result import Limit, Simulation
+from swashplate.simulation.run import check_voltage, simulate_drive, simulate_pump
 
 Array = NDArray[np.float64]
 
@@ -59,6 +60,43 @@ def simulated_current(experiment: Experiment, parameters: ParameterSet) -> Recor
     # refinements begin behind the card
     run = simulate_drive(parameters.plain, record, experiment.begins)
     return Record(run.fine("current"), record.start, record.rate, record.substeps)
+
+
+def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulation:
+    """An experiment as a parameter set has it, whatever was measured.
+
+    Raises
+    ------
+    InputError
+        If the input is neither a voltage nor a current, or cannot be marched.
+    DomainError
+        If the model does not hold under it.
+    """
+    begins = experiment.begins
+    try:
+        if experiment.input.kind == "current":
+            return simulate_pump(
+                parameters, current_record(experiment), begins, experiment.start_pressure
+            )
+        return simulate_drive(
+            parameters, voltage_record(experiment), begins, experiment.start_pressure
+        )
+    except InputError as error:
+        raise InputError(f"{experiment.input.source}: {error}") from None
+
+
+def limits_reached(experiment: Experiment, parameters: ParameterSet) -> set[str]:
+    """Columns of the limits that act in a run, such as ``"Z16_plus"``, of Z13 to Z16."""
+    run, found = simulated_run(experiment, parameters), set[str]()
+    for limit, symbol, signal in (
+        (Limit.SWASH_STOP, "Z13", run.swash_angle),
+        (Limit.ORIFICE, "Z16", run.orifice_opening),
+    ):
+        acts = run.active(limit)
+        found |= {f"{symbol}_plus"} if (acts & (signal > 0.0)).any() else set()
+        found |= {f"{symbol}_minus"} if (acts & (signal < 0.0)).any() else set()
+    found |= {"Z14"} if run.active(Limit.SPOOL).any() else set()
+    return found | ({"Z15"} if run.active(Limit.RELIEF).any() else set())
 
 
 def at_rate_of(
@@ -233,13 +271,18 @@ CURRENTS: tuple[ChannelKind, ...] = (
 )
 
 
+START_CURRENTS = ("start_current_plus", "start_current_minus")
+"""Names of a channel's current at the first sample, where it is an unknown of the experiment."""
+
+
 @dataclass(frozen=True, eq=False)
 class DriveModel(Result, EquationModel):
     """A drive whose parameters are the unknowns, by columns such as ``"Z16_plus"``.
 
     Besides columns it knows ``"force_plus_1"`` ... (see `Forces`), ``"start_pressure"`` of an
-    experiment [Pa], and of each channel ``"offset NAME"`` (its free zero) and ``"clock NAME"``
-    (by how much the input's clock is ahead of the channel's [s]).
+    experiment [Pa], ``"start_current_plus"`` or ``"..._minus"`` of its card [A], and of each
+    channel ``"offset NAME"`` (its free zero) and ``"clock NAME"`` (by how much the input's clock
+    is ahead of the channel's [s]).
 
     Derivatives are exact, those by refinements as well.
     """
@@ -285,7 +328,13 @@ class DriveModel(Result, EquationModel):
         shifts: tuple[Sequence[float], Sequence[float]],
     ) -> Ready:
         """The drive with numbers; see `EquationModel.ready`."""
-        own = Own(values.get(START_PRESSURE), *shifts)
+        states = {
+            path.removeprefix("start."): values[name]
+            for name in START_CURRENTS
+            if name in values
+            for path in self._start_paths(name)
+        }
+        own = Own(values.get(START_PRESSURE), *shifts, states)
         try:
             return made_ready(self.parameters_at(values), observed, columns, own)
         except InputError as error:  # a filter that is unstable at this step
@@ -295,8 +344,17 @@ class DriveModel(Result, EquationModel):
         """Derivatives by a name of the columns that it moves: of coefficients by a force."""
         if self.forces is not None and name in self.forces.names:
             return self.forces.slopes(name)
+        if name in START_CURRENTS:
+            return dict.fromkeys(self._start_paths(name), 1.0)
         known = is_column(name) or name == START_PRESSURE
         return {name: 1.0} if known else {}
+
+    def _start_paths(self, name: str) -> list[str]:
+        """States that a current at the first sample sets: I*, that of a sample before, and I."""
+        side = name.removeprefix("start_current_")
+        # with the differential equation the second number is a rate
+        leaves = ("now", "out") if self.parameters.rate is None else ("now", "before", "out")
+        return [f"start.card.{side}.{leaf}" for leaf in leaves]
 
     def parameters_at(self, values: Mapping[str, float]) -> ParameterSet:
         """The parameter set for some values of the unknowns.

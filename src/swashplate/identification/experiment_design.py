@@ -1,12 +1,17 @@
-"""Design of experiments: which further test tells most, by Fisher information."""
+"""Design of experiments by Fisher information: what runs tell of each unknown, what a test adds.
+
+`outlook` is known before a fit: which run tells of which unknown, and what none tells of. `bench`
+and `advise` rank tests to come by what they would add.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +21,12 @@ from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Sou
 from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.identification.drive_model import CURRENTS, SIGNALS
+from swashplate.identification.drive_model import CURRENTS, SIGNALS, DriveModel, Forces
+from swashplate.identification.identifiability import Identifiability, identifiability
 from swashplate.identification.intervals import uncertainty
 from swashplate.identification.problem import (
     TOLERANCE,
+    LinearisedFit,
     Problem,
     linearised_fit,
     triangular_factor,
@@ -29,12 +36,155 @@ from swashplate.identification.setup import Free, Setup, Stage
 from swashplate.identification.staging import stage_problem
 from swashplate.identification.unknowns import Unknowns
 from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
-from swashplate.parameters.definitions import CATALOGUE, find
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS, find
+from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result, short
+from swashplate.tables import listed
 
 Array = NDArray[np.float64]
+
+# --- what the runs tell ---------------------------------------------------------------------------
+
+OTHERS = "a tilted swash plate"
+"""What parameters need that say nothing of it, and single runs' numbers."""
+
+
+def need_of(name: str, forces: Forces | None = None) -> str:
+    """What an unknown needs, in words."""
+    if forces is not None and name in forces.names:
+        _, side, number = name.split("_")
+        return f"{getattr(forces, side)[int(number) - 1]:g} A beyond Z17"
+    symbol = COLUMNS.get(name, name)
+    return (CATALOGUE[symbol].needs if symbol in CATALOGUE else "") or OTHERS
+
+
+Mark = Literal["most", "some", "none"]
+
+ALONE = 0.9
+"""Share of a single run from which an unknown is said to rest on it."""
+MOST = 0.2
+"""Share of a run's information from which it is one of those that tell most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outlook(Result):
+    """What the runs can tell of a stage's unknowns, at the nominal values: known before a fit."""
+
+    stage: Stage
+    problem: Problem
+    linearised: LinearisedFit
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The unknowns, those of single runs left out."""
+        return tuple(each.name for each in self.problem.unknowns if each.run is None)
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """Names of the runs that the stage fits."""
+        return tuple(each.name for each in self.problem.experiments)
+
+    @property
+    def _model(self) -> DriveModel:
+        assert isinstance(self.problem.model, DriveModel)
+        return self.problem.model
+
+    def need(self, name: str) -> str:
+        """What an unknown needs, in words."""
+        return need_of(name, self._model.forces)
+
+    @cached_property
+    def identifiability(self) -> Identifiability:
+        """Which unknowns the runs determine, and directions that change nothing."""
+        taken = {target for each in self.problem.unknowns for target in each.targets}
+        return identifiability(
+            self.linearised.triangle,
+            self.linearised.variables,
+            tolerance=self.linearised.tolerance,
+            fixed={k: v for k, v in self._model.parameters.numbers.items() if k not in taken},
+        )
+
+    @cached_property
+    def shares(self) -> Array:
+        """(runs, K) part of what is known of an unknown from each run, its channels together."""
+        runs = self.runs
+        squares = np.zeros((len(runs), self.linearised.variables.count))
+        for run in self.linearised.runs:
+            squares[runs.index(run.name)] += np.sum(run.jacobian**2, axis=0)
+        total = squares.sum(axis=0)
+        shares: Array = np.divide(squares, total, out=np.zeros_like(squares), where=total > 0.0)
+        return shares
+
+    def effect(self, name: str) -> float:
+        """Length of the change of all weighted residuals for 1 % of an unknown; 1 is one noise."""
+        return float(self.identifiability.sensitivity[self.linearised.variables.index(name)])
+
+    def marks(self, name: str) -> tuple[Mark, ...]:
+        """Whether each run tells most of an unknown, some, or none."""
+        share = self.shares[:, self.linearised.variables.index(name)]
+        return tuple("most" if s >= MOST else "some" if s > 0.0 else "none" for s in share)
+
+    def sentences(self) -> tuple[str, ...]:
+        """What no run tells of, why, and what rests on one run alone."""
+        groups: dict[str, list[str]] = {}
+        for name in self.identifiability.unexcited:
+            if name in self.names:
+                groups.setdefault(self._missing(name), []).append(name)
+        said = [
+            f"{listed(names)} need{'s' if len(names) == 1 else ''} {why}."
+            for why, names in groups.items()
+        ]
+        runs = self.runs
+        for name in self.names if len(runs) > 1 else ():
+            share = self.shares[:, self.linearised.variables.index(name)]
+            most = int(np.argmax(share))
+            if share[most] >= ALONE:
+                said.append(
+                    f"{name}: {100.0 * share[most]:.0f} % of its information is from {runs[most]} "
+                    "alone."
+                )
+        return tuple(said)
+
+    def _missing(self, name: str) -> str:
+        """What an unknown that no sample depends on needs."""
+        need = self.need(name)
+        if name.startswith("force_"):
+            need = "currents of their size beyond Z17"
+        side = next((each for each in ("plus", "minus") if f"_{each}" in name), None)
+        need = need if side is None else f"{need} ({side})"
+        forces = name.startswith("force_")
+        instead = "ask for forces at smaller currents" if forces else "fix it"
+        return f"{need}, which no sample shows: {instead}, or add a test that has it"
+
+
+def outlook(
+    stage: Stage, nominal: ParameterSet | HasParameters, experiments: Sequence[Experiment]
+) -> Outlook:
+    """What runs can tell of a stage's unknowns, before any fit.
+
+    Parameters
+    ----------
+    stage : Stage
+        What is free and what is fitted.
+    nominal : ParameterSet or Drive
+        Nominal values; best those that `fitting.smooth` makes, as a fit takes them.
+    experiments : sequence of Experiment
+        The runs to fit.
+
+    Raises
+    ------
+    InputError, ParameterError
+        If runs and set-up do not fit each other, see `staging.stage_problem`.
+    DomainError
+        If the model does not hold at the nominal values.
+    """
+    parameters = set_of(nominal)
+    problem = stage_problem(stage, parameters, experiments)
+    return Outlook(stage, problem, linearised_fit(problem, problem.start))
+
+
+# --- tests to come --------------------------------------------------------------------------------
 
 RATE = 512.0
 """At which tests to come are simulated. [Hz]"""
@@ -107,51 +257,41 @@ FARTHEST = 0.05
 def measured_sensors(
     problem: Problem, machine: Sequence[int], *, fitted: bool
 ) -> dict[str, Sensor]:
-    """The campaign's own sensors, by channel.
+    """The campaign's own sensors, by channel, with the noise that it states.
 
-    `machine` are the places of the unknowns that belong to no single run. If the drive at which the
-    problem begins is `fitted`, its residuals are the noise; else that is as the campaign states.
+    If the drive at which the problem begins is `fitted`, its residuals are the noise; `machine` are
+    the places of the unknowns that belong to no single run.
 
     Raises
     ------
     InputError
-        If the residuals are zero, or so large that the drive was not fitted to these tests.
+        If they are zero, or so large that the drive was not fitted to these tests.
     """
-    channels = {
-        name: [each[name] for each in problem.experiments if name in each.channels]
-        for name in problem.channels
-    }
-    if not fitted:
-        return {
-            name: Sensor(ours[0].kind, problem.scales[name], origin="as in the campaign")
-            for name, ours in channels.items()
-        }
-    fit, made = linearised_fit(problem, problem.start), {}
-    for name, measured in channels.items():
-        runs = []
-        for run in (run for run in fit.runs if run.channel == name):
-            # with free zeros and other unknowns of single runs fitted
-            own = np.delete(run.jacobian, list(machine), axis=1)
-            shift = np.linalg.lstsq(own, -run.residual, rcond=None)[0]
-            runs.append(run._replace(residual=run.residual + own @ shift))
-        deviation = float(np.sqrt(np.mean(np.concatenate([run.residual for run in runs]) ** 2)))
-        if not deviation > NOISELESS:
-            raise InputError(
-                f"The residuals of '{name}' are practically zero: without noise any test is "
-                "perfect."
-            )
-        noise = problem.scales[name] * deviation
-        share = noise / max(float(np.ptp(each.values)) for each in measured)
-        if share > FARTHEST:
-            raise InputError(
-                f"The drive misses '{name}' by {100.0 * share:.2g} % of its range, so that its "
-                "residuals are no noise; give a drive that was fitted to these tests, or none."
-            )
-        told = uncertainty(replace(fit, runs=tuple(runs)))
-        # not of all that the residuals hold, but of what meets the unknowns' derivatives
-        worth = float(np.median(told.inflation[told.own.determined]))
-        memory = worth * interval(problem, name)
-        made[name] = Sensor(measured[0].kind, noise, memory, "residuals of the drive")
+    fit, made = linearised_fit(problem, problem.start) if fitted else None, {}
+    for name in problem.channels:
+        measured = [each[name] for each in problem.experiments if name in each.channels]
+        sensor = Sensor(measured[0].kind, problem.scales[name], origin="as in the campaign")
+        if fit is not None:
+            left = []
+            for run in (run for run in fit.runs if run.channel == name):
+                # with free zeros and other unknowns of single runs fitted
+                own = np.delete(run.jacobian, list(machine), axis=1)
+                shift = np.linalg.lstsq(own, -run.residual, rcond=None)[0]
+                left.append(run._replace(residual=run.residual + own @ shift))
+            square = np.concatenate([run.residual for run in left]) ** 2
+            noise = sensor.noise * float(np.sqrt(np.mean(square)))
+            share = noise / max(float(np.ptp(each.values)) for each in measured)
+            if not NOISELESS * sensor.noise < noise or share > FARTHEST:
+                raise InputError(
+                    f"The drive misses '{name}' by {100.0 * share:.2g} % of its range, so that its "
+                    "residuals are no noise; give a drive that was fitted to these tests, or none."
+                )
+            said = uncertainty(replace(fit, runs=tuple(left)))
+            # not of all that the residuals hold, but of what meets the unknowns' derivatives
+            worth = float(np.median(said.inflation[said.own.determined]))
+            memory = worth * interval(problem, name)
+            sensor = Sensor(sensor.kind, noise, memory, "residuals of the drive")
+        made[name] = sensor
     return made
 
 
@@ -406,9 +546,12 @@ def advise(
     """
     if not candidates:
         raise InputError("There is no candidate to choose from.")
-    _check("what is known at present", present, variables.count)
-    for each in candidates:
-        _check(each.name, each.derivatives, variables.count)
+    for name, rows in (("the present", present), *((c.name, c.derivatives) for c in candidates)):
+        if rows.ndim != 2 or rows.shape[1] != variables.count or not np.isfinite(rows).all():
+            raise InputError(
+                f"{name}: derivatives by {variables.count} parameters are so many columns of "
+                f"finite numbers, not {rows.shape}."
+            )
     judged = [_judge(present, each, variables) for each in candidates]
     return tuple(sorted(judged, key=lambda each: each.rank))
 
@@ -434,13 +577,6 @@ def _judge(present: Array, candidate: Candidate, variables: Unknowns) -> Advice:
         float(np.exp(0.5 * shrinking / max(now.shape[1], 1))),
         candidate.duration,
     )
-
-
-def _check(name: str, rows: Array, count: int) -> None:
-    if rows.ndim != 2 or rows.shape[1] != count:
-        raise InputError(f"{name}: {count} parameters need as many columns, not {rows.shape}.")
-    if not np.isfinite(rows).all():
-        raise InputError(f"{name}: the derivatives must be finite.")
 
 
 def default_maneuvers() -> tuple[Maneuver, ...]:

@@ -19,7 +19,12 @@ from swashplate.drive import Drive
 from swashplate.equations import Model as Equations
 from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial
-from swashplate.identification.data_checks import check_model, check_sound, refuse_unsound
+from swashplate.identification.data_checks import (
+    check_model,
+    check_sound,
+    refuse_unsound,
+    spike_findings,
+)
 from swashplate.identification.drive_model import DriveModel, at_rate_of
 from swashplate.identification.intervals import weighed
 from swashplate.identification.lack_of_fit import measurement_error
@@ -80,6 +85,21 @@ class StageFit(Result):
     def values(self) -> dict[str, float]:
         """The unknowns by name, in their units."""
         return self.problem.unknowns.values(self.solution.vector)
+
+    def bounds_reached(self) -> tuple[str, ...]:
+        """Sentences on unknowns that ended at a bound: the line that moves it, if there is one."""
+        point, said = self.problem.unknowns.at(self.solution.vector), []
+        for each, side in zip(point, point.at_bound.tolist(), strict=True):
+            if each.run is None and side:
+                line, end = self.stage.widened(each, side), "upper" if side > 0 else "lower"
+                bound = f"{each.name} ended at its {end} bound"
+                said.append(
+                    f"{bound}, the {'greatest' if side > 0 else 'least'} value that it may have."
+                    if line is None
+                    else f"{bound}; to let it go on, write {line} of the stage "
+                    f"'{self.stage.name}' and fit again."
+                )
+        return tuple(said)
 
     @property
     def drive(self) -> Drive:
@@ -142,6 +162,7 @@ class Fit(Result):
                 "evaluations."
             )
             said += [*each.identifiability.sentences(), *each.uncertainty.sentences()]
+            said += each.stage.bounds_reached()
         return (*said, fixed_line(self))
 
     @property
@@ -208,14 +229,14 @@ def fit(
     if not experiments:
         raise InputError("There is no run to fit.")
     nominal = model.parameters if isinstance(model, Drive) else model
-    doubts: tuple[str, ...] = ()
+    doubts = refuse_unsound(spike_findings(experiments, loss))
     if isinstance(nominal, ParameterSet):
         if not isinstance(free, Setup):
             raise InputError(
                 "A drive needs a Setup, such as load_setup('hoist'), for what is free."
             )
         setup = free
-        doubts = refuse_unsound(check_sound(experiments, smooth(nominal), setup))
+        doubts += refuse_unsound(check_sound(experiments, smooth(nominal), setup))
         nominal, changed = at_rate_of(experiments, nominal)
         doubts = (*doubts, *changed)
     elif not isinstance(nominal, ModelParameters):
@@ -224,7 +245,7 @@ def fit(
             entries = free if isinstance(free, Mapping) else {}
             named = tuple(channels), dict(noise or {}), dict(fixed or {})
             own = ModelSetup(own, entries, "", *named)
-        doubts = refuse_unsound(check_model(experiments, own))
+        doubts += refuse_unsound(check_model(experiments, own))
         nominal = own.nominal(experiments)
         setup = own.setup
     else:

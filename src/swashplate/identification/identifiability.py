@@ -278,7 +278,15 @@ class Identifiability(Result):
                 f"No test exercises {', '.join(self.unexcited)}: fix "
                 f"{'them' if len(self.unexcited) > 1 else 'it'}, or add a test that does."
             )
-        said += [each.sentence for each in (*self.null, *self.weak)]
+        said += [each.sentence for each in self.null]
+        if len(self.weak) == 1:
+            said.append(self.weak[0].sentence)
+        elif self.weak:
+            known = [f"{each.fix} to ±{100.0 * each.half_width:.3g} %" for each in self.weak]
+            said.append(
+                f"Weak, each with those before it fixed: {listed(known)}. Add tests that determine "
+                "them, or fix those whose values you know."
+            )
         return (
             *said,
             *(

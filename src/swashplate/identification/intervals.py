@@ -22,17 +22,16 @@ from swashplate.identification.noise import (
     line_sentences,
     noise_colours,
     spectral_covariance,
-    white_noise_covariance,
     without_lines,
 )
 from swashplate.identification.problem import LinearisedFit, Problem, linearised_fit
 from swashplate.identification.profile import CheckedEnd
 from swashplate.identification.unknowns import Unknowns
 from swashplate.results import Result, short
+from swashplate.tables import percent
 
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Experiment
-    from swashplate.identification.assessment import Assessment
     from swashplate.identification.fitting import StageFit
 
 Array = NDArray[np.float64]
@@ -170,12 +169,6 @@ class Handed(NamedTuple):
     slopes: Array
     """(K, K_earlier) by how much the later stage's vector follows the earlier one's."""
 
-    @property
-    def added(self) -> Array:
-        """(K, K) covariance that it adds to the later stage's own."""
-        added: Array = self.slopes @ self.covariance.matrix @ self.slopes.T
-        return added
-
 
 def slopes_by_earlier(
     stage: StageFit, earlier: StageFit, linearised: LinearisedFit
@@ -206,7 +199,7 @@ def slopes_by_earlier(
     model = stage.problem.model
     if not isinstance(model, DriveModel) or model.part != "pump" or earlier.stage.part != "card":
         return None
-    if not _driven_by_card(stage):
+    if not any(_driven_by_card(stage, each) for each in stage.problem.experiments):
         return None
     unknowns, vector = earlier.problem.unknowns, earlier.solution.vector
     names = [name for each in unknowns if each.run is None for name in each.targets]
@@ -217,47 +210,31 @@ def slopes_by_fixed(stage: StageFit, linearised: LinearisedFit) -> Array:
     """(K, F) changes of a stage's estimates for a standard uncertainty of each fixed number."""
     uncertain = stage.problem.uncertain
     names = [name for together in uncertain for name in together]
-    deviations = np.array([[each.get(name, 0.0) for each in uncertain] for name in names])
     if not names:
         return np.zeros((linearised.variables.count, 0))
+    deviations = np.array([[each.get(name, 0.0) for each in uncertain] for name in names])
     return _slopes(stage, linearised, names, deviations)
 
 
-def _driven_by_card(stage: StageFit) -> list[int]:
-    """Runs of which the pump is driven by what the card makes of a voltage."""
-    return [
-        number
-        for number, each in enumerate(stage.problem.experiments)
-        if stage.stage.current == "simulated" and each.input.kind == "voltage"
-    ]
+def _driven_by_card(stage: StageFit, experiment: Experiment) -> bool:
+    """Whether the pump is driven by what the card makes of a voltage."""
+    return stage.stage.current == "simulated" and experiment.input.kind == "voltage"
 
 
 def _slopes(stage: StageFit, linearised: LinearisedFit, names: Sequence[str], by: Array) -> Array:
-    """Derivatives of a stage's estimates by what moves numbers that it takes for granted.
+    """(K, F) derivatives of a stage's estimates by what moves numbers that it takes for granted.
 
-    Parameters
-    ----------
-    stage, linearised :
-        The stage, at its optimum.
-    names : sequence of str
-        Of the numbers, in the model.
-    by : (len(names), F) array
-        Derivatives of the numbers by what moves them.
-
-    Returns
-    -------
-    (K, F) array
+    `names` are those of the numbers, in the model; `by` (len(names), F) their own derivatives.
     """
     problem, vector = stage.problem, stage.solution.vector
     model, machine = problem.model, dict(problem.unknowns.targets(vector, ""))
     chain = model
     if isinstance(model, DriveModel) and model.part == "pump":
         chain = DriveModel(model.parameters_at(machine), "chain")
-    driven = _driven_by_card(stage)
     products = np.zeros((linearised.rank, by.shape[1]))
     rows = {(run.name, run.channel): run for run in linearised.runs}
     for number, experiment in enumerate(problem.experiments):
-        if chain is model or number not in driven:
+        if chain is model or not _driven_by_card(stage, experiment):
             values = problem.model_values(vector, number)
             moved = linearised_model(model, values, experiment, names)
         else:
@@ -266,11 +243,10 @@ def _slopes(stage: StageFit, linearised: LinearisedFit, names: Sequence[str], by
             moved = linearised_model(chain, own, experiment, names)
         for name, weight in problem.weights[number].items():
             used = weight > 0.0
-            if not used.any():
-                continue
-            run = rows[experiment.name, name]
-            changes = weight[used, None] * (moved[name].by[used] @ by)
-            products += (run.jacobian @ linearised.whitening).T @ changes
+            if used.any():
+                changes = weight[used, None] * (moved[name].by[used] @ by)
+                run = rows[experiment.name, name]
+                products += linearised.whitening.T @ (run.jacobian.T @ changes)
     slopes: Array = -linearised.whitening @ products
     return slopes
 
@@ -285,41 +261,33 @@ def with_handed(
     """
     if not handed and (fixed is None or not fixed.size):
         return own
-    total = own.matrix.copy()
-    if fixed is not None:
-        total += np.where(np.outer(own.determined, own.determined), fixed @ fixed.T, 0.0)
-    variance = np.diag(own.matrix).copy()
-    spread = _part(variance, own.degrees_of_freedom)
+    known = np.outer(own.determined, own.determined)
+    total = own.matrix + (0.0 if fixed is None else np.where(known, fixed @ fixed.T, 0.0))
+    spread = np.diag(own.matrix) ** 2 / own.degrees_of_freedom
     for each in handed:
-        added = np.where(np.outer(own.determined, own.determined), each.added, 0.0)
+        added = np.where(known, each.slopes @ each.covariance.matrix @ each.slopes.T, 0.0)
         total += added
         # of each earlier unknown by itself, as if they were independent of each other
         parts = each.slopes**2 * np.diag(each.covariance.matrix)
         share = parts / np.maximum(parts.sum(axis=1, keepdims=True), 1e-300)
-        freedom = 1.0 / np.maximum(
-            np.sum(share**2 / each.covariance.degrees_of_freedom, axis=1), 1e-300
-        )
-        spread += _part(np.diag(added), freedom)
+        inverse = np.sum(share**2 / each.covariance.degrees_of_freedom, axis=1)
+        spread += np.diag(added) ** 2 * np.maximum(inverse, 1e-300)
     variance = np.diag(total)
     freedom = np.divide(variance**2, spread, out=np.full_like(variance, np.inf), where=spread > 0.0)
     return replace(own, matrix=total, degrees_of_freedom=freedom)
 
 
-def _part(variance: Array, freedom: Array) -> Array:
-    part: Array = variance**2 / freedom
-    return part
-
-
 @dataclass(frozen=True, eq=False)
 class Uncertainty(Result):
-    """Errors of a fit's estimates: those to quote, and others beside them."""
+    """Errors of a fit's estimates: those to quote, and what they rest on."""
 
     quoted: Covariance
     """That of the stage's own noise with what earlier stages handed on."""
     own: Covariance
     """That of the stage's own noise."""
-    white: Covariance
-    """Too small where residuals are coloured: what `inflation` is told from."""
+    inflation: Array
+    """(K,) samples that stand for one independent one, at least 1, unknown by unknown: the own
+    variance over that of white residuals."""
     colours: tuple[NoiseColour, ...]
     noisy: bool
     """Whether there are any residuals at all."""
@@ -346,15 +314,9 @@ class Uncertainty(Result):
         return estimates(self.quoted, level=self.level, ends=ends)
 
     @property
-    def inflation(self) -> Array:
-        """(K,) samples that stand for one independent one, at least 1, unknown by unknown.
-
-        The ratio of the stage's own variance to that of white noise; for profiles.
-        """
-        white = np.diag(self.white.matrix)
-        known = self.own.determined & (white > 0.0)
-        ratio = np.divide(np.diag(self.own.matrix), white, out=np.ones_like(white), where=known)
-        return np.maximum(ratio, 1.0)
+    def sampled(self) -> Covariance:
+        """That of all stages' noise: the quoted one without what fixed numbers may be off."""
+        return with_handed(self.own, self.handed)
 
     def sentences(self) -> tuple[str, ...]:
         """What the errors rest on."""
@@ -362,19 +324,7 @@ class Uncertainty(Result):
             return ("The residuals are exactly zero: errors of zero do not apply to other tests.",)
         said = list(line_sentences(self.lines))
         for colour in self.colours:
-            if colour.length:
-                worth = (
-                    f"{colour.inflation:.3g} samples count as one independent sample"
-                    if colour.inflation > 1.05
-                    else "positive and negative correlations cancel, and the samples count as "
-                    "independent ones"
-                )
-                said.append(
-                    f"Residuals of {colour.channel} stay correlated over {colour.duration:.3g} s: "
-                    f"{worth}."
-                )
-            else:
-                said.append(f"Residuals of {colour.channel} are white.")
+            said.append(colour.sentence)
             if colour.drifting:
                 said.append(
                     f"That is a large part of a run: residuals of {colour.channel} are model error "
@@ -384,27 +334,20 @@ class Uncertainty(Result):
         for end in self.ends:
             side, name = "upper" if end.upper else "lower", self.own.variables.names[end.number]
             if end.better is not None:
-                said.append(
-                    f"The profile of {name} found a better optimum, cost {end.better:.6g}: fit "
-                    "from more starts."
-                )
-            elif not np.isfinite(end.distance):
-                said.append(
-                    f"{name} has no {side} end: the cost does not rise enough on that side."
-                )
+                words = f"The profile of {name} found a better optimum, cost {end.better:.6g}"
+                said.append(f"{words}: fit from more starts.")
+            elif np.isfinite(end.distance):
+                words = f"The {side} end of {name} is that of its profile"
+                said.append(f"{words}, which is asymmetric.")
             else:
-                said.append(
-                    f"The {side} end of {name} is that of its profile, which is asymmetric."
-                )
+                words = f"{name} has no {side} end"
+                said.append(f"{words}: the cost does not rise enough on that side.")
         known = self.own.determined & (np.diag(self.own.matrix) > 0.0)
         if known.any() and (self.handed or self.fixed.any()):
-            what = [
-                *(["the uncertainty of earlier stages"] if self.handed else []),
-                *(["the standard uncertainty of fixed parameters"] if self.fixed.any() else []),
-            ]
-            wider = np.where(known, self.quoted.standard_errors, 1.0) / np.where(
-                known, self.own.standard_errors, 1.0
-            )
+            what = ["the uncertainty of earlier stages"] * bool(self.handed)
+            what += ["the standard uncertainty of fixed parameters"] * bool(self.fixed.any())
+            wider = np.ones(known.size)
+            wider[known] = self.quoted.standard_errors[known] / self.own.standard_errors[known]
             most = int(np.argmax(wider))
             said.append(
                 f"Intervals include {' and '.join(what)}, which widens them by a factor of "
@@ -412,11 +355,6 @@ class Uncertainty(Result):
                 f"{self.own.variables.names[most]}."
             )
         return tuple(said)
-
-    @property
-    def sampled(self) -> Covariance:
-        """That of all stages' noise: the quoted one without what fixed numbers may be off."""
-        return with_handed(self.own, self.handed)
 
 
 def uncertainty(
@@ -426,7 +364,7 @@ def uncertainty(
     handed: Sequence[Handed] = (),
     fixed: Array | None = None,
 ) -> Uncertainty:
-    """Errors of a fit's estimates for coloured residuals, with white-noise ones beside them.
+    """Errors of a fit's estimates for coloured residuals.
 
     Parameters
     ----------
@@ -446,13 +384,15 @@ def uncertainty(
     """
     bounded, fit = fit.variables, released(fit)
     clean, lines = without_lines(fit)
-    colours = noise_colours(clean)
     own = replace(coloured_noise_covariance(fit), variables=bounded)
+    white = fit.squares / fit.spare_samples * np.sum(fit.whitening**2, axis=1)
+    ratio = np.ones_like(white)
+    np.divide(np.diag(own.matrix), white, out=ratio, where=own.determined & (white > 0.0))
     made = Uncertainty(
         with_handed(own, handed, fixed),
         own,
-        replace(white_noise_covariance(fit), variables=bounded),
-        colours,
+        np.maximum(ratio, 1.0),
+        noise_colours(clean),
         fit.squares > 0.0,
         level,
         tuple(handed),
@@ -507,97 +447,26 @@ def weighed(problem: Problem, vector: Array) -> Problem:
     ratio = np.diag(own.matrix)[known] / assumed[known]
     found = np.full(known.size, float(np.median(ratio)) if known.any() else 1.0)
     found[known] = ratio
-    worths = [
-        max(float(worth), LEAST)
-        for worth, unknown in zip(found, problem.unknowns, strict=True)
-        if unknown.prior is not None
-    ]
+    having = [each.prior is not None for each in problem.unknowns]
+    worths = np.maximum(found[having], LEAST).tolist()
     return replace(problem, unknowns=problem.unknowns.with_worths(worths))
 
 
 def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tuple[str, ...]:
     """What each prior adds, and how far from it the estimate lies."""
     said = []
-    errors = quoted.standard_errors
-    for k, unknown in enumerate(unknowns):
+    for unknown, number, error in zip(unknowns, vector, quoted.standard_errors, strict=True):
         prior = unknown.prior
         if prior is None:
             continue
         scale = 1.0 if unknown.log else unknown.scale
         middle = log(prior.mean) if unknown.log else prior.mean
-        pull = (float(vector[k]) * scale - middle) / prior.deviation
-        share = min(float(errors[k] * scale / prior.deviation) ** 2, 1.0)
-        percent = 100.0 * share
-        part = f"{percent:.0f}" if percent >= 10.0 else f"{percent:.2g}"
+        pull = (float(number) * scale - middle) / prior.deviation
+        share = min(float(error * scale / prior.deviation) ** 2, 1.0)
         spread = f"{100.0 * prior.deviation:.3g} %" if unknown.log else f"{prior.deviation:.4g}"
         said.append(
             f"The prior of {unknown.name}, {prior.mean:.5g} ± {spread}, contributes "
-            f"{part} % of the information on it; the estimate lies "
+            f"{percent(share, 1.0)} of the information on it; the estimate lies "
             f"{abs(pull):.2g} deviations {'above' if pull >= 0.0 else 'below'} its mean."
         )
     return tuple(said)
-
-
-OPEN = 0.01
-"""Part of a channel's range that a prediction moves by, for 10 % of an unknown, from which it
-depends on that unknown."""
-
-
-def unbounded_predictions(
-    assessments: Sequence[Assessment], experiments: Sequence[Experiment]
-) -> tuple[str, ...]:
-    """Unknowns without an interval on which the prediction of some runs depends.
-
-    Parameters
-    ----------
-    assessments : sequence of Assessment
-        Of the stages.
-    experiments : sequence of Experiment
-        The runs that are predicted; each is looked at in the channels that a stage fits.
-
-    Notes
-    -----
-    Only a prediction that leaves the directions which the fitted runs determine is unbounded: of
-    two unknowns of which the fit tells the product, it depends on the product alone.
-    """
-    names = []
-    for each in assessments:
-        model, found = each.stage.problem.model, each.uncertainty
-        if not isinstance(model, DriveModel):
-            continue
-        unknowns, vector = each.stage.problem.unknowns, each.stage.solution.vector
-        status = [estimate.status for estimate in found.estimates]
-        undetermined = np.array(
-            [s == "undetermined" and u.run is None for s, u in zip(status, unknowns, strict=True)]
-        )
-        # a better optimum that was met says nothing of how far an unknown can go
-        one_ended = np.zeros(len(unknowns), dtype=np.bool_)
-        one_ended[[e.number for e in found.ends if np.isinf(e.distance) and e.better is None]] = (
-            True
-        )
-        if not (undetermined | one_ended).any():
-            continue
-        lengths = np.linalg.norm(each.linearised.triangle, axis=0)
-        lengths[lengths == 0.0] = 1.0
-        # directions that the fitted runs determine, in units of their effect there
-        told = np.linalg.qr(lengths[:, None] * each.linearised.whitening)[0]
-        chain = DriveModel(each.stage.drive.parameters, "card" if model.part == "card" else "chain")
-        chain = replace(chain, forces=model.forces)
-        for experiment in experiments:
-            if experiment.input.kind != "voltage" or not chain.signals_of(experiment):
-                continue
-            targets = [t for u in unknowns if u.run is None for t in u.targets]
-            values = {t: v for t, v in unknowns.targets(vector, "").items() if t in targets}
-            by_name = unknowns.chain(vector, targets, "")
-            for name, part in chain.linearise(values, experiment, targets).items():
-                channel = experiment[name]
-                rows = part.by[channel.used] @ by_name
-                reach = float(np.ptp(channel.values[channel.used]))
-                if channel.is_position:
-                    rows = rows - rows.mean(axis=0)
-                open_rows = rows / lengths
-                open_rows = (open_rows - (open_rows @ told) @ told.T) * lengths
-                moved = 0.1 * np.where(undetermined, np.abs(open_rows).max(axis=0), 0.0)
-                moved += 0.1 * np.where(one_ended, np.abs(rows).max(axis=0), 0.0)
-                names += [unknowns.names[k] for k in np.flatnonzero(moved > OPEN * reach)]
-    return tuple(dict.fromkeys(names))

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_banded
 
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.errors import DomainError
 from swashplate.identification.drive_model import CURRENTS, DriveModel
-from swashplate.identification.model import linearised, simulated
+from swashplate.identification.model import OFFSET, linearised, simulated
 from swashplate.identification.problem import TOLERANCE, triangular_factor
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, columns_of
 from swashplate.tables import listed
@@ -48,14 +49,32 @@ COMMAND_CHANGE = 1e-3
 SAME_STAMPS = 0.01
 """The same of late stamps and a longer delay, compared by whole samples: stamps have jitter. [1]"""
 
+LAG = 0.01
+"""Time constant by which the effect of a slow instrument or amplifier is found. [s]"""
+
+EQUAL = 0.8
+"""Part of what the best cause explains from which another one is about as good: sizes are those of
+one step, and causes of different kind imitate each other to about that."""
+
+MOST_CAUSES = 4
+"""Causes that are named."""
+
 FAR = 100.0
 """One-step estimate of a relative error beyond which one step says nothing, tau's apart. [%]"""
 
 UNTOLD = 1e-4
 """Part of a fixed parameter's effect outside the estimates' below which it is a unit of them."""
 
-LOSS = "loss at the largest speeds of "
-"""What the name of a counter's fault begins with, that it does not follow the largest speeds."""
+LOSS, STAMPS, SLOW = "loss at the largest speeds of ", "time stamps of ", "lag of "
+"""What names of faults begin with: a counter that does not follow, late stamps, slow instruments
+or amplifiers."""
+
+MEANS = {
+    STAMPS: " (or a delay or lag that the model leaves out)",
+    f"{SLOW}the command": " (an amplifier or filter that the model leaves out)",
+    SLOW: " (a slow instrument)",
+}
+"""What else a fault may be, by what its name begins with."""
 
 UNCERTAIN = "fixed: "
 """What the name of a fixed parameter with a standard uncertainty begins with: an estimate that its
@@ -127,7 +146,9 @@ class Fault:
 
     @property
     def near(self) -> bool:
-        """Whether one step says how large it is, or it has no size of its own."""
+        """Whether one step says how large it is, or it has no size; no lag is below 0."""
+        if self.name.startswith(SLOW):
+            return self.size > 0.0
         return self.unit != "%" or self.name == "tau" or self.lost or abs(self.size) <= FAR
 
     @property
@@ -139,7 +160,8 @@ class Fault:
     def cause(self) -> str:
         """It as a likely cause, in words."""
         size = "" if self.lost else f" by {self.size:+.3g} {self.unit}"
-        return f"{self.name}{size} (explains {100.0 * self.share:.0f} % of the remaining residuals)"
+        start = next((each for each in MEANS if self.name.startswith(each)), "")
+        return f"{self.name}{MEANS.get(start, '')}{size}"
 
     @property
     def assumption(self) -> str:
@@ -155,9 +177,7 @@ class Fault:
                 "visible"
             )
         others = ", ".join(self.same_as)
-        return (
-            f"{self.name}: indistinguishable from other values of {others} (to {self.outside:.0e})"
-        )
+        return f"{self.name}: equal to other values of {others} for any measurement of these runs"
 
 
 @dataclass(frozen=True)
@@ -197,8 +217,17 @@ class LackOfFit:
 
     @property
     def causes(self) -> tuple[Fault, ...]:
-        """Faults that explain a large part of the residuals, the likeliest first; three at most."""
-        return tuple(each for each in self.faults if each.explains and each.near)[:3]
+        """Faults that explain most of the residuals, and about equally, the likeliest first."""
+        large = [each for each in self.faults if each.explains and each.near]
+        return tuple(each for each in large if each.share >= EQUAL * large[0].share)[:MOST_CAUSES]
+
+    @property
+    def likely(self) -> str:
+        """The causes in words; several where the residuals do not tell them apart."""
+        said = [f"{each.cause} explains {100.0 * each.share:.0f} %" for each in self.causes]
+        if len(said) < 2:
+            return "".join(f"{each} of the remaining residuals" for each in said)
+        return f"one of these, which the residuals hardly tell apart: {'; '.join(said)} of them"
 
     @property
     def assumed(self) -> tuple[Fault, ...]:
@@ -529,28 +558,38 @@ class _StageBlocks:
     def _by_command(
         self, number: int, outputs: Mapping[str, Array]
     ) -> dict[str, dict[str, tuple[Array, tuple[float, str, float]]]]:
-        """By channel, the effect of a scale error of the command, by a difference."""
+        """By channel, the effects of a scale error and of a lag of the command, by differences."""
         experiment = self.problem.experiments[number]
         if not isinstance(self.model, DriveModel) or self.model.part == "pump":
             return {}
         signal = experiment.input
-        less = replace(
-            experiment, input=replace(signal, values=(1.0 - COMMAND_CHANGE) * signal.values)
-        )
         values = self.problem.unknowns.targets(self.vector, experiment.name)
-        plain = {k: v for k, v in values.items() if not k.startswith("offset ")}
+        plain = {k: v for k, v in values.items() if not k.startswith(OFFSET)}
+        changed = ((1.0 - COMMAND_CHANGE) * signal.values, _lagged(signal.time, signal.values))
         try:
-            changed = simulated(self.model, plain, less)
-            before = simulated(self.model, plain, experiment)
+            before, less, later = (
+                simulated(self.model, plain, replace(experiment, input=replace(signal, values=x)))
+                for x in (signal.values, *changed)
+            )
         except DomainError:
             return {}
-        meaning = (100.0, "%", 100.0 * PLAUSIBLE_SCALE)
+        scale, lag = (100.0, "%", 100.0 * PLAUSIBLE_SCALE), (1e3, "ms", inf)
         return {
             name: {
-                "scale of the command": ((before[name] - changed[name]) / COMMAND_CHANGE, meaning)
+                "scale of the command": ((before[name] - less[name]) / COMMAND_CHANGE, scale),
+                f"{SLOW}the command": ((later[name] - before[name]) / LAG, lag),
             }
             for name in outputs
         }
+
+
+def _lagged(time: Array, values: Array) -> Array:
+    """(m,) values behind a first-order lag of `LAG`, at rest before."""
+    kept = np.exp(-np.diff(time) / LAG)
+    bands = np.vstack([np.ones(time.size), np.append(-kept, 0.0)])
+    driven = np.concatenate([values[:1], (1.0 - kept) * values[1:]])
+    made: Array = solve_banded((1, 0), bands, driven)
+    return made
 
 
 def _instrument_faults(
@@ -567,7 +606,8 @@ def _instrument_faults(
     about = output - output[0] if channel.is_position else output
     made = {
         f"scale of {name}": (output, (100.0, "%", 100.0 * PLAUSIBLE_SCALE)),
-        f"time stamps of {name}": (-slope, (1e3, "ms", 1e3 * PLAUSIBLE_DELAY)),
+        f"{STAMPS}{name}": (-slope, (1e3, "ms", 1e3 * PLAUSIBLE_DELAY)),
+        f"{SLOW}{name}": ((_lagged(time, output) - output) / LAG, (1e3, "ms", inf)),
         f"drift of {name} over the campaign": (about * place, (100.0, "%", inf)),
     }
     if channel.kind in CURRENTS:
@@ -607,7 +647,7 @@ def _late_commands(assessment: Assessment) -> list[Fault]:
     values = {
         k: v
         for k, v in problem.unknowns.targets(stage.solution.vector, experiment.name).items()
-        if not k.startswith("offset ")
+        if not k.startswith(OFFSET)
     }
     shifted = replace(experiment, input=replace(signal, values=later))
     first = simulated(model, values, shifted)

@@ -49,19 +49,6 @@ class Covariance(Result):
         return correlation
 
 
-def white_noise_covariance(fit: LinearisedFit) -> Covariance:
-    """Covariance if the residuals were white: s²(JᵀJ)⁻¹.
-
-    Raises
-    ------
-    InputError
-        If there are no more samples than unknowns.
-    """
-    spare = fit.spare_samples
-    matrix = fit.squares / spare * (fit.whitening @ fit.whitening.T)
-    return covariance_of(fit, matrix, np.full(fit.variables.count, float(spare)))
-
-
 def covariance_of(fit: LinearisedFit, matrix: Array, freedom: Array) -> Covariance:
     """A covariance from a matrix, cleared of what the fit does not determine."""
     known = np.outer(fit.determined, fit.determined)
@@ -225,11 +212,6 @@ class NoiseColour(Result):
     """Longest lag looked at, in steps."""
 
     @property
-    def duration(self) -> float:
-        """Time over which the residuals stay correlated. [s]"""
-        return self.length * self.step
-
-    @property
     def inflation(self) -> float:
         """Samples that stand for one independent sample, at least 1: 1 + 2 Σ ρ."""
         return max(1.0, float(2.0 * self.correlation.sum() - 1.0))
@@ -239,6 +221,20 @@ class NoiseColour(Result):
         """Whether the runs are only a few correlation lengths long: no noise does that."""
         return self.length > max(DRIFTING * self.longest, 5.0)
 
+    @property
+    def sentence(self) -> str:
+        """How long the residuals stay correlated, and what that makes the samples worth."""
+        if not self.length:
+            return f"Residuals of {self.channel} are white."
+        worth = (
+            f"{self.inflation:.3g} samples count as one independent sample"
+            if self.inflation > 1.05
+            else "positive and negative correlations cancel, and the samples count as independent "
+            "ones"
+        )
+        during = f"{self.length * self.step:.3g} s"
+        return f"Residuals of {self.channel} stay correlated over {during}: {worth}."
+
 
 def unweighted(run: LinearisedRun) -> Array:
     """(n,) differences simulated less measured, without the weights if those are known."""
@@ -246,7 +242,7 @@ def unweighted(run: LinearisedRun) -> Array:
 
 
 def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
-    """Colours of the residuals of each channel, pooled over its runs."""
+    """Colours of the residuals of each channel, pooled over its runs of one sampling step."""
     colours = []
     grids = [grid_of(run.time) for run in fit.runs]
     for members in _alike(fit, grids):
@@ -255,27 +251,16 @@ def noise_colours(fit: LinearisedFit) -> tuple[NoiseColour, ...]:
         for k in members:
             added, pairs = pair_sums(unweighted(fit.runs[k]), grids[k], longest)
             sums, counts = sums + added, counts + pairs
-        colours.append(
-            colour_of(fit.runs[members[0]].channel, members, grids[members[0]].step, sums, counts)
-        )
+        autocovariance = sums / np.maximum(counts, 1.0)
+        length = correlation_length(autocovariance, counts)
+        flat = min(length, longest // 2)  # the taper must have come down at the longest lag
+        lags = np.arange(min(2 * max(flat, 1), longest) + 1.0)
+        correlation = np.where(lags == 0.0, 1.0, 0.0)
+        if autocovariance[0] > 0.0 and flat:
+            correlation = autocovariance[: lags.size] / autocovariance[0] * flat_top(lags, flat)
+        channel, step = fit.runs[members[0]].channel, grids[members[0]].step
+        colours.append(NoiseColour(channel, members, step, correlation, length, longest))
     return tuple(colours)
-
-
-def colour_of(
-    channel: str, members: Sequence[int], step: float, sums: Array, counts: Array
-) -> NoiseColour:
-    """A colour from sums of products and their counts at the lags 0 to m."""
-    autocovariance = sums / np.maximum(counts, 1.0)
-    length = correlation_length(autocovariance, counts)
-    flat = min(length, (sums.size - 1) // 2)  # the taper must have come down at the longest lag
-    lags = np.arange(min(2 * max(flat, 1), sums.size - 1) + 1.0)
-    white = np.where(lags == 0.0, 1.0, 0.0)
-    correlation = (
-        autocovariance[: lags.size] / autocovariance[0] * flat_top(lags, flat)
-        if autocovariance[0] > 0.0 and flat
-        else white
-    )
-    return NoiseColour(channel, tuple(members), step, correlation, length, sums.size - 1)
 
 
 def _alike(fit: LinearisedFit, grids: Sequence[Grid]) -> list[tuple[int, ...]]:
@@ -283,19 +268,15 @@ def _alike(fit: LinearisedFit, grids: Sequence[Grid]) -> list[tuple[int, ...]]:
     groups: list[list[int]] = []
     for k, run in enumerate(fit.runs):
         for group in groups:
-            first = group[0]
-            if fit.runs[first].channel == run.channel and (
-                abs(grids[k].step - grids[first].step) <= SAME_STEP * grids[first].step
-                or run.time.size < 2
-            ):
+            first = grids[group[0]].step
+            same = abs(grids[k].step - first) <= SAME_STEP * first or run.time.size < 2
+            if fit.runs[group[0]].channel == run.channel and same:
                 group.append(k)
                 break
         else:
             groups.append([k])
     return [tuple(group) for group in groups]
 
-
-Complex = NDArray[np.complex128]
 
 NEIGHBOURS = 21
 """Frequencies, of all runs of a channel together, over which a periodogram is averaged."""
@@ -332,7 +313,7 @@ def spectral_covariance(
     of squares are divided by sums of 1 - h, as in HC2 of MacKinnon and White (1985). Degrees of
     freedom follow from the frequencies that an unknown's variance is an average over.
     """
-    spectra = spectra or spectra_of(fit)
+    spectra = spectra or [_Spectrum(run, fit.whitening) for run in fit.runs]
     sums = _Sums(fit)
     for channel in dict.fromkeys(run.channel for run in fit.runs):
         parts = [s for s, run in zip(spectra, fit.runs, strict=True) if run.channel == channel]
@@ -344,16 +325,16 @@ def spectral_covariance(
         seen, rest = _smoothed(power[order]), _smoothed(left[order])
         shape = np.empty(order.size)
         shape[order] = seen / np.maximum(rest, LEAST_LEFT * NEIGHBOURS)
-        weights = []
-        for part, spectrum in zip(parts, np.split(shape, _ends(parts)), strict=True):
+        weights, middle = [], np.zeros((fit.rank, fit.rank))
+        ends = np.cumsum([part.frequencies.size for part in parts])[:-1]
+        for part, spectrum in zip(parts, np.split(shape, ends), strict=True):
             density = part.level * spectrum * part.twice
-            sums.middle += ((part.derivatives.conj().T * density) @ part.derivatives).real
+            middle += ((part.derivatives.conj().T * density) @ part.derivatives).real
             across = np.abs(part.derivatives @ fit.whitening.T) ** 2
             weights.append(across * (part.level * part.twice)[:, None])
         # what each frequency's square adds to the variances: the smoothing the other way round
         share = np.concatenate(weights)[order] / np.maximum(rest, LEAST_LEFT * NEIGHBOURS)[:, None]
-        added = _smoothed(share) * power[order][:, None]
-        sums.add(added)
+        sums.add(middle, _smoothed(share) * power[order][:, None])
     return sums.covariance(4.0, np.inf)
 
 
@@ -367,8 +348,9 @@ class _Sums:
         self.total: Array = np.einsum("ki,ij,kj->k", fit.whitening, self.middle, fit.whitening)
         self.squares: Array = np.zeros(fit.variables.count)
 
-    def add(self, parts: Array) -> None:
-        """Add parts (n, K) of the variances, independent of each other."""
+    def add(self, middle: Array, parts: Array) -> None:
+        """Add to the middle (rank, rank), and parts (n, K) of the variances, all independent."""
+        self.middle = self.middle + middle
         self.total += parts.sum(axis=0)
         self.squares += np.sum(parts**2, axis=0)
 
@@ -411,16 +393,6 @@ class _Spectrum:
         self.level = float(np.mean(residual**2))
 
 
-def spectra_of(fit: LinearisedFit) -> list[_Spectrum]:
-    """The spectra of each run, from which both sandwiches are made."""
-    return [_Spectrum(run, fit.whitening) for run in fit.runs]
-
-
-def _ends(parts: Sequence[_Spectrum]) -> list[int]:
-    """Where the frequencies of one part end and those of the next begin."""
-    return [int(each) for each in np.cumsum([part.frequencies.size for part in parts])[:-1]]
-
-
 def _smoothed(values: Array) -> Array:
     """Sums over each value and its neighbours (n, ...), mirrored at both ends."""
     near = min((NEIGHBOURS - 1) // 2, values.shape[0] - 1)
@@ -445,13 +417,13 @@ def band_score_covariance(
     each band and run.
     """
     sums = _Sums(fit)
-    for part in spectra or spectra_of(fit):
+    for part in spectra or [_Spectrum(run, fit.whitening) for run in fit.runs]:
         products = part.derivatives.conj() * (part.twice * part.residual)[:, None]
         width = min(BAND, 0.5 / part.step / FEWEST_BANDS)
         band = (part.frequencies / width).astype(np.intp)
         scores = np.add.reduceat(products, np.flatnonzero(np.diff(band, prepend=-1)), axis=0)
-        sums.middle += 0.5 * (scores.conj().T @ scores).real
-        sums.add(0.5 * np.abs(scores @ fit.whitening.T) ** 2)
+        middle = 0.5 * (scores.conj().T @ scores).real
+        sums.add(middle, 0.5 * np.abs(scores @ fit.whitening.T) ** 2)
     return sums.covariance(2.0, 1.0)
 
 
@@ -462,7 +434,7 @@ def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
     take in noise that is not, but are few. On the bench neither alone holds 93 to 97 % on every
     axis, both together do (docs/calibration.md).
     """
-    spectra = spectra_of(fit)
+    spectra = [_Spectrum(run, fit.whitening) for run in fit.runs]
     first, second = spectral_covariance(fit, spectra), band_score_covariance(fit, spectra)
     known = first.determined & (first.standard_errors > 0.0)
     ratio = np.divide(
@@ -525,12 +497,14 @@ def without_lines(fit: LinearisedFit) -> tuple[LinearisedFit, tuple[SpectralLine
         )
         left = {k: unweighted(fit.runs[k]) for k in members}
         for frequency in _frequencies([left[k] for k in members], [_grid(fit, k) for k in members]):
-            before = sum(float(each @ each) for each in left.values())
+            taken = 0.0
             for k in members:
                 turn = 2.0 * np.pi * frequency * fit.runs[k].time
-                waves = np.linalg.qr(np.column_stack([np.cos(turn), np.sin(turn)]))[0]
-                left[k] = left[k] - waves @ (waves.T @ left[k])
-            taken = before - sum(float(each @ each) for each in left.values())
+                waves = np.stack([np.cos(turn), np.sin(turn)])
+                products = waves @ left[k]
+                amplitudes = np.linalg.solve(waves @ waves.T, products)
+                left[k] = left[k] - amplitudes @ waves
+                taken += float(products @ amplitudes)
             found.append(SpectralLine(channel, frequency, taken / whole))
         for k in members:
             weight = fit.runs[k].weight
@@ -543,18 +517,14 @@ def line_sentences(lines: Sequence[SpectralLine]) -> tuple[str, ...]:
     said = []
     for channel in dict.fromkeys(line.channel for line in lines):
         alike = sorted((e for e in lines if e.channel == channel), key=lambda e: e.frequency)
+        low, high = alike[0].frequency, alike[-1].frequency
         most = max(alike, key=lambda each: each.share)
-        what, largest = f"A spectral line at {most.frequency:.3g} Hz makes", ""
+        what, largest = f"A spectral line at {low:.3g} Hz makes", ""
         if len(alike) > 1:
-            what = (
-                f"{len(alike)} spectral lines between {alike[0].frequency:.3g} and "
-                f"{alike[-1].frequency:.3g} Hz make"
-            )
+            what = f"{len(alike)} spectral lines between {low:.3g} and {high:.3g} Hz make"
             largest = f", the largest {100.0 * most.share:.2g} % at {most.frequency:.3g} Hz"
-        share = sum(each.share for each in alike)
-        said.append(
-            f"{what} {100.0 * share:.2g} % of the residuals' variance of {channel}{largest}."
-        )
+        share = 100.0 * sum(each.share for each in alike)
+        said.append(f"{what} {share:.2g} % of the residuals' variance of {channel}{largest}.")
     return tuple(said)
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.problem import LinearisedFit, Problem
+from swashplate.identification.problem import TOLERANCE, LinearisedFit, Problem
 from swashplate.identification.solving import Evaluation, solve
 from swashplate.identification.unknowns import Vector
 from swashplate.results import Result
@@ -21,52 +21,6 @@ if TYPE_CHECKING:
     from swashplate.identification.assessment import Assessment
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class _Beside:
-    """A problem with one of its unknowns fixed, as `solving.Objective` has it."""
-
-    problem: Problem
-    index: int
-    number: float
-    """Of the fixed unknown, in the solver's vector."""
-    start: Array
-    """(K - 1,)"""
-
-    @property
-    def bounds(self) -> tuple[Array, Array]:
-        low, high = self.problem.bounds
-        return np.delete(low, self.index), np.delete(high, self.index)
-
-    def evaluate(self, vector: Array, *, compressed: bool = True) -> Evaluation:
-        whole = self.problem.evaluate(self.whole(vector), compressed=compressed)
-        return Evaluation(whole.residuals, np.delete(whole.jacobian, self.index, axis=1))
-
-    def cost(self, vector: Array) -> float:
-        return self.problem.cost(self.whole(vector))
-
-    def whole(self, vector: Array) -> Array:
-        return np.insert(vector, self.index, self.number)
-
-
-def minimiser(
-    problem: Problem, *, tolerance: float = 1e-8, max_evaluations: int = 60
-) -> Callable[[int, float, Array], tuple[float, Array]]:
-    """What `profile` asks for: the least cost with one unknown fixed."""
-
-    def minimise(index: int, number: float, start: Array) -> tuple[float, Array]:
-        low, high = problem.bounds
-        others = np.delete(np.clip(start, low, high), index)
-        if not others.size:
-            vector = np.array([number])
-            return problem.cost(vector), vector
-        beside = _Beside(problem, index, number, others)
-        found = solve(beside, tolerance=tolerance, max_evaluations=max_evaluations)
-        return found.cost, beside.whole(found.vector)
-
-    return minimise
-
 
 Minimise = Callable[[int, float, Array], tuple[float, Array]]
 """Number of the unknown that is fixed, its number in the vector, and a (K,) start to the least cost
@@ -103,105 +57,6 @@ class Point(NamedTuple):
     vector: Vector
 
 
-@dataclass(eq=False)
-class ProfileSide(Result):
-    """One side of a profile, outwards."""
-
-    minimise: Minimise
-    optimum: Point
-    index: int
-    rise: float
-    """Of the cost, at which the side ends."""
-    direction: float
-    """1 upwards, -1 downwards."""
-    step: float
-    """Of about one standard error."""
-    bound: float
-    most: int
-    """Largest number of points."""
-    points: list[Point] = field(default_factory=list)
-    end: float | None = None
-    better: Point | None = None
-
-    def march(self) -> Ending:
-        """Outwards until the cost has risen enough, or something else ends the side."""
-        # roots of the rise over the threshold's, by distance: nearly a straight line
-        path = [(0.0, 0.0)]
-        stride, halvings = STRIDE * self.step, 0
-        while len(self.points) < self.most:
-            distance = min(path[-1][0] + stride, abs(self.bound - self.optimum.number))
-            if distance <= path[-1][0]:
-                return "bound"
-            if distance > FURTHEST * self.step:
-                return "open"
-            point = self._at(distance)
-            if point is None:
-                if halvings == HALVINGS:
-                    return "domain"
-                halvings, stride = halvings + 1, 0.5 * stride
-                continue
-            if self._improves(point):
-                return "better optimum"
-            self.points.append(point)
-            height = self._height(point)
-            if height >= 1.0:
-                return self._crossing(path[-1], (distance, height))
-            gained = max(height - path[-1][1], 0.1 * STRIDE)
-            path.append((distance, height))
-            # slowly, so that the next start is good and a flat stretch is not leapt over
-            stride *= float(np.clip(STRIDE / gained, 0.3, 2.5))
-        return "open"
-
-    def _crossing(self, inside: tuple[float, float], outside: tuple[float, float]) -> Ending:
-        """Find where the cost has risen just enough, by false position (Illinois) in the root."""
-        (near, low), (far, high) = inside, outside
-        low, high = low - 1.0, high - 1.0
-        distance = far
-        for _ in range(12):
-            if abs(high) <= CLOSE:
-                distance = far
-                break
-            distance = far - high * (far - near) / (high - low)
-            point = self._at(distance)
-            if point is None:
-                break
-            if self._improves(point):
-                return "better optimum"
-            self.points.append(point)
-            self.points.sort(key=lambda each: abs(each.number - self.optimum.number))
-            value = self._height(point) - 1.0
-            if abs(value) <= CLOSE:
-                break
-            if value * high < 0.0:
-                near, low = far, high
-            else:
-                low *= 0.5
-            far, high = distance, value
-        self.end = self.optimum.number + self.direction * distance
-        return "crossed"
-
-    def _at(self, distance: float) -> Point | None:
-        """The least cost at a distance from the optimum; None outside the model's domain."""
-        number = self.optimum.number + self.direction * distance
-        known = (self.optimum, *self.points)
-        start = min(known, key=lambda point: abs(point.number - number)).vector.copy()
-        start[self.index] = number
-        try:
-            cost, vector = self.minimise(self.index, number, start)
-        except DomainError:
-            return None
-        return Point(number, float(cost), vector) if np.isfinite(cost) else None
-
-    def _improves(self, point: Point) -> bool:
-        better = point.cost < self.optimum.cost - BETTER * self.rise
-        if better:
-            self.better = point
-        return better
-
-    def _height(self, point: Point) -> float:
-        return float(np.sqrt(max(point.cost - self.optimum.cost, 0.0) / self.rise))
-
-
 @dataclass(frozen=True, eq=False)
 class Profile(Result):
     """Least cost as a function of one unknown."""
@@ -229,69 +84,16 @@ class Profile(Result):
                 f"{self.cost:.6g}: fit again from there.",
             )
         reasons: dict[Ending, str] = {
-            "bound": "reaches its bound before the cost rises enough",
-            "open": "reaches the end of the search before the cost rises enough",
-            "domain": "reaches the edge of the model's domain before the cost rises enough",
+            "bound": "its bound",
+            "open": "the end of the search",
+            "domain": "the edge of the model's domain",
         }
         return tuple(
-            f"{name} {reasons[ending]} on its {side} side: no end of the interval there."
+            f"{name} reaches {reasons[ending]} before the cost rises enough on its {side} side: no "
+            "end of the interval there."
             for side, ending in zip(("lower", "upper"), self.endings, strict=True)
             if ending in reasons
         )
-
-
-def threshold(
-    cost: float,
-    samples: int,
-    unknowns: int,
-    *,
-    inflation: float = 1.0,
-    freedom: float | None = None,
-    level: float = 0.95,
-) -> float:
-    """Rise of the cost (half the sum of squares) that ends an interval, for coloured residuals.
-
-    Parameters
-    ----------
-    cost : float
-        At the optimum.
-    samples, unknowns : int
-        Numbers of samples and of combinations determined.
-    inflation : float
-        Samples that stand for one independent one, at least 1: the ratio of the unknown's variance
-        under coloured noise to that under white noise.
-    freedom : float, optional
-        Degrees of freedom of Student's quantile; by default samples/inflation - unknowns.
-    level : float
-        Probability of the interval.
-
-    Raises
-    ------
-    InputError
-        If nothing is left to tell the noise from, or inflation or level are out of range.
-
-    Notes
-    -----
-    ½ q² s² times the inflation, s² = 2 cost/(n - K) and q Student's quantile: on a linear model
-    exactly the estimate ± q standard errors.
-    """
-    if not 0.0 < level < 1.0:
-        raise InputError(f"The level {level:g} of a profile must lie between 0 and 1.")
-    if not inflation >= 1.0 or not np.isfinite(inflation):
-        raise InputError(f"{inflation:g} samples cannot stand for one; 1 is the least.")
-    if samples <= unknowns:
-        raise InputError(f"{samples} samples for {unknowns} parameters do not determine the noise.")
-    if freedom is None:
-        freedom = samples / inflation - unknowns
-    if not freedom > 0.0:
-        raise InputError(
-            f"{samples} samples count as {samples / inflation:.1f} independent ones, no more than "
-            f"the {unknowns} parameters: no interval follows from them."
-        )
-    from scipy.special import stdtrit
-
-    quantile = float(stdtrit(freedom, 0.5 + 0.5 * level))
-    return quantile**2 * inflation * cost / (samples - unknowns)
 
 
 def profile(
@@ -316,7 +118,7 @@ def profile(
     index : int
         Number of the unknown.
     rise : float
-        Of the cost at which the interval ends, see `threshold`.
+        Of the cost at which the interval ends.
     step : float
         About one standard error of the unknown's number, positive: how far the first step goes.
     bounds : (float, float)
@@ -338,28 +140,160 @@ def profile(
     if not bounds[0] <= vector[index] <= bounds[1]:
         raise InputError("The optimum of a profile lies outside the bounds of its parameter.")
     optimum = Point(float(vector[index]), cost, vector)
-    sides = [
-        ProfileSide(minimise, optimum, index, rise, direction, step, bound, most)
-        for direction, bound in ((-1.0, bounds[0]), (1.0, bounds[1]))
-    ]
-    endings: list[Ending] = []
-    for side in sides:
-        endings.append(side.march())
-        if side.better is not None:
-            break
-    endings += ["open"] * (2 - len(endings))
-    points = (*reversed(sides[0].points), optimum, *sides[1].points)
-    better = next((side.better for side in sides if side.better is not None), None)
+    lower = _side(minimise, optimum, index, rise, -step, bounds[0], most)
+    upper = _Side([], "open", None, None)
+    if lower.better is None:
+        upper = _side(minimise, optimum, index, rise, step, bounds[1], most)
+    better = lower.better or upper.better
     return Profile(
         index,
         cost,
-        points,
+        (*reversed(lower.points), optimum, *upper.points),
         rise,
-        sides[0].end if better is None else None,
-        sides[1].end if better is None else None,
-        (endings[0], endings[1]),
+        lower.end if better is None else None,
+        upper.end if better is None else None,
+        (lower.ending, upper.ending),
         better,
     )
+
+
+class _Side(NamedTuple):
+    """One side of a profile."""
+
+    points: list[Point]
+    """Outwards."""
+    ending: Ending
+    end: float | None
+    better: Point | None
+
+
+def _side(
+    minimise: Minimise,
+    optimum: Point,
+    index: int,
+    rise: float,
+    step: float,
+    bound: float,
+    most: int,
+) -> _Side:
+    """Outwards until the cost has risen enough, or something else ends the side.
+
+    `step` is that of about one standard error, negative downwards.
+    """
+    points: list[Point] = []
+    sign, step = float(np.sign(step)), abs(step)
+
+    def at(distance: float) -> Point | None:
+        """The least cost there; None outside the model's domain."""
+        number = optimum.number + sign * distance
+        near = min((optimum, *points), key=lambda point: abs(point.number - number))
+        start = near.vector.copy()
+        start[index] = number
+        try:
+            cost, vector = minimise(index, number, start)
+        except DomainError:
+            return None
+        return Point(number, float(cost), vector) if np.isfinite(cost) else None
+
+    def improves(point: Point) -> bool:
+        return point.cost < optimum.cost - BETTER * rise
+
+    def height(point: Point) -> float:
+        # the root of the rise over the threshold's is nearly a straight line
+        return float(np.sqrt(max(point.cost - optimum.cost, 0.0) / rise))
+
+    before, stride, halvings = (0.0, 0.0), STRIDE * step, 0
+    while len(points) < most:
+        distance = min(before[0] + stride, abs(bound - optimum.number))
+        if distance <= before[0]:
+            return _Side(points, "bound", None, None)
+        if distance > FURTHEST * step:
+            break
+        point = at(distance)
+        if point is None:
+            if halvings == HALVINGS:
+                return _Side(points, "domain", None, None)
+            halvings, stride = halvings + 1, 0.5 * stride
+            continue
+        if improves(point):
+            return _Side(points, "better optimum", None, point)
+        points.append(point)
+        now = height(point)
+        if now >= 1.0:
+            break
+        gained = max(now - before[1], 0.1 * STRIDE)
+        before = (distance, now)
+        # slowly, so that the next start is good and a flat stretch is not leapt over
+        stride *= float(np.clip(STRIDE / gained, 0.3, 2.5))
+    if not points or height(points[-1]) < 1.0:
+        return _Side(points, "open", None, None)
+    # where it has risen just enough, by false position (Illinois) in the root
+    (near, low), (far, high) = (before[0], before[1] - 1.0), (distance, now - 1.0)
+    distance = far
+    for _ in range(12):
+        if abs(high) <= CLOSE:
+            distance = far
+            break
+        distance = far - high * (far - near) / (high - low)
+        point = at(distance)
+        if point is None:
+            break
+        if improves(point):
+            return _Side(points, "better optimum", None, point)
+        points.append(point)
+        points.sort(key=lambda each: abs(each.number - optimum.number))
+        value = height(point) - 1.0
+        if abs(value) <= CLOSE:
+            break
+        if value * high < 0.0:
+            near, low = far, high
+        else:
+            low *= 0.5
+        far, high = distance, value
+    return _Side(points, "crossed", optimum.number + sign * distance, None)
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """A problem with one of its unknowns fixed, as `solving.Objective` has it."""
+
+    problem: Problem
+    index: int
+    number: float
+    """Of the fixed unknown, in the solver's vector."""
+    start: Array
+    """(K - 1,)"""
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        low, high = self.problem.bounds
+        return np.delete(low, self.index), np.delete(high, self.index)
+
+    def evaluate(self, vector: Array, *, compressed: bool = True) -> Evaluation:
+        whole = self.problem.evaluate(self.whole(vector), compressed=compressed)
+        return Evaluation(whole.residuals, np.delete(whole.jacobian, self.index, axis=1))
+
+    def cost(self, vector: Array) -> float:
+        return self.problem.cost(self.whole(vector))
+
+    def whole(self, vector: Array) -> Array:
+        return np.insert(vector, self.index, self.number)
+
+
+def minimiser(problem: Problem, *, tolerance: float = 1e-8, max_evaluations: int = 60) -> Minimise:
+    """What `profile` asks for: the least cost with one unknown fixed."""
+
+    def minimise(index: int, number: float, start: Array) -> tuple[float, Array]:
+        low, high = problem.bounds
+        others = np.delete(np.clip(start, low, high), index)
+        if not others.size:
+            vector = np.array([number])
+            return problem.cost(vector), vector
+        beside = _Beside(problem, index, number, others)
+        found = solve(beside, tolerance=tolerance, max_evaluations=max_evaluations)
+        return found.cost, beside.whole(found.vector)
+
+    return minimise
 
 
 SWITCHING = ("V_dz", "J_", "lim", "I_t", "Z13", "Z14", "Z15", "Z16", "Z17")
@@ -374,8 +308,11 @@ LEAST_STEP = 1e-3
 """First step of that profile, in parts of the bounds: where the derivative is that of a switch that
 one sample just passes, the linearised interval is next to nothing."""
 TRIES, LOOK = 20, 4
-"""Evaluations of a fit without a limit, and after how many it is seen whether it gets there: one
-that is not needed is let go of in ten."""
+"""Evaluations of a fit without a limit, and after how many it is seen whether it gets there."""
+HOPELESS = 100.0
+"""Rise of the cost, in that of the threshold, that a first linear step without a limit may leave.
+In 48 such fits of hoist, luff and slew it left 250 or more in 47, where the limit was needed, and
+0.03 in the one where it was not."""
 
 
 class CheckedEnd(NamedTuple):
@@ -397,7 +334,7 @@ def checked_ends(
     linearised: LinearisedFit,
     reach: Array,
     limits: Collection[int] = (),
-) -> tuple[CheckedEnd, ...]:
+) -> Iterator[CheckedEnd]:
     """Sides on which the cost does not rise as the linearised fit says, and how it does.
 
     Unknowns of single runs, such as a free zero, are passed over: residuals are linear in them; and
@@ -420,18 +357,18 @@ def checked_ends(
     inverse = linearised.whitening @ linearised.whitening.T
     low, high = problem.bounds
     cost = problem.cost(vector)
-    found = []
-    machine = np.array([each.run is None for each in problem.unknowns])
     drive = isinstance(problem.model, DriveModel)
-    bends = np.array([_bends(each.targets[0]) or not drive for each in problem.unknowns])
-    looked = machine & ((bends & (reach > 0.0)) | (reach > STRAIGHT))
-    for index in np.flatnonzero(looked):
+    minimise = minimiser(problem, tolerance=1e-6, max_evaluations=TRIES)
+    for index, unknown in enumerate(problem.unknowns):
+        bends = not drive or unknown.targets[0].startswith(SWITCHING)
+        if unknown.run is not None or not reach[index] > (0.0 if bends else STRAIGHT):
+            continue
         direction = inverse[index] / inverse[index, index]
         rise = 0.5 * reach[index] ** 2 / inverse[index, index]
-        if index in limits and _unneeded(problem, vector, int(index), cost + rise):
-            found.append(CheckedEnd(int(index), True, np.inf))
+        if index in limits and _unneeded(problem, vector, index, cost, rise):
+            yield CheckedEnd(index, True, np.inf)
             continue
-        for sign in (-1.0, 1.0):
+        for sign, bound in ((-1.0, low[index]), (1.0, high[index])):
             end = np.clip(vector + sign * reach[index] * direction, low, high)
             try:
                 risen = problem.cost(end) - cost
@@ -439,56 +376,45 @@ def checked_ends(
                 continue  # beyond the model's domain nothing is possible
             if risen >= SHALLOW * rise:
                 continue
-            bound = float(high[index] if sign > 0.0 else low[index])
-            side = ProfileSide(
-                minimiser(problem, tolerance=1e-6, max_evaluations=TRIES),
-                Point(float(vector[index]), cost, vector),
-                int(index),
-                rise,
-                sign,
-                max(float(reach[index]), LEAST_STEP * float(high[index] - low[index])),
-                bound,
-                MOST_POINTS,
-            )
-            side.march()
-            distance = np.inf if side.end is None else abs(side.end - float(vector[index]))
-            better = side.better.cost if side.better is not None else None
-            found.append(CheckedEnd(int(index), sign > 0.0, float(distance), better))
-    return tuple(found)
+            optimum = Point(float(vector[index]), cost, vector)
+            step = sign * max(float(reach[index]), LEAST_STEP * float(high[index] - low[index]))
+            side = _side(minimise, optimum, index, rise, step, float(bound), MOST_POINTS)
+            distance = np.inf if side.end is None else abs(side.end - optimum.number)
+            better = None if side.better is None else side.better.cost
+            yield CheckedEnd(index, sign > 0.0, float(distance), better)
 
 
-def _bends(name: str) -> bool:
-    """Whether a drive's parameter is one at which its equations switch."""
-    return name.startswith(SWITCHING)
-
-
-def _unneeded(problem: Problem, vector: Array, index: int, allowed: float) -> bool:
+def _unneeded(problem: Problem, vector: Array, index: int, cost: float, rise: float) -> bool:
     """Whether a fit with a limit out of the way is as good.
 
-    It is followed for a few evaluations at a time, and given up where the cost falls so slowly
-    that the tries left would not reach what is allowed.
+    It is given up where a first linear step leaves far too much. Then it is followed for a few
+    evaluations at a time, until the cost falls so slowly that the tries left would not do.
     """
     start = vector.copy()
     start[index] = problem.bounds[1][index]
+    others = _Beside(problem, index, float(start[index]), np.delete(start, index))
     minimise = minimiser(problem, tolerance=1e-6, max_evaluations=LOOK)
     try:
-        before = problem.cost(start)
+        residuals, jacobian = others.evaluate(others.start)
+        step = np.linalg.lstsq(jacobian, residuals, rcond=TOLERANCE)[0]
+        left = 0.5 * float(np.sum((residuals - jacobian @ step) ** 2))
+        if left - cost > HOPELESS * rise:
+            return False
+        before = 0.5 * float(residuals @ residuals)
+        for tried in range(LOOK, TRIES + 1, LOOK):
+            now, start = minimise(index, float(start[index]), start)
+            over = now - cost - rise
+            if over < 0.0:
+                return True
+            if (before - now) * (TRIES - tried) / LOOK < over:
+                return False
+            before = now
     except DomainError:
-        return False
-    for tried in range(LOOK, TRIES + 1, LOOK):
-        try:
-            cost, start = minimise(index, float(start[index]), start)
-        except DomainError:
-            return False
-        if cost < allowed:
-            return True
-        if (before - cost) * (TRIES - tried) / LOOK < cost - allowed:
-            return False
-        before = cost
+        pass
     return False
 
 
-class _Sideways(NamedTuple):
+class _Work(NamedTuple):
     """What a worker needs to follow a profile."""
 
     problem: Problem
@@ -525,7 +451,15 @@ def profiles_of(
     ------
     InputError
         For a name that is none of the stage's unknowns.
+
+    Notes
+    -----
+    The cost rises to ½ q² s² f with s² = 2 cost/(n - K), q Student's quantile and f the samples
+    that count as one independent sample: on a linear model exactly the estimate ± q standard
+    errors.
     """
+    from scipy.special import stdtrit
+
     problem, found, fit = assessment.stage.problem, assessment.uncertainty, assessment.linearised
     variables, vector = found.own.variables, assessment.stage.solution.vector
     if names is None:
@@ -534,19 +468,11 @@ def profiles_of(
     else:
         chosen = sorted({variables.index(name) for name in names})
     cost = problem.cost(vector)
-    rises = {
-        k: threshold(
-            cost,
-            fit.samples,
-            fit.rank,
-            inflation=float(found.inflation[k]),
-            freedom=float(found.own.degrees_of_freedom[k]),
-            level=found.level,
-        )
-        for k in chosen
-    }
+    quantiles = stdtrit(found.own.degrees_of_freedom, 0.5 + 0.5 * found.level)
+    every = quantiles**2 * found.inflation * cost / fit.spare_samples
+    rises = {k: float(every[k]) for k in chosen}
     steps = found.own.standard_errors
-    shared = _Sideways(replace(problem, threads=1), vector, cost, rises, steps)
+    shared = _Work(replace(problem, threads=1), vector, cost, rises, steps)
     made: dict[str, Profile] = {}
     for position, each in (executor or Serial()).run(_profiled, shared, chosen):
         made[variables.names[chosen[position]]] = each
@@ -555,7 +481,7 @@ def profiles_of(
     return {variables.names[k]: made[variables.names[k]] for k in chosen}
 
 
-def _profiled(shared: _Sideways, index: int) -> Profile:
+def _profiled(shared: _Work, index: int) -> Profile:
     low, high = (float(each[index]) for each in shared.problem.bounds)
     step = float(shared.steps[index])
     if not (np.isfinite(step) and step > 0.0):

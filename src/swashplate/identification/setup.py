@@ -22,6 +22,7 @@ from swashplate.identification.model import OFFSET, Model, OwnModel, simulated
 from swashplate.identification.problem import Problem, noise_scales
 from swashplate.identification.solving import solve
 from swashplate.identification.unknowns import Unknown, Unknowns
+from swashplate.parameters.definitions import find
 from swashplate.results import Result, short
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -156,6 +157,43 @@ class Stage(Entry):
             raise ValueError("a card alone has no start_pressure")
         return self
 
+    def widened(self, unknown: Unknown, side: int) -> str | None:
+        """The line that moves a bound of an unknown outwards, and the table that it stands in.
+
+        `side` is 1 for the upper bound, -1 for the lower one. None where nothing lies beyond: at
+        the least or greatest value that the parameter may have.
+        """
+        name = unknown.name
+        if name.startswith("force_") and self.forces is not None:
+            pair = _moved(self.forces.relative, side, ratio=True)
+            return f"relative = [{pair[0]:.4g}, {pair[1]:.4g}] under [stages.forces]"
+        if self.part == "model" or (name not in self.free and _symbol(name) not in self.free):
+            low, high = _moved((unknown.low, unknown.high), side, ratio=unknown.log)
+            if self.part != "model":
+                return None
+            return f'"{name}": ({low:.4g}, {unknown.start:.4g}, {high:.4g}) in free of the model'
+        key = name if name in self.free else _symbol(name)
+        limits, entry = find(name), self.free[key]
+        bound = unknown.high if side > 0 else unknown.low
+        lowest = limits.lower if limits.least is None else limits.least
+        if bound >= limits.upper if side > 0 else bound <= lowest:
+            return None
+        if entry.relative is not None:
+            # of a negative nominal value the larger factor makes the lower bound
+            way = side if unknown.start > 0.0 else -side
+            pair = _moved(entry.relative, way, ratio=min(entry.relative) > 0.0)
+            words = [f"relative = [{pair[0]:.4g}, {pair[1]:.4g}]"]
+        else:
+            assert entry.bounds is not None
+            low, high = _moved(entry.bounds, side, ratio=entry.log)
+            low, high = max(low, lowest), min(high, limits.upper)
+            words = [f"bounds = [{low:.4g}, {high:.4g}]"]
+        words += [f"{flag} = true" for flag in ("log", "tied") if getattr(entry, flag)]
+        if entry.prior is not None:
+            mean, off = entry.prior.mean, entry.prior.deviation
+            words.append(f"prior = {{ mean = {mean!r}, deviation = {off!r} }}")
+        return f"{key} = {{ {', '.join(words)} }} under [stages.free]"
+
 
 class Setup(Entry):
     """A fit in one stage or several, each starting from what the ones before found."""
@@ -222,6 +260,15 @@ class Setup(Entry):
             start_pressure=max(pressures, default=None),
         )
         return self.model_copy(update={"stages": (stage,)})
+
+
+def _moved(pair: Pair, side: int, *, ratio: bool) -> Pair:
+    """A pair with one end moved outwards: by a factor of two, or by as much as lies between."""
+    low, high = pair
+    reach = high - low
+    if side > 0:
+        return low, 2.0 * high if ratio else high + reach
+    return 0.5 * low if ratio else low - reach, high
 
 
 def _symbol(name: str) -> str:

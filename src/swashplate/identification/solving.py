@@ -40,7 +40,7 @@ VALUES = 25
 """Within its bounds that are tried for one."""
 UNCHANGED = 2
 _ENDINGS = {
-    0: "stopped at the largest number of evaluations; begin again from what was found, with --from",
+    0: "stopped at the largest number of evaluations; allow more with --evaluations",
     1: "the gradient vanished",
     UNCHANGED: "the cost no longer changed",
     3: "the parameters no longer changed",

@@ -35,6 +35,7 @@ from swashplate.identification.setup import (
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, bounded
 from swashplate.parameters.definitions import SWITCHES, columns_of, find
 from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.simulation.instance import START_PRESSURE
 
 
@@ -156,7 +157,7 @@ def stage_problem(
         *free,
         *_forces(stage, forces, parameters),
         *_clocks(stage, runs, channels),
-        *_own(stage, runs, channels),
+        *_own(stage, runs, channels, parameters),
     )
     return Problem(
         DriveModel(_switched_on(parameters, free), stage.part, currents, forces),
@@ -298,8 +299,13 @@ def _clocks(
     ]
 
 
-def _own(stage: Stage, experiments: Sequence[Experiment], channels: Sequence[str]) -> list[Unknown]:
-    """Unknowns of single experiments: free zeros of positions, an estimated initial pressure."""
+def _own(
+    stage: Stage,
+    experiments: Sequence[Experiment],
+    channels: Sequence[str],
+    parameters: ParameterSet,
+) -> list[Unknown]:
+    """Unknowns of single experiments: free zeros of positions, initial pressure and current."""
     unknowns = []
     for each in experiments:
         for name in channels:
@@ -321,7 +327,26 @@ def _own(stage: Stage, experiments: Sequence[Experiment], channels: Sequence[str
         if stage.part != "card" and (stage.start_pressure is not None or each.start == "estimated"):
             most = stage.start_pressure or LARGEST_START_PRESSURE
             unknowns.append(Unknown(START_PRESSURE, 0.0, -most, most, "Pa", run=each.name))
+        measured = [each.channels[name].kind for name in channels if name in each.channels]
+        if (
+            stage.part != "pump"
+            and each.start == "estimated"
+            and each.input.kind == "voltage"
+            and not set(CURRENTS).isdisjoint(measured)
+        ):
+            unknowns += _start_current(each, parameters)
     return unknowns
+
+
+def _start_current(experiment: Experiment, parameters: ParameterSet) -> list[Unknown]:
+    """Current of the driven channel at the first sample; none where neither can be told driven."""
+    first = float(measured_current(experiment).values[0])
+    if first == 0.0:
+        return []
+    side, sign = ("plus", 1.0) if first > 0.0 else ("minus", -1.0)
+    most = 2.0 * abs(Drive(parameters).steady_current(sign * FULL_VOLTAGE))
+    start = min(abs(first), 0.9 * most)
+    return [Unknown(f"start_current_{side}", start, 0.0, most, "A", run=experiment.name)]
 
 
 SPREAD = 0.05

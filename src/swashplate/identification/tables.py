@@ -13,7 +13,7 @@ import numpy as np
 
 from swashplate.errors import InputError
 from swashplate.identification.drive_model import DriveModel
-from swashplate.identification.experiment_design import Advice, Gain
+from swashplate.identification.experiment_design import Advice, Gain, Outlook
 from swashplate.identification.identifiability import GAUGES, SCALES, moved_columns, true_values
 from swashplate.identification.intervals import Estimate
 from swashplate.identification.setup import ModelParameters
@@ -37,7 +37,6 @@ from swashplate.units import chosen_unit, display_unit
 if TYPE_CHECKING:
     from swashplate.campaign.experiment import Channel, Experiment
     from swashplate.identification.assessment import Assessment
-    from swashplate.identification.excitation import Outlook
     from swashplate.identification.fitting import Fit, StageFit
     from swashplate.identification.resampling import Bootstrap, CrossValidation
     from swashplate.identification.unknowns import Unknown
@@ -184,6 +183,8 @@ def meaning_of(name: str, stage: StageFit | None = None) -> str:
         return "number of the state at the first sample" if name.startswith("start.") else ""
     if name == START_PRESSURE:
         return "stroking pressure at the first sample"
+    if name.startswith("start_current_"):
+        return "current of the card at the first sample"
     if name.startswith("force_"):
         return _force_words(name, stage)
     definition = CATALOGUE.get(COLUMNS.get(name, name))
@@ -404,7 +405,7 @@ def residual_table(qualities: Sequence[RunQuality]) -> Table:
         if (test := each.test) is None:
             continue
         lag, value = test.peak
-        star = "*" if abs(value) > test.cross_band else ""
+        star = "*" if test.follows else ""
         run = each.experiment
         start = (run.name, run.role, each.channel, test.duration, value, star)
         made.add(*start, test.cross_band, lag, test.verdict)
@@ -412,12 +413,13 @@ def residual_table(qualities: Sequence[RunQuality]) -> Table:
 
 
 def criteria_table(verdict: Verdict) -> Table:
-    """The acceptance criteria, those that are not met first."""
+    """The acceptance criteria, those that are not met first, then those that were not judged."""
     columns = (Column("criterion", wrap=True), Column("value", "s"), Column("limit", "s"))
     made = Table("Acceptance criteria", (*columns, Column(""), Column("reason", of="p")))
-    for each in sorted(verdict.criteria, key=lambda each: each.passed):
-        met = "met" if each.passed else "NOT MET"
-        made.add(each.name, each.value, each.limit, met, each.reason, look=not each.passed)
+    order = ("not met", "not judged", "met")
+    for each in sorted(verdict.criteria, key=lambda each: order.index(each.state)):
+        state = "NOT MET" if each.failure else each.state
+        made.add(each.name, each.value, each.limit, state, each.reason, look=state != "met")
     return made
 
 
@@ -461,7 +463,7 @@ def folds_tables(found: CrossValidation, assessments: Sequence[Assessment]) -> l
 
 # --- information of runs and of tests to come -----------------------------------------------------
 
-_LETTERS = {"most": "#", "some": "+", "unseen": "o", "none": "."}
+_LETTERS = {"most": "#", "some": "+", "none": "."}
 
 
 def outlook_table(look: Outlook, runs: Sequence[str]) -> Table:
@@ -472,19 +474,17 @@ def outlook_table(look: Outlook, runs: Sequence[str]) -> Table:
             Column("stage", of="f"),
             Column("parameter"),
             Column("needs", wrap=True),
-            Column("s", ".3g"),
             Column("effect", ".3g"),
             Column("runs"),
             *(Column(run, ".6g", of="f") for run in runs),
         ),
     )
-    for k, name in enumerate(look.names):
-        letters = {r: _LETTERS[m] for r, m in zip(look.simulations, look.marks(name), strict=True)}
+    for name in look.names:
+        letters = {run: _LETTERS[m] for run, m in zip(look.runs, look.marks(name), strict=True)}
         marks = "".join(letters.get(run, "-") for run in runs)
-        seconds = float(look.seconds[:, k].sum())
         shares = look.shares[:, look.linearised.variables.index(name)]
-        parts = {run: float(share) for run, share in zip(look.simulations, shares, strict=True)}
-        cells = (look.need(name), seconds, look.effect(name), marks)
+        parts = {run: float(share) for run, share in zip(look.runs, shares, strict=True)}
+        cells = (look.need(name), look.effect(name), marks)
         made.add(look.stage.name, name, *cells, *(parts.get(run) for run in runs))
     return made
 

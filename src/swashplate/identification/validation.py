@@ -30,8 +30,13 @@ LONGEST_SHOWN = 2.0
 DEVIATIONS = 1.96
 """Half width of the bands, in standard deviations: 95 %."""
 
-CHANCE = 0.05
-"""Probability that unrelated signals are said to be related, all lags together."""
+FOLLOWS = 0.5
+"""Correlation of residuals with the input that counts as model error: a quarter of their square."""
+BANDS = 1.35
+"""And how many of its 95 % bands it must reach: where a band is wide, about six independent looks
+fit into the lags, and the largest of them stays below that."""
+SURE = 0.9
+"""A correlation from which no band is asked: in short runs of one slow movement it reaches 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +71,11 @@ class ResidualTest(Result):
         """Lag of the largest cross-correlation [s], and its value."""
         place = int(np.argmax(np.abs(self.cross_correlation)))
         return float(self.cross_lags[place]), float(self.cross_correlation[place])
+
+    @property
+    def follows(self) -> bool:
+        """Whether the residuals follow the input by as much as counts as model error."""
+        return abs(self.peak[1]) >= min(max(FOLLOWS, BANDS * self.cross_band), SURE)
 
 
 def residual_test(
@@ -123,7 +133,6 @@ def residual_test(
 
 
 def _in_words(test: ResidualTest, first: float) -> str:
-    """The verdict of a test; `first` is the first residual."""
     if not test.autocorrelation[1:].any():
         what = "exactly zero" if first == 0.0 else f"{first:.4g} throughout"
         return f"The residuals are {what}: there is no noise to test."
@@ -134,14 +143,9 @@ def _in_words(test: ResidualTest, first: float) -> str:
     )
     if not test.cross_correlation.any():
         return f"{colour}; the input is constant and explains nothing."
-    from scipy.special import ndtri
-
-    # neighbouring lags say the same: as many looks as correlation lengths fit
-    looks = max(test.cross_lags.size / max(test.duration / test.lags[1], 1.0), 1.0)
-    limit = -float(ndtri(0.5 * CHANCE / looks)) / DEVIATIONS * test.cross_band
     lag, value = test.peak
-    if abs(value) <= limit:
-        return f"{colour} and have no relation to the input."
+    if not test.follows:
+        return f"{colour} and do not follow the input (correlation {value:+.2f})."
     when = (
         f"{abs(lag):.2g} s {'after' if lag > 0.0 else 'before'} it" if lag else "at the same time"
     )

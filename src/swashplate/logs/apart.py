@@ -27,7 +27,7 @@ from weakref import finalize
 import numpy as np
 
 from swashplate.errors import FileError, InputError, SwashplateError
-from swashplate.logs.log import Array, Column, Log, opener, printable, said
+from swashplate.logs.log import Array, Column, Log, printable, said
 
 if TYPE_CHECKING:
     import polars
@@ -41,12 +41,7 @@ _START = "import sys; sys.path[:] = {path!r}; from swashplate.logs.apart import 
 
 
 def open_apart(reader: str, path: Path) -> Log:
-    """Look into a file of a format of this package, in the other process.
-
-    Parameters
-    ----------
-    reader : str
-        Name of the format in `READERS`.
+    """Look into a file of a format of `swashplate.logs.binary.OPENERS`, in the other process.
 
     Raises
     ------
@@ -203,29 +198,25 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
     columns = list(dict.fromkeys(log.columns.index(log.find(name)) for name in names))
     stat = log.path.stat()
     stamp = [stat.st_size, stat.st_mtime_ns, log.format]
-    held = _held(table)
-    if held is None or held[:3] != stamp or not {*columns} <= {*held[3]}:
-        columns = sorted({*columns, *(held[3] if held is not None and held[:3] == stamp else [])})
-        _convert(log, columns, table, json.dumps([*stamp, columns]))
-        held = [*stamp, columns]
-    stored = open_apart("Parquet", table)
-    kept = tuple(log.columns[position] for position in held[3])
-    return replace(stored, path=log.path, columns=kept, table=table)
+    *made_of, stored = _stamp_of(table) or [None, []]
+    if made_of != stamp or not {*columns} <= {*stored}:
+        stored = sorted({*columns, *(stored if made_of == stamp else [])})
+        _convert(log, stored, table, json.dumps([*stamp, stored]))
+    kept = tuple(log.columns[position] for position in stored)
+    return replace(open_apart("Parquet", table), path=log.path, columns=kept, table=table)
 
 
-def _held(table: Path) -> list[Any] | None:
+def _stamp_of(table: Path) -> list[Any] | None:
     """Size, time and format of the log that a table was made of, and positions of its columns."""
     import polars as pl
 
-    if not table.is_file():
-        return None
     try:
-        held = json.loads(pl.read_parquet_metadata(table).get(_KEY, "null"))
+        stamp = json.loads(pl.read_parquet_metadata(table).get(_KEY, "null"))
     except (pl.exceptions.PolarsError, ValueError, OSError):
         return None
-    if held is None:
+    if stamp is None:
         raise FileError(f"{table} stands where the table of a long log belongs; rename it.")
-    return list(held)
+    return list(stamp)
 
 
 def _convert(log: Log, columns: Sequence[int], table: Path, stamp: str) -> None:
@@ -275,6 +266,8 @@ _USED = Path("/proc/self/statm")
 
 def serve() -> None:
     """Answer questions: a line of JSON each, answered by a line and the arrays asked for."""
+    from swashplate.logs.binary import OPENERS
+
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print must not get between the answers
     warnings.simplefilter("ignore")
@@ -289,7 +282,7 @@ def serve() -> None:
             known = (reader, path, path.stat().st_mtime_ns, path.stat().st_size)
             if last is None or last[0] != known:
                 last = None
-                last = known, opener(reader)(path)
+                last = known, OPENERS[reader](path)
             log = last[1]
             if asked["positions"] is not None:
                 arrays = log.load(asked["positions"], *asked["rows"])

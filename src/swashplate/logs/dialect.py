@@ -7,7 +7,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple
 
@@ -21,7 +21,7 @@ COMMENTS = ("#", "%", "//")
 
 @dataclass(frozen=True)
 class TextOptions:
-    """Layout of a text log; what is None is told from the file. Other formats take no notice.
+    """Layout of a text log; what is None is recognised from the file. Other formats ignore it.
 
     Parameters
     ----------
@@ -31,8 +31,8 @@ class TextOptions:
     decimal : {".", ","}, optional
         Decimal sign.
     comment : str, optional
-        What lines begin with that are skipped; ``""`` if there are none. Told from the file, it
-        is any of ``#``, ``%`` and ``//``.
+        What lines begin with that are skipped; ``""`` if there are none. By default any of ``#``,
+        ``%`` and ``//``.
     header_row : int, optional
         Line of the column names, the first is 1; 0 if there is none, the columns are then called
         ``column 1``, ``column 2`` and so on. Data begin below.
@@ -56,27 +56,26 @@ class TextOptions:
 
     def __post_init__(self) -> None:
         """Check them."""
-        delimiter = self.delimiter
-        if delimiter is not None and delimiter != "none" and delimiter not in _NAMED:
-            if len(delimiter) != 1 or not delimiter.isascii() or delimiter in '\r\n"\0':
+        mark = self.delimiter
+        if mark is not None and mark != "none" and mark not in _NAMED:
+            if len(mark) != 1 or not mark.isascii() or mark in '\r\n"\0':
                 raise InputError(
-                    f"delimiter must be one character, 'tab', 'space' or 'none', not {delimiter!r}."
+                    f"delimiter must be one character, 'tab', 'space' or 'none', not {mark!r}."
                 )
-            if delimiter.isalnum() or delimiter in "+-.":
-                raise InputError(f"delimiter {delimiter!r} is a part of numbers; name another.")
+            if mark.isalnum() or mark in "+-.":
+                raise InputError(f"delimiter {mark!r} is a part of numbers; name another.")
         if self.decimal not in (None, ".", ","):
             raise InputError(f"decimal must be '.' or ',', not {self.decimal!r}.")
         if self.header_row is not None and self.header_row < 0:
             raise InputError(
                 f"header_row must be the line of the header, or 0, not {self.header_row!r}."
             )
-        if self.encoding is not None:
-            try:
-                "".encode(self.encoding)  # zlib and the like are codecs, too, but not of text
-            except (LookupError, UnicodeError, ValueError):
-                raise InputError(
-                    f"encoding {self.encoding!r} is unknown; take 'utf-8', 'latin-1' or 'utf-16'."
-                ) from None
+        try:
+            "".encode(self.encoding or "utf-8")  # zlib and the like are codecs, but not of text
+        except (LookupError, UnicodeError, ValueError):
+            raise InputError(
+                f"encoding {self.encoding!r} is unknown; take 'utf-8', 'latin-1' or 'utf-16'."
+            ) from None
 
     @property
     def delimiters(self) -> tuple[str | None, ...]:
@@ -104,8 +103,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")
 def encoding_of(path: Path, given: str | None) -> tuple[str, int]:
     """Canonical name of a text file's encoding, and the bytes of its byte-order mark.
 
-    What is not given is told by a byte-order mark, by the zeros that UTF-16 has between Latin
-    letters, as UTF-8, or else as Latin-1.
+    What is not given is told by a byte-order mark, or is UTF-8, or else Latin-1.
 
     Raises
     ------
@@ -116,13 +114,19 @@ def encoding_of(path: Path, given: str | None) -> tuple[str, int]:
         head = file.read(1 << 16)
     marks = ((len(mark), name) for mark, name in _BYTE_ORDER.items() if head.startswith(mark))
     mark, marked = next(marks, (0, None))
-    name = codecs.lookup(given).name.removesuffix("-sig") if given else marked or _guessed(head)
-    name = (marked or "utf-16-le") if name == "utf-16" else name
-    try:
-        text = codecs.getincrementaldecoder(name)("strict").decode(head[mark:])
-    except UnicodeError as error:
+    names = [marked] if marked else ["utf-8", "iso8859-1"]
+    if given is not None:
+        name = codecs.lookup(given).name.removesuffix("-sig")
+        names = [(marked or "utf-16-le") if name == "utf-16" else name]
+    for name in names:
+        try:
+            text = codecs.getincrementaldecoder(name)("strict").decode(head[mark:])
+            break
+        except UnicodeError as error:
+            why = error
+    else:
         check_kind(path)
-        raise FileError(f"{path} is no text in {name}: {error}.") from None
+        raise FileError(f"{path} is no text in {name}: {why}.")
     control = _CONTROL.search(text)
     if control:
         check_kind(path)
@@ -130,19 +134,6 @@ def encoding_of(path: Path, given: str | None) -> tuple[str, int]:
         what = "a NUL byte" if control[0] == "\0" else f"the byte {ord(control[0]):#04x}"
         raise FileError(f"{path} has {what} in line {line}; it is damaged or no text file.")
     return name, mark
-
-
-def _guessed(head: bytes) -> str:
-    even, odd = head[0::2].count(0), head[1::2].count(0)
-    if odd > 0.4 * len(head[1::2]) and even == 0:
-        return "utf-16-le"
-    if even > 0.4 * len(head[0::2]) and odd == 0:
-        return "utf-16-be"
-    try:
-        codecs.getincrementaldecoder("utf-8")().decode(head)
-    except UnicodeDecodeError:
-        return "iso8859-1"
-    return "utf-8"
 
 
 # --- cells ----------------------------------------------------------------------------------------
@@ -189,13 +180,9 @@ def date_form(cell: str) -> str | None:
         if clock is None or bool(clock["between"]) != bool(date):
             continue
         half, zone = clock["half"], clock["zone"]
-        hours = "%H" if half is None else "%I"
-        form = f"{date}{clock['between']}{hours}:%M:%S%.f"
-        return (
-            form
-            + (f"{half}%p" if half is not None else "")
-            + (f"{zone}%#z" if zone is not None and date else "")
-        )
+        form = f"{date}{clock['between']}{'%H' if half is None else '%I'}:%M:%S%.f"
+        form += "" if half is None else f"{half}%p"
+        return form + (f"{zone}%#z" if zone is not None and date else "")
     return None
 
 
@@ -209,10 +196,6 @@ def shown(cell: str) -> str:
 
 _SAID = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces", "|": "bars"}
 _THREE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
-_HEADED = 0.5
-"""Added to a score if the line of text above the rows, the header, has as many fields as they."""
-_DELIMITED = 0.25
-"""Added if it has several, but another number of them."""
 
 
 @dataclass(frozen=True)
@@ -233,27 +216,33 @@ class Layout:
 
     def split(self, line: str) -> list[str]:
         """Cells of a line, stripped."""
-        return _split(line, self.delimiter)
+        if self.delimiter is None:
+            return [line.strip().strip('"')]
+        if self.delimiter == " ":
+            line = line.replace("\t", " ").strip()
+        if '"' in line:
+            try:
+                cells = next(csv.reader([line], delimiter=self.delimiter, skipinitialspace=True))
+                return [cell.strip() for cell in cells]
+            except (csv.Error, StopIteration):
+                pass
+        parts = line.split() if self.delimiter == " " else line.split(self.delimiter)
+        return [cell.strip() for cell in parts]
 
     def is_blank(self, line: str) -> bool:
         """Whether a line is no row; one of nothing but delimiters is a row of empty cells."""
-        if self.delimiter == "\t" and len(self.split(line)) == self.width:
-            return False
-        return not line.strip()
+        empty = self.delimiter == "\t" and len(self.split(line)) == self.width
+        return not empty and not line.strip()
+
+    def numbers_in(self, cells: Sequence[str]) -> list[bool]:
+        """Of the cells in columns of numbers that are not empty, which are numbers."""
+        filled = [cell for cell, one in zip(cells, self.numeric, strict=False) if one and cell]
+        return [is_number(cell, self.decimal) for cell in filled]
 
     def fits(self, cells: Sequence[str]) -> bool:
         """Whether there are numbers wherever the sample has, and as many cells."""
-        if len(cells) != self.width:
-            return False
-        numbers = [cell for cell, numeric in zip(cells, self.numeric, strict=True) if numeric]
-        return any(numbers) and all(is_number(cell, self.decimal) for cell in numbers if cell)
-
-    def has_number(self, cells: Sequence[str]) -> bool:
-        """Whether there is a number in a column of numbers."""
-        return any(
-            numeric and is_number(cell, self.decimal)
-            for cell, numeric in zip(cells, self.numeric, strict=False)
-        )
+        found = self.numbers_in(cells)
+        return len(cells) == self.width and bool(found) and all(found)
 
     def names(self, text: str) -> list[str]:
         """Cells of a header; where spaces delimit, the one before a unit does not."""
@@ -268,20 +257,6 @@ class Layout:
         return f"CSV, {_SAID.get(self.delimiter or '', one)}, decimal {point}"
 
 
-def _split(line: str, delimiter: str | None) -> list[str]:
-    if delimiter is None:
-        return [line.strip().strip('"')]
-    if delimiter == " ":
-        line = line.replace("\t", " ").strip()
-    if '"' in line:
-        try:
-            cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
-            return [cell.strip() for cell in cells]
-        except (csv.Error, StopIteration):
-            pass
-    return line.split() if delimiter == " " else [cell.strip() for cell in line.split(delimiter)]
-
-
 def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layout:
     """Delimiter and decimal sign under which a sample of lines makes most sense as rows of numbers.
 
@@ -294,7 +269,7 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layou
     """
     quoted = any('"' in line for line in lines)
     tried = (
-        _tried(lines, delimiter, decimal, alone=options.delimiter is not None)
+        _tried(lines, Layout(delimiter, decimal, 0, ()), alone=options.delimiter is not None)
         for delimiter in options.delimiters
         for decimal in ((options.decimal,) if options.decimal else (".", ","))
         if delimiter != decimal or quoted or None not in (options.delimiter, options.decimal)
@@ -319,69 +294,48 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layou
             "give 'delimiter' or 'decimal' as an option."
         )
     chosen = equal[0]  # with a point: where both signs are alike, there are whole numbers alone
-    if options.decimal is None and chosen.delimiter != ",":
-        _check_decimals(lines, chosen, trials, path)
+    if options.decimal is None and chosen.delimiter != "," and chosen.decimal == ",":
+        rows = (zip(chosen.split(line), chosen.numeric, strict=False) for line in lines)
+        cells = [cell for row in rows for cell, one in row if one and "," in cell]
+        cells = [cell for cell in cells if is_number(cell, ",")]
+        if cells and all(_THREE.fullmatch(cell) for cell in cells):
+            raise FileError(
+                f"{path} has numbers like '{cells[0]}', where the comma may be a decimal sign or "
+                "separate thousands; give 'decimal' as an option."
+            )
     return chosen
 
 
-def _tried(lines: Sequence[str], delimiter: str | None, decimal: str, alone: bool) -> Layout | None:
-    rows = [_split(line, delimiter) for line in lines]
-    marks = [[cell != "" and is_number(cell, decimal) for cell in row] for row in rows]
+def _tried(lines: Sequence[str], layout: Layout, alone: bool) -> Layout | None:
+    """A layout with width, columns of numbers and score by a sample of lines."""
+    rows = [layout.split(line) for line in lines]
+    marks = [[cell != "" and is_number(cell, layout.decimal) for cell in row] for row in rows]
     counts = Counter(len(row) for row, mark in zip(rows, marks, strict=True) if any(mark))
-    if not counts:
-        return None
     texts = {len(row) for row, mark in zip(rows, marks, strict=True) if not any(mark)}
     # as many fields as most rows have; among equals, as many as a header has, then as the first
-    width = max(counts, key=lambda each: (counts[each], each in texts))
-    if width == 1 and delimiter is not None and not alone:
+    width = max(counts, key=lambda each: (counts[each], each in texts), default=0)
+    if width == 0 or (width == 1 and layout.delimiter is not None and not alone):
         return None
     fitting = [
-        list(zip(row, mark, strict=True))
+        (row, mark)
         for row, mark in zip(rows, marks, strict=True)
         if len(row) == width and any(mark)
     ]
-    numeric = tuple(_mostly([row[i] for row in fitting]) for i in range(width))
-    layout = Layout(delimiter, decimal, width, numeric)
+    filled = [sum(row[i] != "" for row, _ in fitting) for i in range(width)]
+    numbers = [sum(mark[i] for _, mark in fitting) for i in range(width)]
+    numeric = tuple(0 < filled[i] <= 2 * numbers[i] for i in range(width))
+    layout = replace(layout, width=width, numeric=numeric, rows=len(fitting))
     begin = next((place for place, row in enumerate(rows) if layout.fits(row)), None)
     if begin is None:
         return None
-    number = sum(len(cell) for row in fitting for cell, is_one in row if is_one)
-    total = sum(len(cell) for row in fitting for cell, _ in row)
-    score = len(fitting) / (len(rows) - begin) * number / total
+    cells = [pair for row, mark in fitting for pair in zip(row, mark, strict=True)]
+    share = sum(len(cell) for cell, one in cells if one) / sum(len(cell) for cell, _ in cells)
+    score = len(fitting) / (len(rows) - begin) * share
+    # the line of text above the rows, the header, should have as many fields as they
     header = next((len(rows[i]) for i in reversed(range(begin)) if not any(marks[i])), 0)
     if header > 1:
-        score += _HEADED if header == width else _DELIMITED
-    return Layout(delimiter, decimal, width, numeric, len(fitting), score)
-
-
-def _mostly(cells: Sequence[tuple[str, bool]]) -> bool:
-    filled = [number for cell, number in cells if cell]
-    return bool(filled) and 2 * sum(filled) >= len(filled)
-
-
-def _check_decimals(
-    lines: Sequence[str], chosen: Layout, layouts: Sequence[Layout], path: Path
-) -> None:
-    """Refuse numbers that the other decimal sign would make other numbers."""
-    for other in layouts:
-        if (other.delimiter, other.width) == (chosen.delimiter, chosen.width) and any(
-            theirs and not ours for theirs, ours in zip(other.numeric, chosen.numeric, strict=True)
-        ):
-            raise FileError(
-                f"{path} has decimal points in some columns and decimal commas in others; "
-                "give 'decimal' as an option."
-            )
-    cells = [
-        cell
-        for line in lines
-        for cell, numeric in zip(chosen.split(line), chosen.numeric, strict=False)
-        if numeric and "," in cell and is_number(cell, ",")
-    ]
-    if chosen.decimal == "," and cells and all(_THREE.fullmatch(cell) for cell in cells):
-        raise FileError(
-            f"{path} has numbers like '{cells[0]}', where the comma may be a decimal sign or "
-            "separate thousands; give 'decimal' as an option."
-        )
+        score += 0.5 if header == width else 0.25
+    return replace(layout, score=score)
 
 
 # --- what stands above the rows -------------------------------------------------------------------
@@ -419,65 +373,49 @@ def read_heading(
     filled = [line for line in lines if not layout.is_blank(line.text)]
     comments = [line for line in filled if marks and line.text.lstrip().startswith(marks)]
     plain = sorted({*filled}.difference(comments))
+    # comments without their marks, as NumPy writes names into one
+    bare = {
+        line.number: re.sub(rf"^\s*(?:{'|'.join(map(re.escape, marks))})?", "", line.text)
+        for line in comments
+    }
     names: list[str] = []
     units: Units | None = None
     if number:
-        header = [line for line in filled if line.number == number]
+        header = [bare.get(line.number, line.text) for line in filled if line.number == number]
         plain = [line for line in plain if line.number > number]
         if not header or not plain:
             raise FileError(f"{path} has no header in line {number}, or no rows below it.")
-        names, _ = _names_and_units(_bare(header, marks), layout)
+        names, _ = _names_and_units(header, layout)
         if not names:
-            _refuse_names(header[0], layout, path, marks)
+            _refuse_names(Line(number, header[0]), layout, path)
         units = units_of(layout.split(plain[0].text))
         first = 0 if units is None else 1
     else:
-        first = _first_row(plain, layout, path)
+        rows = [layout.split(line.text) for line in plain]
+        first = next((place for place, row in enumerate(rows) if layout.fits(row)), len(rows))
+        if first == len(rows):
+            raise FileError(f"{path} has no rows of numbers in its first {len(plain)} lines.")
+        # a damaged row is a row all the same: it must be refused, not taken for the names
+        while first > 1 and any(layout.numbers_in(rows[first - 1])):
+            if units_of(rows[first - 1]) or len(layout.names(plain[first - 2].text)) < len(rows[0]):
+                break
+            first -= 1
     if number is None:
-        above = plain[:first]
+        above = [line for line in plain[:first] if any(layout.split(line.text))]
         names, units = _names_and_units([line.text for line in above], layout)
         if above and not names:
-            _refuse_names(above[-1], layout, path)
+            title = above[-1].text.rstrip()
+            if len(layout.names(title)) > 1 and not title.endswith((":", ".")):
+                _refuse_names(above[-1], layout, path)
         if not names and layout.width > 1:
-            said = [line for line in comments if line.number < plain[first].number]
-            names, units = _names_and_units(_bare(said, marks), layout)
-            if units is None and (not all(names) or layout.has_number(names)):
+            said = [text for line, text in bare.items() if line < plain[first].number]
+            names, units = _names_and_units(said, layout)
+            if units is None and (not all(names) or any(layout.numbers_in(names))):
                 names = []
     if first == len(plain):
         raise FileError(f"{path} has no rows below line {number}.")
     cells = layout.split(plain[first].text)
-    columns = _columns(names, units, layout, cells)
-    for place, (column, cell) in enumerate(zip(columns, cells, strict=False)):
-        if date_form(cell):
-            columns[place] = column._replace(unit="s")
-    return Heading(tuple(columns), plain[first].number)
-
-
-def _bare(comments: Sequence[Line], marks: tuple[str, ...]) -> list[str]:
-    """Comments without their marks, as NumPy writes names into one."""
-    texts = [line.text.lstrip() for line in comments]
-    for mark in marks:
-        texts = [text.removeprefix(mark) for text in texts]
-    return texts
-
-
-def _first_row(plain: Sequence[Line], layout: Layout, path: Path) -> int:
-    """Position of the first row of data among the lines that are neither empty nor comments."""
-    rows = [layout.split(line.text) for line in plain]
-    first = next((place for place, row in enumerate(rows) if layout.fits(row)), None)
-    if first is None:
-        raise FileError(f"{path} has no rows of numbers in its first {len(plain)} lines.")
-    # a damaged row above it is a row all the same: it must be refused, not taken for a title
-    top = first
-    while top and (layout.has_number(rows[top - 1]) or not any(rows[top - 1])):
-        top -= 1
-    if top == first or len(rows[top]) != layout.width:
-        return top
-    if top and len(layout.names(plain[top - 1].text)) == layout.width:
-        return top + 1 if units_of(rows[top]) is not None else top
-    # names that are numbers, such as those of channels
-    named = any(cell and not is_number(cell, layout.decimal) for cell in rows[top])
-    return top + 1 if named else top
+    return Heading(tuple(_columns(names, units, layout, cells)), plain[first].number)
 
 
 def _names_and_units(above: Sequence[str], layout: Layout) -> tuple[list[str], Units | None]:
@@ -496,14 +434,9 @@ def _names_and_units(above: Sequence[str], layout: Layout) -> tuple[list[str], U
     return (before, units) if len(before) == layout.width else (names, None)
 
 
-def _refuse_names(
-    line: Line, layout: Layout, path: Path, marks: tuple[str, ...] | None = None
-) -> None:
-    """Refuse a header of another width than the rows; a title is none, unless marks are given."""
-    text = _bare([line], marks or ())[0]
-    count = len(layout.names(text))
-    if marks is None and (count == 1 or text.rstrip().endswith((":", "."))):
-        return
+def _refuse_names(line: Line, layout: Layout, path: Path) -> None:
+    """Refuse a header of another width than the rows."""
+    count = len(layout.names(line.text))
     hint = ""
     if layout.delimiter == "," and layout.width >= 2 * count - 1:
         hint = " Do decimal commas stand between commas? Export it with semicolons."
@@ -516,6 +449,7 @@ def _refuse_names(
 def _columns(
     names: Sequence[str], units: Units | None, layout: Layout, cells: Sequence[str]
 ) -> list[Column]:
+    """Columns by names, each its own, and units; a first cell that is a date makes it seconds."""
     called = [name or f"column {place}" for place, name in enumerate(names, 1)] or [
         f"column {place}" for place in range(1, layout.width + 1)
     ]
@@ -525,7 +459,9 @@ def _columns(
     for place, name in enumerate(called):
         seen[name] += 1
         unique = printable(f"{name} #{seen[name]}" if counts[name] > 1 else name)
-        columns.append(Column(unique, split_unit(name)[1] or (units[place] if units else None)))
+        unit = split_unit(name)[1] or (units[place] if units else None)
+        dated = place < len(cells) and date_form(cells[place])
+        columns.append(Column(unique, "s" if dated else unit))
     return columns
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -32,57 +31,38 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """A log file that was looked into; its numbers stay in the file until they are asked for.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    format : str
-        What it was read as, for people: ``CSV, semicolons, decimal comma``.
-    columns : tuple of Column
-        The columns that hold numbers; in text, all columns.
-    load : callable
-        Given positions in `columns`, each once, a first row and the one behind the last (None: all
-        of them), reads these rows of those columns, in that order.
-    left_out : mapping of str to str
-        What the file has besides and cannot be read as numbers: name and reason.
-    lengths : tuple of int
-        Rows of each column; of text, about.
-    stream : callable, optional
-        Of text: given such positions, reads those columns piece after piece.
-    table : Path, optional
-        Where its rows are read from in place of the file.
-    first, last : int
-        Rows that `read` gives, where they are not all of them.
-    cut : str
-        Of a part of a file, which one it is; else empty.
-    resumes : bool
-        Of a part, whether it begins in the midst of a motion.
-    """
+    """A log file that was looked into; its numbers stay in the file until they are asked for."""
 
     path: Path
     format: str
+    """What it was read as, for people: ``CSV, semicolons, decimal comma``."""
     columns: tuple[Column, ...]
+    """The columns that hold numbers; in text, all columns."""
     load: Callable[[Sequence[int], int, int | None], Sequence[Array]] = field(repr=False)
+    """Columns at some positions, each once, from a row to before a last one (None: to the end)."""
     left_out: Mapping[str, str] = field(default_factory=dict)
+    """What the file has besides and cannot be read as numbers: name and reason."""
     lengths: tuple[int, ...] = field(default=(), repr=False)
+    """Rows of each column; of text, about."""
     stream: Callable[[Sequence[int]], Iterator[list[Array]]] | None = field(
         default=None, repr=False
     )
+    """Of text: columns at some positions, piece after piece."""
     table: Path | None = None
+    """Where its rows are read from in place of the file."""
     first: int = 0
     last: int | None = None
+    """Rows that `read` gives, where they are not all of them."""
     cut: str = ""
+    """Of a part of a file, which one it is; else empty."""
     resumes: bool = False
+    """Of a part, whether it begins in the midst of a motion."""
 
     def __post_init__(self) -> None:
         """Make all that may get into a sentence printable: names are what a file says they are."""
-        columns = tuple(
-            Column(printable(name), unit and printable(unit)) for name, unit in self.columns
-        )
+        columns = (Column(printable(name), unit and printable(unit)) for name, unit in self.columns)
         left_out = {printable(name): printable(why) for name, why in self.left_out.items()}
-        object.__setattr__(self, "columns", columns)
+        object.__setattr__(self, "columns", tuple(columns))
         object.__setattr__(self, "left_out", left_out)
 
     def find(self, wanted: str) -> Column:
@@ -235,14 +215,6 @@ _KINDS = {
     b"PK\x03\x04": "Excel or zip",
     b"\xd0\xcf\x11\xe0": "Excel",
     b"\x1f\x8b": "gzip",
-    b"\x28\xb5\x2f\xfd": "zstd",
-    b"\xfd7zXZ": "xz",
-    b"\x80\x02": "Python pickle",
-    b"\x80\x03": "Python pickle",
-    b"\x80\x04": "Python pickle",
-    b"\x80\x05": "Python pickle",
-    b"\x93NUMPY": "NumPy",
-    b"%PDF-": "PDF",
 }
 
 
@@ -263,31 +235,18 @@ def check_kind(path: Path, *expected: str) -> None:
             )
 
 
-def checked(log: Log, what: str = "columns") -> Log:
-    """A log; one without columns of numbers is refused.
-
-    `what` is what the format calls its columns, for the sentence.
-    """
-    if not log.columns:
-        why = "".join(f"; '{each}': {reason}" for each, reason in log.left_out.items())[:300]
-        raise FileError(f"{log.path} has no {what} of numbers{why}.")
-    return log
-
-
 # --- opening --------------------------------------------------------------------------------------
 
-READERS = {
-    "CSV": ("", (".csv", ".tsv", ".txt", ".dat", ".asc", ".log")),
-    "Parquet": ("channels.open_parquet", (".parquet", ".pq")),
-    "MATLAB": ("arrays.open_matlab", (".mat",)),
-    "HDF5": ("arrays.open_hdf5", (".h5", ".hdf5", ".hdf", ".he5")),
-    "TDMS": ("channels.open_tdms", (".tdms",)),
-    "MDF": ("channels.open_mdf", (".mf4", ".mdf")),
+ENDINGS = {
+    "CSV": (".csv", ".tsv", ".txt", ".dat", ".asc", ".log"),
+    "Parquet": (".parquet", ".pq"),
+    "MATLAB": (".mat",),
+    "HDF5": (".h5", ".hdf5", ".hdf", ".he5"),
+    "TDMS": (".tdms",),
+    "MDF": (".mf4", ".mdf"),
 }
-"""What opens each binary format, imported when a file is opened, and the endings of its files.
-Their libraries cannot be trusted with a damaged file: see `apart`."""
-
-SUFFIXES = tuple(suffix for _, suffixes in READERS.values() for suffix in suffixes)
+"""Endings of the files of each format."""
+SUFFIXES = tuple(suffix for suffixes in ENDINGS.values() for suffix in suffixes)
 """Endings of files that swashplate reads itself."""
 
 
@@ -315,7 +274,7 @@ def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
     """
     source = Path(path)
     suffix = source.suffix.lower()
-    name = next((name for name, (_, suffixes) in READERS.items() if suffix in suffixes), None)
+    name = next((name for name, suffixes in ENDINGS.items() if suffix in suffixes), None)
     if name is None:
         if source.is_dir():
             raise FileError(f"{source} is a folder, not a log.")
@@ -330,13 +289,6 @@ def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
     from swashplate.logs.apart import open_apart
 
     return open_apart(name, source)
-
-
-def opener(name: str) -> Callable[[Path], Log]:
-    """What opens a binary format, imported by its name in `READERS`."""
-    module, _, function = READERS[name][0].partition(".")
-    look: Callable[[Path], Log] = getattr(import_module(f"swashplate.logs.{module}"), function)
-    return look
 
 
 class Series(NamedTuple):
@@ -443,17 +395,11 @@ def unit_of(column: Column, wanted: str, si: str) -> str:
     if suffixed:
         return suffixed[1]
     _, underscore, ending = column.name.rpartition("_")
-    if underscore and ending != si and _measures(ending, si):
-        return ending
-    return si
-
-
-def _measures(unit: str, si: str) -> bool:
     try:
-        to_si(1.0, unit, si, "")
+        to_si(1.0, ending if underscore else si, si, "")
     except InputError:
-        return False
-    return True
+        return si
+    return ending if underscore else si
 
 
 def _without_unit(column: Column) -> str:
@@ -475,16 +421,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def check_stamps(log: Log, column: str, stamps: Array) -> None:
-    """Refuse time stamps that are missing, not finite, or do not increase.
-
-    Parameters
-    ----------
-    log : Log
-        Where they are from.
-    column : str
-        Its name, for the sentence.
-    stamps : array, shape (n,)
-        In the file's own unit; there must be at least one.
+    """Refuse time stamps (n,) of a column that are missing, not finite, or do not increase.
 
     Raises
     ------
@@ -528,16 +465,7 @@ def check_duration(log: Log, source: str, time: Array) -> Array:
 
 
 def check_finite(log: Log, column: str, values: Array) -> None:
-    """Refuse a column with a number missing, or not finite.
-
-    Parameters
-    ----------
-    log : Log
-        Where it is from.
-    column : str
-        Its name, for the sentence.
-    values : array, shape (n,)
-        There must be at least one.
+    """Refuse a column (n,) without rows, with a number missing, or one that is not finite.
 
     Raises
     ------

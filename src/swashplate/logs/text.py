@@ -9,7 +9,6 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -65,37 +64,28 @@ def open_text(path: Path, options: TextOptions | None = None) -> Log:
     options = options or TextOptions()
     encoding, mark = encoding_of(path, options.encoding)
     head = next(_pieces(path, encoding, mark), "").split("\n")[:-1]
-    lines = [Line(number, text) for number, text in enumerate(head[:_HEAD], 1)]
-    some = _SAMPLE
+    some, size = _SAMPLE, sum(map(len, head)) + 1
     if head:
-        some = max(4, min(some, _SAMPLED * len(head) // (sum(map(len, head)) + 1)))
-    marks = options.marks
-
-    def content(lines: Sequence[str]) -> list[str]:
-        return [each for each in lines if each.strip() and not _comments(each, marks)]
-
-    sample = content(head[: 4 * some])[:some] + content(head[some :: 1 + len(head) // some])
-    sample += content(_later(path, encoding, some // 2))
+        some = max(4, min(some, _SAMPLED * len(head) // size))
+    filled = [each for each in head if each.strip() and not _comments(each, options.marks)]
+    sample = filled[:some] + filled[some :: 1 + len(filled) // some]
     if not sample:
         raise FileError(f"{path} has no rows of numbers, only comments and empty lines.")
     layout = find_layout(sample, options, path)
-    heading = read_heading(lines, layout, options, path)
-    called = {"utf-8": "", "ascii": "", "iso8859-1": ", Latin-1"}
-    form = called.get(encoding, f", {encoding.upper().removesuffix('-LE')}")
-    table = Table(path, encoding, mark, layout, heading, marks)
+    lines = [Line(number, text) for number, text in enumerate(head[:_HEAD], 1)]
+    table = _Table(
+        path, encoding, mark, layout, read_heading(lines, layout, options, path), options.marks
+    )
 
     def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
-        pieces = list(table.read(positions))
-        return [
-            np.concatenate([piece.pop(0) for piece in pieces])[first:last]
-            if pieces
-            else np.empty(0)
-            for _ in positions
-        ]
+        pieces = list(table.read(positions)) or [[np.empty(0)] * len(positions)]
+        return [np.concatenate([piece.pop(0) for piece in pieces])[first:last] for _ in positions]
 
-    length = 1.0 + sum(map(len, head)) / max(len(head), 1)
-    rows = (round(path.stat().st_size / length),) * len(heading.columns)
-    return Log(path, f"{layout}{form}", heading.columns, load, {}, rows, table.read)
+    called = {"utf-8": "", "ascii": "", "iso8859-1": ", Latin-1"}
+    form = called.get(encoding, f", {encoding.upper().removesuffix('-LE')}")
+    columns = table.heading.columns
+    rows = (round(path.stat().st_size * len(head) / (size + len(head))),) * len(columns)
+    return Log(path, f"{layout}{form}", columns, load, {}, rows, table.read)
 
 
 def _comments(line: str, marks: tuple[str, ...]) -> bool:
@@ -113,10 +103,9 @@ def _pieces(path: Path, encoding: str, mark: int) -> Iterator[str]:
     # UTF-8 is a guess from the first bytes, and a letter of a comment further down no number
     codec = codecs.getincrementaldecoder(encoding)("replace" if encoding == "utf-8" else "strict")
     decoder = io.IncrementalNewlineDecoder(codec, translate=True)
-    rest = ""
+    rest, last = "", False
     with path.open("rb") as file:
         file.seek(mark)
-        last = False
         while not last:
             block = file.read(PIECE)
             last = len(block) < PIECE
@@ -138,19 +127,6 @@ def _pieces(path: Path, encoding: str, mark: int) -> Iterator[str]:
                 yield text[:cut]
 
 
-def _later(path: Path, encoding: str, count: int, size: int = 1 << 16) -> list[str]:
-    """Lines from the middle and the end of a file of several pieces, so many of each."""
-    total = path.stat().st_size
-    if total < PIECE or encoding.startswith("utf-16"):
-        return []
-    lines = []
-    with path.open("rb") as file:
-        for place in (total // 2, max(total - size, 0)):
-            file.seek(place)
-            lines += file.read(size).decode(encoding, "replace").splitlines()[1:-1][:count]
-    return lines
-
-
 @dataclass
 class _Clock:
     """A column of dates: its first stamp and the last one, days passed since. [µs]"""
@@ -169,7 +145,7 @@ class _NoNumber(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Table:
+class _Table:
     """The rows of a text file, whose dialect is known; memory grows with what is kept of them."""
 
     path: Path
@@ -192,17 +168,9 @@ class Table:
         FileError
             For a row of too many or too few fields, a cell that holds no number, a NUL byte.
         """
-        count = 0
-        clocks: dict[int, _Clock] = {}
-        for text, cells, lines in self._rows():
-            if len(lines):
-                yield self._numbers(text, cells, lines, positions, count, clocks)
-            count += len(lines)
-
-    def _rows(self) -> Iterator[tuple[str, list[list[str]], Sequence[int]]]:
-        """Pieces of rows: as text or, where that is not regular, as cells; and each row's line."""
         line, count, first = 1, 0, self.heading.first
         empty: list[int] = []  # lines of empty cells in a single column, as yet at its end
+        clocks: dict[int, _Clock] = {}
         for piece in _pieces(self.path, self.encoding, self.mark):
             begin, line = line, line + piece.count("\n")
             if line <= first:
@@ -213,13 +181,12 @@ class Table:
             if self.layout.delimiter == " ":
                 piece = _SPACES.sub("\t", piece).replace("\t\n", "\n").replace("\n\t", "\n")
                 piece = piece.removeprefix("\t")
-            if not empty and self._is_regular(piece, line - begin):
-                count += line - begin
-                yield piece, [], range(begin, line)
-            else:
+            cells, lines = list[list[str]](), list(range(begin, line))
+            if empty or not self._is_regular(piece, line - begin):
                 cells, lines = self._one_by_one(piece, begin, count, empty)
-                count += len(lines)
-                yield "", cells, lines
+            if lines:
+                yield self._numbers(piece, cells, lines, positions, count, clocks)
+            count += len(lines)
 
     def _is_regular(self, piece: str, lines: int) -> bool:
         """Whether each of its lines is a row, and each row has as many fields as it should."""
@@ -243,7 +210,7 @@ class Table:
         """Cells of a piece with comments, empty lines or quotes; what is no row is refused."""
         rows: list[list[str]] = []
         lines: list[int] = []
-        width, quoted = self.layout.width, '"' in piece
+        width = self.layout.width
         for number, text in enumerate(piece.split("\n")[:-1], begin):
             if not text.strip() and self.layout.is_blank(text):
                 if width == 1:
@@ -251,29 +218,29 @@ class Table:
                 continue
             if _comments(text, self.marks):
                 continue
-            rows += repeat([""], len(empty))
+            rows += [[""]] * len(empty)
             lines += empty
             empty.clear()
             where = f"data row {count + len(lines) + 1} (line {number})"
             if "\0" in text:
                 raise FileError(f"{self.path} has a NUL byte in {where}; it is damaged.")
-            cells = self._unquoted(text, where) if quoted else text.split(self._delimiter)
+            cells = text.split(self._delimiter)
+            if '"' in text:
+                tab = self._delimiter
+                quoted = csv.reader([text], delimiter=tab, skipinitialspace=True, strict=True)
+                try:
+                    cells = next(quoted) or [""]
+                except csv.Error as error:
+                    said = printable(str(error))
+                    raise FileError(
+                        f"{self.path} has misplaced quotes in {where}: {said}."
+                    ) from None
             if len(cells) != width:
                 has = f"has {len(cells)} field" + "s" * (len(cells) > 1)
                 raise FileError(f"{self.path}: {where} {has} instead of {width}.")
             rows.append(cells)
             lines.append(number)
         return rows, lines
-
-    def _unquoted(self, text: str, where: str) -> list[str]:
-        if text.count('"') % 2:
-            raise FileError(f"{self.path} has a quote without its partner in {where}.")
-        try:
-            rows = csv.reader([text], delimiter=self._delimiter, skipinitialspace=True, strict=True)
-            return next(rows) or [""]
-        except csv.Error as error:
-            said = printable(str(error))
-            raise FileError(f"{self.path} has misplaced quotes in {where}: {said}.") from None
 
     def _numbers(
         self,
@@ -284,7 +251,7 @@ class Table:
         count: int,
         clocks: dict[int, _Clock],
     ) -> list[Array]:
-        """Columns of a piece, before which there are `count` rows."""
+        """Columns of a piece, as text or as cells, before which there are `count` rows."""
         import polars as pl
 
         if cells:
@@ -367,8 +334,7 @@ def numbers_of(cells: polars.Series, decimal: str) -> Array | _NoNumber:
         return _NoNumber(row, str(cells[row]))
     values: Array = numbers.to_numpy(writable=True)
     endless = (unread & infinite).to_numpy()
-    negative = text.str.starts_with("-").to_numpy()
-    values[endless] = np.where(negative[endless], -np.inf, np.inf)
+    values[endless] = np.where(text.str.starts_with("-").to_numpy()[endless], -np.inf, np.inf)
     return values
 
 
@@ -383,17 +349,34 @@ def _seconds(
 ) -> Array | _NoNumber | None:
     """Seconds since the first stamp of a column; None if it holds no dates.
 
-    A clock without a date begins anew at midnight.
+    Stamps count from 1970 in universal time where a zone is written; a clock without a date begins
+    anew at midnight. Of a cell of another form than the first one, that cell.
     """
     import polars as pl
 
-    stamps = _microseconds(cells, due=position in clocks)
-    if not isinstance(stamps, pl.Series):
-        return stamps
-    filled = stamps.drop_nulls()
+    text = cells.str.strip_chars()
+    text = text.set(text == "", None)
+    filled = text.drop_nulls()
+    due = position in clocks
     if filled.is_empty():
-        return np.full(len(cells), np.nan)
-    clock = clocks.setdefault(position, _Clock(int(filled[0]), int(filled[0])))
+        return np.full(len(cells), np.nan) if due else None
+    written = date_form(str(filled[0]))
+    plain = text.str.replace(",", ".", literal=True)  # of the fraction
+    if written is None:
+        wrong = text.is_not_null()
+        if not due:
+            return None
+    else:
+        if not written.startswith(("%Y", "%m", "%d")):
+            plain, written = "1970-01-01 " + plain, f"%Y-%m-%d {written}"
+        found = plain.str.to_datetime(written, time_unit="us", strict=False)
+        wrong = found.is_null() & text.is_not_null()
+    if wrong.any():
+        row = int(wrong.arg_max() or 0)
+        return _NoNumber(row, str(cells[row]))
+    stamps = found.cast(pl.Int64)
+    begin = int(stamps.drop_nulls()[0])
+    clock = clocks.setdefault(position, _Clock(begin, begin))
     whole = stamps.fill_null(strategy="forward").fill_null(clock.last).to_numpy()
     if clock.first < _DAY:
         back = np.diff(whole, prepend=clock.last) < -_DAY // 2
@@ -401,30 +384,3 @@ def _seconds(
         clock.ahead += _DAY * int(back.sum())
     clock.last = int(whole[-1])
     return 1e-6 * (stamps - clock.first).cast(pl.Float64).to_numpy()
-
-
-def _microseconds(cells: polars.Series, *, due: bool) -> polars.Series | _NoNumber | None:
-    """Stamps [µs], from 1970 on in universal time where a zone is written, or from midnight.
-
-    The first cell of another form than the first one; None if that is no date, and none due.
-    """
-    import polars as pl
-
-    text = cells.str.strip_chars()
-    text = text.set(text == "", None)
-    filled = text.drop_nulls()
-    if filled.is_empty():
-        return text.cast(pl.Int64) if due else None
-    written = date_form(str(filled[0]))
-    if written is None:
-        row = int(text.is_not_null().arg_max() or 0)
-        return _NoNumber(row, str(cells[row])) if due else None
-    plain = text.str.replace(",", ".", literal=True)  # of the fraction
-    if not written.startswith(("%Y", "%m", "%d")):
-        plain, written = "1970-01-01 " + plain, f"%Y-%m-%d {written}"
-    found = plain.str.to_datetime(written, time_unit="us", strict=False)
-    other = found.is_null() & text.is_not_null()
-    if other.any():
-        row = int(other.arg_max() or 0)
-        return _NoNumber(row, str(cells[row]))
-    return found.cast(pl.Int64)

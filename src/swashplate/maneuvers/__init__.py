@@ -1,8 +1,7 @@
 """Maneuvers: the voltage that a joystick commands over time, for tests of a drive.
 
 `step`, `ramp`, `sine`, `stairs`, `chirp`, `multisine`, `recorded`, `recorded_file` and `rest`
-make one; `+` puts one
-after another, a factor scales it, `superpose` adds voltages.
+make one; `+` puts one after another, a factor scales it, `superpose` adds voltages.
 
 Most take three keywords, all in seconds: `start`, the rest before the command; `settle`, how long
 the cubic return to (0 V, 0 V/s) lasts at the end, None or 0 for none; `length`, the whole. Every
@@ -19,9 +18,7 @@ with the steepest slope of that sign with which it stays within, at the amplitud
 from swashplate.maneuvers.pieces import Curve as Curve
 from swashplate.maneuvers.pieces import Maneuver as Maneuver
 from swashplate.maneuvers.pieces import Piece as Piece
-from swashplate.maneuvers.pieces import SplineReturn as SplineReturn
 from swashplate.maneuvers.pieces import sampled as sampled
-from swashplate.maneuvers.pieces import spline_return as spline_return
 from swashplate.maneuvers.pieces import superpose as superpose
 from swashplate.maneuvers.shapes import chirp as chirp
 from swashplate.maneuvers.shapes import multisine as multisine

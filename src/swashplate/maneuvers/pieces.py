@@ -158,14 +158,16 @@ class Sum:
 # --- checks ---------------------------------------------------------------------------------------
 
 
-def finite(name: str, value: float) -> float:
-    """Return `value` as a float, or raise InputError if it is no finite number."""
+def finite(name: str, value: float, least: float = -math.inf) -> float:
+    """Return `value` as a float, or raise InputError if not finite or below `least`, which is 0."""
     try:
         number = float(value)
     except (TypeError, ValueError):
         raise InputError(f"{name} must be a number, not {value!r}.") from None
     if not math.isfinite(number):
         raise InputError(f"{name} must be finite, not {number}.")
+    if number < least:
+        raise InputError(f"{name} must not be negative, not {number:g}.")
     return number
 
 
@@ -173,13 +175,6 @@ def positive(name: str, value: float) -> float:
     """Return `value` as a float, or raise InputError if it is not finite and positive."""
     if (number := finite(name, value)) <= 0.0:
         raise InputError(f"{name} must be positive, not {number:g}.")
-    return number
-
-
-def not_negative(name: str, value: float) -> float:
-    """Return `value` as a float, or raise InputError if it is not finite or negative."""
-    if (number := finite(name, value)) < 0.0:
-        raise InputError(f"{name} must not be negative, not {number:g}.")
     return number
 
 
@@ -218,8 +213,8 @@ def window(start: float, settle: float | None, length: float) -> tuple[float, fl
     InputError
         If one is negative or not finite, or nothing is left for the command.
     """
-    start, length = not_negative("start", start), not_negative("length", length)
-    settle = not_negative("settle", settle or 0.0)
+    start, length = finite("start", start, 0.0), finite("length", length, 0.0)
+    settle = finite("settle", settle or 0.0, 0.0)
     if start + settle >= length:
         raise InputError(
             f"start {start:g} s and settle {settle:g} s leave nothing of a length of {length:g} s."
@@ -365,39 +360,6 @@ def _padded(short: Maneuver, length: float) -> Maneuver:
     if short.length == length:
         return short
     return replace(short, length=length, pieces=(*short.pieces, Piece(short.length, Line())))
-
-
-@dataclass(frozen=True)
-class SplineReturn:
-    """What `spline_return` makes: an end, `duration` [s] long, for the maneuver it is added to."""
-
-    duration: float
-
-    def __radd__(self, before: Maneuver) -> Maneuver:
-        if not isinstance(before, Maneuver):
-            return NotImplemented
-        name = f"{before.name} + return {self.duration:g} s"
-        return returned(before, name, before.length + self.duration)
-
-
-def spline_return(duration: float) -> SplineReturn:
-    """Cubic Hermite from the voltage and slope at the end of what it is added to, to (0, 0).
-
-    It stays within the amplitude of what it is added to: where the slope there would carry it
-    beyond, it starts with the steepest slope of that sign that does not, at the amplitude itself
-    with none. What states no amplitude is not exceeded beyond the voltage that it ends with.
-
-    Parameters
-    ----------
-    duration : float
-        Positive. [s]
-
-    Raises
-    ------
-    InputError
-        If it is not.
-    """
-    return SplineReturn(positive("duration", duration))
 
 
 def returned(before: Maneuver, name: str, length: float) -> Maneuver:

@@ -22,7 +22,6 @@ from swashplate.maneuvers.pieces import (
     Tone,
     finite,
     interval,
-    not_negative,
     positive,
     row,
     settled,
@@ -35,7 +34,7 @@ from swashplate.maneuvers.pieces import (
 
 def rest(duration: float) -> Maneuver:
     """Nothing, 0 V, for `duration` [s]; it raises InputError if that is negative."""
-    duration = not_negative("duration", duration)
+    duration = finite("duration", duration, 0.0)
     return Maneuver(f"rest {duration:g} s", duration, (Piece(0.0, Line()),), 0.0)
 
 
@@ -107,7 +106,7 @@ def stairs(
         If there is no level, or a time is out of its range.
     """
     volts, dwell = row("levels", levels).tolist(), positive("dwell", dwell)
-    start, settle = not_negative("start", start), not_negative("settle", settle or 0.0)
+    start, settle = finite("start", start, 0.0), finite("settle", settle or 0.0, 0.0)
     pieces = [Piece(start + dwell * index, Line(level)) for index, level in enumerate(volts)]
     end = start + dwell * len(pieces)
     name = f"stairs {'/'.join(f'{level:g}' for level in volts)} V"
@@ -174,7 +173,7 @@ def chirp(
         If a frequency is negative, or `start` and `settle` leave nothing of `length`.
     """
     amplitude = finite("amplitude", amplitude)
-    first, last = not_negative("first", first), not_negative("last", last)
+    first, last = finite("first", first, 0.0), finite("last", last, 0.0)
     start, end, length = window(start, settle, length)
     curve = Tone(amplitude, first, growth=(last - first) / (end - start))
     name = f"chirp {amplitude:g} V {first:g} to {last:g} Hz"

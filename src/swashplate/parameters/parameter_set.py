@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Literal, NamedTuple, Protocol
 
 from swashplate.equations.replacement import Replacement
-from swashplate.errors import InputError, ParameterError
+from swashplate.errors import ParameterError
 from swashplate.parameters.definitions import (
     CATALOGUE,
     DEFAULTS,
@@ -20,7 +20,7 @@ from swashplate.parameters.definitions import (
     options_of,
     unknown_parameter,
 )
-from swashplate.parameters.rules import check_bounds, check_options, check_rules
+from swashplate.parameters.rules import check_options, check_rules
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table
 
@@ -135,9 +135,13 @@ class ParameterSet(Mapping[str, Parameter]):
         for parameter in ordered.values():
             for column, value in zip(parameter.definition.columns, parameter.values, strict=True):
                 numbers[column] = value
-                if parameter.own_bounds is not None:
-                    check_bounds(
-                        self.name, column, parameter.definition, value, parameter.own_bounds
+                if parameter.own_bounds is None:
+                    continue
+                low, high = parameter.own_bounds
+                if not low <= value <= high:
+                    raise ParameterError(
+                        f"{self.name}: {column} ({parameter.name}) is {value:g} {parameter.unit}, "
+                        f"outside its bounds {low:g} to {high:g}."
                     )
         check_rules(self.name, numbers)
         check_options(self.name, self.options, numbers)
@@ -203,27 +207,6 @@ class ParameterSet(Mapping[str, Parameter]):
         parameters = {symbol: self.parameters[symbol] for symbol in CATALOGUE}
         own = {SWITCHES[symbol] for symbol in CATALOGUE if symbol in SWITCHES}
         return replace(self, parameters=parameters, options=self.options & own, equations=())
-
-    def refuse_refinements(self, what: str) -> None:
-        """Refuse the set where a computation knows Kruse's equations alone.
-
-        Parameters
-        ----------
-        what : str
-            The computation, plural, as a sentence begins: ``"Sensitivities"``.
-
-        Raises
-        ------
-        InputError
-            If a refinement is on.
-        """
-        if self.refinements:
-            listed = ", ".join(self.refinements)
-            raise InputError(
-                f"{self.name}: {what} do not know refinements, but {listed} "
-                f"{'are' if len(self.refinements) > 1 else 'is'} on; take the drive without them "
-                "(its .plain), or simulate it."
-            )
 
     def tables(self) -> list[Table]:
         """Every parameter with its unit and status, a table for each block that the set has.

@@ -96,17 +96,6 @@ def check_options(owner: str, options: frozenset[str], numbers: Mapping[str, flo
             )
 
 
-def check_bounds(
-    owner: str, column: str, definition: Definition, value: float, bounds: tuple[float, float]
-) -> None:
-    """Check one value against bounds that the set's author gave, besides the catalogue's."""
-    if not bounds[0] <= value <= bounds[1]:
-        raise ParameterError(
-            f"{owner}: {column} ({definition.name}) is {value:g} {definition.unit}, outside its "
-            f"bounds {bounds[0]:g} to {bounds[1]:g}."
-        )
-
-
 def broken_rules(numbers: Mapping[str, Array]) -> Iterator[Broken]:
     """Every rule with the sets that break it, those about single values first.
 
@@ -122,16 +111,18 @@ def broken_rules(numbers: Mapping[str, Array]) -> Iterator[Broken]:
             partial(range_sentence, column, definition, values),
         )
     if not REFINEMENTS.keys().isdisjoint(numbers):
-        yield _dither(numbers)
-        yield _line(numbers)
-        yield _cam_ring(numbers)
-    yield _rest(numbers)
+        yield from _of_refinements(numbers)
+    pressure, ceiling = numbers["Z2"] / numbers["Z1"], np.minimum(numbers["Z9"], numbers["Z15"])
+    yield (
+        np.abs(pressure) >= ceiling,
+        lambda i: (
+            f"the pressure at rest Z2/Z1 is {pressure[i]:g} Pa, but must stay below "
+            f"{ceiling[i]:g} Pa, the smaller of Z9 and Z15."
+        ),
+    )
     lowest, moment = _static(numbers)
     for k, side in enumerate(SIDES):
-        yield _thresholds(numbers, side)
-        yield _feedback_arm(numbers, side)
-        yield _negative_current(lowest[:, k], side)
-        yield _solenoid_moment(moment[:, k], side)
+        yield from _of_side(numbers, side, lowest[:, k], moment[:, k])
 
 
 def out_of_range(definition: Definition, values: Array) -> Mask:
@@ -153,34 +144,27 @@ def range_sentence(column: str, definition: Definition, values: Array, i: int) -
     return f"{column} ({definition.name}) is {value:g}{unit}, but must be {definition.range}{hint}."
 
 
-def _dither(numbers: Mapping[str, Array]) -> Broken:
-    friction, travel = (_refinement(numbers, s) for s in ("spool_friction", "spool_presliding"))
-    time = _refinement(numbers, "dither_time")
-    return (
-        (friction > 0.0) & np.isfinite(time) & (travel == 0.0),
+def _of_refinements(numbers: Mapping[str, Array]) -> Iterator[Broken]:
+    """Rules of refinements together; one that is not given is what it is without."""
+    size = next(iter(numbers.values())).size
+    n = {name: numbers.get(name, np.full(size, default)) for name, default in DEFAULTS.items()}
+    time, stiffness = n["dither_time"], n["line_stiffness"]
+    depth = n["cam_ripple"] + n["cam_ripple_per_torque"] * np.abs(n["load_torque"])
+    yield (
+        (n["spool_friction"] > 0.0) & np.isfinite(time) & (n["spool_presliding"] == 0.0),
         lambda i: (
             f"dither_time is {time[i]:g} s, but spool_presliding is 0: dither frees a spool that "
             "friction lets give a little; give that travel, of the order of 5e-5 m."
         ),
     )
-
-
-def _line(numbers: Mapping[str, Array]) -> Broken:
-    stiffness, inertia = (_refinement(numbers, s) for s in ("line_stiffness", "load_inertia"))
-    return (
-        (stiffness > 0.0) & (inertia == 0.0),
+    yield (
+        (stiffness > 0.0) & (n["load_inertia"] == 0.0),
         lambda i: (
             f"line_stiffness is {stiffness[i]:g} N m/rad, but load_inertia is 0: give the inertia "
             "that the line has to turn, in kg m^2 at the shaft."
         ),
     )
-
-
-def _cam_ring(numbers: Mapping[str, Array]) -> Broken:
-    torque = np.abs(_refinement(numbers, "load_torque"))
-    depth = _refinement(numbers, "cam_ripple")
-    depth = depth + _refinement(numbers, "cam_ripple_per_torque") * torque
-    return (
+    yield (
         depth >= 1.0,
         lambda i: (
             f"cam_ripple + cam_ripple_per_torque·|load_torque| is {depth[i]:.4g}, but must be "
@@ -189,49 +173,28 @@ def _cam_ring(numbers: Mapping[str, Array]) -> Broken:
     )
 
 
-def _refinement(numbers: Mapping[str, Array], symbol: str) -> Array:
-    """A refinement's values, of all sets, or what it is where none is given."""
-    size = next(iter(numbers.values())).size
-    return numbers.get(symbol, np.full(size, DEFAULTS[symbol]))
-
-
-def _rest(numbers: Mapping[str, Array]) -> Broken:
-    pressure = numbers["Z2"] / numbers["Z1"]
-    ceiling = np.minimum(numbers["Z9"], numbers["Z15"])
-    return (
-        np.abs(pressure) >= ceiling,
-        lambda i: (
-            f"the pressure at rest Z2/Z1 is {pressure[i]:g} Pa, but must stay below "
-            f"{ceiling[i]:g} Pa, the smaller of Z9 and Z15."
-        ),
-    )
-
-
-def _thresholds(numbers: Mapping[str, Array], side: str) -> Broken:
+def _of_side(
+    numbers: Mapping[str, Array], side: str, lowest: Array, moment: Array
+) -> Iterator[Broken]:
+    """Rules of one direction, with its lowest steady current [A] and largest sin φ."""
     upper, lower = numbers[f"I_t1_{side}"], numbers[f"I_t2_{side}"]
-    return (
+    yield (
         lower >= upper,
         lambda i: (
             f"I_t2_{side} is {lower[i]:g} A, but must be below I_t1_{side} = {upper[i]:g} A: the "
             "decay begins at a lower current than the rate limit."
         ),
     )
-
-
-def _feedback_arm(numbers: Mapping[str, Array], side: str) -> Broken:
     stop = numbers[f"Z13_{side}"]
     sine = numbers["Z3"] * np.tan(stop)
-    return (
+    yield (
         sine >= 1.0,
         lambda i: (
             f"Z3·tan Z13_{side} is {sine[i]:.4g}, but must be below 1: at its stop of "
             f"{stop[i]:g} rad the swash plate would turn the feedback arm past 90°."
         ),
     )
-
-
-def _negative_current(lowest: Array, side: str) -> Broken:
-    return (
+    yield (
         lowest < 0.0,
         lambda i: (
             f"the steady current of the {side} channel falls to {lowest[i]:.3g} A within "
@@ -239,13 +202,10 @@ def _negative_current(lowest: Array, side: str) -> Broken:
             f"G3_{side}."
         ),
     )
-
-
-def _solenoid_moment(sine: Array, side: str) -> Broken:
-    return (
-        ~(sine < 1.0),
+    yield (
+        ~(moment < 1.0),
         lambda i: (
-            f"Z5·F/√Z4 reaches {sine[i]:.4g} within {FULL_VOLTAGE:g} V ({side}), but must be "
+            f"Z5·F/√Z4 reaches {moment[i]:.4g} within {FULL_VOLTAGE:g} V ({side}), but must be "
             "below 1: the solenoid would overpower the feedback spring; check Z19 to Z22, Z4 and "
             "Z5."
         ),

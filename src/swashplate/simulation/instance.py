@@ -60,7 +60,9 @@ START_PRESSURE = "start_pressure"
 
 
 def path_of(column: str) -> str:
-    """Path in the model of a column, or of the pressure at the start."""
+    """Path in the model of a column, of the pressure at the start, or of a state at the start."""
+    if column.startswith("start."):
+        return column
     return "start.pump.pressure" if column == START_PRESSURE else PATHS[column]
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -56,6 +57,8 @@ class Own(NamedTuple):
     """Offset of each observation, in its signal's unit; none given means none."""
     clock_offsets: Sequence[float] = ()
     """By how much the record's clock is ahead of each observation's; none given means none. [s]"""
+    states: Mapping[str, float] = MappingProxyType({})
+    """Numbers of the card's state at the first sample, by path; others are those of the start."""
 
 
 NOTHING_OWN = Own()
@@ -140,8 +143,8 @@ def moved_by(
     }
     moved["card"] = any(moved.values())
     moved["pump"] = any(each.signal not in CURRENTS for each in observed.observations)
-    paths = (path.removeprefix("start.") for path in _paths(tuple(names)))
-    return [moved[path.rpartition(".")[0]] for path in paths]
+    moved |= {"start.card.plus": True, "start.card.minus": True, "start.pump": moved["pump"]}
+    return [moved[path.rpartition(".")[0]] for path in _paths(tuple(names))]
 
 
 @lru_cache(maxsize=256)
@@ -165,11 +168,11 @@ def made_ready(
     # what is differentiated by counts, at 0 as well, unless equations have derivatives for that
     asked = frozenset(SWITCHES[name] for name in names if name in SWITCHES) - {"leaky", "loaded"}
     instance = instance_of(_switched_on(parameters, asked), by_voltage)
-    start: dict[str, float] = {}
+    start = dict(own.states)
     if own.start_pressure is not None:
         started = started_at(instance, observed.records, observed.record.step, observed.start)
         states = start_states(instance, own.start_pressure, started)
-        start = {f"pump.{path}": pressure for path, pressure in states.items()}
+        start |= {f"pump.{path}": pressure for path, pressure in states.items()}
     elif START_PRESSURE in names:
         raise InputError(f"{START_PRESSURE} is a column, so Own needs a value of it.")
     return Ready(

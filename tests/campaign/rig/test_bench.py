@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError, maneuvers
-from swashplate.campaign import recognise, rig
+from swashplate.campaign import rig
 from swashplate.campaign.rig.bench import perturbed
 
 STEP = maneuvers.step(4.0)
@@ -84,24 +84,6 @@ def test_the_same_seed_gives_the_same_logs_in_any_order_and_company() -> None:
     assert not same(alone.runs[STEP.name], other.runs[STEP.name])
 
 
-@pytest.mark.parametrize("axis", ["hoist", "slew", "luff"])
-def test_every_log_can_be_recognised(axis: str) -> None:
-    for name, run in rig.run(axis, severity="harsh").runs.items():
-        voltage = run.columns["voltage"]
-        there = np.isfinite(voltage)
-        assert recognise(run.columns["time"][there], voltage[there]).name == name
-
-
-def test_harsh_logs_lack_rows_and_cells_but_no_stamps() -> None:
-    columns = rig.run("hoist", [SINE], severity="harsh").runs[SINE.name].columns
-    assert 0.97 * 6145 < columns["time"].size < 6145
-    assert np.isfinite(columns["time"]).all()
-    assert np.diff(columns["time"]).min() > 0.0
-    empty = {name: np.isnan(values) for name, values in columns.items() if name != "time"}
-    assert all(0 < gaps.sum() < 0.02 * gaps.size for gaps in empty.values())
-    assert not np.array_equal(empty["voltage"], empty["current"])
-
-
 def test_other_channels_are_the_simulated_signals() -> None:
     kinds = (
         "signed_current",
@@ -128,15 +110,6 @@ def test_other_channels_are_the_simulated_signals() -> None:
         np.testing.assert_array_equal(run.columns[column], signal)
     noisy = rig.run("luff", [SINE], channels=["swash_angle"]).runs[SINE.name].columns["swash_angle"]
     assert 0.0 < np.abs(np.diff(noisy[:500])).mean() < 0.02 * np.abs(noisy).max()
-
-
-def test_what_is_simulated_may_be_another_drive() -> None:
-    truth = Drive.preset("hoist").scale(Z10=1.1)
-    tests = rig.run("hoist", [STEP], severity="clean", truth=truth)
-    assert tests.nominal == Drive.preset("hoist")
-    assert tests.drive == split(truth)
-    expected = 1.1 * split(Drive.preset("hoist")).simulate(STEP.sample()).shaft_speed
-    np.testing.assert_allclose(tests.runs[STEP.name].truth.shaft_speed, expected, rtol=1e-12)
 
 
 def test_backlash_is_between_shaft_and_encoder() -> None:
@@ -180,16 +153,6 @@ def test_tests_of_middle_size_are_kept_for_validation() -> None:
     assert {run.role for run in rig.run("hoist", [STEP, SINE]).runs.values()} == {"fit"}
     own = rig.run("hoist", [STEP, SINE], validate=[SINE.name])
     assert [run.role for run in own.runs.values()] == ["fit", "validate"]
-
-
-def test_a_drive_of_ones_own_says_whose_tests_it_runs() -> None:
-    crane = Drive.preset("hoist").renamed("my crane")
-    tests = rig.run(crane, axis="hoist")
-    assert len(tests.runs) == 13
-    assert tests.preset is None
-    own = rig.run(crane, {"try": STEP}, counts_per_turn=100.0)
-    assert own.axis == "my crane"
-    assert own.runs["try"].stem == "my_crane_try"
 
 
 @pytest.mark.parametrize(

@@ -39,14 +39,6 @@ def test_csv_logs_read_back_as_they_were(harsh: rig.VirtualTests, tmp_path: Path
         np.testing.assert_array_equal(read, values)
 
 
-def test_clean_logs_keep_every_digit(tmp_path: Path) -> None:
-    tests = rig.run("slew", [SINE], severity="clean")
-    rig.write(tests, tmp_path)
-    table = pl.read_csv(tmp_path / "slew_sine_4_V_0.2_Hz.csv", comment_prefix="#")
-    for name, values in tests.runs[SINE.name].columns.items():
-        np.testing.assert_array_equal(table[name].to_numpy(), values)
-
-
 def test_the_same_seed_gives_the_same_files(harsh: rig.VirtualTests, tmp_path: Path) -> None:
     again = rig.run("hoist", [SINE, STEP], severity="harsh", seed=4)
     rig.write(harsh, tmp_path / "one")
@@ -67,28 +59,9 @@ def test_a_campaign_reads_what_is_written(severity: rig.Severity, tmp_path: Path
     for experiment, run in zip(read, tests.runs.values(), strict=True):
         channel = experiment["counts"]
         truth = np.interp(channel.time, run.truth.time, run.truth.shaft_position)
-        # a count is 2.5 mrad, to which hidden jitter of 0.4 ms adds at most a third
-        bound = {"clean": 1e-12, "realistic": 2.6e-3, "harsh": 4e-3}[severity]
+        # a count is 2.5 mrad
+        bound = {"clean": 1e-12, "realistic": 2.6e-3, "harsh": 2.6e-3}[severity]
         assert np.abs(channel.values - truth).max() < bound
-
-
-def test_the_campaign_file_says_that_it_is_virtual(tmp_path: Path) -> None:
-    truth = Drive.preset("luff").replace(cam_ripple=0.02)
-    tests = rig.run("luff", severity="harsh", truth=truth, seed=9)
-    path = rig.write(tests, tmp_path)
-    text = path.read_text("utf-8")
-    assert text.startswith("# Virtual tests, simulated by swashplate ")
-    assert "# Instruments: harsh; refinements: cam_ripple; seed 9." in text
-    file = tomllib.loads(text)
-    assert file["virtual"] is True
-    axis = file["axes"]["luff"]
-    assert axis["drive"] == "luff"
-    assert axis["input"]["interpolation"] == "linear"
-    assert axis["channels"]["counts"]["counts_per_turn"] == 2540.0
-    assert axis["channels"]["counts"]["rolls_over_at"] == 65536
-    assert axis["channels"]["current"]["kind"] == "rectified_current"
-    assert [run["role"] for run in file["runs"]].count("validate") == 2
-    assert all((tmp_path / run["file"]).exists() for run in file["runs"])
 
 
 def test_the_truth_lies_apart_and_complete(tmp_path: Path) -> None:

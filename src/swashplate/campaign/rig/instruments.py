@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from hashlib import blake2b
-from math import isfinite
+from math import inf, isfinite
 from types import MappingProxyType
 from typing import Literal
 
@@ -62,12 +62,6 @@ class Instruments:
     """Share by which the ammeter reads too much. [1]"""
     current_zero: float = 0.0
     """Reading without a current. [A]"""
-    current_floor: float = 0.0
-    """Noise within the ammeter's bandwidth, which a true-RMS meter squares, adds and so never reads
-    below: its error around zero crossings. [A]"""
-    averaging_time: float = 0.0
-    """Time constant of the mean under the RMS: the reading lags, and the ripple counts into it. 0
-    is a meter that follows every instant. [s]"""
 
     dither: float = 0.0
     """Half the height of the current's ripple at half of the full current. [A]"""
@@ -87,8 +81,6 @@ class Instruments:
 
     jitter: float = 0.0
     """Standard deviation of the instants sampled about the grid; the stamps tell it. [s]"""
-    hidden_jitter: float = 0.0
-    """The same, but the stamps do not tell it. [s]"""
     stamp_resolution: float = 0.0
     """Step to which the stamps are rounded. [s]"""
     lost_rows: float = 0.0
@@ -102,15 +94,13 @@ class Instruments:
 
     def __post_init__(self) -> None:
         for each in fields(self):
-            value = getattr(self, each.name)
-            if not isfinite(value):
-                raise InputError(f"{each.name} must be finite, not {value}.")
-            if value < 0 and each.name not in _EITHER_SIGN:
-                raise InputError(f"{each.name} must not be negative, not {value:g}.")
-            if value > 1.0 and each.name in _SHARES:
-                raise InputError(f"{each.name} is a share, at most 1, not {value:g}.")
-            if value == 0 and each.name in _POSITIVE:
-                raise InputError(f"{each.name} must be positive, not 0.")
+            name, value = each.name, getattr(self, each.name)
+            low = -inf if name in _EITHER_SIGN else 1e-300 if name in _POSITIVE else 0.0
+            high, what = (1.0, "a share, at most 1") if name in _SHARES else (inf, "finite")
+            if value < low:
+                what = "positive" if name in _POSITIVE else "0 or more"
+            if not (isfinite(value) and low <= value <= high):
+                raise InputError(f"{name} must be {what}, not {value:g}.")
 
 
 _EITHER_SIGN = ("voltage_offset", "current_gain_error", "current_zero")
@@ -141,14 +131,11 @@ SEVERITIES: Mapping[Severity, Instruments] = MappingProxyType(
             current_resolution=0.0005,
             current_gain_error=0.01,
             current_zero=0.004,
-            current_floor=0.01,
-            averaging_time=0.002,
             dither=0.03,
             encoder_step=1,
             counter_bits=16,
             transducer_noise=0.01,
             jitter=200e-6,
-            hidden_jitter=100e-6,
             stamp_resolution=1e-6,
             lost_rows=0.01,
             longest_loss=20,
@@ -163,8 +150,8 @@ clean: none. The log holds the model's own numbers at k/512 s, so that a fit can
 to as many digits as it likes. realistic: noise of mean zero and nothing systematic (no zero or gain
 error, no lag; jitter as of a clock in hardware, which never lets a sample beside a step pass the
 card's dead zone), so that a fit of the right model is unbiased and its confidence intervals can be
-held against the truth. harsh: zero and gain errors, a lagging ammeter with a floor, jitter that
-moves steps by a part of a sample, gaps and a counter that rolls over.
+held against the truth. harsh: zero and gain errors, jitter that moves steps by a part of a sample,
+gaps and a counter that rolls over.
 """
 
 
@@ -182,9 +169,6 @@ SIGNALS: Mapping[str, str] = {
 """Simulated signals that are not called as the kind of their channel."""
 FULL_SCALE = 10.0
 """Range of the command's converters, either way. [V]"""
-OVERSAMPLING = 32
-"""Points from one sample to the next at which a lagging ammeter is followed: 160 a period of a
-100 Hz dither at 512 Hz."""
 FARTHEST = 0.4
 """Of the way to the next grid point a sample strays at most, so that the stamps increase. [1]"""
 
@@ -249,20 +233,12 @@ def logged(
 def sampled_instants(
     grid: Array, instruments: Instruments, generator: Generator
 ) -> tuple[Array, Array]:
-    """Instants (n,) at which samples are taken, and stamps (n,) that are written for them. [s]
-
-    Both about an even grid (n,), instants within it. The stamps leave the hidden part of the jitter
-    out and are rounded.
-    """
-    told = instruments.jitter * generator.standard_normal(grid.size)
-    hidden = instruments.hidden_jitter * generator.standard_normal(grid.size)
-    spacing = grid[1] - grid[0] if grid.size > 1 else 0.0
-    bound = 0.5 * FARTHEST * spacing
-    stamps = np.clip(grid + np.clip(told, -bound, bound), grid[0], grid[-1])
-    instants = np.clip(stamps + np.clip(hidden, -bound, bound), grid[0], grid[-1])
-    if instruments.stamp_resolution:
-        stamps = rounded(stamps, instruments.stamp_resolution)
-    return instants, stamps
+    """Instants (n,) about an even grid (n,) of the samples, and their stamps (n,). [s]"""
+    strayed = instruments.jitter * generator.standard_normal(grid.size)
+    bound = FARTHEST * (grid[1] - grid[0] if grid.size > 1 else 0.0)
+    instants = np.clip(grid + np.clip(strayed, -bound, bound), grid[0], grid[-1])
+    step = instruments.stamp_resolution
+    return instants, rounded(instants, step) if step else instants
 
 
 def rounded(values: Array, step: float) -> Array:
@@ -351,45 +327,19 @@ def read_current(
 ) -> Array:
     """The ammeter around both leads, read at some instants (m,). [A]
 
-    `plus` and `minus` are the currents (n,) of both channels on an even grid, magnitudes. With i =
-    |I₊ + ripple| + |I₋ + ripple| the meter shows y = √(p + floor²), T p' + p = i², and p = i² where
-    the averaging time T is 0. The reading is (1 + gain error) y + zero error + noise.
+    `plus` and `minus` are the currents (n,) of both channels on an even grid, magnitudes. The
+    reading is (1 + gain error) (|I₊ + ripple| + |I₋ + ripple|) + zero error + noise.
     """
     phase = float(generator.random())
-    noise = instruments.current_noise * generator.standard_normal(instants.size)
-    if instruments.averaging_time and time.size > 1:
-        fine = np.linspace(time[0], time[-1], (time.size - 1) * OVERSAMPLING + 1)
-        square = _followed(_sum(time, plus, minus, fine, phase, instruments), fine, instruments)
-        mean = np.sqrt(np.interp(instants, fine, square))
-    else:
-        mean = _sum(time, plus, minus, instants, phase, instruments)
-    reading = np.hypot(mean, instruments.current_floor)
-    reading = (1.0 + instruments.current_gain_error) * reading + instruments.current_zero + noise
-    if instruments.current_resolution:
-        return rounded(reading, instruments.current_resolution)
-    return np.asarray(reading)
-
-
-def _sum(
-    time: Array, plus: Array, minus: Array, at: Array, phase: float, instruments: Instruments
-) -> Array:
-    """|I₊| + |I₋| with the ripple of both. [A]"""
-    total = np.zeros(at.size)
+    reading = np.zeros(instants.size)
     for channel in (plus, minus):
-        mean = interpolated(at, time, channel)
-        ripple = dither_ripple(at, mean, phase, instruments) if instruments.dither else 0.0
-        total += np.abs(mean + ripple)
-    return total
-
-
-def _followed(current: Array, fine: Array, instruments: Instruments) -> Array:
-    """Mean of the square with an exponential memory, exact for a square that is held."""
-    from scipy.signal import lfilter
-
-    keep = float(np.exp(-(fine[1] - fine[0]) / instruments.averaging_time))
-    square = current**2
-    followed, _ = lfilter([1.0 - keep], [1.0, -keep], square, zi=[keep * square[0]])
-    return np.asarray(followed)
+        mean = interpolated(instants, time, channel)
+        ripple = dither_ripple(instants, mean, phase, instruments) if instruments.dither else 0.0
+        reading += np.abs(mean + ripple)
+    noise = instruments.current_noise * generator.standard_normal(instants.size)
+    reading = (1.0 + instruments.current_gain_error) * reading + instruments.current_zero + noise
+    step = instruments.current_resolution
+    return rounded(reading, step) if step else np.asarray(reading)
 
 
 def read_counts(

@@ -22,12 +22,10 @@ from swashplate.analysis import (
     Envelope,
     Improvement,
     InverseMap,
-    LimitTimeline,
     OneAtATime,
     Outcome,
     Way,
     WhatIf,
-    limit_timeline,
     outcome_unit,
     proportional_command,
 )
@@ -40,6 +38,7 @@ from swashplate.report.lines import (
     draw,
     fit_time,
     merged,
+    stretches,
 )
 from swashplate.report.style import (
     BLUE,
@@ -71,7 +70,7 @@ from swashplate.report.style import (
     write_title,
     zero_line,
 )
-from swashplate.simulation.result import Simulation
+from swashplate.simulation.result import Limit, Simulation
 from swashplate.units import display_unit
 
 # --- envelope -------------------------------------------------------------------------------------
@@ -200,7 +199,7 @@ def plot_limit_timeline(
     InputError
         If the wanted speed has another length than the run.
     """
-    timeline, unit = limit_timeline(run), display_unit("rad/s")
+    acting, unit = [each for each in Limit if run.active(each).any()], display_unit("rad/s")
     asked = None if wanted is None else np.asarray(wanted, dtype=np.float64)
     if asked is not None and asked.shape != run.time.shape:
         raise InputError(
@@ -209,7 +208,7 @@ def plot_limit_timeline(
     legend = [handle("speed", BLUE)]
     if asked is not None:
         legend.append(handle("without limits", GREY, "dashed"))
-    heights = [1.1, 2.2, 0.27 * max(len(timeline.limits), 1)]
+    heights = [1.1, 2.2, 0.27 * max(len(acting), 1)]
     figure, axes = sheet(heights, run.name if title is None else title, legend=legend)
     command, speed, rows = axes
     volts = run.voltage
@@ -221,30 +220,30 @@ def plot_limit_timeline(
     draw(speed, run.time, unit.factor * run.shaft_speed, BLUE)
     for ax in (command, speed):
         zero_line(ax)
-    _bars(rows, timeline)
+    _bars(rows, run, acting)
     fit_time(rows, run.time)
     label_below(rows, "time (s)")
     return figure
 
 
-def _bars(ax: Axes, timeline: LimitTimeline) -> None:
+def _bars(ax: Axes, run: Simulation, acting: list[Limit]) -> None:
     dress(ax)
-    count = len(timeline.limits)
+    count = len(acting)
     ax.set_ylim(max(count, 1) - 0.5, -0.5)
-    ax.set_yticks(range(count), [SHADES[limit].name for limit in timeline.limits])
+    ax.set_yticks(range(count), [SHADES[limit].name for limit in acting])
     ax.grid(False, axis="y")
-    for row, (limit, spans) in enumerate(zip(timeline.limits, timeline.spans, strict=True)):
+    for row, limit in enumerate(acting):
+        spans = merged(stretches(run.time, run.active(limit)))
         ax.broken_barh(
-            [(begin, end - begin) for begin, end in merged(spans).tolist()],
+            [(begin, end - begin) for begin, end in spans.tolist()],
             (row - 0.5 * BAR, BAR),
             facecolor=SHADES[limit].color,
             edgecolor=GREY,
             linewidth=0.4,
         )
-    for row, share in enumerate(timeline.shares):
         write(
             ax,
-            f"{100.0 * share:.1f} %",
+            f"{100.0 * run.active(limit).mean():.1f} %",
             (1.0, row),
             (5.0, 0.0),
             coords=ax.get_yaxis_transform(),
@@ -461,9 +460,9 @@ def plot_compensation(
     _draw_map(whole, close, inverse)
     legend = [handle("inverse map", INK), handle("straight line", GREY, "dashed")]
     if improvement is not None:
-        pairs = zip(improvement.ways, COLORS, strict=True)
+        pairs = zip(improvement.runs, COLORS, strict=True)
         legend = [handle("map, wanted speed", INK)]
-        legend += [handle(f"with {way.name}", color) for way, color in pairs]
+        legend += [handle(f"with {name}", color) for name, color in pairs]
         speed = figure.add_subplot(grid[1, :])
         error = figure.add_subplot(grid[2, :], sharex=speed)
         _draw_improvement(speed, error, improvement)
@@ -510,13 +509,14 @@ def _draw_map(whole: Axes, close: Axes, inverse: InverseMap) -> None:
 
 
 def _draw_improvement(speed: Axes, error: Axes, improvement: Improvement) -> None:
-    unit, time = display_unit("rad/s"), improvement.time
+    unit, runs = display_unit("rad/s"), list(improvement.runs.values())
+    time = runs[0].time
     dress(speed, unit.label("speed"))
     dress(error, unit.label("error"), "time (s)")
     for ax in (speed, error):
         zero_line(ax)
-    for way, color in zip(improvement.ways, COLORS, strict=True):
-        done = way.run.shaft_speed
+    for run, color in zip(runs, COLORS, strict=True):
+        done = run.shaft_speed
         draw(speed, time, unit.factor * done, color)
         draw(error, time, unit.factor * (done - improvement.wanted), color)
     draw(speed, time, unit.factor * improvement.wanted, INK, width=1.0, zorder=3.0)

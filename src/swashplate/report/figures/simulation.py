@@ -188,7 +188,7 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
     title : str, optional
         By default the name of the physical set.
     """
-    full, differ = found.full, found.difference
+    full = found.full
     machine = full.plant.machine
 
     def holding(limit: Limit, held: Flags) -> tuple[tuple[Limit, Array], ...]:
@@ -200,8 +200,8 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
         else Panel("voltage", "V", (Trace(found.voltage, INK),))
     )
     error = (
-        Panel("difference", "% of top", (Trace(100.0 * found.error / differ.top_speed, INK),))
-        if differ.moves
+        Panel("difference", "% of top", (Trace(100.0 * found.error / found.top_speed, INK),))
+        if found.moves
         else Panel("difference", "rad/s", (Trace(found.error, INK),))
     )
     speeds = (

@@ -16,7 +16,6 @@ from swashplate.campaign import Campaign, examine, quality_table
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
-from swashplate.identification.acceptance import percent
 from swashplate.identification.assessment import Assessment, StageProfile, assess, motion_of
 from swashplate.identification.fitting import Fit, StageFit
 from swashplate.identification.resampling import CrossValidation
@@ -24,7 +23,7 @@ from swashplate.identification.setup import ModelParameters
 from swashplate.identification.solving import StartResult
 from swashplate.identification.staging import Parameters
 from swashplate.identification.validation import RunQuality, pooled
-from swashplate.identification.verdict import Verdict, starts_of, verdict
+from swashplate.identification.verdict import Verdict, percent, starts_of, verdict
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
 from swashplate.report.fit_report.live import can_run, live_page
@@ -420,6 +419,7 @@ def _verdict_section(
     }
     said = [(subject, "plain", words) for subject, words in measured.items()]
     said.append(("Remarks", "look", judged.sentences))
+    said.append(("Not judged", "look", judged.not_judged))
     said.append(("Range of validity", "plain", (judged.validity,) if judged.validity else ()))
     said.append(("Assumed, cannot be checked", "plain", judged.assumed))
     if findings:

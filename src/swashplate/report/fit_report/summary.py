@@ -14,10 +14,18 @@ from swashplate.analysis import dead_zone, drives, limit_shares
 from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
-from swashplate.identification.acceptance import POOR, following, percent, range_of
 from swashplate.identification.assessment import Assessment
 from swashplate.identification.validation import Measures, RunQuality, pooled
-from swashplate.identification.verdict import CARRIES_OVER, Grade, Verdict, weak_unknowns
+from swashplate.identification.verdict import (
+    CARRIES_OVER,
+    POOR,
+    Grade,
+    Verdict,
+    following,
+    percent,
+    range_of,
+    weak_unknowns,
+)
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.fit_report.page import Block, Section, listed_block, text
 from swashplate.report.fit_report.runs import ShownRun
@@ -60,7 +68,7 @@ def numbers_of(drive: Drive) -> Array:
         command[0] = 0.0
         run = drive.simulate(command, RATE, start="steady")
         top = float(drive.steady_speed(way * FULL_VOLTAGE))
-        made[0, column] = dead_zone(drive, way).inside
+        made[0, column] = dead_zone(drive, way)[0]
         made[1, column], made[5, column] = top, rest
         if top == rest:
             continue
@@ -257,7 +265,7 @@ def _next(
     runs: Sequence[ShownRun],
     findings: int,
 ) -> list[str | Markup]:
-    failed = [each.failure for each in judged.criteria if not each.passed]
+    failed = [each.failure for each in judged.criteria if each.failure]
     said: list[str | Markup] = [f"Settle first: {words}." for words in failed[:3]]
     if findings:
         link = Markup('Look into the <a href="#data">{}</a> on the logs.')

@@ -1,0 +1,291 @@
+"""Noise of residuals: correlation over time, spectral lines, and errors of the estimates."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.signal import lfilter
+from tests.identification.linear import linear_fit, unknowns_of
+
+from swashplate.errors import InputError
+from swashplate.identification import uncertainty
+from swashplate.identification.noise import (
+    NoiseColour,
+    SpectralLine,
+    band_score_covariance,
+    coloured_noise_covariance,
+    grid_of,
+    line_sentences,
+    noise_colours,
+    pair_sums,
+    spectral_covariance,
+    without_lines,
+)
+from swashplate.identification.problem import LinearisedFit, LinearisedRun
+
+RUNS, N, RATE = 4, 4096, 512.0
+TIME = np.arange(N) / RATE
+LEVEL = np.clip((TIME - 1.0) / 0.2, 0.0, 1.0) - np.clip((TIME - 6.0) / 0.2, 0.0, 1.0)
+BUMP = np.exp(-((TIME - 2.0) ** 2) / 0.02)
+DESIGN = np.column_stack([LEVEL, np.sin(1.7 * TIME), BUMP])
+
+
+def first_order(rho: float, rng: np.random.Generator, size: tuple[int, ...] = (RUNS, N)):
+    """Noise of variance 1 with the autocorrelation ρ^|k|."""
+    drawn = rng.normal(size=(*size[:-1], size[-1] + 1000))
+    return lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], drawn)[..., 1000:]
+
+
+def fitted(
+    noise: np.ndarray, weight: np.ndarray | None = None, design: np.ndarray = DESIGN
+) -> tuple[LinearisedFit, np.ndarray]:
+    """Weighted regression of noise (runs, N) on a design, the truth being 0."""
+    w = np.ones(N) if weight is None else weight
+    rows = w[:, None] * design
+    estimate = -np.linalg.solve(
+        len(noise) * rows.T @ rows, sum(rows.T @ (w * each) for each in noise)
+    )
+    runs = [
+        LinearisedRun(f"run {k}", "current", TIME, w * (e + design @ estimate), rows, weight)
+        for k, e in enumerate(noise)
+    ]
+    names = [f"p{k}" for k in range(design.shape[1])]
+    return linear_fit(runs, unknowns_of(names, np.ones(len(names)))), estimate
+
+
+# --- correlation over time ------------------------------------------------------------------------
+
+
+def colour(*residuals: np.ndarray, time: np.ndarray | None = None) -> NoiseColour:
+    runs = [
+        LinearisedRun(
+            f"run {k}",
+            "speed",
+            np.arange(each.size) / RATE if time is None else time,
+            each,
+            np.ones((each.size, 1)),
+        )
+        for k, each in enumerate(residuals)
+    ]
+    return noise_colours(linear_fit(runs, unknowns_of(["p"], [1.0])))[0]
+
+
+def test_gaps_and_jitter_of_stamps() -> None:
+    day = grid_of(np.concatenate([np.arange(100) / RATE, 86400.0 + np.arange(100) / RATE]))
+    assert day.size < 5000  # a day without samples costs no memory
+    time = np.arange(50) * 0.01 + np.random.default_rng(0).uniform(-0.004, 0.004, 50)
+    assert np.all(np.diff(grid_of(time).places) >= 1)
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 4), st.floats(-5, 5)), min_size=1, max_size=30),
+    st.integers(0, 12),
+)
+def test_pair_sums_are_those_of_a_double_loop(steps: list, lags: int) -> None:
+    places = np.cumsum([step for step, _ in steps])
+    samples = np.array([value for _, value in steps])
+    if places.size > 1 and np.median(np.diff(places)) != 1.0:
+        places = np.arange(places.size)  # the grid's step is the median distance
+    sums, counts = pair_sums(samples, grid_of(places.astype(float)), lags)
+    for lag in range(lags + 1):
+        pairs = [
+            samples[i] * samples[k]
+            for i in range(places.size)
+            for k in range(i, places.size)
+            if places[k] - places[i] == lag
+        ]
+        assert counts[lag] == len(pairs)
+        assert sums[lag] == pytest.approx(sum(pairs), abs=1e-10)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.9, 0.98])
+def test_inflation_by_first_order_noise(rho: float) -> None:
+    found = colour(*first_order(rho, np.random.default_rng(0), (2, 100_000)))
+    assert found.inflation == pytest.approx((1.0 + rho) / (1.0 - rho), rel=0.1)
+
+
+def test_a_gap_does_not_change_the_colour() -> None:
+    noise = first_order(0.9, np.random.default_rng(3), (100_000,))
+    kept = np.ones(noise.size, bool)
+    kept[20_000:50_000] = False
+    kept[::7] = False
+    found = colour(noise[kept], time=(np.arange(noise.size) / RATE)[kept])
+    assert found.inflation == pytest.approx(19.0, rel=0.15)
+
+
+def test_slow_noise_under_white_noise_is_seen() -> None:
+    """A first-order plug-in from lag one would see ρ = 0.1 and an inflation of 1.2."""
+    rng = np.random.default_rng(5)
+    slow = first_order(0.99, rng, (100_000,))
+    mixed = np.sqrt(0.9) * rng.normal(size=slow.size) + np.sqrt(0.1) * slow
+    assert colour(mixed).inflation == pytest.approx(0.9 + 0.1 * 199.0, rel=0.25)
+
+
+def test_drifts_and_next_to_no_residuals() -> None:
+    assert colour(np.linspace(-1.0, 1.0, 2000)).drifting
+    assert not colour(first_order(0.5, np.random.default_rng(1), (4000,))).drifting
+    assert colour(np.array([0.3])).inflation == 1.0
+    assert colour(np.zeros(100)).inflation == 1.0
+
+
+def test_channels_and_steps_have_their_own_colours() -> None:
+    runs = [
+        LinearisedRun(name, channel, np.arange(100) / rate, TIME[:100], np.ones((100, 1)))
+        for name, channel, rate in (
+            ("a", "speed", RATE),
+            ("a", "current", RATE),
+            ("b", "speed", 100.0),
+            ("c", "speed", RATE),
+        )
+    ]
+    found = noise_colours(linear_fit(runs, unknowns_of(["p"], [1.0])))
+    assert [(each.channel, each.members) for each in found] == [
+        ("speed", (0, 3)),
+        ("current", (1,)),
+        ("speed", (2,)),
+    ]
+
+
+# --- spectral lines -------------------------------------------------------------------------------
+
+
+def ripple(rng: np.random.Generator, level: np.ndarray | float = 1.0) -> np.ndarray:
+    """A 100 Hz ripple far above white noise, of another phase in each run."""
+    phase = rng.uniform(0.0, 2.0 * np.pi, (RUNS, 1))
+    return 8.0 * level * np.sin(2.0 * np.pi * 100.03 * TIME + phase)
+
+
+@pytest.mark.parametrize("weight", [None, np.where(TIME < 2.0, 3.0, 1.0)])
+def test_a_ripple_is_found_and_removed(weight: np.ndarray | None) -> None:
+    rng = np.random.default_rng(1)
+    fit, _ = fitted(rng.normal(size=(RUNS, N)) + ripple(rng), weight)
+    clean, (line, *others) = without_lines(fit)
+    assert line.channel == "current"
+    assert line.frequency == pytest.approx(100.03, abs=0.05)
+    assert not others
+    assert line.share == pytest.approx(32.0 / 33.0, rel=0.01)
+    left = [run.residual if weight is None else run.residual / weight for run in clean.runs]
+    assert np.var(np.concatenate(left)) == pytest.approx(1.0, abs=0.15)
+
+
+def test_shares_never_exceed_what_there_is() -> None:
+    rng = np.random.default_rng(2)
+    slow = 20.0 * np.sin(2.0 * np.pi * 0.2 * TIME)
+    fit, _ = fitted(rng.normal(size=(RUNS, N)) + ripple(rng, LEVEL) + slow)
+    _, lines = without_lines(fit)
+    assert 0.0 < sum(each.share for each in lines) < 1.0
+    assert all(each.share >= 0.0 for each in lines)
+
+
+def test_slow_model_errors_white_noise_and_short_runs_have_no_lines() -> None:
+    rng = np.random.default_rng(4)
+    # the lowest bins are those of the tests: four half bandwidths of 8 s are 2 Hz
+    for frequency in (0.1, 0.3, 1.0, 1.9):
+        slow = 3.0 * np.cos(2.0 * np.pi * frequency * TIME)
+        assert without_lines(fitted(rng.normal(size=(RUNS, N)) + slow)[0])[1] == ()
+    white = [without_lines(fitted(rng.normal(size=(RUNS, N)))[0])[1] for _ in range(20)]
+    # one campaign in a hundred may have one by chance
+    assert sum(len(each) for each in white) <= 1
+    short = LinearisedRun("short", "current", TIME[:100], np.ones(100), DESIGN[:100])
+    assert without_lines(linear_fit([short], unknowns_of("abc", np.ones(3))))[1] == ()
+
+
+def test_errors_are_those_of_the_noise_under_a_ripple() -> None:
+    """Estimates scatter by the noise alone, as the ripple averages out; errors say so."""
+    rng = np.random.default_rng(2)
+    estimates, errors = [], []
+    for _ in range(60):
+        fit, estimate = fitted(rng.normal(size=(RUNS, N)) + ripple(rng, LEVEL))
+        estimates.append(estimate)
+        errors.append(uncertainty(fit).quoted.standard_errors)
+    scatter = np.sqrt(np.mean(np.square(estimates), axis=0))
+    # 60 draws tell a standard deviation to 9 %
+    np.testing.assert_allclose(np.mean(errors, axis=0), scatter, rtol=0.3)
+
+
+def test_lines_are_told_channel_by_channel() -> None:
+    said = line_sentences(
+        [
+            SpectralLine("counts", 21.5, 0.089),
+            SpectralLine("current", 98.0, 0.9),
+            SpectralLine("counts", 255.0, 0.004),
+        ]
+    )
+    assert said == (
+        "2 spectral lines between 21.5 and 255 Hz make 9.3 % of the residuals' variance of counts, "
+        "the largest 8.9 % at 21.5 Hz.",
+        "A spectral line at 98 Hz makes 90 % of the residuals' variance of current.",
+    )
+
+
+# --- errors ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize("rho", [0.0, 0.95])
+def test_errors_are_those_of_the_true_noise(rho: float, weighted: bool) -> None:
+    """By hand from the known autocovariance ρ^|k|."""
+    rng = np.random.default_rng(1)
+    weight = np.where(TIME < 4.0, 2.0, 1.0) if weighted else np.ones(N)
+    errors = [
+        spectral_covariance(fitted(first_order(rho, rng), weight)[0]).standard_errors
+        for _ in range(20)
+    ]
+    columns = (weight**2)[:, None] * DESIGN
+    lags = np.abs(np.subtract.outer(np.arange(N), np.arange(N)))
+    inner = RUNS * columns.T @ (rho**lags @ columns)
+    inverse = np.linalg.inv(RUNS * DESIGN.T @ columns)
+    expected = np.sqrt(np.diag(inverse @ inner @ inverse))
+    # each from 4 runs of 8 s: about 20 independent frequencies, 20 campaigns
+    found = np.sqrt(np.mean(np.square(errors), axis=0))
+    np.testing.assert_allclose(found, expected, rtol=0.15)
+
+
+def test_runs_have_levels_of_their_own() -> None:
+    rng = np.random.default_rng(3)
+    loud = first_order(0.5, rng) * np.array([[5.0], [1.0], [1.0], [1.0]])
+    quiet = first_order(0.5, rng)
+    errors = [spectral_covariance(fitted(each)[0]).standard_errors for each in (loud, quiet)]
+    # (25 + 3)/4 of the variance
+    np.testing.assert_allclose(errors[0] / errors[1], np.sqrt(7.0), rtol=0.35)
+
+
+def test_the_larger_of_both_is_quoted() -> None:
+    noise = np.random.default_rng(4).normal(size=(12, N)) * np.where(BUMP > 0.01, 10.0, 1.0)
+    fit, _ = fitted(noise)
+    both = np.maximum(
+        spectral_covariance(fit).standard_errors, band_score_covariance(fit).standard_errors
+    )
+    np.testing.assert_allclose(coloured_noise_covariance(fit).standard_errors, both)
+    # where the noise is loud, an error of noise that is alike everywhere misses it
+    assert both[2] > 1.5 * spectral_covariance(fit).standard_errors[2]
+
+
+@pytest.mark.parametrize(("kind", "width"), [("ripple", 0.02), ("with every pulse", 0.15)])
+def test_noise_that_differs_along_the_runs(kind: str, width: float) -> None:
+    """12 Hz come to the same phase every second: the pulses' errors add up, not their squares."""
+    rng = np.random.default_rng(5)
+    pulses = (np.abs(TIME % 1.0 - 0.5) < width).astype(float)
+    estimates, errors = [], []
+    for _ in range(80):
+        noise = rng.normal(size=(6, N))
+        if kind == "ripple":
+            phase = rng.uniform(0.0, 2.0 * np.pi, (6, 1))
+            noise += np.sin(2.0 * np.pi * 12.0 * TIME + phase)
+        else:
+            noise *= 1.0 + 4.0 * pulses
+        fit, estimate = fitted(noise, design=np.column_stack([pulses, np.ones(N)]))
+        estimates.append(estimate[0])
+        errors.append(band_score_covariance(fit).standard_errors[0])
+    ratio = np.sqrt(np.mean(np.square(errors)) / np.mean(np.square(estimates)))
+    # 80 draws tell a standard deviation to 8 %
+    assert 0.8 < ratio < 1.25
+
+
+def test_no_residual_has_no_error_and_too_few_samples_are_refused() -> None:
+    fit, _ = fitted(np.zeros((2, N)))
+    assert spectral_covariance(fit).standard_errors.tolist() == [0.0, 0.0, 0.0]
+    run = LinearisedRun("run", "y", TIME[:3], np.ones(3), DESIGN[:3] + np.eye(3))
+    few = linear_fit([run], unknowns_of("abc", np.ones(3)))
+    with pytest.raises(InputError, match="3 samples for 3 parameters"):
+        spectral_covariance(few)
