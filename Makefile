@@ -15,7 +15,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test test-slow golden lint docs figures reproduce bench cluster fuzz tools browser calibration coverage dist binaries \
+.PHONY: help .venv demo test test-slow lint docs figures reproduce bench cluster fuzz tools browser calibration coverage dist binaries \
   format clean
 
 help: ## list the targets
@@ -44,9 +44,6 @@ test-slow: $(STAMP) ## the slow tests: pages, examples, reproduction, searches, 
 	@$(BIN)/pytest -n 2 --dist loadgroup --durations=40 -m slow
 	@echo; echo "== Tests marked 'interpreted', without the JIT"
 	@NUMBA_DISABLE_JIT=1 $(BIN)/pytest -n 2 -m interpreted
-
-golden: $(STAMP) ## compare with the numbers stored before the engine was rebuilt, all 600 cases
-	@GOLDEN=all $(BIN)/pytest tests/golden -q
 
 lint: $(STAMP) ## style, format, types and the direction of imports
 	@echo "== Style";   $(BIN)/ruff check .

@@ -13,11 +13,10 @@ from swashplate import Campaign, maneuvers
 from swashplate.campaign import rig
 from swashplate.executors import Processes
 from swashplate.full_order.drive import FullOrderDrive
-from swashplate.identification.assessment import assess
+from swashplate.identification.assessment import Judged
 from swashplate.identification.fitting import fit
 from swashplate.identification.resampling import bootstraps_of
 from swashplate.identification.setup import load_setup
-from swashplate.identification.validation import predict
 from swashplate.report.fit_report import write_fit_report
 
 ROUNDS = 5
@@ -33,23 +32,23 @@ def fit_study_rows() -> Iterator[Row]:
         tests = rig.run("hoist", seed=1, perturb=0.1)
         campaign = Campaign.from_toml(rig.write(tests, Path(folder) / "virtual"))
         nominal, setup = campaign.drive("hoist").parameters, load_setup("hoist")
-        runs, held = campaign.select(role="fit"), campaign.select(role="validate")
+        runs = campaign.select(role="fit")
         fitted, judged, written = [], [], []
         # the first round is not counted: it compiles, or loads what was compiled
         for _ in range(ROUNDS + 1):
             begin = time.perf_counter()
-            result = fit(nominal, runs, setup)
+            found = Judged(campaign, fit(nominal, runs, setup), runs)
             fitted.append(time.perf_counter() - begin)
             begin = time.perf_counter()
-            assessed = assess(result.stages)
+            assessed = found.assessments
             for each in assessed:
                 # what a stage says is computed where it is asked for
                 each.identifiability, each.uncertainty, each.runs  # noqa: B018
-            predicted = predict(result.parameters, held)
+            found.verdict  # noqa: B018  held-out runs, predicted and judged
             judged.append(time.perf_counter() - begin)
             begin = time.perf_counter()
             page = Path(folder) / "report.html"
-            write_fit_report(result, campaign, page, assessments=assessed, validation=predicted)
+            write_fit_report(found, page)
             written.append(time.perf_counter() - begin)
         yield _limited("complete staged fit of a virtual hoist", median(fitted[1:]), FIT)
         yield Row("what the fit is worth: intervals, tests", duration(median(judged[1:])))

@@ -23,7 +23,7 @@ from swashplate.identification.setup import load_setup
 from swashplate.identification.staging import drawn, true_value
 from swashplate.identification.validation import predict, with_speeds
 from swashplate.identification.verdict import verdict
-from swashplate.report.figures import plot_fit, save_figure
+from swashplate.report.figures import plot_channel, save_figure
 
 parser = argparse.ArgumentParser(description="Identify a hoist.")
 parser.add_argument("--out", type=Path, default=Path("identified"), help="folder for all files")
@@ -123,4 +123,5 @@ fitted.renamed("identified").to_toml(options.out / "drive.toml")
 for name, drive in (("identified", fitted), ("true", truth)):
     print(f"{name} limits:", *np.degrees(drive.steady_speed([-10.0, 10.0])).round(1), "deg/s")
 if options.figure:
-    save_figure(plot_fit(speeds[-1], assessments, true), options.figure)
+    run = speeds[-1]
+    save_figure(plot_channel(run.experiment[run.channel], run.simulated), options.figure)

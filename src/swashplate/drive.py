@@ -213,7 +213,7 @@ class Drive(Result):
         Returns
         -------
         Simulation
-            All signals of the chain, the motor's torque and pressure drop included.
+            All signals, the motor's torque and pressure drop included.
 
         Raises
         ------

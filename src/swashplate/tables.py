@@ -59,8 +59,6 @@ class Column:
     """Where it is shown: ``t`` terminal, ``p`` page, ``f`` file."""
     key: str = ""
     """Its name in a file, if that is another."""
-    shade: bool = False
-    """Whether a page shades its cells by their values, from 0 to 1."""
 
 
 UNIT = Column("unit")

@@ -97,12 +97,6 @@ def test_a_log_without_a_command_leaves_a_line_to_fill_in(tmp_path: Path) -> Non
         draft([], tmp_path)
 
 
-def test_names_that_need_quotes(tmp_path: Path) -> None:
-    path = tmp_path / 'a "b".csv'
-    path.write_text('time,"volt ""x"" [V]",counts\n0,1,2\n1,2,3\n', "utf-8")
-    assert tomllib.loads(draft([path], tmp_path))["runs"][0]["file"] == 'a "b".csv'
-
-
 def write_wrapping(folder: Path, name: str) -> list[Path]:
     """A column of whole numbers that go up to 4095 and begin anew, and one that numbers rows."""
     rows = [f"{k},{k / 100},{4 if k > 20 else 0},{60 * (k - 20) % 4096},on" for k in range(21, 200)]
@@ -120,12 +114,3 @@ def test_a_counter_that_begins_anew_is_an_encoder_s(tmp_path: Path, name: str) -
     (line,) = [line for line in text.splitlines() if line.startswith("rolls_over_at")]
     assert "# guessed" in line
     assert "# Columns that are not used: Nr, state" in text
-
-
-def test_counts_per_turn_without_an_encoder(tmp_path: Path) -> None:
-    rows = [f"{k},{k / 100},{4 if k > 20 else 0},0.4,{k % 7}" for k in range(100)]
-    path = tmp_path / "log.csv"
-    path.write_text("\n".join(["Nr,time,voltage,current,Geber", *rows]), "utf-8")
-    said = "# No column looks like an encoder's counts among Nr, Geber; counts_per_turn = 4096 is"
-    assert said in draft([path], tmp_path, "hoist", 4096.0)
-    assert "No column looks like" not in draft([path], tmp_path, "hoist")

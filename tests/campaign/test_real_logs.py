@@ -57,21 +57,6 @@ def excavator(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     return Campaign.from_toml(file)
 
 
-def test_the_excavator_has_three_actuators(excavator: Campaign) -> None:
-    assert list(excavator.axes) == ["boom", "stick", "bucket"]
-    assert len(excavator) == 12
-    assert excavator.ignored == ("steps_boom_0928_0829",)
-    assert len(excavator.select(axis="boom", role="fit")) == 2
-
-
-def test_millimetres_and_centimetres_come_out_alike(excavator: Campaign) -> None:
-    for axis, stroke in (("boom", 0.16), ("stick", 0.16), ("bucket", 0.16)):
-        for experiment in excavator.select(axis=axis):
-            position = experiment["position"].values
-            assert np.all(np.abs(position) < stroke)
-            assert np.ptp(position) > 0.02
-
-
 def test_irregular_stamps_are_kept_as_they_are(excavator: Campaign) -> None:
     experiment = excavator["manual_1021_mitch boom"]
     first = np.array([0.00605297088623, 0.0761840343475])
@@ -80,11 +65,6 @@ def test_irregular_stamps_are_kept_as_they_are(excavator: Campaign) -> None:
     assert drive.stamps.rate == pytest.approx(19.7, abs=0.1)
     assert drive.stamps.jitter > 0.0
     assert position.stamps.gaps.size >= 0
-
-
-def test_at_neutral_the_command_is_zero(excavator: Campaign) -> None:
-    for experiment in excavator:
-        assert np.mean(np.abs(experiment.input.values) < 1e-9) > 0.02
 
 
 def test_a_pause_in_the_log_is_found(tmp_path: Path) -> None:

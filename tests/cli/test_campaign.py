@@ -41,12 +41,6 @@ def test_from_logs_to_a_check(done: Done, logs: list[str], tmp_path: Path) -> No
     assert "1 finding, marked" in said
 
 
-def test_a_draft_replaces_no_file(done: Done, refused: Callable[..., str], logs: list[str]) -> None:
-    done("campaign", "init", *logs, *COUNTS)
-    assert "campaign.toml exists already" in refused("campaign", "init", *logs)
-    done("campaign", "init", *logs, "--force")
-
-
 def test_strict_fails_on_findings(
     run: Callable[..., object], done: Done, logs: list[str], tmp_path: Path
 ) -> None:
@@ -65,12 +59,6 @@ def test_the_schema_is_json(done: Done) -> None:
     schema = json.loads(done("campaign", "schema"))
     assert {"axes", "runs", "title"} <= set(schema["properties"])
     assert "counts_per_turn" in schema["$defs"]["Channel"]["properties"]
-
-
-def test_a_picture(done: Done, logs: list[str], tmp_path: Path) -> None:
-    done("campaign", "init", *logs, *COUNTS)
-    done("campaign", "plot", "--out", "tests.png")
-    assert (tmp_path / "tests.png").stat().st_size > 10_000
 
 
 def test_a_close_look(done: Done, refused: Callable[..., str], logs: list[str]) -> None:
@@ -119,13 +107,6 @@ def test_volts_that_were_declared_as_millivolts(
     assert 'if the log is in V, write unit = "V": it then reaches 4 V' in said
 
 
-def test_a_run_that_there_is_not(done: Done, refused: Callable[..., str], logs: list[str]) -> None:
-    done("campaign", "init", *logs, *COUNTS)
-    said = refused("campaign", "plot", "--run", "lfit")
-    assert "no run 'lfit' (did you mean lift?); it has lift, lower" in said
-    assert "lift has rectified_current, enc" in refused("campaign", "plot", "--run", "lift")
-
-
 def test_what_a_draft_leaves_out_stands_before_the_command_to_run(
     done: Done, tmp_path: Path
 ) -> None:
@@ -167,11 +148,6 @@ def test_a_drive_out_of_a_folder(done: Done, logs: list[str], tmp_path: Path) ->
     done("campaign", "init", *logs, *COUNTS, "--drive", "fitted")
     assert 'drive = "fitted/drive.toml"' in (tmp_path / "campaign.toml").read_text("utf-8")
     done("campaign", "check")
-
-
-def test_refusals(refused: Callable[..., str], tmp_path: Path) -> None:
-    assert "There is no file campaign.toml" in refused("campaign", "check")
-    assert "There is no file nothing.csv" in refused("campaign", "init", "nothing.csv")
 
 
 # --- rig ------------------------------------------------------------------------------------------

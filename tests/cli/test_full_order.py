@@ -32,23 +32,6 @@ def test_a_run(done, number):
     assert "One state is enough, to 1 % of the top speed." in text
 
 
-def test_the_load_that_is_given(done):
-    load = ("--physical", "load_torque=2kN*m", "--physical", "load_inertia=0")
-    text = done("full-order", "hoist", "step:4", *load)
-    assert "14 of 16 physical values are assumed" in text
-    assert cells(text, "load_torque") == ["2000", "N", "m", "given"]
-
-
-def test_too_fast_for_one_state(done):
-    # a sine of 3 Hz, whose end would overshoot, cut to its first 4 s
-    times = np.arange(0.0, 4.0, 1.0 / 512.0)
-    volts = 6.5 * np.sin(2.0 * np.pi * 3.0 * times)
-    pl.DataFrame({"time": times, "voltage": volts}).write_csv("sine.csv")
-    text = done("full-order", "hoist", "sine.csv", "--interpolation", "linear")
-    assert "One state is not enough, to 1 % of the top speed." in text
-    assert cells(text, "sine.csv")[-1] == "no"
-
-
 def test_nothing_moves(done):
     text = done("full-order", "hoist", "rest:2", "--set", "Z18=0")
     assert "The shaft does not move, so nothing can be said" in text

@@ -25,11 +25,6 @@ def fitted(done, tmp_path):
         ("simulate", "fitted", "step:4"),
         ("compare", "hoist", "fitted"),
         ("limits", "fitted"),
-        ("linearize", "fitted", "--at", "4"),
-        ("bode", "fitted", "--points", "2"),
-        ("compensate", "fitted"),
-        ("sensitivity", "fitted", "--lever", "pump"),
-        ("size", "fitted", "--speed-deg-s", "180"),
         ("whatif", "fitted", "--scale", "pump=1.1"),
     ],
 )
@@ -38,12 +33,6 @@ def test_each_command_takes_the_folder_of_a_fit(done, words):
     first, second = (NUMBER.findall(done(*each)) for each in (words, by_file))
     assert len(first) > 5
     assert first == second
-
-
-@pytest.mark.usefixtures("fitted")
-def test_a_virtual_machine_from_a_folder(done):
-    words = ("--maneuver", "step:4,stop=1.5,length=2", "--severity", "clean")
-    assert "Campaign: v/campaign.toml" in done("rig", "fitted", "--out", "v", *words)
 
 
 def test_what_a_word_means(tmp_path, monkeypatch):

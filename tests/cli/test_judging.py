@@ -52,15 +52,6 @@ def test_a_correlation_beyond_its_band_is_marked(
         assert "* marks what lies beyond" in " ".join(said.split())
 
 
-def test_roles(done: Words, held_out: Path) -> None:
-    said = done("validate", "hoist", "virtual/campaign.toml", "--role", "all")
-    assert "hoist_step_-5_V" in said
-    assert "hoist_step_4_V" in said
-    assert "hoist_step_-5_V" not in done(
-        "validate", "hoist", "virtual/campaign.toml", "--role", "fit"
-    )
-
-
 def test_a_drive_that_is_not_usable_ends_with_1(
     run: Callable[..., Result], held_out: Path, tmp_path: Path
 ) -> None:
@@ -113,15 +104,9 @@ def test_the_report_is_written_again(done: Words, fitted: Fit, tmp_path: Path) -
     assert f"{fitted.stages[1].values['Z10']:.2f}" in page
     assert '<th class="n">truth</th>' in page
     assert '<th scope="row">seed</th><td>7</td>' in page
-    first = done("report", "fitted/drive.toml", "virtual/campaign.toml", "--out", "again")
-    assert "again/report.html" in first
-    assert '<th class="n">truth</th>' not in (tmp_path / "again" / "report.html").read_text("utf-8")
-
-
-def test_samples_stand_beside_it(done: Words, fitted: Fit, tmp_path: Path) -> None:
-    words = ("--data", "all.parquet", "--out", "print")
-    assert "Samples:   all.parquet" in done("report", "fitted", "virtual/campaign.toml", *words)
-    assert (tmp_path / "print" / "report.html").is_file()
+    words = ("fitted/drive.toml", "virtual/campaign.toml", "--data", "all.parquet")
+    assert "Samples, in SI: all.parquet" in done("report", *words)
+    assert '<th class="n">truth</th>' not in (tmp_path / "fitted/report.html").read_text("utf-8")
 
 
 def test_report_refusals(refused: Words, fitted: Fit, tmp_path: Path) -> None:

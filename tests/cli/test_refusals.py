@@ -10,75 +10,42 @@ REFUSED = {
     "simulate hoist stairs:2,4,0": "separate levels by /, as in stairs:2/4/0",
     "bode hoist --points 1": "--points is 1, but must be 2 to 2000",
     "bode hoist --from 2 --to 1": "must rise from above 0 Hz, not 2 to 1",
-    "bode hoist --from nan": "must rise from above 0 Hz",
-    "bode hoist --to 100": "at most 64 Hz",
-    "bode hoist --amplitude 11": "reach 11 V",
     "bode hoist --amplitude 0.05": "nothing moves about 0 V",
     "bode hoist --linear-at 0": "so the gain is 0; linearise at +0.2065 V or beyond.",
     "compare hoist slew --maneuver hop --out both.csv": "one of the tests of hoist",
     "compensate hoist --speed-deg-s 200": "hoist cannot settle at 200 deg/s",
-    "compensate hoist --points 1": "takes 2 to 10001 points per direction, not 1",
-    "compensate slew rest:2": "asks for nothing but standstill",
-    "limits hoist --error 0": "The error is 0, but must be above 0 and below 1",
-    "limits hoist --frequency 300": "from 0.001 to 64 Hz",
-    "limits hoist sine:4,0.2 --frequency -1": "leave them out, or 'sine:4,0.2'",
-    "limits hoist step:9 --error 0.1": "--error and --frequency belong to the sines",
     "linearize hoist": "give one of --at, --current and --speed-deg-s",
     "linearize hoist --current 1 --input voltage": "needs --at or --speed-deg-s, not",
     "linearize hoist --at 0.1": "lies in the card's dead zone, so the gain is 0; linearise at +0.",
-    "linearize hoist --at 0.15": "pump alone with --current 0 --input solenoid_force.",
     "linearize hoist --at 4 --loop-gain 1": "the closed loop is unstable",
     "sensitivity hoist --lever pumpe": "no lever 'pumpe' (did you mean pump?)",
-    "sensitivity hoist --lever pump=2": "--lever cannot read 'pump=2'; write it as pump or",
-    "sensitivity hoist --lever pump=2/1": "must rise from 0 or more, not 2 to 1",
     "sensitivity hoist --lever pump --lever pump=1/2": "--lever gives pump twice",
     "sensitivity hoist --outcome speed": "There is no outcome 'speed'",
-    "size hoist": "Require at least one of a speed",
     "size hoist --speed-deg-s 500": "the hoist reaches a speed of 370 deg/s (required 500)",
     "size hoist --tracking-deg-s 5": "--tracking-deg-s and --maneuver belong together",
-    "size hoist --speed-deg-s 250 --maneuver step:9": "belong together",
     "size hoist --speed-deg-s 250 --lever pump=1.2/2": "must reach from at most 1",
     "whatif hoist --scale orifise=1.5": "There is no lever 'orifise' (did you mean orifice?)",
-    "whatif hoist --scale orifice": "--scale cannot read 'orifice'; write it as orifice=1.5",
-    "whatif hoist --scale pump=1 --scale pump=2": "--scale gives pump twice",
     "whatif hoist --scale pump=2 --uncertainty none": "none holds no fit.json",
     "full-order neutral": "neutral: spool_stroke (stroke of the spool, both ways) is inf m",
     "full-order hoist --plot run.png": "--plot draws one run; name a maneuver",
-    "full-order hoist step:9 --out run.doc": "run.doc ends in '.doc'",
     "full-order hoist --physical oil_volume": "--physical cannot read 'oil_volume'; write",
-    "full-order hoist --physical oil_volume=1e-4/2e-4": "oil_volume has one value, not a plus",
-    "full-order hoist --physical swash_arm=0.1 --physical swash_arm=80mm": "--physical gives",
     "simulate crane step:9": "no packaged set, file or folder 'crane'; packaged are hoist, slew",
     "simulate none.toml step:9": "There is no file none.toml",
     "simulate hoist stepp:9": "'stepp' is no maneuver: choose one of rest, step",
     "simulate hoist 'step +8 V'": 'multisine; or name one of the tests of hoist, such as "step +9',
-    "simulate neutral 'step +9 V'": "is no maneuver: choose one of rest, step",
     "simulate hoist step": "'amplitude'; step takes amplitude, start, stop, length; or name one",
-    "simulate hoist step:x": "'x' is not a number",
-    "simulate hoist step:9,top=3": "step takes amplitude, start, stop, length",
-    "simulate hoist step:10.5": "The voltage is 10.5 V at 1 s, but the card takes ±10 V",
-    "simulate hoist step:9 --rate 9.9": "must be between 10 and 100000 Hz",
     "simulate hoist step:9 --set z16=1e-4": "did you mean Z16?",
     "simulate hoist step:9 --set Z16": "--set cannot read 'Z16'; write it as Z16=1.2e-4",
-    "simulate hoist step:9 --set Z16=": "cannot read 'Z16='",
     "simulate hoist step:9 --set Z16=nan": "Z16_plus (opening at which the orifice limits the",
-    "simulate hoist step:9 --set Z1=inf": "Z1 (pressure to swash plate tangent) is inf 1/Pa",
     "simulate hoist step:9 --set Z13_plus=-0.2": "(stop of the swash plate) is -0.2 rad, but must",
     "simulate hoist step:9 --set 'Z16=1 bar'": "'bar', which does not measure the same as m",
-    "simulate hoist step:9 --set 'Z16=1 smoot_of_no_kind'": "unknown unit",
     "simulate hoist step:9 --set Z1=1/2": "Z1 has one value, not a plus and a minus one",
-    "simulate hoist step:9 --set Z16_plus=1/2": "Z16_plus has one value",
     "simulate hoist step:9 --set Z19=100": "the solenoid would overpower the feedback spring",
-    "simulate hoist step:9 --scale Zz=2": "There is no parameter 'Zz'",
     "simulate hoist step:9 --scale Z16=1.5mm": "--scale cannot read 'Z16=1.5mm'; write it as",
-    "simulate hoist step:9 --scale Z16=x": "--scale cannot read 'Z16=x'",
-    "simulate hoist step:9 --scale Z16=-1": "must be above 0",
     "simulate hoist step:9 --scale Z1=1/2": "takes one factor, not two",
     "size hoist --speed-deg-s 250 --out no/a.toml": "folder no does not",
-    "linearize hoist --at 4 --out a.csv": "written as .toml or .json",
     "compensate hoist --out a.xlsx": "written as .toml, .csv or .parquet",
     "excitation none.toml --out no/a.csv": "folder no does not exist",
-    "excitation none.toml --out a.txt": "written as .csv or .parquet",
     "campaign plot none.toml --out a.gif": ".png, .svg or .pdf",
 }
 """What is typed, and what the sentence that refuses it says."""
@@ -94,12 +61,6 @@ def test_a_sentence(refused, typed):
     "typed",
     [
         "simulate hoist step:9 --out run.csv",
-        "limits hoist --out envelope.csv",
-        "limits hoist step:9 --out shares.csv",
-        "whatif hoist --scale orifice=1.5 --out larger.toml",
-        "sensitivity hoist --lever pump --out numbers.csv",
-        "bode hoist --points 2 --out bode.csv",
-        "compensate hoist --out inverse.toml",
         "compare hoist slew --out both.csv",
     ],
 )
@@ -112,9 +73,7 @@ def test_nothing_is_written_beside_a_figure_that_cannot_be(refused, typed, plot)
     ("typed", "file"),
     [
         ("simulate hoist rest:1 --out {}", "a.csv"),
-        ("simulate hoist rest:1 --plot {}", "a.png"),
         ("whatif hoist --scale pump=1.1 --maneuver step:1 --out {}", "a.toml"),
-        ("compensate hoist --points 5 --out {}", "a.csv"),
         ("rig hoist --maneuver rest:1 --out {}", "logs/a.csv"),
         ("demo --out {}", "mine/drive.toml"),
     ],
@@ -134,26 +93,17 @@ def test_what_is_there_is_replaced_with_force_alone(refused, done, tmp_path, typ
         assert place.read_bytes() != b"old"
 
 
-@pytest.mark.parametrize("option", ["--set", "--scale"])
-def test_a_change_is_given_once(refused, option):
-    words = ("simulate", "hoist", "step:9", option, "Z16=1", option, "Z16=2")
-    assert f"{option} gives Z16 twice" in refused(*words)
-
-
 @pytest.mark.parametrize("option", ["--out", "--plot"])
 @pytest.mark.parametrize(
     ("name", "said"),
     [
         ("run.doc", "run.doc ends in '.doc'"),
-        ("run", "run ends in ''"),
         ("missing/run.{}", "cannot be written: folder missing does not exist"),
-        ("file/run.{}", "cannot be written: file is no folder"),
         ("folder.{}", "cannot be written: it is a folder"),
     ],
 )
 def test_places_that_cannot_be_written(refused, tmp_path, option, name, said):
     ending = "csv" if option == "--out" else "png"
-    (tmp_path / "file").write_text("")
     (tmp_path / f"folder.{ending}").mkdir()
     assert said in refused("simulate", "hoist", "step:9", option, name.format(ending))
 
@@ -166,11 +116,9 @@ def test_places_that_cannot_be_written(refused, tmp_path, option, name, said):
         ("\x00\xff", "mine.toml"),
     ],
 )
-@pytest.mark.parametrize("command", ["show", "simulate"])
-def test_a_bad_set(refused, tmp_path, command, text, said):
+def test_a_bad_set(refused, tmp_path, text, said):
     (tmp_path / "mine.toml").write_bytes(text.encode("latin-1"))
-    words = ("step:9",) if command == "simulate" else ()
-    assert said in refused(command, "mine.toml", *words)
+    assert said in refused("simulate", "mine.toml", "step:9")
 
 
 @pytest.mark.parametrize(
@@ -178,10 +126,7 @@ def test_a_bad_set(refused, tmp_path, command, text, said):
     [
         ((), "Usage: swashplate"),
         (("simul",), "Did you mean 'simulate'?"),
-        (("simulate",), "Missing argument"),
         (("simulate", "hoist", "step:9", "--start", "bed"), "'rest', 'steady'"),
-        (("simulate", "hoist", "step:9", "--interpolation", "cubic"), "'linear', 'previous'"),
-        (("simulate", "hoist", "step:9", "--rate", "fast"), "Invalid value for '--rate'"),
         (("simulate", "hoist", "step:9", "--nonsense"), "--nonsense"),
         (("simulate", "hoist", "step:9", "step:8"), "step:8"),
     ],

@@ -8,11 +8,8 @@ import pytest
 from swashplate.errors import DomainError, InputError
 from swashplate.identification.solving import (
     Evaluation,
-    Progress,
-    longest_left,
     sobol_starts,
     solve_from,
-    time_left,
 )
 
 
@@ -56,13 +53,6 @@ def test_points_outside_the_domain_are_drawn_again() -> None:
     assert (starts[:, 3] <= 0.6).all()
     with pytest.raises(InputError, match="narrow the bounds"):
         list(sobol_starts(Forces(forbidden=0.1001), 8, seed=0))
-
-
-def test_time_left_by_hand() -> None:
-    assert time_left(0, 10, 3.0) is None
-    assert time_left(4, 6, 8.0) == 12.0
-    assert longest_left(Progress(1, 5.0, np.zeros(1), 2.0, 4, 20)) == 8.0
-    assert longest_left(Progress(0, 5.0, np.zeros(1), 0.0)) is None
 
 
 @dataclass(frozen=True)

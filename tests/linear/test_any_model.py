@@ -119,7 +119,7 @@ def test_a_machine_of_one_s_own(hold: str) -> None:
     moved[0] = 0.0
     records = {"command": at["command"] + moved[:, 0], "leak": at["leak"] + moved[:, 1]}
     started = instance.start({k: float(v[0]) for k, v in records.items()}, H, "steady", states)
-    out, _ = marched(
+    out = marched(
         instance,
         records,
         H,

@@ -193,7 +193,7 @@ DAMAGED = [
     ),
     ("dots.csv", text("a;b\n0,5;1,5\n1.5;2,5\n"), "'a' holds '1.5', ... in data row 2 (line 3)"),
     ("thousands.csv", text("a;b\n1,234;5\n2,345;6\n"), "'1,234', where the comma may be a decimal"),
-    ("either.csv", text("voltage\n0,5\n1,5\n"), "can be read in more than one way, '0,5' as"),
+    ("either.csv", text("voltage\n0,5\n1,5\n"), "has no column 'voltage'; it has 'column 1',"),
     ("open.csv", text('a,b\n1,"2\n3,4\n'), "misplaced quotes in data row 1 (line 2)"),
     ("quotes.csv", text('a,b\n1,2\n3,"4"5\n'), "misplaced quotes in data row 2 (line 3)"),
     ("wide.csv", text("time,u\n0,1\n".encode("utf-16")[:-1]), "is no text in utf-16-le"),

@@ -294,14 +294,3 @@ def test_mdf(tmp_path, compression):
     }
     left_out = {"note": "it holds text or bytes"}
     holds(file, expected, units={"time": "s", "voltage": "V"}, left_out=left_out)
-
-
-def test_mdf_of_several_groups(tmp_path):
-    file = tmp_path / "log.mf4"
-    with MDF(version="4.10") as written:
-        written.append([Signal(NOISE[:, 0], TIME, name="voltage")])
-        written.append([Signal(NOISE[:9, 1], TIME[:9], name="pressure")])
-        written.save(file, overwrite=True)
-    expected = {"group 0/time": TIME, "group 0/voltage": NOISE[:, 0]}
-    expected |= {"group 1/time": TIME[:9], "group 1/pressure": NOISE[:9, 1]}
-    holds(file, expected, units={"group 0/time": "s", "group 1/time": "s"})

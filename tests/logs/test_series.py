@@ -69,12 +69,6 @@ def test_find_nothing_or_too_much(wanted, said):
         log_of(*COLUMNS).find(wanted)
 
 
-def test_what_was_left_out_says_why():
-    log = log_of(Column("a"), note="it holds text")
-    with pytest.raises(FileError, match="'note' cannot be read as numbers: it holds text"):
-        log.read(["a", "note"])
-
-
 def test_a_column_is_loaded_once():
     asked = []
 
@@ -86,12 +80,6 @@ def test_a_column_is_loaded_once():
     assert log.read(["b", "a", "a [V]", "b"]).keys() == {"a", "a [V]", "b"}
     assert log.read([]) == {}
     assert asked == [[1, 0]]
-
-
-def test_a_log_is_printable():
-    log = log_of(Column("a\0\n", "\x1b"), **{"b\0": "c\r"})
-    assert log.columns == (Column("a��", "�"),)
-    assert log.left_out == {"b�": "c�"}
 
 
 @pytest.mark.parametrize(

@@ -27,12 +27,6 @@ def shared():
     ("name", "rows"),
     [
         ("manual_1021_mitch.csv", 2199),
-        ("manual_mitch_1101_2333.csv", 1896),
-        ("manual_ol_1010_2055.csv", 2111),
-        ("manual_shyam_1102_1824.csv", 3676),
-        ("steps_arm_0928_0840.csv", 146),
-        ("steps_arm_0928_0841.csv", 146),
-        ("steps_boom_0928_0829.csv", 149),
         ("steps_boom_0928_0851.csv", 158),
     ],
 )

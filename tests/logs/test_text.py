@@ -1,7 +1,6 @@
 """How text is written: delimiters, decimal signs, headers, units, comments, encodings."""
 
 import math
-from pathlib import Path
 
 import pytest
 
@@ -94,24 +93,9 @@ def test_units_of_the_header(text, content, units):
     assert [column.unit for column in text(content).columns] == units
 
 
-def test_a_second_row_of_names_is_no_row_of_units(text):
-    log = text("Motor,Motor,Pump\nspeed,torque,pressure\n0,1,2\n3,4,5\n")
-    assert [column.name for column in log.columns] == ["speed", "torque", "pressure"]
-
-
 def test_no_header(text, all_of):
     log = text("0,1.5\n0.5,2.5\n")
     assert all_of(log) == {"column 1": [0.0, 0.5], "column 2": [1.5, 2.5]}
-
-
-def test_names_that_are_numbers(text):
-    log = text("time,1,2,3\n0,1,2,3\n1,2,3,4\n")
-    assert [column.name for column in log.columns] == ["time", "1", "2", "3"]
-
-
-def test_names_without_text_and_names_twice(text):
-    log = text("time,,v,v\n0,1,2,3\n1,2,3,4\n")
-    assert [column.name for column in log.columns] == ["time", "column 2", "v #1", "v #2"]
 
 
 def test_names_in_a_comment(text):
@@ -140,12 +124,6 @@ def test_missing_and_infinite_numbers(text):
     assert log.read(["u"])["u"].tolist() == [math.inf, -math.inf, math.inf, -math.inf, 1.0]
 
 
-def test_an_empty_line_in_a_single_column_is_an_empty_cell(text):
-    numbers = text("voltage\n0.5\n\n1.5\n\n\n").read(["voltage"])["voltage"]
-    assert numbers.size == 3
-    assert math.isnan(numbers[1])
-
-
 def test_only_what_is_asked_for_must_be_numbers(text):
     log = text("time,note,voltage\n0,on,1\n1,,2\n")
     assert {name: array.tolist() for name, array in log.read(["voltage", "time"]).items()} == {
@@ -168,8 +146,6 @@ def test_a_cell_in_quotes_may_hold_the_delimiter(text):
     ("content", "options", "expected"),
     [
         ("0,1\n1,2\n", {"delimiter": ","}, {"column 1": [0.0, 1.0], "column 2": [1.0, 2.0]}),
-        ("0,1\n1,2\n", {"decimal": ",", "delimiter": "none"}, {"column 1": [0.1, 1.2]}),
-        ("0,1\n1,2\n", {"decimal": ","}, {"column 1": [0.1, 1.2]}),
         ("a;b\n1,234;5\n", {"decimal": ","}, {"a": [1.234], "b": [5.0]}),
         ("a~b\n1~2\n", {"delimiter": "~"}, {"a": [1.0], "b": [2.0]}),
         ("a\tb\n1\t2\n", {"delimiter": "tab"}, {"a": [1.0], "b": [2.0]}),
@@ -216,13 +192,3 @@ def test_a_large_file_is_read_in_pieces(tmp_path, text, all_of, monkeypatch):
     assert all_of(text("time,u\r\n" + paused)) == expected
     with pytest.raises(FileError, match=r"'u' holds 'x', .* in data row 151 \(line 152\)"):
         all_of(text("time,u\r\n" + rows.replace("150.5", "x")))
-
-
-def test_a_word_of_another_language_may_stand_among_units(tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    path.write_text(
-        "Zeit;Spannung;Strom;Zähler\ns;V;mA;Imp\n0,0;1,0;2,5;3\n0,1;1,5;2,5;4\n", "utf-8"
-    )
-    log = open_log(path)
-    assert [column.name for column in log.columns] == ["Zeit", "Spannung", "Strom", "Zähler"]
-    assert [column.unit for column in log.columns] == ["s", "V", "mA", "Imp"]

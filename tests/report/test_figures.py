@@ -1,6 +1,8 @@
 """Figures of simulations and analyses: what they show, in which units, and that it can be read."""
 
+import re
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +26,7 @@ from swashplate.report import figures
 from swashplate.report.lines import COLUMNS, MOST_SPANS, SHADES
 from swashplate.units import shown_in
 
+DOCS = Path(__file__).parents[2] / "docs"
 LEVERS = ("orifice", "pump", "relief")
 DEGREE = 180.0 / np.pi
 
@@ -176,11 +179,6 @@ def test_orifices_and_stops_are_marked_where_the_signal_comes_near(hoist: Drive)
     assert levels(4, low) == []
 
 
-def test_what_has_no_dead_zone_shows_none(made: dict[str, Figure]) -> None:
-    assert shades(made["neutral"], 1) == {}
-    assert legend(made["neutral"]) == []
-
-
 def test_a_long_run_is_drawn_by_few_points_and_few_spans(hoist: Drive) -> None:
     time = np.arange(900 * 512) / 512.0
     run = hoist.simulate(8.0 * np.sin(0.2 * time) + 1.5 * np.sin(20.0 * time))
@@ -193,18 +191,6 @@ def test_a_long_run_is_drawn_by_few_points_and_few_spans(hoist: Drive) -> None:
 
 def test_a_single_sample_can_be_shown(hoist: Drive) -> None:
     figures.plot_simulation(hoist.simulate([0.0])).draw_without_rendering()
-
-
-def test_both_models_and_what_lies_between(made: dict[str, Figure]) -> None:
-    assert labels(made["full order"]) == [
-        "voltage (V)",
-        "shaft speed (deg/s)",
-        "difference (% of top)",
-        "spool (mm)",
-        "swash angle (deg)",
-        "stroking pressure (bar)",
-        "motor pressure drop (bar)",
-    ]
 
 
 def test_a_comparison_shows_what_differs(step: Simulation, hoist: Drive) -> None:
@@ -222,6 +208,36 @@ def test_the_envelope_ends_at_the_swash_stop(made: dict[str, Figure]) -> None:
     words = [text.get_text() for text in made["envelope"].axes[0].texts]
     assert "swash stop\n+196.0 deg/s" in words
     assert "orifice, at rest\n+136.8 deg/s²" in words
+
+
+CAPTIONS = {
+    "envelope": ("limits.md", "envelope.png", ("137", "178")),
+    "whatif": ("what-if.md", "what-if.png", ("196", "294")),
+    "full order": ("full-order.md", "full-order.png", ()),
+    "improvement": ("limits.md", "inverse-map.png", ()),
+    "bode": ("linear-models.md", "bode.png", ("1", "9")),
+}
+"""Page and image of figures, and the numbers that the caption there has from the drawing."""
+
+
+@pytest.mark.parametrize("name", CAPTIONS)
+def test_captions_say_what_figures_show(made: dict[str, Figure], name: str) -> None:
+    page, image, numbers = CAPTIONS[name]
+    text = (DOCS / page).read_text("utf-8")
+    found = re.search(rf"!\[([^\]]*)\]\(images/{re.escape(image)}\)", text)
+    assert found is not None
+    figure = made[name]
+    words = " ".join([*legend(figure), *(t.get_text() for ax in figure.axes for t in ax.texts)])
+    drawn = [abs(float(each)) for each in re.findall(r"\d+\.?\d*", words)]
+    drawn += [abs(float(y)) for ax in figure.axes for line in ax.lines for y in line.get_ydata()]
+    for number in numbers:
+        assert re.search(rf"\b{number}\b", found[1]), number
+        assert np.nanmin(np.abs(np.array(drawn) - float(number))) < 0.5, number
+    # what a panel is called in the caption is a panel's or a line's name
+    for word in ("acceleration", "speed", "gain", "phase", "distortion", "straight line"):
+        if re.search(rf"\b{word}\b", found[1], re.IGNORECASE):
+            axes = " ".join(f"{ax.get_ylabel()} {ax.get_xlabel()}" for ax in figure.axes)
+            assert word in f"{axes} {words}".replace("\n", " "), word
 
 
 def test_the_timeline_has_a_row_for_each_limit(
@@ -251,7 +267,12 @@ def test_the_strongest_lever_is_at_the_top(made: dict[str, Figure]) -> None:
     assert rise.get_yticklabels()[-1].get_text() == "orifice"
     ends = sorted(bar.get_x() + bar.get_width() for bar in speed.patches)
     assert (ends[0], ends[-1]) == pytest.approx((176.4, 215.6), abs=0.05)
-    assert speed.get_xlabel() == "final speed (deg/s)"
+    for ax in (speed, rise, still):
+        # the number in a panel's heading is where its bars begin, in the unit of its axis
+        outcome, number = ax.get_title("left").split(", ")
+        assert ax.get_xlabel() == f"{outcome} ({number.split()[1]})"
+        base = ax.lines[-1].get_xdata()[0]
+        assert float(number.split()[0]) == pytest.approx(base, abs=0.005)
     assert "no lever moves it" in [text.get_text() for text in still.texts]
 
 

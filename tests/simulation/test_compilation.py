@@ -16,10 +16,10 @@ SCRIPT = """
 import numpy as np
 from swashplate import Drive
 from swashplate.equations.marching.run import march_of
+from swashplate.simulation.result import KEPT
 run = Drive.preset("hoist").simulate_current(np.full(60, 0.5))
 print(run.shaft_speed[-1])
-kept = tuple(sorted(run.kept, key=lambda each: each.kind == "limits"))
-march = march_of(run.instance.model, (run.driven_by,), run.instance.options, kept).made
+march = march_of(run.instance.model, (run.driven_by,), run.instance.options, KEPT).made
 print(march.cache_hits)
 """
 

@@ -22,12 +22,12 @@ def speed(**changes) -> Observation:
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"time": [], "values": []}, "The observation of shaft_speed is empty"),
+        ({"time": [], "values": []}, "The observation of shaft_speed: the time is empty"),
         ({"time": [0.0, 1.0]}, "has 2 stamps for 3 values"),
         ({"time": [0.0, 2.0, 1.0]}, "never fall, but is 1 s at sample 2"),
         ({"time": [0.0, np.nan, 1.0]}, "must be finite and never fall, but is nan s at sample 1"),
         ({"time": np.zeros((3, 1))}, "the time must be one column, not 2-dimensional"),
-        ({"values": ["a", "b", "c"]}, "the values must be a sequence of numbers"),
+        ({"values": ["a", "b", "c"]}, "the values must be a sequence of real numbers"),
         ({"values": [1.0, np.nan, 2.0]}, "not finite, or the weight negative, at sample 1"),
         ({"weight": [1.0, 1.0, -1.0]}, "the weight negative, at sample 2"),
         ({"weight": [1.0, 2.0]}, "one number or 3 of them, not of shape"),

@@ -41,7 +41,7 @@ def test_uniform_stamps_are_the_same_as_a_rate(hoist: Drive) -> None:
         ([1.0, np.nan, 2.0], {}, "not finite, the first nan at sample 1"),
         ([1.0, np.inf], {}, "not finite, the first inf at sample 1"),
         ([[1.0, 2.0]], {}, "2-dimensional"),
-        (["a"], {}, "sequence of numbers"),
+        (["a"], {}, "sequence of real numbers"),
         ([0.0, 10.5], {}, r"10.5 V at 0.00195312 s, but the card takes ±10 V"),
         ([0.0, 1.0], {"time": [0.0], "interpolation": "linear"}, "1 time stamps for 2 samples"),
         ([0.0, 1.0], {"time": [0.0, 0.0], "interpolation": "linear"}, "from 0 s at sample 0 to 0"),

@@ -1,6 +1,5 @@
 """The march with refinements: each does what it is for, and has exact derivatives."""
 
-from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -132,14 +131,6 @@ def test_a_damped_plate_comes_late(hoist: Drive) -> None:
     assert late > 0.003  # rad
 
 
-def test_a_plate_damped_by_next_to_nothing_is_the_plain_one(axis: Drive) -> None:
-    command = maneuvers.sine(9.0, 0.1).sample(RATE)
-    plain = axis.simulate(command).shaft_speed
-    damped = axis.replace(swash_damping=1e-9).simulate(command).shaft_speed
-    # flow and plate are stepped one after the other: the pressure's root is taken earlier in a step
-    assert np.abs(damped - plain).max() < 2e-4 * np.abs(plain).max()
-
-
 def test_a_stiff_line_is_no_line(hoist: Drive) -> None:
     """With K_mL J well below the step Kruse's leakage by the flow's acceleration holds."""
     light = {**LOAD, "load_inertia": 500.0}
@@ -187,66 +178,3 @@ def test_next_to_nothing_of_each_is_next_to_nothing(hoist: Drive) -> None:
         run = hoist.replace(**small).simulate(command)
         assert run.refined
         assert 0.0 <= np.abs(run.shaft_speed - plain).max() < 1e-5 * np.abs(plain).max()
-
-
-PARAMETERS = (
-    *(name for name in ALL if name != "load_torque"),
-    "load_torque",
-    "cam_cycles",
-    "Z1",
-    "Z8",
-    "Z10",
-    "Z16_plus",
-    "G1_plus",
-    "tau",
-)
-"""Every parameter of a refinement, and some of card and pump beside."""
-
-
-def slopes(drive: Drive, name: str, signals: tuple[str, ...], command: Array) -> list[Array]:
-    """Extrapolated differences of signals by one parameter, with several steps."""
-    value = drive.parameters.numbers[name]
-
-    def at(h: float) -> Array:
-        run = drive.replace(**{name: value + h}).simulate(command, RATE)
-        return np.stack([getattr(run, signal) for signal in signals])
-
-    found = []
-    for share in (2e-6, 2e-5, 2e-4):
-        h = share * abs(value)
-        coarse = (at(h) - at(-h)) / (2.0 * h)
-        fine = (at(0.5 * h) - at(-0.5 * h)) / h
-        found.append((4.0 * fine - coarse) / 3.0)
-    return found
-
-
-CASES = {
-    "everything": {**ALL, "cam_cycles": 5.4},
-    "everything but the line": {k: v for k, v in ALL.items() if k != "line_stiffness"},
-    "damping, physical root": {"swash_damping": 0.02, "Z7": 0.3},
-}
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_derivatives_are_those_of_differences(hoist: Drive, case: str) -> None:
-    drive = hoist.replace(**CASES[case])
-    if "root" in case:
-        drive = Drive(replace(drive.parameters, pressure_root="symmetric"))
-    command = maneuvers.sine(4.0, 0.8, start=0.05, length=2.0, settle=0.4).sample(RATE) + 0.5
-    signals = ("shaft_speed", "shaft_position")
-    on = [name for name in PARAMETERS if drive.parameters.numbers.get(name, 0.0) not in (0.0, inf)]
-    by = drive.sensitivities(command, RATE, parameters=on)
-    run = drive.simulate(command, RATE)
-    moved = set()
-    for j, name in enumerate(on):
-        found = slopes(drive, name, signals, command)
-        for k, signal in enumerate(signals):
-            exact = getattr(by, signal)[:, j]
-            size = np.abs(exact).max()
-            noise = 1e-11 * np.abs(getattr(run, signal)).max() / abs(drive.parameters.numbers[name])
-            error = np.min([np.abs(each[k] - exact) for each in found], axis=0)
-            assert (error > 1e-5 * size + noise).mean() < 0.01, (name, signal, error.max(), size)
-            if size > 0.0:
-                moved.add(name)
-    known = {name for name in CASES[case] if name != "Z7"}
-    assert known - moved <= {"motor_constant"}

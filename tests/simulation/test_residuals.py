@@ -154,49 +154,44 @@ OWN = Own(
 )
 
 
-@pytest.mark.parametrize("name", ["hoist, hard", "everything", "everything, steady start"])
+@pytest.mark.parametrize("name", ["hoist, hard", "everything"])
 def test_derivatives_are_those_of_differences(name: str) -> None:
+    """By an experiment's own unknowns and some parameters; by all of them: test_sensitivities."""
     command, changes, start = SCENES[name]
     drive, observed = drive_of(changes), everything_observed(command, start)
-    columns = (*ALL_COLUMNS, "start_pressure")
+    columns = ("Z8", "Z16_plus", "G1_minus", "omega_plus", "tau", "start_pressure")
     found = jacobian(drive.parameters, observed, columns, OWN)
     assert found.names[len(columns) :] == observed.own_columns
     assert np.array_equal(found.residuals, residuals(drive.parameters, observed, OWN))
-    base = [np.abs(found.residuals[observed.rows_of(r)]).max() for r in range(len(OBSERVABLE))]
 
     def at(column: str, offset: float) -> np.ndarray:
-        own, changed = OWN, drive
-        number = OBSERVABLE.index("shaft_position" if "position" in column else "shaft_speed")
         if column == "start_pressure":
             own = OWN._replace(start_pressure=OWN.start_pressure + offset)
         elif column in observed.own_columns:
-            field = "clock_offsets" if column.startswith("clock") else "offsets"
-            values = list(getattr(OWN, field))
+            word, number = column.split(" of ")[0], int(column[-2])
+            values = list(getattr(OWN, f"{word}s"))
             values[number] += offset
-            own = OWN._replace(**{field: values})
+            own = OWN._replace(**{f"{word}s": values})
         else:
             changed = drive.replace(**{column: drive.parameters.numbers[column] + offset})
-        return residuals(changed.parameters, observed, own)
+            return residuals(changed.parameters, observed, OWN)
+        return residuals(drive.parameters, observed, own)
 
-    sizes = {"start_pressure": 2e4, "Z2": 1e-3, "Z18": 1e-5, "clock_offset": 1e-4}
-    moved = 0
+    sizes = {"start_pressure": 2e4, "clock_offset": 1e-4}
     for j, column in enumerate(found.names):
-        value = drive.parameters.numbers.get(column, 0.0)
-        if np.isinf(value) or (value == 0.0 and column[:2] in ("C_", "Z7")):
-            continue  # off, or at the end of its range
-        size = abs(value) or sizes.get(column.split(" ")[0], 1e-2)
+        size = drive.parameters.numbers.get(column, sizes.get(column.split(" ")[0], 1e-2))
         exact, differences = found.columns[:, j], []
+        assert np.abs(exact).max() > 0.0
         for h in (2e-6 * size, 5e-5 * size, 1e-3 * size):
             coarse = (at(column, h) - at(column, -h)) / (2.0 * h)
             fine = (at(column, 0.5 * h) - at(column, -0.5 * h)) / h
             differences.append((4.0 * fine - coarse) / 3.0)
-        for r in range(len(OBSERVABLE)):
+        for r, signal in enumerate(OBSERVABLE):
             rows = observed.rows_of(r)
-            tolerance = 1e-5 * np.abs(exact[rows]).max() + 1e-10 * base[r] / size
+            base = np.abs(found.residuals[rows]).max()
+            tolerance = 1e-5 * np.abs(exact[rows]).max() + 1e-10 * base / size
             error = np.min([np.abs(each[rows] - exact[rows]) for each in differences], axis=0)
-            assert (error > tolerance).mean() < 0.005, (column, OBSERVABLE[r], error.max())
-        moved += bool(np.abs(exact).max() > 0.0)
-    assert moved > 40
+            assert (error > tolerance).mean() < 0.005, (column, signal, error.max())
 
 
 @pytest.mark.traced
@@ -290,23 +285,6 @@ def test_triangle_is_the_qr_of_the_jacobian(name: str, columns: tuple) -> None:
 
 
 @pytest.mark.traced
-def test_steps_of_a_fit_are_those_of_the_jacobian(hoist: Drive) -> None:
-    run = hoist.simulate(HARD)
-    observed = ObservedRecord(
-        record_of(np.array(run.current), RATE, what="current"),
-        [Observation("shaft_speed", run.time, 1.01 * run.shaft_speed + 0.01)],
-        driven_by="current",
-    )
-    columns = ["Z3", "Z8", "Z10", "Z16", "Z17"]  # none of them a gauge of another
-    whole = jacobian(hoist.parameters, observed, columns)
-    factor = triangle(hoist.parameters, observed, columns).factor
-    size = np.linalg.norm(whole.columns, axis=0)
-    expected, *_ = np.linalg.lstsq(whole.columns / size, whole.residuals)
-    found = np.linalg.solve(factor[:-1, :-1] / size, factor[:-1, -1])
-    np.testing.assert_allclose(found, expected, rtol=1e-10)
-
-
-@pytest.mark.traced
 def test_gauges_are_null_directions_of_the_triangle(hoist: Drive) -> None:
     observed = observed_at_samples(HARD, signals=["shaft_speed"])
     numbers = hoist.parameters.numbers
@@ -328,32 +306,15 @@ FORCES = ("Z19", "Z20", "Z21", "Z22")
 
 
 @pytest.mark.traced
-@pytest.mark.parametrize("block", [2, 3, 64, 511])
-def test_blocks_of_any_size_give_the_same(hoist: Drive, block: int) -> None:
-    observed = everything_observed(HARD)
-    columns = ["Z8", "Z13", "G1", "tau", "start_pressure"]
-    expected = jacobian(hoist.parameters, observed, columns, OWN)
-    found = jacobian(hoist.parameters, observed, columns, OWN, block=block)
-    assert np.array_equal(found.residuals, expected.residuals)
-    close(found.columns, expected.columns, 1e-13)
-    assert np.array_equal(
-        residuals(hoist.parameters, observed, OWN, block=block), expected.residuals
-    )
-    factor = triangle(hoist.parameters, observed, columns, OWN).factor
-    size = np.abs(factor).max(axis=0)
-    size[size == 0.0] = 1.0
-    other = triangle(hoist.parameters, observed, columns, OWN, block=block).factor
-    np.testing.assert_allclose(other / size, factor / size, rtol=0.0, atol=1e-12)
-
-
-@pytest.mark.traced
-def test_records_of_a_few_samples(hoist: Drive) -> None:
-    for samples in (1, 2, 3):
-        observed = observed_at_samples(np.full(samples, 5.0), "steady")
-        found = jacobian(hoist.parameters, observed, ["Z8", "G1_plus", "Z10"])
-        run = hoist.simulate(np.full(samples, 5.0), start="steady")
-        speed = observed.rows_of(OBSERVABLE.index("shaft_speed"))
-        assert np.array_equal(found.residuals[speed], run.shaft_speed)
+def test_where_a_record_ends_does_not_count(hoist: Drive) -> None:
+    """After a few samples, or about the end of a block of 512."""
+    columns = ["Z8", "G1_plus", "Z10"]
+    longest = observed_at_samples(3.0 + SWING[:1100], "steady", ["shaft_speed"])
+    whole = jacobian(hoist.parameters, longest, columns)
+    for samples in (1, 2, 3, 511, 512, 513, 1024, 1025):
+        observed = observed_at_samples(3.0 + SWING[:samples], "steady", ["shaft_speed"])
+        found = jacobian(hoist.parameters, observed, columns)
+        assert np.array_equal(found.rows, whole.rows[:, :samples])
         triangle(hoist.parameters, observed, ["Z8"])
 
 
@@ -419,8 +380,6 @@ def test_refusals(hoist: Drive) -> None:
         residuals(hoist.parameters, observed, Own(start_pressure=np.nan))
     with pytest.raises(DomainError, match="the pressure at the start is 1e\\+07 Pa, but"):
         residuals(hoist.parameters, observed, Own(start_pressure=1e7))
-    with pytest.raises(InputError, match="block is 1, but must be 2 to 512"):
-        residuals(hoist.parameters, observed, block=1)
     current = ObservedRecord(
         record_of([0.0, 3.0, 3.0], RATE, what="current"),
         [Observation("shaft_speed", [0.0], [0.0])],

@@ -12,8 +12,9 @@ def test_bad_command_leaves_the_state(hoist: Drive) -> None:
     for bad in (10.1, float("nan"), float("-inf")):
         with pytest.raises(InputError, match="takes ±10 V"):
             stepper.step(bad)
-    assert (stepper.state.numbers == before.numbers).all()
-    assert (stepper.state.line == before.line).all()
+    assert stepper.state.last == before.last
+    assert (stepper.state.machine.states == before.machine.states).all()
+    assert (stepper.state.machine.lines == before.machine.lines).all()
 
 
 def test_state_of_another_rate_is_refused(hoist: Drive) -> None:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive
-from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import SOURCE_RATE
-from swashplate.equations.marching.run import Instance, Part, observed_at
+from swashplate.equations.marching.run import Instance, Part, called
 from swashplate.models.displacement_control import PumpOptions
+from swashplate.models.pump import PumpState
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result, Tabular, short
 from swashplate.simulation.instance import instance_of
-from swashplate.simulation.run import pressure_limits, settled_state
+from swashplate.simulation.run import pressure_limits, pump_arguments, settled_state
 from swashplate.tables import UNIT, Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -151,10 +151,10 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
     forms = PumpOptions(symmetric=options.symmetric, steep=options.steep, leakage=leaks)
     still = Part(p._replace(Z12=0.0, load_inertia=0.0), forms)
     instance = Instance(instance.model, (front, still), instance.name)
-    current = np.full_like(pressure, drive.steady_current(voltage))
-    known = {Stored(0, "signals", "current"): current, Stored(1, "state", "pressure"): pressure}
-    wanted = tuple(Stored(1, "signals", s) for s in ("shaft_speed", "swash_rate", "spool_free"))
-    speed, rate, free = observed_at(instance, 1, known, ("current",), 1.0, wanted)
+    known = pump_arguments(instance, drive.steady_current(voltage))
+    pump: Any = instance.model.parts[1]
+    found = [called(pump.sample, {**known, "state": PumpState(each)}) for each in pressure.tolist()]
+    speed, rate, free = np.array([(s.shaft_speed, s.swash_rate, s.spool_free) for s in found]).T
     orifice = np.where(free > 0.0, p.Z16_plus, p.Z16_minus)
     limited = np.minimum(np.abs(free), p.Z14) > orifice
     code = np.where(limited, 2, np.where(np.abs(free) > p.Z14, 1, 0))

@@ -24,7 +24,7 @@ from swashplate.campaign.reading import (
 )
 from swashplate.campaign.recognition import recognise
 from swashplate.campaign.samples import ambiguous_gaps, unwrap_counts
-from swashplate.campaign.schema import applying, inside
+from swashplate.campaign.schema import applying, ends, inside
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.errors import InputError
 from swashplate.logs import Log, open_log
@@ -86,7 +86,8 @@ class Campaign(Result):
         """
         file = read_campaign_file(path)
         folder = Path(path).parent if logs is None else Path(logs)
-        experiments, ignored, names = [], [], run_names(path, file)
+        experiments, ignored = list[Experiment](), list[str]()
+        names = run_names(path, file)
         for number, (name, run) in enumerate(zip(names, file.runs, strict=True), 1):
             if run.role == "ignore":
                 ignored.append(name)
@@ -237,19 +238,10 @@ def run_names(path: str | Path, file: schema.CampaignFile) -> list[str]:
 
 def read_run(
     place: str, name: str, run: schema.Run, axes: Mapping[str, schema.Axis], log: Log
-) -> list[Experiment]:
-    """Experiments of a run, one for each axis that it tests, and one more for each split.
+) -> Iterator[Experiment]:
+    """Experiments of a run of a name, one for each axis that it tests, and one more for each split.
 
-    Parameters
-    ----------
-    place : str
-        The run, for sentences about the campaign file.
-    name : str
-        Its name.
-    run, axes : schema.Run, mapping of str to schema.Axis
-        Its entry, and the axes of the campaign.
-    log : Log
-        Its log.
+    `place` is the run, for sentences about the campaign file.
 
     Raises
     ------
@@ -258,13 +250,9 @@ def read_run(
     """
     tested = axes_of(place, run, axes)
     columns = Columns(log, [each for axis in tested.values() for each in wanted_columns(axis)])
-    return [
-        each
-        for key, axis in tested.items()
-        for each in _experiments(
-            f"{name} {key}" if len(axes) > 1 else name, name, key, run, axis, columns
-        )
-    ]
+    for key, axis in tested.items():
+        full = f"{name} {key}" if len(axes) > 1 else name
+        yield from _experiments(full, name, key, run, axis, columns)
 
 
 def axes_of(place: str, run: schema.Run, axes: Mapping[str, schema.Axis]) -> dict[str, schema.Axis]:
@@ -339,23 +327,37 @@ def _experiments(
             f"{columns.log.path}: its channels have 0 samples that can be used; leave the run out "
             'with role = "ignore".'
         )
+    unit = {"voltage": "V", "current": "A"}.get(drive.kind, drive.unit)
     edges = [-np.inf, *sorted(cuts), np.inf]
     for part, (begin, end) in enumerate(pairwise(edges)):
-        piece = _within(drive, begin, end)
+        given = _within(drive, begin, end)
         kept = {each: _within(read, begin, end) for each, read in signals.items()}
         kept = {each: read for each, read in kept.items() if read.time.size > 1}
-        if piece.time.size < 2 or not kept:
+        if given.time.size < 2 or not kept:
             continue
         said = list(notes) if part == 0 else []
         if np.isfinite(end):
             said.append(f"split at {end:.4g} s, from where it is a run of its own: {cuts[end]}")
-        yield _experiment(
-            f"{name} from {piece.time[0]:.6g} s" if part or log.cut else name,
-            (run_name, key, run, axis),
-            piece,
-            kept,
+        split = part > 0 or log.resumes
+        recognised = recognise(given.time, given.values, unit=unit)
+        maneuver = run.maneuver or recognised.name
+        ignored = applying((*axis.ignore, *run.ignore), maneuver)
+        yield Experiment(
+            f"{name} from {given.time[0]:.6g} s" if part or log.cut else name,
+            key,
+            run_name,
+            run.role,
+            "estimated" if split else run.start or axis.start,
+            None if split else run.start_pressure,
+            given,
+            {
+                each: _finished(axis.channels[each], read, given, maneuver, ignored, run)
+                for each, read in kept.items()
+            },
+            run.maneuver,
+            recognised,
+            tuple((*ends(each), each.why) for each in ignored),
             tuple(said),
-            split=part > 0 or log.resumes,
         )
 
 
@@ -370,72 +372,29 @@ def _within(signal: AnySignal, begin: float, end: float) -> AnySignal:
     return replace(signal, **arrays)
 
 
-def _experiment(
-    name: str,
-    of: tuple[str, str, schema.Run, schema.Axis],
-    given: InputSignal,
-    signals: Mapping[str, Channel],
-    notes: tuple[str, ...],
-    *,
-    split: bool,
-) -> Experiment:
-    run_name, key, run, axis = of
-    unit = {"voltage": "V", "current": "A"}.get(given.kind, given.unit)
-    recognised = recognise(given.time, given.values, unit=unit)
-    maneuver = run.maneuver or recognised.name
-    ignored = applying((*axis.ignore, *run.ignore), maneuver)
-    channels = {}
-    for channel, read in signals.items():
-        entry, encoder, counts = axis.channels[channel], read.encoder, read.counts
-        if encoder is not None and counts is not None:
-            if encoder.rolls_over_at is not None:
-                try:
-                    counts = unwrap_counts(counts, encoder.rolls_over_at)
-                except InputError as error:
-                    raise InputError(f"{read.source}: {error}") from None
-            read = replace(read, counts=counts, values=counts * encoder.angle_per_count)
-        weighted = applying((*entry.weights, *run.weights), maneuver)
-        left_out = (*ignored, *applying(entry.ignore, maneuver))
-        weight = _weights(entry, read.time, given, left_out, weighted, run.weight)
-        channels[channel] = replace(read, weight=weight)
-    return Experiment(
-        name,
-        key,
-        run_name,
-        run.role,
-        "estimated" if split else run.start or axis.start,
-        None if split else run.start_pressure,
-        given,
-        channels,
-        run.maneuver,
-        recognised,
-        tuple(
-            (
-                -np.inf if each.start is None else each.start,
-                np.inf if each.stop is None else each.stop,
-                each.why,
-            )
-            for each in ignored
-        ),
-        notes,
-    )
-
-
-def _weights(
-    channel: schema.Channel,
-    time: Array,
+def _finished(
+    entry: schema.Channel,
+    read: Channel,
     drive: InputSignal,
+    maneuver: str,
     ignored: Sequence[schema.Window],
-    weighted: Sequence[schema.Weight],
-    factor: float,
-) -> Array:
-    """(m,) products of all factors on the squared errors that apply; 0 where ignored."""
-    product = np.full(time.shape, factor * channel.weight)
-    if channel.weight_by_input:
-        levels, factors = np.transpose(channel.weight_by_input)
-        product *= np.interp(np.abs(drive.at(time)), levels, factors)
-    for each in weighted:
-        product[inside(each, time)] *= each.factor
-    for window in ignored:
-        product[inside(window, time)] = 0.0
-    return product
+    run: schema.Run,
+) -> Channel:
+    """A channel whose counts are unwrapped, with the product of all factors that apply."""
+    encoder, counts, values = read.encoder, read.counts, read.values
+    if encoder is not None and counts is not None:
+        if encoder.rolls_over_at is not None:
+            try:
+                counts = unwrap_counts(counts, encoder.rolls_over_at)
+            except InputError as error:
+                raise InputError(f"{read.source}: {error}") from None
+        values = counts * encoder.angle_per_count
+    weight = np.full(read.time.shape, run.weight * entry.weight)
+    if entry.weight_by_input:
+        levels, factors = np.transpose(entry.weight_by_input)
+        weight *= np.interp(np.abs(drive.at(read.time)), levels, factors)
+    for each in applying((*entry.weights, *run.weights), maneuver):
+        weight[inside(each, read.time)] *= each.factor
+    for window in (*ignored, *applying(entry.ignore, maneuver)):
+        weight[inside(window, read.time)] = 0.0
+    return replace(read, counts=counts, values=values, weight=weight)

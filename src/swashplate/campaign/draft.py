@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -148,10 +149,7 @@ class _Look(NamedTuple):
     log: Log
     guesses: list[ColumnGuess]
     values: dict[str, Array]
-
-    @property
-    def time(self) -> ColumnGuess | None:
-        return next((each for each in self.guesses if each.role == "time"), None)
+    time: ColumnGuess | None
 
 
 def draft_campaign(
@@ -207,30 +205,26 @@ def draft_campaign(
     unmet = sorted({*given, *(units or {})} - met)
     if unmet:
         raise InputError(f"No log has a column '{unmet[0]}'; there are {', '.join(sorted(met))}.")
-    first = looks[0]
     axes = _by_axis(_refined(looks, counts_per_turn, given))
     plain = Path(drive).stem if drive is not None else "drive"
     named = {prefix or plain: guesses for prefix, guesses in axes.items()}
     lines = [HEADER, f"title = {toml_string(Path(folder).resolve().name)}", ""]
     for name, guesses in named.items():
-        lines += _axis(name, guesses, first, drive, counts_per_turn)
-    taken = {each.column.name for guesses in named.values() for each in guesses}
-    left = [
-        each.column.name
-        for each in first.guesses
-        if each.column.name not in taken and each.role != "time"
-    ]
+        lines += _axis(name, guesses, looks[0], drive, counts_per_turn)
+    used = [each for guesses in named.values() for each in guesses]
+    taken = {each.column.name for each in used}
+    others = [each for each in looks[0].guesses if each.role != "time"]
+    left = ", ".join(each.column.name for each in others if each.column.name not in taken)
     if left:
-        lines += [f"{UNUSED}: {', '.join(left)}", ""]
-    kinds = {each.kind for guesses in named.values() for each in guesses}
-    if counts_per_turn is not None and "encoder_counts" not in kinds:
-        among = f" among {', '.join(left)}" if left else ""
+        lines += [f"{UNUSED}: {left}", ""]
+    if counts_per_turn is not None and all(each.kind != "encoder_counts" for each in used):
+        among = f" among {left}" if left else ""
         lines += [f"{NO_ENCODER}{among}; counts_per_turn = {counts_per_turn:.12g} is left out", ""]
     runs = [_run(look, named, Path(folder)) for look in looks]
     _mark_unreadable(lines, runs, looks)
     _hold_back(runs)
     for each in runs:
-        lines += each.lines()
+        lines += run_lines(each.file, each.role, each.more, seen=each.seen, why=each.why)
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -247,7 +241,8 @@ def _look(log: Log, given: Mapping[str, str], units: Mapping[str, str]) -> _Look
         elif guessed.role in said:
             guessed = guessed._replace(role="unknown", kind=None)
         guesses.append(guessed._replace(unit=units.get(column.name, guessed.unit)))
-    return _Look(log, guesses, _numbers(log, [each.column.name for each in guesses]))
+    time = next((each for each in guesses if each.role == "time"), None)
+    return _Look(log, guesses, _numbers(log, [each.column.name for each in guesses]), time)
 
 
 def _numbers(log: Log, names: list[str]) -> dict[str, Array]:
@@ -270,31 +265,26 @@ def _refined(
     whole numbers that begin anew at their end are an encoder's, whatever their name.
     """
     met: dict[str, ColumnGuess] = {}
-    for look in looks:
-        for each in look.guesses:
-            met.setdefault(each.column.name, each)
+    for each in chain.from_iterable(look.guesses for look in looks):
+        met.setdefault(each.column.name, each)
     for name, each in met.items():
         values = [look.values[name] for look in looks if look.values.get(name, np.zeros(0)).size]
         empty = sum(int(np.count_nonzero(~np.isfinite(part))) for part in values)
         met[name] = each = each._replace(empty=empty)
         if each.kind == "encoder_counts" or (each.role == "unknown" and each.unit is None):
-            sizes = [rolls_over_at(part, counts_per_turn) for part in values]
-            size = max((size for size in sizes if size is not None), default=None)
-            if size is not None:
+            sizes = [rolls_over_at(part, counts_per_turn) or 0 for part in values]
+            if size := max(sizes, default=0):
                 met[name] = each._replace(role="channel", kind="encoder_counts", rolls_over_at=size)
-        known = name in given
-        if each.kind == "rectified_current" and values and not known and has_sign(values):
+        if each.kind == "rectified_current" and values and name not in given and has_sign(values):
             met[name] = each._replace(kind="signed_current")
-    for one, other in (("A", "B"), ("a", "b"), ("1", "2")):
-        for name, each in met.items():
-            twin = met.get(f"{name[:-1]}{other}")
-            if name.endswith(f"_{one}") and twin is not None and "current" in str(each.kind):
-                met[name] = each._replace(kind="current_plus")
-                met[twin.column.name] = twin._replace(
-                    role="channel", kind="current_minus", axis=each.axis, unit=each.unit
-                )
-    kinds = {each.kind for each in met.values()}
-    if not {"current_plus", "current_minus"} <= kinds:
+    for name, each in met.items():
+        twin = met.get(name[:-1] + {"A": "B", "a": "b", "1": "2"}.get(name[-1:], "?"))
+        if name[-2:-1] == "_" and twin is not None and "current" in str(each.kind):
+            met[name] = each._replace(kind="current_plus")
+            met[twin.column.name] = twin._replace(
+                role="channel", kind="current_minus", axis=each.axis, unit=each.unit
+            )
+    if not {"current_plus", "current_minus"} <= {each.kind for each in met.values()}:
         for name, each in met.items():
             if each.kind in ("current_plus", "current_minus") and name not in given:
                 met[name] = each._replace(kind="rectified_current", axis="")
@@ -337,7 +327,7 @@ def _axis(
     own += [f"time = {clock}", 'start = "rest"    # at the first sample: rest, steady or estimated']
     names = ", ".join(repr(each.name) for each in look.log.columns)
     left_open = f'column = "{FIXME}"    # which of {names}'
-    drives = [each for each in guesses if each.role == "input"]
+    drives = _inputs(guesses)
     given = [f'kind = "voltage"    # {FIXME}: or current, or other', f"{left_open} commands?"]
     given = _signal(drives[0], look, None) if drives else given
     given.append('interpolation = "previous"    # guessed: held between samples; or "linear"')
@@ -414,20 +404,14 @@ class _Draft:
     role: str
     why: str = ""
 
-    def lines(self) -> list[str]:
-        return run_lines(self.file, self.role, self.more, seen=self.seen, why=self.why)
-
 
 def _run(look: _Look, axes: Mapping[str, list[ColumnGuess]], folder: Path) -> _Draft:
     path, root = look.log.path.resolve(), folder.resolve()
     file = path.relative_to(root) if path.is_relative_to(root) else path
-    seen, stratum, peak = _seen(look, axes)
-    lines = list[str]()
     names = {column.name for column in look.log.columns}
     tested, without = list[str](), list[str]()
     for axis, guesses in axes.items():
-        drives = [each for each in guesses if each.role == "input"][:1]
-        channels = _channels(guesses)
+        drives, channels = _inputs(guesses)[:1], _channels(guesses)
         missing = [
             f"axes.{toml_key(axis)}.channels.{key} = false    # no column "
             f"{toml_string(each.column.name)}"
@@ -438,9 +422,14 @@ def _run(look: _Look, axes: Mapping[str, list[ColumnGuess]], folder: Path) -> _D
             tested.append(axis)
             without += missing
     if tested and len(tested) < len(axes):
-        lines.append(f"only = [{', '.join(toml_string(axis) for axis in tested)}]")
-    made = _Draft(file.as_posix(), seen, [*lines, *without], stratum, peak, "fit")
-    return made if tested else replace(made, role="ignore", why="it has no input")
+        without.insert(0, f"only = [{', '.join(toml_string(axis) for axis in tested)}]")
+    role, why = ("fit", "") if tested else ("ignore", "it has no input")
+    seen, stratum, peak = _seen(look, axes)
+    return _Draft(file.as_posix(), seen, without, stratum, peak, role, why)
+
+
+def _inputs(guesses: Iterable[ColumnGuess]) -> list[ColumnGuess]:
+    return [each for each in guesses if each.role == "input"]
 
 
 def _seen(look: _Look, axes: Mapping[str, list[ColumnGuess]]) -> tuple[str, str, float]:
@@ -458,7 +447,7 @@ def _seen(look: _Look, axes: Mapping[str, list[ColumnGuess]]) -> tuple[str, str,
     seen.append(f"{np.ptp(time):.4g} s at {1.0 / np.median(np.diff(time)):.4g} Hz")
     strata, peak = [], 0.0
     for guesses in axes.values():
-        for drive in [each for each in guesses if each.role == "input"][:1]:
+        for drive in _inputs(guesses)[:1]:
             values = look.values.get(drive.column.name)
             if values is None or not np.isfinite(values).all():
                 continue
@@ -484,10 +473,10 @@ def _mark_unreadable(lines: list[str], runs: list[_Draft], looks: Sequence[_Look
     for each, look in zip(runs, looks, strict=True):
         if each.role == "ignore":
             continue
-        one = "\n".join([text, *each.lines()])
+        one = "\n".join([text, *run_lines(each.file, each.role, each.more)])
         try:
             file = validated(parse_toml(one, "the draft"), CampaignFile, "the draft")
-            read_run("the draft", "run", file.runs[0], file.axes, look.log)
+            list(read_run("the draft", "run", file.runs[0], file.axes, look.log))
         except (FileError, InputError) as error:
             each.role, each.why = "ignore", f"{FIXME}: {error}"
 

@@ -9,7 +9,7 @@ about them. Both are where a fit begins, not its result.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from math import inf, isfinite, log, sqrt
 from typing import NamedTuple
@@ -88,37 +88,25 @@ class Guess(NamedTuple):
 
 
 @kernel
-def march_guess(
-    command: Array,
-    h: float,
-    dead: Array,
-    gain: Array,
-    top: Array,
-    pull: Array,
-    began: tuple[float, float],
-    position: Array,
-) -> None:
-    """March speed and position behind dead zone, gain, limits and lag.
+def march_guess(command: Array, h: float, numbers: Array, share: float, position: Array) -> None:
+    """March the position behind dead zone, gain, limits and lag.
 
-    From a delayed command (n,) [V] with a step [s]; dead zones, gains, top speeds and accelerations
-    (2,) are those of plus and minus; `began` is the share of the way to its target that the speed
-    takes in a step [1], and the speed at first. `position` (n,) is the output, 0 at the first
-    sample.
+    From a delayed command (n,) [V] with a step [s]; numbers (8,) are dead zones, gains, top speeds
+    and accelerations of plus and minus; `share` is that of the way to its target that the speed
+    takes in a step [1]. `position` (n,) is the output; its first sample gives the speed at first.
     """
-    share, speed = began
+    speed = position[0]
     position[0] = 0.0
     for n in range(1, command.size):
         u = command[n - 1]
-        target = min(gain[0] * max(u - dead[0], 0.0), top[0])
-        target -= min(gain[1] * max(-u - dead[1], 0.0), top[1])
-        move = share * (target - speed)
+        target = min(numbers[2] * max(u - numbers[0], 0.0), numbers[4])
+        target -= min(numbers[3] * max(-u - numbers[1], 0.0), numbers[5])
         last = speed
-        speed += min(max(move, -pull[1] * h), pull[0] * h)
+        speed += min(max(share * (target - speed), -numbers[7] * h), numbers[6] * h)
         position[n] = position[n - 1] + 0.5 * h * (last + speed)
 
 
-@dataclass(frozen=True)
-class _Run:
+class _Run(NamedTuple):
     """A run on the march's grid, and the mean speeds in its windows."""
 
     time: Array
@@ -129,18 +117,6 @@ class _Run:
     """(m,) edges of the windows. [s]"""
     speeds: Array
     """(m,)"""
-
-
-@dataclass(frozen=True)
-class _Numbers:
-    """What is searched for, both ways in an array."""
-
-    dead: Array
-    gain: Array
-    top: Array
-    pull: Array
-    lag: float
-    delay: float
 
 
 def guess_drive(experiments: Sequence[Experiment]) -> Guess:
@@ -188,19 +164,17 @@ def guess_drive(experiments: Sequence[Experiment]) -> Guess:
         raise InputError("The command or the speed never leaves rest: there is nothing to guess.")
     found = _searched(runs, size, scale)
     errors = np.concatenate([_errors(run, found) for run in runs])
-    spread = float(np.std(speeds))
+    # numbers of a way that was not tried are the other's
+    pairs = found[:8].reshape(4, 2)
+    pairs[:, size == 0.0] = pairs[:, size > 0.0][:, :1]
+    dead, gain, top, pull = ((float(plus), float(minus)) for plus, minus in pairs)
     return Guess(
-        experiments[0].axis,
-        unit,
-        _both(found.dead, size),
-        _both(found.gain, size),
-        _both(found.top, size),
-        _both(found.pull, size),
-        found.lag,
-        found.delay,
-        (float(size[0]), float(size[1])),
-        scale,
-        100.0 * (1.0 - float(np.sqrt(np.mean(errors**2))) / spread),
+        *(experiments[0].axis, unit, dead, gain, top, pull),
+        lag=float(found[8]),
+        delay=float(found[9]),
+        command=(float(size[0]), float(size[1])),
+        speed=scale,
+        fit_percent=100.0 * (1.0 - float(np.sqrt(np.mean(errors**2)) / np.std(speeds))),
     )
 
 
@@ -237,85 +211,77 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     return _Run(grid, drive.at(grid), start, edges[:-1][~broken], edges[1:][~broken], speeds)
 
 
-def _errors(run: _Run, numbers: _Numbers) -> Array:
-    """Simulated less measured mean speeds of a run."""
+def _errors(run: _Run, numbers: Array) -> Array:
+    """Simulated less measured mean speeds of a run; numbers (10,) end with lag and delay [s]."""
     position = np.empty(run.time.size)
-    share = 1.0 - np.exp(-STEP / max(numbers.lag, 1e-4))
-    command = np.interp(run.time - numbers.delay, run.time, run.command)
-    march_guess(
-        command,
-        STEP,
-        numbers.dead,
-        numbers.gain,
-        numbers.top,
-        numbers.pull,
-        (float(share), float(run.start)),
-        position,
-    )
+    position[0] = run.start
+    share = float(1.0 - np.exp(-STEP / max(numbers[8], 1e-4)))
+    command = np.interp(run.time - numbers[9], run.time, run.command)
+    march_guess(command, STEP, numbers, share, position)
     there, back = (np.interp(each, run.time, position) for each in (run.ends, run.begins))
-    return (there - back) / (run.ends - run.begins) - run.speeds
+    return np.asarray((there - back) / (run.ends - run.begins) - run.speeds)
 
 
-def _searched(runs: Sequence[_Run], size: Array, scale: float) -> _Numbers:
-    """The least squares: a grid first, on which gains are linear, then all numbers at once."""
+LOWEST = np.array([0.0, 0.0, -5.0, -5.0, log(0.002), 0.0, -1.5, -1.5, -2.0, -2.0])
+HIGHEST = np.array([0.95, 0.95, 7.0, 7.0, log(5.0), LONGEST_DELAY, 1.5, 1.5, 6.0, 6.0])
+TYPICAL = np.array([0.05, 0.05, 0.2, 0.2, 0.3, 0.02, 0.1, 0.1, 0.5, 0.5])
+"""Of what is searched for: dead zones over the largest command, logarithms of gains and of the lag,
+the delay [s], and logarithms of top speeds and accelerations over the greatest speed."""
+
+
+def _searched(runs: Sequence[_Run], size: Array, scale: float) -> Array:
+    """Numbers (10,) of least squares: a grid first, on which gains are linear, then all at once."""
     from scipy.optimize import least_squares
 
-    tried = size > 0.0
-    candidates: list[tuple[float, _Numbers]] = []
+    tried, steepness = size > 0.0, scale / size.max()
     speeds = np.concatenate([run.speeds for run in runs])
 
-    def errors(numbers: _Numbers) -> Array:
+    def errors(numbers: Array) -> Array:
         return np.concatenate([_errors(run, numbers) for run in runs])
 
-    for lag, delay, share in product(LAGS, DELAYS, DEAD_ZONES):
-        still = _Numbers(share * size, np.zeros(2), np.full(2, inf), np.full(2, inf), lag, delay)
-        at_rest = errors(still)
-        ways = [errors(replace(still, gain=way)) - at_rest for way in np.eye(2)[tried]]
-        design, gain = np.transpose(ways), np.zeros(2)
-        gain[tried] = np.linalg.lstsq(design, speeds, rcond=None)[0]
-        cost = float(np.sum((design @ gain[tried] - speeds) ** 2))
-        candidates.append((cost, replace(still, gain=gain)))
-    candidates.sort(key=lambda each: each[0])
-    if (candidates[0][1].gain[tried] <= 0.0).any():
-        raise InputError(
-            "The speed goes against the command: reverse it with sign = -1 in its channel."
-        )
-
-    def numbers_of(vector: Array) -> _Numbers:
-        """From dead zones, gains, lag and delay, and where there are ten, limits."""
+    def numbers_of(vector: Array) -> Array:
+        """From what is searched for, with or without limits."""
         limits = np.exp([*vector[6:], *[NONE] * (10 - vector.size)]) * scale
         limits[limits > np.exp(0.5 * NONE) * scale] = inf
-        gain = np.exp(vector[2:4]) * scale / size.max()
-        lag, delay = float(np.exp(vector[4])), vector[5]
-        return _Numbers(vector[:2] * size, gain, limits[:2], limits[2:], lag, delay)
+        gain = np.exp(vector[2:4]) * steepness
+        return np.concatenate([vector[:2] * size, gain, limits, [np.exp(vector[4]), vector[5]]])
 
     def residuals(vector: Array) -> Array:
         return errors(numbers_of(vector)) / scale
 
     def solved(vector: Array) -> tuple[float, Array]:
-        low = np.array([0.0, 0.0, -5.0, -5.0, log(0.002), 0.0, -1.5, -1.5, -2.0, -2.0])
-        high = np.array([0.95, 0.95, 7.0, 7.0, log(5.0), LONGEST_DELAY, 1.5, 1.5, 6.0, 6.0])
         n = vector.size
         found = least_squares(
             residuals,
-            np.clip(vector, low[:n] + 1e-6, high[:n] - 1e-6),
-            bounds=(low[:n], high[:n]),
+            np.clip(vector, LOWEST[:n] + 1e-6, HIGHEST[:n] - 1e-6),
+            bounds=(LOWEST[:n], HIGHEST[:n]),
             loss="soft_l1",
             f_scale=0.05,
-            x_scale=np.array([0.05, 0.05, 0.2, 0.2, 0.3, 0.02, 0.1, 0.1, 0.5, 0.5])[:n],
+            x_scale=TYPICAL[:n],
             diff_step=1e-3,
             max_nfev=60,
         )
         return float(found.cost), found.x
 
-    begins = []
-    for _, each in candidates[:3]:
-        share = np.divide(each.dead, size, out=np.full(2, 0.1), where=tried)
-        gain = np.log(np.maximum(each.gain, 1e-3 * scale / size.max()) * size.max() / scale)
-        begins.append(np.array([*share, *gain, log(each.lag), each.delay]))
-    _, plain = min((solved(each) for each in begins), key=lambda each: each[0])
+    candidates: list[tuple[float, Array]] = []
+    for lag, delay, share in product(LAGS, DELAYS, DEAD_ZONES):
+        numbers = np.array([*(share * size), 0.0, 0.0, inf, inf, inf, inf, lag, delay])
+        at_rest = errors(numbers)
+        ways = [errors(numbers + np.eye(10)[2 + way]) - at_rest for way in np.flatnonzero(tried)]
+        design, gain = np.transpose(ways), np.zeros(2)
+        gain[tried] = np.linalg.lstsq(design, speeds, rcond=None)[0]
+        cost = float(np.sum((design @ gain[tried] - speeds) ** 2))
+        steep = np.log(np.maximum(gain, 1e-3 * steepness) / steepness)
+        dead = np.where(tried, share, 0.1)
+        candidates.append((cost, np.array([*dead, *steep, log(lag), delay, *gain])))
+    candidates.sort(key=lambda each: each[0])
+    if (candidates[0][1][6:][tried] <= 0.0).any():
+        raise InputError(
+            "The speed goes against the command: reverse it with sign = -1 in its channel."
+        )
+    _, plain = min((solved(each[:6]) for _, each in candidates[:3]), key=lambda each: each[0])
     steep = log(0.7) - plain[4]
-    tries = [plain, np.array([*plain[:2], *(plain[2:4] + 0.7), plain[4] - 0.7, plain[5]])]
+    tries = [plain, plain + np.array([0.0, 0.0, 0.7, 0.7, -0.7, 0.0])]
     limited = (solved(np.array([*each, 0.0, 0.0, steep, steep])) for each in tries)
     cost, whole = min(limited, key=lambda each: each[0])
     # a limit that makes no difference was not reached
@@ -327,12 +293,6 @@ def _searched(runs: Sequence[_Run], size: Array, scale: float) -> _Numbers:
         if loss < SEEN * cost + NEXT_TO_NOTHING * float(np.sum((speeds / scale) ** 2)):
             whole = without
     return numbers_of(whole)
-
-
-def _both(values: Array, size: Array) -> tuple[float, float]:
-    """Numbers of both ways; those of a way that was not tried are the other's."""
-    plus, minus = (float(each) for each in values)
-    return (plus if size[0] else minus), (minus if size[1] else plus)
 
 
 def guessed_set(guess: Guess, source: str) -> ParameterSet:

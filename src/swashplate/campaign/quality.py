@@ -91,12 +91,52 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
     unsigned : collection of str
         Channels whose sign says nothing, see `unsigned_currents`.
     """
-    drive = experiment.input
-    limits = drive.limits
-    if limits is None and drive.kind == "voltage":
-        limits = (-FULL_VOLTAGE, FULL_VOLTAGE)
-    stamps, low, high = stamp_statistics(drive.time), drive.values.min(), drive.values.max()
-    findings = list(_stamp_findings(stamps))
+    drive, found = experiment.input, list[Quality]()
+    signals: dict[str, InputSignal | Channel] = {"input": drive, **experiment.channels}
+    for name, signal in signals.items():
+        stamps, lost = stamp_statistics(signal.time), None
+        used = np.ones(signal.time.size, np.bool_)
+        if isinstance(signal, Channel):
+            used = signal.used
+            limits, findings = signal.limits, _of_channel(experiment, signal, name not in unsigned)
+            if signal.counts is not None:
+                lost = 0 if used.sum() < 8 else _lost(signal)
+            if lost:
+                times = "once" if lost == 1 else f"{lost} times"
+                findings.append(f"jumps {times} as no motion does: lost or doubled counts")
+        else:
+            full = (-FULL_VOLTAGE, FULL_VOLTAGE) if drive.kind == "voltage" else None
+            limits = drive.limits or full
+            findings = _of_input(drive, limits)
+        values = signal.values[used]
+        clipped = float("nan")
+        if limits is not None and values.size:
+            clipped = float(np.mean((values <= limits[0]) | (values >= limits[1])))
+        if clipped > 0.0 and signal is not drive:
+            findings.insert(
+                0, f"{100.0 * clipped:.2g} % of the samples are at the end of its range"
+            )
+        if signal.dropped and signal is not drive:
+            many = _counted(signal.dropped, "missing sample is", "missing samples are")
+            findings.insert(0, f"{many} left out")
+        # the input's stamps are told of once, with the input
+        if signal is drive or not np.array_equal(signal.time, drive.time):
+            findings = [*_stamp_findings(stamps), *findings]
+        shown = values if values.size else signal.values
+        ends = float(shown.min()), float(shown.max())
+        found.append(
+            Quality(
+                *(experiment.name, name, signal.kind, signal.unit, stamps, *ends, clipped, lost),
+                dropped=signal.dropped,
+                ignored=float(np.mean(~used)),
+                findings=tuple(findings),
+            )
+        )
+    return tuple(found)
+
+
+def _of_input(drive: InputSignal, limits: tuple[float, float] | None) -> list[str]:
+    low, high, findings = drive.values.min(), drive.values.max(), []
     if low == high:
         findings.append("the input never changes: nothing can be identified from this run")
     if limits is not None and (low < limits[0] or high > limits[1]):
@@ -104,77 +144,31 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
             f"goes from {low:g} to {high:g} {drive.unit}, beyond its range of {limits[0]:g} to "
             f"{limits[1]:g}: check unit, scale and offset"
         )
-    clipped = _share_at(drive.values, limits)
-    return _quality(experiment, "input", drive, stamps, drive.values, clipped, findings), *(
-        _of_channel(experiment, each, signed=each.name not in unsigned)
-        for each in experiment.channels.values()
-    )
+    return findings
 
 
-def _quality(
-    experiment: Experiment,
-    name: str,
-    signal: InputSignal | Channel,
-    stamps: StampStatistics,
-    values: Array,
-    clipped: float,
-    findings: Iterable[str],
-    *,
-    lost: int | None = None,
-) -> Quality:
-    return Quality(
-        experiment.name,
-        name,
-        signal.kind,
-        signal.unit,
-        stamps,
-        float(values.min()),
-        float(values.max()),
-        clipped,
-        lost,
-        signal.dropped,
-        float(np.mean(~signal.used)) if isinstance(signal, Channel) else 0.0,
-        tuple(findings),
-    )
-
-
-def _of_channel(experiment: Experiment, channel: Channel, *, signed: bool) -> Quality:
-    drive, used = experiment.input, channel.used
-    stamps, findings = stamp_statistics(channel.time), list[str]()
+def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> list[str]:
+    drive, used, findings = experiment.input, channel.used, list[str]()
     time, values = channel.time[used], channel.values[used]
-    clipped, lost = _share_at(values, channel.limits), None
-    # the input's stamps are told of once, with the input
-    if not np.array_equal(channel.time, drive.time):
-        findings += _stamp_findings(stamps)
-    if channel.dropped:
-        dropped = channel.dropped
-        findings.append(f"{_counted(dropped, 'missing sample is', 'missing samples are')} left out")
-    if clipped > 0.0:
-        findings.append(f"{100.0 * clipped:.2g} % of the samples are at the end of its range")
-    if channel.counts is not None:
-        lost = 0
-    if time.size > 1:
-        if np.ptp(values) == 0.0 and np.ptp(drive.values) > 0.0:
-            findings.append("never changes although the input does: is it connected?")
-        if channel.counts is not None and time.size >= 8:
-            lost = int(find_lost_counts(time, channel.counts[used]).size)
-        if lost:
-            times = "once" if lost == 1 else f"{lost} times"
-            findings.append(f"jumps {times} as no motion does: lost or doubled counts")
-        findings += _spike_findings(experiment, channel)
-        if channel.kind == "rectified_current" and has_sign([values], NEGATIVE):
-            findings.append("turns negative, so it is not rectified: should it be signed_current?")
-        if signed and _moves_against(drive, channel):
-            findings.append("moves against the input: should its sign be -1?")
-        outside = (time < drive.time[0]) | (time > drive.time[-1])
-        if outside.any():
-            lie = _counted(int(outside.sum()), "sample lies", "samples lie")
-            findings.append(f"{lie} before or after the input's record")
-    shown = values if values.size else channel.values
-    return _quality(
-        *(experiment, channel.name, channel, stamps, shown, clipped, findings),
-        lost=lost,
-    )
+    if time.size < 2:
+        return []
+    if np.ptp(values) == 0.0 and np.ptp(drive.values) > 0.0:
+        findings.append("never changes although the input does: is it connected?")
+    findings += _spike_findings(experiment, channel)
+    if channel.kind == "rectified_current" and has_sign([values], NEGATIVE):
+        findings.append("turns negative, so it is not rectified: should it be signed_current?")
+    if signed and _moves_against(drive, channel):
+        findings.append("moves against the input: should its sign be -1?")
+    outside = int(np.count_nonzero((time < drive.time[0]) | (time > drive.time[-1])))
+    if outside:
+        lie = _counted(outside, "sample lies", "samples lie")
+        findings.append(f"{lie} before or after the input's record")
+    return findings
+
+
+def _lost(channel: Channel) -> int:
+    assert channel.counts is not None
+    return int(find_lost_counts(channel.time[channel.used], channel.counts[channel.used]).size)
 
 
 def _counted(number: int, one: str, several: str) -> str:
@@ -192,12 +186,6 @@ def _stamp_findings(stamps: StampStatistics) -> Iterator[str]:
             f"the interval of {1e3 * stamps.period:.3g} ms varies by {1e3 * stamps.jitter:.2g} ms: "
             "its own stamps are kept"
         )
-
-
-def _share_at(values: Array, limits: tuple[float, float] | None) -> float:
-    if limits is None or not values.size:
-        return float("nan")
-    return float(np.mean((values <= limits[0]) | (values >= limits[1])))
 
 
 def _moves_against(drive: InputSignal, channel: Channel) -> bool:
@@ -475,8 +463,8 @@ def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table
             each.kind.replace("_", " "),
             stamps.rows,
             stamps.rate,
-            _milliseconds(stamps.jitter),
-            _milliseconds(stamps.longest) if stamps.gaps.size else "-",
+            f"{round(1e3 * stamps.jitter, 4):.3g}",
+            f"{round(1e3 * stamps.longest, 4):.3g}" if stamps.gaps.size else "-",
             _range(each),
             clipped,
             each.lost_counts,
@@ -484,10 +472,6 @@ def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table
             look=bool(each.findings),
         )
     return made
-
-
-def _milliseconds(seconds: float) -> str:
-    return f"{round(1e3 * seconds, 4):.3g}"
 
 
 def _range(quality: Quality) -> str:

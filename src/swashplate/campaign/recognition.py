@@ -297,8 +297,10 @@ def _levels(trace: _Trace) -> tuple[list[tuple[int, int]], tuple[int, int]] | No
     lasts = [*(int(group[0]) + 1 for group in groups), values.size]
     levels: list[tuple[int, int]] = []
     for bounds in zip(firsts, lasts, strict=True):
-        first, last = _trimmed(trace, *bounds)
-        final = last == values.size
+        first, last = bounds
+        final, beside = last == values.size, min(2, (last - first) // 4)
+        # without the samples beside its jumps, which may be taken while they last
+        first, last = first + beside * (first > 0), last - beside * (not final)
         sure = np.median(values[first : first + max(HELD, (last - first) // 10)])
         leaves = min(trace.first(np.abs(values[first:last] - sure) > trace.tolerance, first), last)
         if leaves - first < (1 if final else HELD):
@@ -315,19 +317,6 @@ def _levels(trace: _Trace) -> tuple[list[tuple[int, int]], tuple[int, int]] | No
         if levels or not resting:
             levels.append((first, leaves))
     return levels, (values.size, values.size)
-
-
-def _trimmed(trace: _Trace, first: int, last: int) -> tuple[int, int]:
-    """A level without the samples beside its jumps that were taken while they lasted."""
-    values = trace.values
-    width = min(max(HELD, (last - first) // 10), last - first)
-
-    def off(level: Array) -> int:
-        away = np.flatnonzero(np.abs(level[:2] - np.median(level)) > trace.tolerance)
-        return int(away[-1]) + 1 if away.size else 0
-
-    late, early = off(values[first : first + width]), off(values[last - width : last][::-1])
-    return first + (late if first else 0), last - (early if last < values.size else 0)
 
 
 # --- ramps ----------------------------------------------------------------------------------------
@@ -377,67 +366,60 @@ def _line(trace: _Trace, first: int, last: int) -> tuple[float, float, float]:
 # --- sines ----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Tone:
-    sine: float
-    cosine: float
-    mean: float
-    omega: float
-    origin: float
-    """Instant from which its phase counts. [s]"""
-    error: float
-    """Standard error of omega. [rad/s]"""
-
-    @property
-    def amplitude(self) -> float:
-        return float(np.hypot(self.sine, self.cosine))
-
-    @property
-    def crossing(self) -> float:
-        """An upward crossing of its mean. [s]"""
-        return self.origin - float(np.arctan2(self.cosine, self.sine)) / self.omega
-
-    def __call__(self, time: Array) -> Array:
-        # one sine, not two: it is computed over the whole record
-        return self.mean + self.amplitude * np.sin(self.omega * (time - self.crossing))
+def _tone(time: Array, amplitude: float, crossing: float, mean: float, omega: float) -> Array:
+    """A sine [unit] by an instant of an upward crossing of its mean [s] and omega [rad/s]."""
+    return np.asarray(mean + amplitude * np.sin(omega * (time - crossing)))
 
 
 def _sine(trace: _Trace, unit: str) -> Recognised | None:
     """One frequency, at least a whole period of it, None of other records."""
+    from scipy.optimize import curve_fit
+
     guess = _guessed(trace)
     if guess is None:
         return None
-    departs = trace.first(np.abs(trace.values) > trace.tolerance, 0)
-    certain = int(np.searchsorted(trace.time, guess[1]))
-    if certain - departs < COARSEST:
+    numbers, until = guess
+    first = trace.first(np.abs(trace.values) > trace.tolerance, 0)
+    certain = leaves = int(np.searchsorted(trace.time, until))
+    if certain - first < COARSEST:
         return None
-    tone = _fitted(trace, guess[0], departs, certain)
-    start = _start(trace, tone, departs)
-    first = int(np.searchsorted(trace.time, start - 1e-9))
-    away = np.abs(trace.values[first:] - tone(trace.time[first:])) > trace.tolerance
-    leaves = trace.first(away, first)
-    if leaves < certain:
-        return None
-    tone = _fitted(trace, tone, first, leaves)
+    for again in (True, False):  # once more with all that lies on the first tone
+        time, values = trace.time[first:leaves], trace.values[first:leaves]
+        # a crossing in the middle hardly correlates with the frequency
+        half = np.pi / numbers[3]
+        turns = 2 * round((0.5 * float(time[0] + time[-1]) - numbers[1]) / (2.0 * half))
+        numbers[1] += turns * half
+        try:
+            numbers, covariance = curve_fit(_tone, time, values, numbers)
+        except RuntimeError:
+            return None
+        model = _tone(trace.time, *numbers)
+        if again:
+            away = np.abs(trace.values - model)[first:] > trace.tolerance
+            leaves = trace.first(away, first)
+            if leaves < certain:
+                return None
+    amplitude, crossing, mean, omega = map(float, numbers)
+    size = abs(amplitude)
+    # so long it takes from the crossing at which it begins to the tolerance
+    hidden = np.arcsin(min(trace.tolerance / size, 1.0)) / omega if first else 0.0
+    start = float(trace.time[first]) - hidden
     ending = _ending(trace, leaves, start)
-    end = float(trace.time[min(leaves, trace.time.size - 1)])
-    if (end - start) * tone.omega < 2.0 * np.pi * 0.99:
-        return None
-    if abs(tone.mean) > max(0.02 * tone.amplitude, trace.noise) and first:
-        return None
-    model = tone(trace.time)
     model[:first] = 0.0
-    if ending is None or not _fits(trace, model, ending):
+    whole = float(trace.time[min(leaves, trace.time.size - 1)]) - start > 0.99 * 2.0 * np.pi / omega
+    centred = not first or abs(mean) <= max(0.02 * size, trace.noise)
+    if not (whole and centred) or ending is None or not _fits(trace, model, ending):
         return None
-    hertz = tone.omega / (2.0 * np.pi)
-    frequency = roundest(hertz, max(3.0 * tone.error / (2.0 * np.pi), 0.001 * hertz))
-    down = float(np.cos(tone.omega * (start - tone.crossing))) < -1e-9
-    amplitude = roundest(-tone.amplitude if down else tone.amplitude, 0.002 * tone.amplitude)
-    return Recognised(f"sine {amplitude:g} {unit} {frequency:g} Hz", frequency)
+    hertz = omega / (2.0 * np.pi)
+    error = float(np.sqrt(covariance[3, 3])) / (2.0 * np.pi)
+    frequency = roundest(hertz, max(3.0 * error, 0.001 * hertz))
+    rises = amplitude * float(np.cos(omega * (start - crossing)))
+    shown = roundest(size if rises > -1e-9 * size else -size, 0.002 * size)
+    return Recognised(f"sine {shown:g} {unit} {frequency:g} Hz", frequency)
 
 
-def _guessed(trace: _Trace) -> tuple[_Tone, float] | None:
-    """A tone through the changes of sign, and the last instant up to which they are a sine's."""
+def _guessed(trace: _Trace) -> tuple[list[float], float] | None:
+    """Numbers of a tone by the changes of sign, and the instant up to which they are a sine's."""
     beyond = np.flatnonzero(np.abs(trace.values) > BAND * trace.peak)
     changes = np.flatnonzero(np.diff(np.signbit(trace.values[beyond])))
     if changes.size < 2:
@@ -448,55 +430,10 @@ def _guessed(trace: _Trace) -> tuple[_Tone, float] | None:
     half = float(np.median(halves))
     uneven = np.abs(halves - half) > EVEN * half
     regular = int(uneven.argmax()) if uneven.any() else halves.size
-    if regular < max(halves.size - 1, 1):
-        return None
-    if 2.0 * half < COARSEST * trace.spacing:
+    if regular < max(halves.size - 1, 1) or 2.0 * half < COARSEST * trace.spacing:
         return None
     # the last may be a part of the return
     even = crossings[: min(regular + 1, max(crossings.size - 1, 2))]
     half, first = np.polynomial.Polynomial.fit(np.arange(even.size), even, 1).convert().coef[::-1]
     sign = 1.0 if trace.values[after[0]] > 0.0 else -1.0
-    tone = _Tone(sign * trace.peak, 0.0, 0.0, float(np.pi / half), float(first), 0.0)
-    return tone, float(even[-1])
-
-
-def _fitted(trace: _Trace, guess: _Tone, first: int, last: int) -> _Tone:
-    """Least-squares sine of four parameters through samples `first` to before `last`.
-
-    Gauss-Newton from a guess whose phase is right to a small part of a turn over the whole record,
-    as IEEE Std 1057 does it.
-    """
-    time, values = trace.time[first:last], trace.values[first:last]
-    origin = float(0.5 * (time[0] + time[-1]))
-    omega = guess.omega
-    # carried along to where it hardly correlates with the frequency
-    phase = omega * (origin - guess.crossing)
-    sine, cosine = guess.amplitude * np.cos(phase), guess.amplitude * np.sin(phase)
-    mean, since = guess.mean, time - origin
-    design = np.ones((time.size, 4))
-    for _ in range(6):
-        s, c = np.sin(omega * since), np.cos(omega * since)
-        design[:, 0], design[:, 1] = s, c
-        design[:, 3] = since * (sine * c - cosine * s)
-        normal = design.T @ design
-        # a minimum-norm solution where few samples leave a direction open
-        sine, cosine, mean, step = np.linalg.lstsq(normal, design.T @ values)[0]
-        omega += float(np.clip(step, -0.1 * omega, 0.1 * omega))
-        if abs(step) < 1e-12 * omega:
-            break
-    error = trace.noise * float(np.sqrt(np.linalg.pinv(normal)[3, 3]))
-    return _Tone(float(sine), float(cosine), float(mean), float(omega), origin, error)
-
-
-def _start(trace: _Trace, tone: _Tone, departs: int) -> float:
-    """Where it begins: at the crossing before it is seen, or elsewhere where it is seen. [s]"""
-    seen = float(trace.time[departs])
-    if departs == 0:
-        return seen
-    half = np.pi / tone.omega
-    # so long it takes from the crossing to the tolerance
-    hidden = np.arcsin(min(trace.tolerance / tone.amplitude, 1.0)) / tone.omega
-    crossing = tone.crossing + half * round((seen - hidden - tone.crossing) / half)
-    if abs(crossing - (seen - hidden)) > 0.1 * half + trace.spacing or crossing > seen:
-        return seen
-    return max(float(crossing), float(trace.time[0]))
+    return [sign * trace.peak, float(first), 0.0, float(np.pi / half)], float(even[-1])

@@ -28,15 +28,6 @@ Stamps of an even logger are off by what their printing rounds away: 1/512 s in 
 """
 
 
-class Stamps(NamedTuple):
-    """Stamps, and how far they are apart if that is the same throughout."""
-
-    time: Array
-    """Stamps; where they are even, those of the even grid. [s]"""
-    period: float | None
-    """Sample period, None for uneven stamps. [s]"""
-
-
 class StampStatistics(NamedTuple):
     """What the stamps of a record are like."""
 
@@ -76,8 +67,8 @@ def increasing(time: ArrayLike) -> Array:
     return stamps
 
 
-def stamps_of(time: ArrayLike) -> Stamps:
-    """Check two stamps [s] or more; those that are even but for their rounding go onto their grid.
+def stamps_of(time: ArrayLike) -> tuple[Array, float | None]:
+    """Increasing stamps and their period [s]; even ones go onto their grid, uneven ones have None.
 
     Raises
     ------
@@ -88,28 +79,20 @@ def stamps_of(time: ArrayLike) -> Stamps:
     period = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
     grid = stamps[0] + period * np.arange(stamps.size)
     if np.max(np.abs(stamps - grid)) > TOLERANCE * period:
-        return Stamps(stamps, None)
-    return Stamps(grid, period)
+        return stamps, None
+    return grid, period
 
 
-def stamp_statistics(time: ArrayLike) -> StampStatistics:
-    """Rate, jitter and gaps of two stamps [s] or more.
-
-    Raises
-    ------
-    InputError
-        As `increasing`.
-    """
-    stamps = increasing(time)
+def stamp_statistics(stamps: Array) -> StampStatistics:
+    """Rate, jitter and gaps of two increasing stamps [s] or more."""
     intervals = np.diff(stamps)
     median = float(np.median(intervals))
     wide = intervals > GAP * median
-    usual = intervals[~wide]
     return StampStatistics(
         rows=stamps.size,
         rate=1.0 / median,
         period=median,
-        jitter=float(np.sqrt(np.mean((usual - median) ** 2))),
+        jitter=float(np.sqrt(np.mean((intervals[~wide] - median) ** 2))),
         longest=float(intervals.max()),
         gaps=np.flatnonzero(wide) + 1,
         missing=int(np.sum(np.round(intervals[wide] / median) - 1.0)),
@@ -242,7 +225,7 @@ def interpolate_counts(time: ArrayLike, counts: ArrayLike) -> Array:
     Parameters
     ----------
     time : array_like, shape (n,)
-        Stamps, even or not. [s]
+        Increasing stamps, even or not. [s]
     counts : array_like, shape (n,)
         Position without roll-overs, either direction. [count]
 
@@ -250,51 +233,30 @@ def interpolate_counts(time: ArrayLike, counts: ArrayLike) -> Array:
     -------
     array, shape (n,)
         Position on straight lines from each row at which the count changed to the next such row.
-        The first row counts as one: up to the first change the line starts there, because a step
-        of a whole count within one sample would be a spike of speed. From the last change on the
-        count is held. [count]
-
-    Raises
-    ------
-    InputError
-        If the stamps do not increase or a number is not finite.
+        The first row counts as one: a step of a whole count within one sample would be a spike of
+        speed. From the last change on the count is held. [count]
 
     Notes
     -----
-    Kruse (2001), section 7.2. Two properties of it stay: a line knows a change before it happens,
-    so it is no causal filter; and the row of a change carries its new count in both directions, so
-    that a reversal, whose two changes pass the same edge, moves the position by one count.
+    Kruse (2001), section 7.2. A line knows a change before it happens, so it is no causal filter;
+    and the row of a change carries its new count in both directions, so that a reversal, whose two
+    changes pass the same edge, moves the position by one count.
     """
-    stamps = increasing(time)
-    edges = signal("counts", counts, stamps.size)
+    stamps, edges = np.asarray(time, np.float64), np.asarray(counts, np.float64)
     knots = np.concatenate([[0], np.flatnonzero(edges[1:] != edges[:-1]) + 1])
     filled: Array = np.interp(stamps, stamps[knots], edges[knots])
     return filled
 
 
-def find_lost_counts(time: ArrayLike, counts: ArrayLike) -> Rows:
+def find_lost_counts(time: Array, counts: Array) -> Rows:
     """Rows at which the count changed faster than the shaft can turn.
 
-    Rows that jumps lead to: faster than 1.5 times the greatest speed that lasts (the median over
-    five neighbouring intervals, which isolated jumps do not reach), one count of rounding granted.
-    A loss that is no larger than the motion within a sample is not seen.
-
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        Stamps, even or not, six or more. [s]
-    counts : array_like, shape (n,)
-        Position without roll-overs. [count]
-
-    Raises
-    ------
-    InputError
-        If the stamps do not increase, a number is not finite, or the record is too short.
+    Of six or more stamps [s] and positions without roll-overs [count]: faster than 1.5 times the
+    greatest speed that lasts (the median over five neighbouring intervals, which isolated jumps do
+    not reach), one count of rounding granted. A loss that is no larger than the motion within a
+    sample is not seen.
     """
-    stamps = increasing(time)
-    steps, intervals = np.diff(signal("counts", counts, stamps.size)), np.diff(stamps)
-    if steps.size < SUSTAINED:
-        raise InputError(f"A record of {stamps.size} rows is too short to find lost counts.")
+    steps, intervals = np.diff(counts), np.diff(time)
     limit = MARGIN * _lasting(steps, intervals)
     return np.flatnonzero(np.abs(steps) > limit * intervals + 1.0) + 1
 

@@ -133,10 +133,17 @@ def applying(windows: Iterable[AnyWindow], maneuver: str) -> tuple[AnyWindow, ..
     )
 
 
+def ends(window: Window) -> tuple[float, float]:
+    """First and last instant of a window, infinite where it has none. [s]"""
+    return (
+        -np.inf if window.start is None else window.start,
+        np.inf if window.stop is None else window.stop,
+    )
+
+
 def inside(window: Window, time: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(m,) whether stamps [s] lie in a window, its ends included."""
-    low = -np.inf if window.start is None else window.start
-    high = np.inf if window.stop is None else window.stop
+    low, high = ends(window)
     within: NDArray[np.bool_] = (time >= low) & (time <= high)
     return within
 

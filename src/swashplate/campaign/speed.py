@@ -67,7 +67,7 @@ def speed_of(channel: Channel, method: Method = "exact") -> Speed:
     angle = channel.values
     if encoder is not None and channel.counts is not None:
         # on a grid where the stamps are even, so that their rounding stays out of the speed
-        even = stamps_of(time).time
+        even, _ = stamps_of(time)
         angle = interpolate_counts(even, channel.counts) * encoder.angle_per_count
     return Speed(time, speed_from_angle(time, angle), 1.0 / LOW_PASS + 1.0 / DIFFERENTIATOR)
 
@@ -99,11 +99,9 @@ def speed_from_angle(time: ArrayLike, angle: ArrayLike) -> Array:
     it makes a staircase, which the differentiator amplifies by bh/(1 - exp(-bh)), 20 % too much at
     512 Hz.
     """
-    stamps = stamps_of(time)
-    position = signal("angle", angle, stamps.time.size)
-    intervals = np.diff(stamps.time)
-    if stamps.period is not None:
-        intervals = np.full(stamps.time.size - 1, stamps.period)
+    stamps, period = stamps_of(time)
+    position = signal("angle", angle, stamps.size)
+    intervals = np.diff(stamps) if period is None else np.full(stamps.size - 1, period)
     first, second = np.exp(-LOW_PASS * intervals), np.exp(-DIFFERENTIATOR * intervals)
     # what the first low pass has at the start of an interval leaves in the second at its end
     from_state = DIFFERENTIATOR / (DIFFERENTIATOR - LOW_PASS) * (first - second)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from swashplate.cli.options import (
     AxisName,
@@ -13,12 +13,9 @@ from swashplate.cli.options import (
     SetupWord,
     StartWord,
     TableFile,
-    argument,
-    option,
 )
 from swashplate.cli.terminal import Outputs, note, say, show, working
 from swashplate.cli.words import (
-    assigned,
     campaign_of,
     configuration_of,
     file_kind,
@@ -30,9 +27,7 @@ from swashplate.errors import InputError
 from swashplate.tables import TABLE, joined
 
 if TYPE_CHECKING:
-    from swashplate.campaign import ChannelKind
     from swashplate.identification.experiment_design import Bench, Sensor
-    from swashplate.parameters.parameter_set import ParameterSet
 
 LEGEND = (
     "Under 'runs', one letter a run: # gives 20 % or more of the information, + gives less, . "
@@ -95,34 +90,15 @@ def excitation(
 
 
 def advise(
-    word: Annotated[
-        str,
-        argument(
-            "CAMPAIGN.toml|AXIS|SET.toml", "Tests made so far; or only a drive, for a fresh plan."
-        ),
-    ],
-    drive: Annotated[
-        str | None,
-        option("The fitted drive: noise is then that of its residuals.", metavar="SET.toml"),
-    ] = None,
+    word: str,
+    *,
+    drive: str | None = None,
     axis: AxisName = None,
     setup: SetupWord = None,
-    free: Annotated[
-        list[str] | None,
-        option("A further parameter to determine, such as Z9. May be repeated.", metavar="SYMBOL"),
-    ] = None,
-    maneuver: Annotated[
-        list[str] | None,
-        option("A test to judge instead of the usual ones. May be repeated.", metavar="MANEUVER"),
-    ] = None,
-    noise: Annotated[
-        list[str] | None,
-        option(
-            "Standard deviation of a sensor, with its unit. May be repeated.", metavar="KIND=VALUE"
-        ),
-    ] = None,
-    top: Annotated[int, option("Tests to list.", min=1)] = 10,
-    tests: Annotated[int, option("Tests in the plan.", min=0)] = 4,
+    free: list[str] | None = None,
+    maneuver: list[str] | None = None,
+    top: int = 10,
+    tests: int = 4,
     out: TableFile = None,
 ) -> None:
     """Recommend the test that determines each parameter best.
@@ -131,11 +107,19 @@ def advise(
     the drive's present values. Errors are standard errors from noise alone; a
     drive that differs from its model is known less well.
 
+    Options:
+      word CAMPAIGN.toml|AXIS|SET.toml: Tests made so far; or only a drive, for a fresh plan.
+      drive SET.toml: The fitted drive: noise is then that of its residuals.
+      free SYMBOL: A further parameter to determine, such as Z9. May be repeated.
+      maneuver MANEUVER: A test to judge instead of the usual ones. May be repeated.
+      top: Tests to list.
+      tests: Tests in the plan.
+
     For example:
       swashplate advise hoist                                      a fresh plan
       swashplate advise harbour/campaign.toml --drive fitted/drive.toml
       swashplate advise harbour/campaign.toml --maneuver step:-9 --top 1
-      swashplate advise hoist --free Z9 --noise stroker_pressure=0.2bar
+      swashplate advise hoist --free Z9
     """
     from swashplate.drive import Drive
     from swashplate.identification import tables
@@ -148,7 +132,7 @@ def advise(
 
     files = Outputs((out, TABLE))
     with working("Judging tests"):
-        bench = _bench(word, drive, axis, setup, free or [], noise or [])
+        bench = _bench(word, drive, axis, setup, free or [])
         machine = Drive(bench.parameters)
         named = [maneuver_of(each, machine) for each in maneuver or []] or default_maneuvers()
         trials = list({each.name: each for each in named}.values())
@@ -190,9 +174,9 @@ def _bench(
     axis: str | None,
     setup: str | None,
     free: Sequence[str],
-    noise: Sequence[str],
 ) -> Bench:
-    from swashplate.identification.experiment_design import bench
+    from swashplate.drive import Drive
+    from swashplate.identification.experiment_design import bench, default_sensors
     from swashplate.identification.fitting import smooth
     from swashplate.identification.setup import load_setup
     from swashplate.identification.staging import setup_of
@@ -202,39 +186,10 @@ def _bench(
             raise InputError("--axis belongs to a campaign; a drive is one axis.")
         parameters = parameters_of(drive or word)
         plan = load_setup(configuration_of(word, setup, parameters.name))
-        return bench(smooth(parameters), plan, free=free, sensors=_noises(noise, fresh=parameters))
+        usual = default_sensors(Drive(parameters))
+        return bench(smooth(parameters), plan, free=free, sensors=usual)
     campaign, chosen = campaign_of(Path(word), axis)
     plan = setup_of(campaign, chosen, setup)
     runs = runs_to_fit(campaign, chosen)
     parameters = parameters_of(drive) if drive else campaign.drive(chosen).parameters
-    kinds = {channel.kind for each in runs for channel in each.channels.values()}
-    own = [each for each in _noises(noise) if each.kind in kinds]
-    return bench(smooth(parameters), plan, runs, fitted=drive is not None, free=free, sensors=own)
-
-
-def _kind(word: str) -> ChannelKind:
-    from swashplate.identification.drive_model import SIGNALS
-
-    for kind in SIGNALS:
-        if word == kind:
-            return kind
-    raise InputError(f"There is no sensor '{word}'; there are {', '.join(SIGNALS)}.")
-
-
-def _noises(words: Sequence[str], fresh: ParameterSet | None = None) -> list[Sensor]:
-    """Sensors of stated noise; for a fresh plan the usual ones with what is stated put in."""
-    from swashplate.campaign import KINDS
-    from swashplate.drive import Drive
-    from swashplate.identification.experiment_design import Sensor, default_sensors
-    from swashplate.units import to_si
-
-    def read(name: str, numbers: list[float], unit: str) -> Sensor | None:
-        kind = _kind(name)
-        si = KINDS[kind].units[0]
-        value = to_si(numbers[0], unit or si, si, f"--noise {name}")
-        return Sensor(kind, value) if len(numbers) == 1 and value > 0.0 else None
-
-    made = assigned("--noise", words, "swash_angle=0.1deg, above 0", read)
-    if fresh is None:
-        return list(made.values())
-    return [made.get(each.kind, each) for each in default_sensors(Drive(fresh))]
+    return bench(smooth(parameters), plan, runs, fitted=drive is not None, free=free)

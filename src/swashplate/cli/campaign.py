@@ -16,7 +16,6 @@ from swashplate.cli.options import (
     DriveChoice,
     Seed,
     command,
-    option,
 )
 from swashplate.cli.terminal import (
     FORCED,
@@ -56,43 +55,29 @@ app = typer.Typer(
 
 
 def init(
+    *,
     logs: Annotated[
         list[Path], typer.Argument(metavar="LOGS...", help="The logs, one run of the machine each.")
     ],
-    out: Annotated[
-        Path | None,
-        option("The campaign file; by default campaign.toml beside the first log.", metavar="FILE"),
-    ] = None,
-    drive: Annotated[
-        str | None,
-        option(
-            "A packaged drive or a parameter file that the tests belong to.",
-            metavar="AXIS|SET.toml",
-        ),
-    ] = None,
-    counts_per_turn: Annotated[
-        float | None,
-        option(
-            "Of the encoder, quadrature included; else it is left to be filled in.",
-            metavar="COUNTS",
-        ),
-    ] = None,
-    column: Annotated[
-        list[str] | None,
-        option(
-            "What a column is: time, voltage, shaft_speed or another kind; may be repeated.",
-            metavar="KIND=COLUMN",
-        ),
-    ] = None,
-    unit: Annotated[
-        list[str] | None, option("Unit of a column; may be repeated.", metavar="COLUMN=UNIT")
-    ] = None,
+    out: Path | None = None,
+    drive: str | None = None,
+    counts_per_turn: float | None = None,
+    column: list[str] | None = None,
+    unit: list[str] | None = None,
 ) -> None:
     """Write the first draft of a campaign file from the headers of logs.
 
     What each column is gets guessed from its name and unit, and marked as such;
     what cannot be told says FIXME. Read the file, mend what is wrong, then run
     'swashplate campaign check'.
+
+    Options:
+      out FILE: The campaign file; by default campaign.toml beside the first log.
+      drive AXIS|SET.toml: A packaged drive or a parameter file that the tests belong to.
+      counts_per_turn COUNTS: Of the encoder, quadrature included; else it is left to be filled in.
+      column KIND=COLUMN: What a column is: time, voltage, shaft_speed or another kind; may be
+          repeated.
+      unit COLUMN=UNIT: Unit of a column; may be repeated.
 
     For example:
       swashplate campaign init logs/*.csv --drive hoist
@@ -133,18 +118,16 @@ def _from(folder: Path, drive: str | None) -> str | None:
     return (place.relative_to(root) if place.is_relative_to(root) else place).as_posix()
 
 
-def check(
-    path: CampaignPath = CAMPAIGN,
-    strict: Annotated[
-        bool, option("End with exit code 1 if there are findings.", "--strict")
-    ] = False,
-) -> None:
+def check(path: CampaignPath = CAMPAIGN, *, strict: bool = False) -> None:
     """Check a campaign and the measurements in all its logs.
 
     Each signal's rate, jitter, longest interval, range, clipping and lost
     counts, the maneuver recognised from the voltage, and below the table
     whatever someone should look into: also windows that no run takes, and runs
     that are far from what the axis's drive would do.
+
+    Options:
+      strict: End with exit code 1 if there are findings.
 
     For example:
       swashplate campaign check
@@ -193,27 +176,25 @@ def check(
 
 def plot(
     path: CampaignPath = CAMPAIGN,
-    out: Annotated[Path, option("The figure: .png, .svg or .pdf.", metavar="FILE")] = Path(
-        "campaign.png"
-    ),
-    run: Annotated[
-        str | None,
-        option("Look at one experiment closely; --channel must be given.", metavar="NAME"),
-    ] = None,
-    channel: Annotated[
-        str | None,
-        option(
-            "The channel: a position with its speed, another against what the axis's drive does.",
-            metavar="NAME",
-        ),
-    ] = None,
-    begin: Annotated[float | None, option("Show from here on.", "--from", metavar="S")] = None,
-    end: Annotated[float | None, option("Show up to here.", "--to", metavar="S")] = None,
+    *,
+    out: Path = Path("campaign.png"),
+    run: str | None = None,
+    channel: str | None = None,
+    begin: float | None = None,
+    end: float | None = None,
 ) -> None:
     """Draw all runs and channels of a campaign, or one channel closely.
 
     The overview is one figure for each axis and eight runs, numbered if there
     are several.
+
+    Options:
+      out FILE: The figure: .png, .svg or .pdf.
+      run NAME: Look at one experiment closely; --channel must be given.
+      channel NAME: The channel: a position with its speed, another against what the axis's drive
+          does.
+      begin --from S: Show from here on.
+      end --to S: Show up to here.
 
     For example:
       swashplate campaign plot harbour/campaign.toml --out overview.png
@@ -287,23 +268,13 @@ command(app, "schema")(schema)
 
 def rig(
     drive: DriveChoice,
-    out: Annotated[Path, option("A new or empty folder for logs and campaign.", metavar="DIR")],
+    *,
+    out: Path,
     seed: Seed = 1,
-    severity: Annotated[
-        Severity,
-        option("The instruments: perfect, as in a good campaign, or with everything wrong."),
-    ] = "realistic",
-    backlash_deg: Annotated[float, option("Play between shaft and encoder.", metavar="DEG")] = 0.0,
-    perturb: Annotated[
-        float, option("Draw all true parameters, fixed ones too, within this share: 0.1.")
-    ] = 0.0,
-    maneuver: Annotated[
-        list[str] | None,
-        option(
-            "A test instead of those of Kruse (2001), such as step:4. May be repeated.",
-            metavar="MANEUVER",
-        ),
-    ] = None,
+    severity: Severity = "realistic",
+    backlash_deg: float = 0.0,
+    perturb: float = 0.0,
+    maneuver: list[str] | None = None,
 ) -> None:
     """Write a virtual test campaign: logs, campaign.toml and, apart, the truth.
 
@@ -312,6 +283,13 @@ def rig(
     drive that is simulated, not the one that a fit starts from. Fit it as you
     would your machine's logs, then look into truth/. Every file says that it is
     virtual.
+
+    Options:
+      out DIR: A new or empty folder for logs and campaign.
+      severity: The instruments: perfect, as in a good campaign, or with everything wrong.
+      backlash_deg DEG: Play between shaft and encoder.
+      perturb: Draw all true parameters, fixed ones too, within this share: 0.1.
+      maneuver MANEUVER: A test instead of those of Kruse (2001), such as step:4. May be repeated.
 
     For example:
       swashplate rig hoist --out virtual-hoist
@@ -348,19 +326,15 @@ def rig(
     note(f"Truth:    {path.parent / 'truth'} (open it only after the fit)")
 
 
-def guess(
-    path: CampaignPath = CAMPAIGN,
-    axis: AxisName = None,
-    out: Annotated[
-        Path | None,
-        option("Folder for start.toml and setup.toml; by default the campaign's.", metavar="DIR"),
-    ] = None,
-) -> None:
+def guess(path: CampaignPath = CAMPAIGN, *, axis: AxisName = None, out: Path | None = None) -> None:
     """Read a machine's dead zones, gains, limits, delay and lag off its logs.
 
     For a machine of unknown numbers: needs the command and a speed or a position,
     no current. Writes a drive to start a fit from, start.toml, and what the fit
     is to change within which bounds, setup.toml.
+
+    Options:
+      out DIR: Folder for start.toml and setup.toml; by default the campaign's.
 
     For example:
       swashplate campaign init logs/*.csv --drive neutral

@@ -99,6 +99,7 @@ def export(
                 files.write(
                     wasm, "WebAssembly", lambda path: exporting.wasm(chosen, path, step=own)
                 )
+    drive.warn()
     for line in drive.changes:
         note(line)
     files.say()
@@ -153,6 +154,7 @@ def live(
         else:
             command = maneuver_of(maneuver or "", drive.chosen)
             said = write_live_page(drive.chosen, out, command=command, name=name)
+    drive.warn()
     for sentence in (*drive.changes, *said):
         note(sentence)
     note(f"Page: {out} ({out.stat().st_size / 1e3:.0f} kB)")

@@ -17,11 +17,10 @@ from swashplate.cli.options import (
     Seed,
     SetupWord,
     StartWord,
-    argument,
     option,
 )
 from swashplate.cli.terminal import (
-    Shown,
+    Outputs,
     bullets,
     check_free,
     long_work,
@@ -29,7 +28,6 @@ from swashplate.cli.terminal import (
     say,
     show,
     side,
-    waiting,
     working,
 )
 from swashplate.cli.words import (
@@ -46,8 +44,6 @@ from swashplate.tables import (
     TABLE,
     Form,
     check_folder,
-    check_place,
-    ending,
     joined,
     made_folder,
     write_text,
@@ -55,9 +51,7 @@ from swashplate.tables import (
 
 if TYPE_CHECKING:
     from swashplate.campaign import Campaign
-    from swashplate.drive import Drive
     from swashplate.identification.assessment import Judged
-    from swashplate.identification.fitting import Search
     from swashplate.identification.solving import Progress, StartResult
     from swashplate.identification.staging import Parameters
     from swashplate.identification.validation import RunQuality
@@ -84,50 +78,29 @@ RESIDUALS = (
 Loss = Literal["linear", "soft_l1", "huber", "cauchy", "arctan"]
 Role = Literal["validate", "fit", "all"]
 CAMPAIGN = Path("campaign.toml")
-PrintedReport = Annotated[
-    Path | None, option("Print the report to this PDF as well, by Chromium.", metavar="FILE")
-]
 
 
 def fit(
     path: CampaignPath = CAMPAIGN,
-    out: Annotated[
-        Path, option("Folder for the fitted drive and its tables.", metavar="DIR")
-    ] = Path("fitted"),
+    *,
+    out: Path = Path("fitted"),
     axis: AxisName = None,
     setup: SetupWord = None,
     model: OwnModel = None,
-    joint: Annotated[
-        bool,
-        option("After the stages, estimate all parameters at once, through the chain.", "--joint"),
-    ] = False,
+    joint: bool = False,
     begin: StartWord = None,
-    starts: Annotated[int, option("More starts, spread over the bounds.", min=0)] = 0,
-    evaluations: Annotated[
-        int, option("Evaluations of the model that a search may take.", min=1)
-    ] = MOST_EVALUATIONS,
-    folds: Annotated[
-        int, option("Cross-validate over so many parts of the runs; 0 = off.", min=0)
-    ] = 0,
-    bootstrap: Annotated[int, option("Fit again to so many draws of the noise.", min=0)] = 0,
-    profile: Annotated[
-        list[str] | None,
-        option("Profile the cost along this parameter, or 'all'; may be repeated.", metavar="NAME"),
-    ] = None,
+    starts: int = 0,
+    evaluations: int = MOST_EVALUATIONS,
+    folds: int = 0,
+    bootstrap: int = 0,
+    profile: list[str] | None = None,
     seed: Seed = 0,
-    jobs: Annotated[int, option("Processes for all of these; 0 = all cores.", min=0)] = 0,
-    dask: Annotated[
-        str | None, option("Run them on the cluster of this scheduler.", metavar="ADDRESS")
-    ] = None,
-    resume: Annotated[
-        bool, option("Continue a search: keep the starts that DIR holds already.", "--resume")
-    ] = False,
-    loss: Annotated[
-        Loss, option("Robust loss functions reduce the weight of outliers.")
-    ] = "linear",
+    jobs: int = 0,
+    dask: str | None = None,
+    resume: bool = False,
+    loss: Loss = "linear",
     require: Required = 10.0,
     report: Annotated[bool, option("Write report.html, one file that works offline.")] = True,
-    pdf: PrintedReport = None,
 ) -> None:
     """Identify a drive, or a model of your own, from its tests.
 
@@ -137,6 +110,19 @@ def fit(
     with their intervals, and what 'report' needs to write the report again.
     Ctrl-C keeps the best so far, of several starts those that ended, and the exit
     code is 130. It is 1 if the result is not usable.
+
+    Options:
+      out DIR: Folder for the fitted drive and its tables.
+      joint: After the stages, estimate all parameters at once, through the whole drive.
+      starts: More starts, spread over the bounds.
+      evaluations: Evaluations of the model that a search may take.
+      folds: Cross-validate over so many parts of the runs; 0 = off.
+      bootstrap: Fit again to so many draws of the noise.
+      profile NAME: Profile the cost along this parameter, or 'all'; may be repeated.
+      jobs: Processes for all of these; 0 = all cores.
+      dask ADDRESS: Run them on the cluster of this scheduler.
+      resume: Continue a search: keep the starts that DIR holds already.
+      loss: Robust loss functions reduce the weight of outliers.
 
     For example:
       swashplate rig hoist --out virtual --perturb 0.1
@@ -156,16 +142,14 @@ def fit(
         made = [DRIVE, CONFIGURATION, NUMBERS, "estimates.csv", STORED]
         made += ["report.html"] if report else []
         check_free(*(out / each for each in made))
-    _check_printed(report, pdf)
     if model is not None and (setup is not None or begin is not None or joint):
         raise InputError(f"{model} says what is free and where it begins: leave out the others.")
     with working("Starting"):
         from swashplate.executors import Dask, Processes
         from swashplate.identification.assessment import Wanted, judge_fit
+        from swashplate.identification.fitting import Search, refined
         from swashplate.identification.fitting import fit as fitted
-        from swashplate.identification.fitting import refined
         from swashplate.identification.setup import ModelSetup
-        from swashplate.identification.solving import longest_left
         from swashplate.identification.staging import setup_of
     with working(f"Reading {path}"):
         campaign, chosen = campaign_of(path, axis)
@@ -183,12 +167,13 @@ def fit(
     with long_work("Fitting") as shown:
 
         def watch(stage: str, now: Progress) -> None:
-            shown(
-                f"{stage}: iteration {now.iteration}, cost {now.cost:.6g}",
-                left=waiting(longest_left(now), "at most"),
-            )
+            shown(f"{stage}: iteration {now.iteration}, cost {now.cost:.6g}")
 
-        search = _search(starts, seed, executor, out, resume, shown) if starts else None
+        def ended(stage: str, one: StartResult, done: int) -> None:
+            words = f"{stage}: {done} of {starts + 1} starts, the last to cost {one.cost:.6g}"
+            shown(words, done / (starts + 1))
+
+        search = Search(starts, seed, executor, out / "starts", resume, ended) if starts else None
         result = fitted(
             nominal,
             runs,
@@ -214,7 +199,7 @@ def fit(
         verdict = found.verdict
     judged = perf_counter()
     lines = _written(found, out)
-    lines += _shown(found, out, report=report, pdf=pdf)
+    lines += [_reported(found, out)] if report else []
     virtual = " (virtual)" if campaign.virtual else ""
     note(f"{campaign.title}{virtual}: {_spent(begun, searched, judged)}")
     _say_fit(found)
@@ -232,29 +217,6 @@ def _spent(begun: float, searched: float, judged: float) -> str:
         f"searched for {searched - begun:.2f} s, judged for {judged - searched:.2f} s, wrote for "
         f"{perf_counter() - judged:.2f} s"
     )
-
-
-def _search(
-    starts: int, seed: int, executor: object, out: Path, resume: bool, shown: Shown
-) -> Search:
-    from swashplate.executors import Dask, Processes
-    from swashplate.identification.fitting import Search
-    from swashplate.identification.solving import time_left
-
-    assert isinstance(executor, Processes | Dask)
-    begun: dict[str, tuple[float, int]] = {}
-
-    def watch(stage: str, result: StartResult, done: int) -> None:
-        # results of an earlier run come all at once: the pace counts from the first new one
-        first, kept = begun.setdefault(stage, (perf_counter(), done))
-        left = time_left(done - kept, starts + 1 - done, perf_counter() - first)
-        shown(
-            f"{stage}: {done} of {starts + 1} starts, the last to cost {result.cost:.6g}",
-            done / (starts + 1),
-            waiting(left),
-        )
-
-    return Search(starts, seed, executor, out / "starts", resume, watch)
 
 
 def _say_fit(found: Judged) -> None:
@@ -321,51 +283,13 @@ def _written(found: Judged, out: Path) -> list[str]:
     return [*lines, f"Estimates: {out / 'estimates.csv'}", f"Fit:       {out / STORED}"]
 
 
-def _shown(
-    found: Judged,
-    out: Path,
-    *,
-    report: bool = True,
-    pdf: Path | None = None,
-    truth: ParameterSet | None = None,
-) -> list[str]:
-    """Write the report, and print it; lines that say so."""
-    from swashplate.report.fit_report import print_report, write_fit_report
+def _reported(found: Judged, out: Path, truth: ParameterSet | None = None) -> str:
+    """Write the report; a line that says so."""
+    from swashplate.report.fit_report import write_fit_report
 
-    what, lines = (found.result, found.campaign), []
-    if report:
-        with working("Writing the report"):
-            write_fit_report(
-                *what,
-                out / "report.html",
-                profiles=found.profiles,
-                folds=found.folds,
-                truth=truth,
-                judged=found.verdict,
-                notes=found.notes,
-                assessments=found.assessments,
-                validation=found.predicted,
-            )
-        lines.append(f"Report:    {out / 'report.html'}")
-    if pdf is not None:
-        with working("Printing the report"):
-            print_report(out / "report.html", pdf)
-        lines.append(f"Printed:   {pdf}")
-    return lines
-
-
-def _check_printed(report: bool, pdf: Path | None) -> None:
-    """See to it, before long work, that a printed report can be written."""
-    if pdf is None:
-        return
-    from swashplate.report.fit_report import find_browser
-
-    if not report:
-        raise InputError("--pdf prints the report: leave out --no-report.")
-    ending(pdf, Form("a printed report", (".pdf",)))
-    check_place(pdf)
-    check_free(pdf)
-    find_browser()
+    with working("Writing the report"):
+        write_fit_report(found, out / "report.html", truth=truth)
+    return f"Report:    {out / 'report.html'}"
 
 
 def _say_verdict(verdict: Verdict) -> None:
@@ -392,25 +316,24 @@ def _say_verdict(verdict: Verdict) -> None:
 
 
 def validate(
-    drive: Annotated[
-        str,
-        argument(
-            "SET.toml", "The drive: a parameter file, the folder of a fit, or a packaged one."
-        ),
-    ],
+    drive: str,
     path: CampaignPath = CAMPAIGN,
+    *,
     axis: AxisName = None,
     model: OwnModel = None,
-    role: Annotated[Role, option("Runs that were held out, those to fit, or both.")] = "validate",
-    out: Annotated[
-        Path | None, option("Folder for report.html and measures.csv.", metavar="DIR")
-    ] = None,
+    role: Role = "validate",
+    out: Path | None = None,
     require: Required = 10.0,
 ) -> None:
     """Predict runs from their command alone and judge the drive by them.
 
     Prints errors run by run, what is left in the residuals, and a verdict. The
     exit code is 1 if the drive is not usable for these runs.
+
+    Options:
+      drive SET.toml: The drive: a parameter file, the folder of a fit, or a packaged one.
+      role: Runs that were held out, those to fit, or both.
+      out DIR: Folder for report.html and measures.csv.
 
     For example:
       swashplate validate fitted/drive.toml virtual/campaign.toml
@@ -482,34 +405,25 @@ def _validation_written(
 
 
 def report(
-    fitted: Annotated[Path, argument("FITTED", "The folder that 'fit' wrote, or its drive.toml.")],
+    fitted: Path,
     path: CampaignPath = CAMPAIGN,
+    *,
     model: OwnModel = None,
-    out: Annotated[
-        Path | None,
-        option("Folder for report.html; by default where the fit is.", metavar="DIR"),
-    ] = None,
-    pdf: PrintedReport = None,
-    data: Annotated[
-        Path | None,
-        option(
-            "Write all samples, measured and simulated, as one table: .csv or .parquet.",
-            metavar="FILE",
-        ),
-    ] = None,
-    truth: Annotated[
-        str | None,
-        option(
-            "Of virtual tests: the folder or parameter file of what was simulated, to stand "
-            "beside the estimates.",
-            metavar="TRUTH",
-        ),
-    ] = None,
+    pdf: Path | None = None,
+    data: Path | None = None,
+    truth: str | None = None,
 ) -> None:
     """Write the report of a fit again, from what the fit stored.
 
     Nothing is fitted. The campaign must be the one that was fitted: if its
     samples, weights or ignored windows have changed, the report is refused.
+
+    Options:
+      fitted FITTED: The folder that 'fit' wrote, or its drive.toml.
+      pdf FILE: Print the report to this PDF as well, by Chromium.
+      data FILE: Write all samples, measured and simulated, as one table: .csv or .parquet.
+      truth TRUTH: Of virtual tests: the folder or parameter file of what was simulated, to stand
+          beside the estimates.
 
     For example:
       swashplate fit virtual/campaign.toml --out fitted
@@ -517,16 +431,12 @@ def report(
       swashplate report fitted virtual/campaign.toml --pdf report.pdf
     """
     from swashplate.campaign import Campaign
-    from swashplate.report.fit_report import shown_runs, write_samples
+    from swashplate.report.fit_report import find_browser, print_report, shown_runs, write_samples
 
-    if data is not None:
-        ending(data, TABLE)
-        check_place(data)
-        check_free(data)
+    files = Outputs((data, TABLE), (pdf, Form("a printed report", (".pdf",))))
+    if pdf is not None:
+        find_browser()
     folder = fitted if fitted.is_dir() else fitted.parent
-    if out is not None and out != folder:  # the fit's own report is written again
-        check_free(out / "report.html")
-    _check_printed(True, pdf)
     with working(f"Reading {path}"):
         if not (folder / STORED).is_file():
             raise InputError(
@@ -540,12 +450,11 @@ def report(
         found = _stored(fitted, folder / STORED, campaign, model)
     with working("Judging"):
         verdict = found.verdict
-    place = made_folder(out or folder)
-    for line in _shown(found, place, pdf=pdf, truth=true):
-        note(line)
-    if data is not None:
-        write_samples(shown_runs(found.assessments, found.predicted), data)
-        note(f"Samples:   {data}")
+    note(_reported(found, folder, true))
+    files.write(pdf, "Printed", lambda to: print_report(folder / "report.html", to))
+    runs = shown_runs(found.assessments, found.predicted)
+    files.write(data, "Samples, in SI", lambda to: write_samples(runs, to))
+    files.say()
     say(verdict.headline)
 
 
@@ -567,18 +476,16 @@ def _stored(fitted: Path, place: Path, campaign: Campaign, model: Path | None) -
     return stored
 
 
-def demo(
-    out: Annotated[Path, option("Folder for logs, drive and report.", metavar="FOLDER")] = Path(
-        "demo"
-    ),
-    seed: Seed = 1,
-) -> None:
+def demo(*, out: Path = Path("demo"), seed: Seed = 1) -> None:
     """Identify a virtual hoist from its tests, and compare it with the truth.
 
     Draws a hoist that differs from the published one, logs the 13 tests of
     Kruse (2001) through a 12-bit command, an ammeter and an encoder, fits card,
     pump and motor to ten of them, predicts the other three and writes a report.
     Takes less than a minute. An earlier demo is replaced.
+
+    Options:
+      out FOLDER: Folder for logs, drive and report.
 
     For example:
       swashplate demo
@@ -614,8 +521,8 @@ def demo(
         judged = perf_counter()
         tables = [estimates_table(each, truth=truth.parameters) for each in found.assessments]
         begin("writing the report")
-        lines = [*_written(found, out), *_shown(found, out, truth=truth.parameters)]
-        lines.append(_result_drawn(found, truth, out))
+        lines = [*_written(found, out), _reported(found, out, truth.parameters)]
+        lines.append(_result_drawn(found, out))
         spent = _spent(begun, searched, judged)
     note(f"Campaign:  {path}")
     show(*tables)
@@ -630,21 +537,15 @@ def demo(
         note(line)
 
 
-def _result_drawn(found: Judged, truth: Drive, out: Path) -> str:
-    """Draw a predicted run and the estimates beside the truth; a line that says so."""
-    from swashplate.identification.identifiability import true_values
+def _result_drawn(found: Judged, out: Path) -> str:
+    """Draw a predicted run beside what was measured; a line that says so."""
     from swashplate.identification.validation import with_speeds
-    from swashplate.report.figures import plot_fit, save_figure
+    from swashplate.report.figures import plot_channel, save_figure
 
-    speeds = [
-        each
-        for each in with_speeds(found.predicted)
-        if each.experiment[each.channel].kind == "shaft_speed"
-    ]
-    values = {
-        name: value
-        for each in found.assessments
-        for name, value in true_values(each.stage, truth.parameters).items()
-    }
-    save_figure(plot_fit(speeds[-1], found.assessments, values), out / "result.png")
+    judged = [(each, each.experiment[each.channel]) for each in with_speeds(found.predicted)]
+    run, channel = [pair for pair in judged if pair[1].kind == "shaft_speed"][-1]
+    title = f"{run.experiment.run}: held out, predicted from the voltage"
+    if run.measures.fit_percent is not None:
+        title += f", fit {run.measures.fit_percent:.1f} %"
+    save_figure(plot_channel(channel, run.simulated, title=title), out / "result.png")
     return f"Figure:    {out / 'result.png'}"

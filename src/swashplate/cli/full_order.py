@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 from swashplate.cli.options import (
     DriveChoice,
     FigureFile,
     Simulating,
     TableFile,
-    argument,
-    option,
 )
 from swashplate.cli.terminal import Outputs, long_work, note, say, show, working
 from swashplate.cli.words import physical_values, simulated
@@ -20,32 +16,12 @@ from swashplate.tables import FIGURE, TABLE
 
 def full_order(
     drive: DriveChoice,
-    command: Annotated[
-        str | None,
-        argument(
-            "MANEUVER|FILE",
-            "A maneuver or a log, as in 'swashplate simulate'. Without one, a table of maneuvers.",
-        ),
-    ] = None,
-    like: Annotated[
-        str | None,
-        option(
-            "Packaged axis whose assumed physical values count; by default the drive's own, or "
-            "else hoist.",
-            metavar="AXIS",
-        ),
-    ] = None,
-    physical: Annotated[
-        list[str] | None,
-        option(
-            "Another physical value: oil_volume=1e-4 in SI, oil_volume=100cm^3 with a unit. May be "
-            "repeated.",
-            metavar="NAME=VALUE",
-        ),
-    ] = None,
+    command: str | None = None,
+    *,
+    like: str | None = None,
+    physical: list[str] | None = None,
     out: TableFile = None,
     plot: FigureFile = None,
-    *,
     sampling: Simulating,
 ) -> None:
     """Check whether one state is enough for a drive and a command.
@@ -54,6 +30,14 @@ def full_order(
     physical values are completed from the drive's parameters and from assumed
     ones. Prints these, the modes, and by how much the speed of the one-state
     model differs. What is assumed can be replaced by what you know.
+
+    Options:
+      command MANEUVER|FILE: A maneuver or a log, as in 'swashplate simulate'. Without one, a table
+          of maneuvers.
+      like AXIS: Packaged axis whose assumed physical values count; by default the drive's own, or
+          else hoist.
+      physical NAME=VALUE: Another physical value: oil_volume=1e-4 in SI, oil_volume=100cm^3 with a
+          unit. May be repeated.
 
     For example:
       swashplate full-order hoist

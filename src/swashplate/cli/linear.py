@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import degrees, radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
-from swashplate.cli.options import DriveChoice, FigureFile, Interpolation, TableFile, option
+from swashplate.cli.options import DriveChoice, FigureFile, Interpolation, TableFile
 from swashplate.cli.terminal import Outputs, note, show, working
 from swashplate.errors import DomainError, InputError
 from swashplate.tables import FIGURE, TABLE
@@ -23,41 +23,33 @@ Input = Literal["voltage", "current", "solenoid_force"]
 
 def linearize(
     drive: DriveChoice,
-    at: Annotated[float | None, option("Linearise at this constant voltage.", metavar="V")] = None,
-    current: Annotated[
-        float | None, option("Or at this constant signed current.", metavar="A")
-    ] = None,
-    speed_deg_s: Annotated[
-        float | None,
-        option("Or at the voltage that settles at this speed.", "--speed-deg-s", metavar="DEG/S"),
-    ] = None,
-    input: Annotated[
-        Input | None,
-        option("What moves the model; by default the voltage, or the current with --current."),
-    ] = None,
-    sample_time: Annotated[
-        float | None,
-        option("Sample the model, with the recurrences of the simulation.", metavar="S"),
-    ] = None,
-    interpolation: Annotated[
-        Interpolation, option("The input between samples: linear, or zero-order hold.")
-    ] = "linear",
-    loop_gain: Annotated[
-        float | None,
-        option("Print the margins of a proportional speed loop of this gain.", metavar="V/(DEG/S)"),
-    ] = None,
-    frequency: Annotated[
-        float, option("Frequency to print gain and phase at.", metavar="HZ")
-    ] = 0.3,
-    out: Annotated[
-        Path | None, option("Write the model, in SI, to a .toml or .json file.", metavar="FILE")
-    ] = None,
+    *,
+    at: float | None = None,
+    current: float | None = None,
+    speed_deg_s: float | None = None,
+    input: Input | None = None,
+    sample_time: float | None = None,
+    interpolation: Interpolation = "linear",
+    loop_gain: float | None = None,
+    frequency: float = 0.3,
+    out: Path | None = None,
 ) -> None:
     """Linearise a drive at a voltage, a current or a speed.
 
     Prints the operating point, the gain, the lag of the pump, the poles, the
     bandwidth and what a speed loop closed over the drive can bear. The model is
     exact for small motions; 'swashplate bode' shows what becomes of large ones.
+
+    Options:
+      at V: Linearise at this constant voltage.
+      current A: Or at this constant signed current.
+      speed_deg_s DEG/S: Or at the voltage that settles at this speed.
+      input: What moves the model; by default the voltage, or the current with --current.
+      sample_time S: Sample the model, with the recurrences of the simulation.
+      interpolation: The input between samples: linear, or zero-order hold.
+      loop_gain V/(DEG/S): Print the margins of a proportional speed loop of this gain.
+      frequency HZ: Frequency to print gain and phase at.
+      out FILE: Write the model, in SI, to a .toml or .json file.
 
     For example:
       swashplate linearize hoist --at 4
@@ -108,25 +100,14 @@ def _has_coulomb(model: LinearDrive) -> bool:
 
 def bode(
     drive: DriveChoice,
-    amplitudes: Annotated[
-        list[float] | None,
-        option(
-            "Amplitude of the sine; may be repeated. By default 1, 4, 6.5 and 9.",
-            "--amplitude",
-            metavar="V",
-        ),
-    ] = None,
-    bias: Annotated[float, option("Mean of the sine.", metavar="V")] = 0.0,
-    lowest: Annotated[float, option("Lowest frequency.", "--from", metavar="HZ")] = 0.02,
-    highest: Annotated[float, option("Highest frequency.", "--to", metavar="HZ")] = 5.0,
-    points: Annotated[
-        int, option("Frequencies, evenly spaced on a logarithmic axis.", metavar="N")
-    ] = 40,
-    frequency: Annotated[float, option("Frequency to print and to mark.", metavar="HZ")] = 0.3,
-    linear_at: Annotated[
-        float | None,
-        option("Draw the linear model at this voltage beside the sines.", metavar="V"),
-    ] = None,
+    *,
+    amplitudes: list[float] | None = None,
+    bias: float = 0.0,
+    lowest: float = 0.02,
+    highest: float = 5.0,
+    points: int = 40,
+    frequency: float = 0.3,
+    linear_at: float | None = None,
     plot: FigureFile = None,
     out: TableFile = None,
 ) -> None:
@@ -136,6 +117,15 @@ def bode(
     those of its first harmonic, the distortion is all the rest of it. Prints the
     gain, the phase and the time by which the speed lags at one frequency: what a
     controller that is to damp a swing of that frequency has to make up for.
+
+    Options:
+      amplitudes --amplitude V: Amplitude of the sine; may be repeated. By default 1, 4, 6.5 and 9.
+      bias V: Mean of the sine.
+      lowest --from HZ: Lowest frequency.
+      highest --to HZ: Highest frequency.
+      points N: Frequencies, evenly spaced on a logarithmic axis.
+      frequency HZ: Frequency to print and to mark.
+      linear_at V: Draw the linear model at this voltage beside the sines.
 
     For example:
       swashplate bode hoist

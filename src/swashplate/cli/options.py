@@ -7,6 +7,7 @@ spreads them in its signature and gathers them again.
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cached_property
@@ -142,6 +143,12 @@ class DriveChoice:
 
         return changes_between(parameters_of(self.drive), self.chosen.parameters)
 
+    def warn(self) -> None:
+        """Say it if the fit that found the drive calls it not usable: its title then has it."""
+        _, found, why = self.chosen.parameters.title.partition("Not usable")
+        if found:
+            note(f"! The fit of this drive says: {found}{why}.")
+
     def note(self, heading: str) -> None:
         """Print a heading, and below it what is changed."""
         for line in (heading, *self.changes):
@@ -205,6 +212,8 @@ class ShownUnits:
     ] = None
 
 
+_ENTRY = re.compile(r"^  (\w+)((?: --[\w-]+)*) ?([A-Z\[]\S*)?: (.*(?:\n   .*)*)", re.MULTILINE)
+"""An entry of a docstring's options."""
 WRITTEN = {"out", "plot", "write", "pdf", "fmu", "c", "wasm"}
 """Parameters of commands that write files, and so replace older ones with --force alone."""
 
@@ -217,12 +226,21 @@ def command(
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Register a command: its groups spread, --force and units added.
 
-    Examples at the end of its docstring are shown below its options.
+    Its docstring ends with "Options:", an entry for each parameter that no shared type here
+    describes: name, flag if it has another, metavar, colon, help. Parameters before the ``*`` are
+    arguments. Examples stand behind them, and are shown below the options.
     """
 
     def register(function: Callable[..., None]) -> Callable[..., None]:
+        text = inspect.cleandoc(function.__doc__ or "")
+        text, head, shown = text.partition("\n\nFor example:")
+        text, _, entries = text.partition("\n\nOptions:\n")
+        said = {found[1]: found for found in _ENTRY.finditer(entries)}
         hints = get_type_hints(function, include_extras=True)
         given = inspect.signature(function).parameters.values()
+        for each in given:
+            if each.name in said:
+                hints[each.name] = _described(each, hints[each.name], said[each.name])
         groups = {each.name: hints[each.name] for each in given if is_dataclass(hints[each.name])}
         flat = []
         for each in given:
@@ -243,7 +261,6 @@ def command(
             with shown_in([each.strip() for each in units.split(",") if each.strip()], drum):
                 function(**words)
 
-        text, head, shown = inspect.cleandoc(function.__doc__ or "").partition("\n\nFor example:")
         run.__doc__ = text
         run.__wrapped__ = function  # type: ignore[attr-defined]
         # Typer reads the options off the signature, which functions have without declaring it
@@ -255,6 +272,16 @@ def command(
         return function
 
     return register
+
+
+def _described(given: inspect.Parameter, kind: Any, said: re.Match[str]) -> Any:
+    """Typer's description of a parameter, from its entry."""
+    name, flags, metavar, words = said[1], said[2].split(), said[3], " ".join(said[4].split())
+    if given.kind is not inspect.Parameter.KEYWORD_ONLY:
+        return Annotated[kind, argument(metavar, words)]
+    flags = flags or ([f"--{name}"] if kind is bool else [])
+    least = {"min": 0} if kind is int else {}
+    return Annotated[kind, option(words, *flags, metavar=metavar or None, **least)]
 
 
 def _spread(group: Any) -> list[inspect.Parameter]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -15,8 +15,6 @@ from swashplate.cli.options import (
     Rate,
     Simulating,
     TableFile,
-    argument,
-    option,
 )
 from swashplate.cli.terminal import Outputs, note, say, show, working
 from swashplate.cli.words import (
@@ -37,18 +35,23 @@ if TYPE_CHECKING:
 def simulate(
     drive: DriveChoice,
     command: CommandWord,
+    *,
     sampling: Simulating,
     out: TableFile = None,
     plot: FigureFile = None,
-    begin: Annotated[float | None, option("Plot from here on.", "--from", metavar="S")] = None,
-    end: Annotated[float | None, option("Plot up to here.", "--to", metavar="S")] = None,
+    begin: float | None = None,
+    end: float | None = None,
 ) -> None:
     """Simulate a drive over a maneuver or a measured voltage.
 
     Prints what the drive did: its largest speeds and currents, how far it went
     and how long each of its limits held it back, the dead zone only while the
-    command is not 0 V. --out writes every signal of the chain, --plot draws
-    them. 'swashplate --help' lists the maneuvers.
+    command is not 0 V. --out writes every signal, --plot draws them.
+    'swashplate --help' lists the maneuvers.
+
+    Options:
+      begin --from S: Plot from here on.
+      end --to S: Plot up to here.
 
     For example:
       swashplate simulate hoist step:9
@@ -75,11 +78,10 @@ def simulate(
 
 
 def compare(
-    first: Annotated[str, argument("A", "A packaged drive or a TOML file.")],
-    second: Annotated[str, argument("B", "Another, compared with the first.")],
-    maneuver: Annotated[
-        str, option('Maneuver for both, such as step:9 or "step +9 V".', metavar="NAME")
-    ] = "step:9",
+    first: str,
+    second: str,
+    *,
+    maneuver: str = "step:9",
     rate: Rate = 512.0,
     plot: FigureFile = None,
     out: TableFile = None,
@@ -89,6 +91,11 @@ def compare(
     The settled speed is the one that the maneuver's largest voltage would lead
     to if it were held. The time to 90 % of it counts from the moment at which
     the voltage first changes. --out writes the voltage and both speeds.
+
+    Options:
+      first A: A packaged drive or a TOML file.
+      second B: Another, compared with the first.
+      maneuver NAME: Maneuver for both, such as step:9 or "step +9 V".
 
     For example:
       swashplate compare hoist luff
@@ -154,16 +161,14 @@ def axes() -> None:
     show(made)
 
 
-def show_parameters(
-    drive: DriveChoice,
-    toml: Annotated[
-        bool, option("Print a TOML file, complete and ready to edit.", "--toml")
-    ] = False,
-) -> None:
+def show_parameters(drive: DriveChoice, *, toml: bool = False) -> None:
     """Show every parameter of a drive, with its unit and where it comes from.
 
     A parameter with a plus and a minus value has one for each direction; both
     are magnitudes. Units are SI.
+
+    Options:
+      toml: Print a TOML file, complete and ready to edit.
 
     For example:
       swashplate show hoist

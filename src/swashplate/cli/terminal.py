@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from textwrap import fill
-from typing import Any, Protocol
+from typing import Any
 
 import rich.table
 from rich import box
@@ -153,49 +153,28 @@ def working(text: str) -> AbstractContextManager[Status]:
     return side.status(f"{text} ...")
 
 
-class Shown(Protocol):
-    """Says how far a long piece of work is."""
-
-    def __call__(self, what: str, share: float | None = None, left: str = "") -> None:
-        """Show what is done now, the share that is done if it is known, and the time left."""
-        ...
-
-
 @contextmanager
-def long_work(text: str, steps: int = 0) -> Iterator[Shown]:
+def long_work(text: str, steps: int = 0) -> Iterator[Callable[..., None]]:
     """A bar with what is done now and the time left; nothing in a pipe.
 
-    Of so many steps, if there are any, each call begins the next one.
+    What it gives is called with words and, where it is known, the share that is done; of so many
+    steps, if there are any, each call begins the next one.
     """
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
-    columns = (
-        SpinnerColumn(),
-        BarColumn(bar_width=20),
-        TextColumn("{task.description}", markup=False),
-        TextColumn("{task.fields[left]}", markup=False),
-    )
-    bar = Progress(*columns, console=side, transient=True, disable=not side.is_terminal)
-    with bar:
-        task, begun = bar.add_task(text, total=None, left=""), 0
+    said = TextColumn("{task.description}", markup=False)
+    columns = (SpinnerColumn(), BarColumn(bar_width=20), said, TimeRemainingColumn())
+    with Progress(*columns, console=side, transient=True, disable=not side.is_terminal) as bar:
+        task, begun = bar.add_task(text, total=None), 0
 
-        def show(what: str, share: float | None = None, left: str = "") -> None:
+        def show(what: str, share: float | None = None) -> None:
             nonlocal begun
             if steps:
-                share, left, begun = begun / steps, f"{begun} of {steps}", begun + 1
+                share, begun = begun / steps, begun + 1
             total = None if share is None else 1.0
-            bar.update(task, description=what, total=total, completed=share or 0.0, left=left)
+            bar.update(task, description=what, total=total, completed=share or 0.0)
 
         yield show
-
-
-def waiting(seconds: float | None, sort: str = "about") -> str:
-    """A time left in words a person takes in at once: ``"about 12 s left"``."""
-    if seconds is None:
-        return ""
-    if seconds < 90.0:
-        return f"{sort} {max(seconds, 0.0):.0f} s left"
-    return f"{sort} {seconds / 60.0:.0f} min left"
 
 
 def check_free(*paths: Path) -> None:

@@ -19,7 +19,6 @@ from swashplate.cli.options import (
     SetFile,
     Simulating,
     TableFile,
-    argument,
     option,
 )
 from swashplate.cli.terminal import Outputs, bullets, note, say, show, working
@@ -35,7 +34,6 @@ from swashplate.errors import InputError
 from swashplate.tables import FIGURE, TABLE, quantity
 
 if TYPE_CHECKING:
-    from swashplate.analysis.limits import LimitShares
     from swashplate.analysis.monte_carlo import Bands
 
 LEVEL, SPAN = 0.95, (0.9, 1.1)
@@ -59,17 +57,10 @@ Direction = Literal["both", "positive", "negative"]
 
 def limits(
     drive: DriveChoice,
-    command: Annotated[
-        str | None,
-        argument(
-            "MANEUVER|FILE",
-            "A maneuver or a log, as in 'swashplate simulate': what limits the drive under it. "
-            "Without one, what the drive can do at all.",
-        ),
-    ] = None,
+    command: str | None = None,
+    *,
     out: TableFile = None,
     plot: FigureFile = None,
-    *,
     sampling: Simulating,
 ) -> None:
     """Show what a drive can do, or what limits it under a command.
@@ -79,6 +70,10 @@ def limits(
     limit acts, by how much the error falls without it, and so which component to
     change first. The error is the rms of the speed less that of a drive without
     limits. The shares need not add up to 100 %.
+
+    Options:
+      command MANEUVER|FILE: A maneuver or a log, as in 'swashplate simulate': what limits the drive
+          under it. Without one, what the drive can do at all.
 
     For example:
       swashplate limits hoist
@@ -140,25 +135,11 @@ def _say_shares(
         return
     if sampling.start == "rest" and not sampling.clip:
         say(found.eased_sentence())
-        note(f"See more of it: {_whatif_words(drive.drive, command, sampling, found)}")
-
-
-def _whatif_words(drive: str, command: str, sampling: Sampling, found: LimitShares) -> str:
-    """The command that shows more of what easing the first limit buys."""
-    assert found.first is not None
-    words = ["swashplate", "whatif", drive]
-    for name, factor in found.first.eased_by.items():
-        words += ["--scale", f"{name}={factor:.6g}"]
-    words += ["--maneuver", command]
-    for name, given, usual in (
-        ("--rate", f"{sampling.rate:g}", "512"),
-        ("--interpolation", sampling.interpolation, None),
-        ("--time-column", sampling.time_column, "time"),
-        ("--column", sampling.column, "voltage"),
-    ):
-        if given is not None and given != usual:
-            words += [name, given]
-    return shlex.join(words)
+    if sampling == Simulating():  # a log or another rate: the reader knows how to type it
+        words = ["swashplate", "whatif", drive.drive]
+        for lever, factor in first.eased_by.items():
+            words += ["--scale", f"{lever}={factor:.6g}"]
+        note(f"See more of it: {shlex.join([*words, '--maneuver', command])}")
 
 
 def _list_levers(asked: bool) -> None:
@@ -171,37 +152,16 @@ def _list_levers(asked: bool) -> None:
 
 def whatif(
     drive: DriveWord,
-    factors: Annotated[
-        list[str],
-        option(
-            "A factor on a lever: orifice=1.5, pump=1.5, dead_zone=0 ... (see --levers), or on a "
-            "parameter: Z16_plus=1.2. May be repeated.",
-            "--scale",
-            metavar="LEVER=FACTOR",
-            show_default=False,
-        ),
-    ],
-    maneuver: Annotated[
-        str,
-        option(
-            'Command for both: a maneuver such as step:9 or "step +9 V", or a log.',
-            metavar="NAME|FILE",
-        ),
-    ] = "sine:9,0.1",
-    uncertainty: Annotated[
-        Path | None,
-        option("Folder that 'fit' wrote: bands from the errors of its estimates.", metavar="DIR"),
-    ] = None,
-    campaign: Annotated[
-        Path | None,
-        option("The campaign of that fit, if it is not where it was.", metavar="CAMPAIGN.toml"),
-    ] = None,
+    *,
+    factors: list[str],
+    maneuver: str = "sine:9,0.1",
+    uncertainty: Path | None = None,
+    campaign: Path | None = None,
     plot: FigureFile = None,
     out: SetFile = None,
     levers: Annotated[
         bool, option("List the levers and end.", "--levers", callback=_list_levers, is_eager=True)
     ] = False,
-    *,
     sampling: Sampling,
 ) -> None:
     """Predict what a change of the machine does.
@@ -210,6 +170,13 @@ def whatif(
     The speed that is wanted is in proportion to the voltage, at the ratio of
     the drive as it is. With --uncertainty outcomes get intervals and the figure
     bands: drives are drawn from the errors of a fit's estimates.
+
+    Options:
+      factors --scale LEVER=FACTOR: A factor on a lever: orifice=1.5, pump=1.5, dead_zone=0 ... (see
+          --levers), or on a parameter: Z16_plus=1.2. May be repeated.
+      maneuver NAME|FILE: Command for both: a maneuver such as step:9 or "step +9 V", or a log.
+      uncertainty DIR: Folder that 'fit' wrote: bands from the errors of its estimates.
+      campaign CAMPAIGN.toml: The campaign of that fit, if it is not where it was.
 
     For example:
       swashplate whatif hoist --scale orifice=1.5 --scale pump=1.5
@@ -264,29 +231,12 @@ def _band_sentences(bands: Mapping[str, Bands]) -> list[str]:
 
 def size(
     drive: DriveChoice,
-    speed_deg_s: Annotated[float | None, option("Speed that is required.", metavar="DEG/S")] = None,
-    acceleration_deg_s2: Annotated[
-        float | None,
-        option(
-            "Acceleration that is required, after a full step from rest.",
-            "--acceleration-deg-s2",
-            metavar="DEG/S2",
-        ),
-    ] = None,
-    tracking_deg_s: Annotated[
-        float | None,
-        option("Largest RMS error that is allowed while following the maneuver.", metavar="DEG/S"),
-    ] = None,
-    maneuver: Annotated[
-        str | None,
-        option(
-            "What is to be followed: the speed in proportion to this maneuver's voltage, at the "
-            "ratio of the drive as it is. Each candidate is commanded in proportion to it, at its "
-            "own ratio.",
-            metavar="NAME",
-        ),
-    ] = None,
-    direction: Annotated[Direction, option("Where speed and acceleration are required.")] = "both",
+    *,
+    speed_deg_s: float | None = None,
+    acceleration_deg_s2: float | None = None,
+    tracking_deg_s: float | None = None,
+    maneuver: str | None = None,
+    direction: Direction = "both",
     levers: Levers = None,
     out: SetFile = None,
 ) -> None:
@@ -295,6 +245,15 @@ def size(
     Smallest is the least sum of squares of the changes, each in per cent. What
     cannot be met is refused, with what can be reached. Levers are orifice and
     pump, from half to twice, unless others are named.
+
+    Options:
+      speed_deg_s DEG/S: Speed that is required.
+      acceleration_deg_s2 DEG/S2: Acceleration that is required, after a full step from rest.
+      tracking_deg_s DEG/S: Largest RMS error that is allowed while following the maneuver.
+      maneuver NAME: What is to be followed: the speed in proportion to this maneuver's voltage, at
+          the ratio of the drive as it is. Each candidate is commanded in proportion to it, at its
+          own ratio.
+      direction: Where speed and acceleration are required.
 
     For example:
       swashplate size hoist --speed-deg-s 250 --lever pump
@@ -334,26 +293,20 @@ def size(
 
 def sensitivity(
     drive: DriveChoice,
+    *,
     levers: Levers = None,
-    outcomes: Annotated[
-        list[str] | None,
-        option(
-            "final_speed, peak_speed, rise_time, response_time, largest_acceleration, overshoot, "
-            "tracking_error, creep or travel; may be repeated.",
-            "--outcome",
-            metavar="NAME",
-        ),
-    ] = None,
-    maneuver: Annotated[
-        str,
-        option('Command: a maneuver such as step:9 or "step +9 V", or a log.', metavar="NAME|FILE"),
-    ] = "step:9",
+    outcomes: list[str] | None = None,
+    maneuver: str = "step:9",
     plot: FigureFile = None,
     out: TableFile = None,
-    *,
     sampling: Sampling,
 ) -> None:
     """Show which lever moves which outcome, each moved down and up by itself.
+
+    Options:
+      outcomes --outcome NAME: final_speed, peak_speed, rise_time, response_time,
+          largest_acceleration, overshoot, tracking_error, creep or travel; may be repeated.
+      maneuver NAME|FILE: Command: a maneuver such as step:9 or "step +9 V", or a log.
 
     For example:
       swashplate sensitivity hoist
@@ -378,34 +331,12 @@ def sensitivity(
 
 def compensate(
     drive: DriveChoice,
-    stick: Annotated[
-        str | None,
-        argument(
-            "MANEUVER|FILE",
-            "What the stick does: ±10 V asks for the full speed of that way, in proportion. A "
-            "maneuver or a log as in 'swashplate simulate'. Shows what the map gains under it.",
-        ),
-    ] = None,
-    speeds_deg_s: Annotated[
-        list[float] | None,
-        option(
-            "A wanted speed to print the voltage of; may be repeated.",
-            "--speed-deg-s",
-            metavar="DEG/S",
-        ),
-    ] = None,
-    points: Annotated[
-        int, option("Points of the map per direction, 2 to 10001.", metavar="N")
-    ] = 101,
-    out: Annotated[
-        Path | None,
-        option(
-            "Write the map, in SI: .toml for a controller, .csv or .parquet as a table.",
-            metavar="FILE",
-        ),
-    ] = None,
-    plot: FigureFile = None,
+    stick: str | None = None,
     *,
+    speeds_deg_s: list[float] | None = None,
+    points: int = 101,
+    out: Path | None = None,
+    plot: FigureFile = None,
     sampling: Sampling,
 ) -> None:
     """Invert a drive's steady map: the voltage for a wanted speed.
@@ -414,6 +345,14 @@ def compensate(
     is straight between its points, so that any controller can follow it. With
     what a stick does, compares three controllers in simulation: a straight
     line, the map, and the map with the drive's lag made up for.
+
+    Options:
+      stick MANEUVER|FILE: What the stick does: ±10 V asks for the full speed of that way, in
+          proportion. A maneuver or a log as in 'swashplate simulate'. Shows what the map gains
+          under it.
+      speeds_deg_s --speed-deg-s DEG/S: A wanted speed to print the voltage of; may be repeated.
+      points N: Points of the map per direction, 2 to 10001.
+      out FILE: Write the map, in SI: .toml for a controller, .csv or .parquet as a table.
 
     For example:
       swashplate compensate hoist --out hoist-inverse.toml

@@ -192,20 +192,13 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
     scaled_as = "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
     chosen: dict[str, Change] = assigned("--set", values, set_as, _value)
     scaled: dict[str, Change] = assigned("--scale", factors, scaled_as, _factor)
-    drive = Drive(parameters_of(word)).replace(**chosen)
-    own = {name: change for name, change in scaled.items() if not _is_lever(name)}
-    drive = drive.scale(**own)
-    if len(own) < len(scaled):
+    levers = {k: v for k, v in scaled.items() if isinstance(v, float) and _is_lever(k)}
+    own = {name: change for name, change in scaled.items() if name not in levers}
+    drive = Drive(parameters_of(word)).replace(**chosen).scale(**own)
+    if levers:
         from swashplate.analysis.whatif import pulled
 
-        pulls = dict[str, float]()
-        for name, change in scaled.items():
-            if name in own:
-                continue
-            if not isinstance(change, float):
-                raise InputError(f"--scale {name} takes one factor, not two.")
-            pulls[name] = change
-        drive = pulled(drive, pulls)
+        drive = pulled(drive, levers)
     return drive
 
 
@@ -290,8 +283,9 @@ def _value(name: str, numbers: list[float], unit: str) -> Change:
 def _factor(name: str, numbers: list[float], unit: str) -> Change | None:
     from swashplate.parameters.definitions import find
 
-    if not _is_lever(name):
-        find(name)
+    if _is_lever(name):
+        return numbers[0] if len(numbers) == 1 and not unit else None
+    find(name)
     return None if unit else _one_or_both(numbers)
 
 
@@ -369,35 +363,30 @@ def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simul
     from swashplate.logs import read_series
 
     least_substeps(options.rate)  # a rate out of range is refused before anything is sampled
-    if not _is_file(command):
+    interpolation, time = options.interpolation, None
+    if _is_file(command):
+        _check_columns(command, options)
+        series = read_series(command, options.column, "V", time_column=options.time_column)
+        if interpolation is None:
+            raise InputError(
+                f"{command} needs --interpolation linear (a straight line from row to row) or "
+                "--interpolation previous (each row held until the next)."
+            )
+        name, where, values, time = Path(command).name, f"{command}: ", series.values, series.time
+    else:
         maneuver = maneuver_of(command, drive)
-        run = drive.simulate(
-            maneuver.sample(options.rate),
-            options.rate,
-            interpolation=options.interpolation,
-            start=options.start,
-            clip=options.clip,
-        )
-        return maneuver.name, run
-    _check_columns(command, options)
-    series = read_series(command, options.column, "V", time_column=options.time_column)
-    if options.interpolation is None:
-        raise InputError(
-            f"{command} needs --interpolation linear (a straight line from row to row) or "
-            "--interpolation previous (each row held until the next)."
-        )
+        name, where, values = maneuver.name, "", maneuver.sample(options.rate)
     try:
-        run = drive.simulate(
-            series.values,
+        return name, drive.simulate(
+            values,
             options.rate,
-            time=series.time,
-            interpolation=options.interpolation,
+            time=time,
+            interpolation=interpolation,
             start=options.start,
             clip=options.clip,
         )
     except InputError as error:
-        raise InputError(f"{command}: {error}") from None
-    return Path(command).name, run
+        raise InputError(f"{where}{error}") from None
 
 
 def trial_of(drive: Drive, command: str, options: Sampling) -> tuple[str, Trial]:

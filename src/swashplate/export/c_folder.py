@@ -174,7 +174,8 @@ def c(
         "commands": "".join(", 9.0" if s == "voltage" else ", 1.0" for s in exported.signals),
         "step": literal(step),
     }
-    texts[f"{name}_values.h"] = _initialiser(exported, values, name)
+    title = what.parameters.title if isinstance(what, Drive) else ""
+    texts[f"{name}_values.h"] = _initialiser(exported, values, name, title)
     for file, text in FILES.items():
         for key, value in words.items():
             text = text.replace(f"@{key}@", value)
@@ -192,11 +193,13 @@ def c(
 _SPEED = Sample._fields[1:].index("shaft_speed")
 
 
-def _initialiser(exported: Exported, values: Array, name: str) -> str:
+def _initialiser(exported: Exported, values: Array, name: str, title: str) -> str:
     """Values as an array of C, each with its name."""
     names = ["step [s]", *(each for each, _ in Writer(exported).values())]
     guard = f"{name.upper()}_VALUES_H"
-    lines = [f"/* Values of {name} for {exported.prefix}_init, as swashplate computed them. */",
+    head = f"Values of {name} for {exported.prefix}_init, as swashplate computed them."
+    head = f"{head} {title}".strip().replace("*/", "* /")
+    lines = [f"/* {head} */",
              f"#ifndef {guard}", f"#define {guard}", "", "#include <math.h>", "",
              f"static const double {name}_values[{len(values)}] = {{"]  # fmt: skip
     for value, what in zip(values.tolist(), names, strict=True):

@@ -417,7 +417,7 @@ class FullOrderDrive:
         step, records = record.step, {"current": np.ascontiguousarray(record.values)}
         instance = self._machine(self.substeps(step, substeps), held)
         started = instance.start({"current": float(record.values[0])}, step, start)
-        out, _ = marched(instance, records, step, started, KEPT, "current")
+        out = marched(instance, records, step, started, KEPT, "current")
         constants = started.arguments[1]["k"]
         return FullOrderSimulation(self.physical.name, record, self.plant, constants, out)
 

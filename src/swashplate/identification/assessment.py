@@ -251,7 +251,7 @@ class Judged(Result):
         """The fitted set, where each number says whether it was fitted or fixed, and its source.
 
         Of a fitted one the source is campaign, date and 95 % interval; of a fixed one that of the
-        set which the fit began from.
+        set which the fit began from. The title of one that is not usable says so.
         """
         found, nominal = self.result.drive.parameters, self.result.nominal
         assert isinstance(nominal, ParameterSet)
@@ -269,6 +269,8 @@ class Judged(Result):
             parameters[symbol] = parameter
         fitted = len(self.result.stages[0].problem.experiments)
         title = f"{self.campaign.title}: fitted to {fitted} runs, {today}"
+        if not self.verdict.usable:
+            title += f". {self.verdict.headline.rstrip('.')}"
         return replace(found, title=title, parameters=parameters, motion=motion_of(self.runs))
 
 

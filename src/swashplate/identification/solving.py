@@ -117,23 +117,6 @@ class Progress(NamedTuple):
     """How many it is given."""
 
 
-def longest_left(progress: Progress) -> float | None:
-    """Time that a solver may still take at most, not what it is expected to take. [s]
-
-    All evaluations that it is given, at the pace so far. It ends earlier as a rule, when cost or
-    parameters no longer change; how soon cannot be told beforehand.
-
-    Returns
-    -------
-    float or None
-        None before the first evaluation.
-    """
-    if progress.evaluations <= 0:
-        return None
-    left = max(progress.most_evaluations - progress.evaluations, 0)
-    return progress.seconds / progress.evaluations * left
-
-
 @dataclass(frozen=True, eq=False)
 class Solution(Result):
     """The optimum that a solver reached."""
@@ -403,29 +386,6 @@ class _StartFile(BaseModel):
 
     origin: dict[str, str]
     result: StartResult
-
-
-def time_left(finished: int, left: int, seconds: float) -> float | None:
-    """Time that the remaining starts are likely to take. [s]
-
-    Parameters
-    ----------
-    finished : int
-        Starts that were solved since the search began; not those that were there already.
-    left : int
-        Starts that are not finished.
-    seconds : float
-        Since the search began. [s]
-
-    Returns
-    -------
-    float or None
-        At the pace so far, however many run side by side. None before the first is finished. Short
-        searches end first, so that early values are somewhat low.
-    """
-    if finished <= 0:
-        return None
-    return seconds / finished * max(left, 0)
 
 
 def solve_from(

@@ -224,7 +224,7 @@ def _settled(
         count = blocks * a_block
         records: dict[str, Array] = {input: np.tile(command, count)}
         started = instance.start({input: float(command[0])}, step, "steady")
-        (signal,), _ = marched(instance, records, step, started, (seen,), input)
+        (signal,) = marched(instance, records, step, started, (seen,), input)
         # a cycle has a whole number of steps, so that its first harmonic is exact
         cycles = signal.reshape(count, command.size)
         earlier, _, _ = _harmonic(cycles[-1 - a_block], size)

@@ -26,8 +26,8 @@ class TextOptions:
     Parameters
     ----------
     delimiter : str, optional
-        One character, or ``"comma"``, ``"semicolon"``, ``"tab"``, ``"bar"``, ``"space"`` (any
-        number of spaces and tabs), or ``"none"`` for a single column.
+        One character, or ``"comma"``, ``"semicolon"``, ``"tab"``, ``"bar"`` or ``"space"`` (any
+        number of spaces and tabs).
     decimal : {".", ","}, optional
         Decimal sign.
     comment : str, optional
@@ -57,10 +57,10 @@ class TextOptions:
     def __post_init__(self) -> None:
         """Check them."""
         mark = self.delimiter
-        if mark is not None and mark != "none" and mark not in _NAMED:
+        if mark is not None and mark not in _NAMED:
             if len(mark) != 1 or not mark.isascii() or mark in '\r\n"\0':
                 raise InputError(
-                    f"delimiter must be one character, 'tab', 'space' or 'none', not {mark!r}."
+                    f"delimiter must be one character, 'tab' or 'space', not {mark!r}."
                 )
             if mark.isalnum() or mark in "+-.":
                 raise InputError(f"delimiter {mark!r} is a part of numbers; name another.")
@@ -78,11 +78,11 @@ class TextOptions:
             ) from None
 
     @property
-    def delimiters(self) -> tuple[str | None, ...]:
-        """Delimiters that may be: the one given, or all that are looked for; None is no one."""
+    def delimiters(self) -> tuple[str, ...]:
+        """Delimiters that may be: the one given, or all that are looked for."""
         if self.delimiter is None:
-            return (",", ";", "\t", " ", "|", None)
-        return (None if self.delimiter == "none" else _NAMED.get(self.delimiter, self.delimiter),)
+            return (",", ";", "\t", " ", "|")
+        return (_NAMED.get(self.delimiter, self.delimiter),)
 
     @property
     def marks(self) -> tuple[str, ...]:
@@ -202,8 +202,8 @@ _THREE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 class Layout:
     """How the rows of a text file are to be taken apart."""
 
-    delimiter: str | None
-    """One character; a space stands for any number of spaces and tabs; None is one column."""
+    delimiter: str
+    """One character; a space stands for any number of spaces and tabs."""
     decimal: str
     width: int
     """Fields in a row."""
@@ -216,8 +216,6 @@ class Layout:
 
     def split(self, line: str) -> list[str]:
         """Cells of a line, stripped."""
-        if self.delimiter is None:
-            return [line.strip().strip('"')]
         if self.delimiter == " ":
             line = line.replace("\t", " ").strip()
         if '"' in line:
@@ -252,9 +250,8 @@ class Layout:
 
     def __str__(self) -> str:
         """What it is, for people."""
-        one = "one column" if self.delimiter is None else f"'{self.delimiter}'"
         point = "comma" if self.decimal == "," else "point"
-        return f"CSV, {_SAID.get(self.delimiter or '', one)}, decimal {point}"
+        return f"CSV, {_SAID.get(self.delimiter, repr(self.delimiter))}, decimal {point}"
 
 
 def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layout:
@@ -269,7 +266,7 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layou
     """
     quoted = any('"' in line for line in lines)
     tried = (
-        _tried(lines, Layout(delimiter, decimal, 0, ()), alone=options.delimiter is not None)
+        _tried(lines, Layout(delimiter, decimal, 0, ()))
         for delimiter in options.delimiters
         for decimal in ((options.decimal,) if options.decimal else (".", ","))
         if delimiter != decimal or quoted or None not in (options.delimiter, options.decimal)
@@ -280,7 +277,9 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layou
         given = [each for each in given if not each.endswith("None")]
         with_them = f" with {' and '.join(given)}" if given else ""
         count = f"{len(lines)} line" + "s" * (len(lines) > 1)
-        raise FileError(f"{path} has no rows of numbers{with_them}, only {count} of text.")
+        raise FileError(
+            f"{path} has no rows of two or more numbers{with_them}, only {count} of text."
+        )
     tabbed = max((trial.rows for trial in trials if trial.delimiter == "\t"), default=0)
     # a tab between numbers delimits them, whatever spaces there are in names
     trials = [each for each in trials if each.delimiter != " " or each.rows > tabbed]
@@ -306,7 +305,7 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layou
     return chosen
 
 
-def _tried(lines: Sequence[str], layout: Layout, alone: bool) -> Layout | None:
+def _tried(lines: Sequence[str], layout: Layout) -> Layout | None:
     """A layout with width, columns of numbers and score by a sample of lines."""
     rows = [layout.split(line) for line in lines]
     marks = [[cell != "" and is_number(cell, layout.decimal) for cell in row] for row in rows]
@@ -314,7 +313,7 @@ def _tried(lines: Sequence[str], layout: Layout, alone: bool) -> Layout | None:
     texts = {len(row) for row, mark in zip(rows, marks, strict=True) if not any(mark)}
     # as many fields as most rows have; among equals, as many as a header has, then as the first
     width = max(counts, key=lambda each: (counts[each], each in texts), default=0)
-    if width == 0 or (width == 1 and layout.delimiter is not None and not alone):
+    if width < 2:  # a log of one column has no time
         return None
     fitting = [
         (row, mark)
@@ -407,7 +406,7 @@ def read_heading(
             title = above[-1].text.rstrip()
             if len(layout.names(title)) > 1 and not title.endswith((":", ".")):
                 _refuse_names(above[-1], layout, path)
-        if not names and layout.width > 1:
+        if not names:
             said = [text for line, text in bare.items() if line < plain[first].number]
             names, units = _names_and_units(said, layout)
             if units is None and (not all(names) or any(layout.numbers_in(names))):

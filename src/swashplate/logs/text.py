@@ -46,7 +46,6 @@ _HEAD = 2000  # lines in which the header and the first row of data must be
 _SAMPLE = 60  # lines by which delimiter and decimal sign are told, from the start and all over
 _SAMPLED = 1 << 20  # letters of them: fewer lines where there are thousands of columns
 _SPACES = re.compile(r"[ \t]+")
-_BLANK = re.compile(r"^[ \t]*$(?=\n)", re.MULTILINE)
 
 
 def open_text(path: Path, options: TextOptions | None = None) -> Log:
@@ -157,8 +156,7 @@ class _Table:
 
     @property
     def _delimiter(self) -> str:
-        # one column has no delimiter; Polars needs one all the same
-        return {" ": "\t", None: "\x1f"}.get(self.layout.delimiter) or str(self.layout.delimiter)
+        return "\t" if self.layout.delimiter == " " else self.layout.delimiter
 
     def read(self, positions: Sequence[int]) -> Iterator[list[Array]]:
         """Columns at these positions, piece after piece, in the file's units.
@@ -169,7 +167,6 @@ class _Table:
             For a row of too many or too few fields, a cell that holds no number, a NUL byte.
         """
         line, count, first = 1, 0, self.heading.first
-        empty: list[int] = []  # lines of empty cells in a single column, as yet at its end
         clocks: dict[int, _Clock] = {}
         for piece in _pieces(self.path, self.encoding, self.mark):
             begin, line = line, line + piece.count("\n")
@@ -182,8 +179,8 @@ class _Table:
                 piece = _SPACES.sub("\t", piece).replace("\t\n", "\n").replace("\n\t", "\n")
                 piece = piece.removeprefix("\t")
             cells, lines = list[list[str]](), list(range(begin, line))
-            if empty or not self._is_regular(piece, line - begin):
-                cells, lines = self._one_by_one(piece, begin, count, empty)
+            if not self._is_regular(piece, line - begin):
+                cells, lines = self._one_by_one(piece, begin, count)
             if lines:
                 yield self._numbers(piece, cells, lines, positions, count, clocks)
             count += len(lines)
@@ -197,30 +194,20 @@ class _Table:
             if re.search(rf"^[ \t]*(?:{any_mark})", piece, re.MULTILINE):
                 return False
         width = self.layout.width
-        if width == 1:
-            return self._delimiter not in piece and _BLANK.search(piece) is None
         characters = np.frombuffer(piece.encode(), np.uint8)
         ends = characters == ord("\n")
         places = np.flatnonzero(ends | (characters == ord(self._delimiter)))
         return places.size == lines * width and bool(ends[places[width - 1 :: width]].all())
 
-    def _one_by_one(
-        self, piece: str, begin: int, count: int, empty: list[int]
-    ) -> tuple[list[list[str]], list[int]]:
+    def _one_by_one(self, piece: str, begin: int, count: int) -> tuple[list[list[str]], list[int]]:
         """Cells of a piece with comments, empty lines or quotes; what is no row is refused."""
         rows: list[list[str]] = []
         lines: list[int] = []
         width = self.layout.width
         for number, text in enumerate(piece.split("\n")[:-1], begin):
-            if not text.strip() and self.layout.is_blank(text):
-                if width == 1:
-                    empty.append(number)
+            blank = not text.strip() and self.layout.is_blank(text)
+            if blank or _comments(text, self.marks):
                 continue
-            if _comments(text, self.marks):
-                continue
-            rows += [[""]] * len(empty)
-            lines += empty
-            empty.clear()
             where = f"data row {count + len(lines) + 1} (line {number})"
             if "\0" in text:
                 raise FileError(f"{self.path} has a NUL byte in {where}; it is damaged.")

@@ -150,7 +150,6 @@ def draw(
     values: Array,
     color: ColorType,
     *,
-    shown: Mask | None = None,
     held: bool = False,
     dashes: Dashes = "solid",
     width: float = LINE,
@@ -170,8 +169,6 @@ def draw(
         Stamps [s] and samples in the panel's unit.
     color : str
         Of the line.
-    shown : (n,) array of bool, optional
-        Samples to draw; the line is broken at the others too.
     held : bool
         Draw a staircase: each sample holds up to the next.
     dashes, width, zorder, label :
@@ -180,13 +177,6 @@ def draw(
         Stretches of time of which a long line keeps the extremes.
     """
     breaks = gap_rows(time)
-    if shown is not None:
-        kept = np.flatnonzero(shown)
-        apart = np.diff(kept) > 1
-        apart |= np.isin(kept[:-1], breaks)
-        time, values, breaks = time[kept], values[kept], np.flatnonzero(apart)
-    if not time.size:
-        return
     if values.size > LONG:
         width *= 0.6
     style: Literal["default", "steps-post"] = "steps-post" if held else "default"
@@ -230,7 +220,6 @@ SHADES = {
     Limit.RELIEF: Shade("#f3b79b", "relief valve"),
 }
 IGNORED = Shade("#ececec", "ignored", "#d2d2d2", "////")
-MASKED = Shade("#fbe6c6", "masked", "#eccb94", "\\\\\\\\")
 
 
 def stretches(time: Array, active: Mask) -> Array:

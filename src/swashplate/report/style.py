@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from swashplate.tables import FIGURE, ending, write_whole
@@ -159,37 +159,15 @@ def right_axis(ax: Axes, factor: float, label: str) -> Any:
     return made
 
 
-def in_lines(label: str, letters: int, most_lines: int = 3) -> str:
-    """A label broken into lines: after words, and after underscores where a word is too long.
+def in_lines(label: str, letters: int) -> str:
+    """A label in up to three lines of so many letters: broken after words and underscores.
 
-    Parameters
-    ----------
-    label : str
-        In one line; a unit in parentheses at its end is never left out.
-    letters : int
-        That fit along the axis.
-    most_lines : int
-        That it may take.
+    The last word, which is the unit, is never left out.
     """
-    most = max(letters, 8)
-    pieces = list[str]()
-    for word in re.findall(r"\([^()]*\)$|\S+", label):
-        whole = f"{word} "
-        pieces += [whole] if len(word) <= most else re.findall(r"[^_]*_|[^_]+", whole)
-    lines = [""]
-    for piece in pieces:
-        if lines[-1] and len(lines[-1]) + len(piece.rstrip()) > most:
-            lines.append("")
-        lines[-1] += piece
-    lines = [each.strip() for each in lines]
-    if len(lines) > most_lines:
-        last = f"{lines[most_lines - 2].rstrip('_')}…"
-        lines = [*lines[: most_lines - 2], last, lines[-1]]
-    # a single word that is too long loses its middle
-    half = most // 2
-    return "\n".join(
-        each if len(each) <= most else f"{each[:half]}…{each[1 - half :]}" for each in lines
-    )
+    lines = wrap(label.replace("_", "_ "), max(letters, 8), break_on_hyphens=False)
+    if len(lines) > 3:
+        lines = [lines[0], f"{lines[1].rstrip('_')}…", lines[-1]]
+    return "\n".join(each.replace("_ ", "_") for each in lines)
 
 
 def handle(name: str, color: str, dashes: Dashes = "solid", width: float = 2.0) -> Line2D:

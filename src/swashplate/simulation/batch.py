@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations import Model, instance_of, parameter_paths, state_paths
 from swashplate.equations.library import TAN_22_5
-from swashplate.equations.marching.lanes import LANES, march_lanes
+from swashplate.equations.marching.lanes import LANES, lanes_of
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Observation
 from swashplate.equations.marching.record import Record
@@ -101,7 +101,7 @@ class _Sets:
     """Sets over one record, and what of them is wanted."""
 
     model: Model
-    numbers: Mapping[str, Array]  # (m,) each, by path; see `march_lanes`
+    numbers: Mapping[str, Array]  # (m,) each, by path; see `Lanes`
     record: Record
     records: Mapping[str, Array]  # external signals on the record's grid
     output: str
@@ -138,13 +138,11 @@ def _march(
     table: dict[str, Array] = {}
     for sets, options in blocks:
         padded, size = np.resize(sets, LANES), sets.size
-        found = march_lanes(
-            shared.model,
-            options,
+        lanes = lanes_of(shared.model, tuple(shared.records), options, shared.output)
+        found = lanes(
             {path: values[padded] for path, values in shared.numbers.items()},
             shared.records,
             record.step,
-            shared.output,
             measured=measured,
             weight=weight,
             keep=keep,

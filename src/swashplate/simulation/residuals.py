@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from swashplate.equations.marching import jacobian as engine
 from swashplate.equations.marching.jacobian import Jacobian as Jacobian
@@ -17,7 +17,6 @@ from swashplate.equations.marching.jacobian import Triangle as Triangle
 from swashplate.equations.marching.observation import ObservedRecord, every_sample
 from swashplate.equations.marching.observation import Own as EngineOwn
 from swashplate.equations.marching.record import Record
-from swashplate.equations.marching.rows import BLOCK
 from swashplate.equations.marching.run import Instance, Start
 from swashplate.errors import InputError
 from swashplate.parameters.definitions import SWITCHES, columns_of
@@ -73,16 +72,10 @@ class Ready(NamedTuple):
     moved: Sequence[bool] | None = None  # Whether the record may depend on a column at all.
 
 
-def residuals(
-    parameters: ParameterSet,
-    observed: ObservedRecord,
-    own: Own = NOTHING_OWN,
-    *,
-    block: int = BLOCK,
-) -> Array:
-    """Weighted residuals of all observations, one after the other; see `jacobian.residuals`."""
+def residuals(parameters: ParameterSet, observed: ObservedRecord, own: Own = NOTHING_OWN) -> Array:
+    """(m,) weighted residuals of all observations, one after the other; see the engine's."""
     ready = made_ready(parameters, observed, (), own)
-    return engine.residuals(ready.instance, observed, ready.own, block=block)
+    return engine.residuals(ready.instance, observed, ready.own)
 
 
 def jacobian(
@@ -92,7 +85,6 @@ def jacobian(
     own: Own = NOTHING_OWN,
     *,
     out: Array | None = None,
-    block: int = BLOCK,
 ) -> Jacobian:
     """The same residuals with their exact derivatives; see the engine's `jacobian`.
 
@@ -101,7 +93,7 @@ def jacobian(
     """
     names = wanted_columns(tuple(columns))
     instance, inner, paths, moved = made_ready(parameters, observed, names, own)
-    found = engine.jacobian(instance, observed, paths, inner, moved=moved, out=out, block=block)
+    found = engine.jacobian(instance, observed, paths, inner, moved=moved, out=out)
     return found._replace(names=(*names, *observed.own_columns))
 
 
@@ -110,13 +102,11 @@ def triangle(
     observed: ObservedRecord,
     columns: Sequence[str],
     own: Own = NOTHING_OWN,
-    *,
-    block: int = BLOCK,
 ) -> Triangle:
     """Triangular factor of [J r]; arguments as in `jacobian`, which is never held."""
     names = wanted_columns(tuple(columns))
     instance, inner, paths, moved = made_ready(parameters, observed, names, own)
-    found = engine.triangle(instance, observed, paths, inner, moved=moved, block=block)
+    found = engine.triangle(instance, observed, paths, inner, moved=moved)
     return found._replace(names=(*names, *observed.own_columns))
 
 
@@ -193,8 +183,6 @@ def _switched_on(parameters: ParameterSet, asked: frozenset[str]) -> ParameterSe
 
 # --- over a whole run -----------------------------------------------------------------------------
 
-OUTPUTS = ("current", "current_positive", "current_negative", "shaft_speed", "shaft_position")
-"""Signals that have sensitivities."""
 PUMP_COLUMNS = tuple(name for name, path in PATHS.items() if path.startswith("pump.Z"))
 """Columns of the pump and motor of Kruse (2001)."""
 ALL_COLUMNS = (
@@ -249,20 +237,6 @@ class Sensitivities(Result):
     def current(self) -> Array:
         """(n, k) derivatives of the signed current. [A/...]"""
         return self.current_positive - self.current_negative
-
-    def at(self, time: ArrayLike, output: str) -> Array:
-        """(m, k) derivatives of an output at other time stamps, by linear interpolation.
-
-        Parameters
-        ----------
-        time : (m,) array_like
-            Time stamps. [s]
-        output : str
-            One of `OUTPUTS`.
-        """
-        rows = getattr(self, output)
-        stamps = np.asarray(time, dtype=np.float64)
-        return np.column_stack([np.interp(stamps, self.record.time, column) for column in rows.T])
 
 
 def sensitivities(

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import Record
-from swashplate.equations.marching.run import Instance, observed_at
+from swashplate.equations.marching.run import Instance, Started, marched
 from swashplate.errors import InputError
 from swashplate.models.displacement_control import Pump
 from swashplate.results import Tabular, figures
@@ -43,9 +43,15 @@ SIGNALS = (
     "shaft_position",
 )
 """Signals of a simulation in the order of the chain."""
-INSIDE = ("solenoid_force", "spool_position", "orifice_opening", "swash_angle")
-"""Signals inside the pump that are computed in one pass."""
 MOTOR = ("motor_torque", "motor_pressure_drop")
+KEPT = (
+    Stored(0, "signals", "current_positive"),
+    Stored(0, "signals", "current_negative"),
+    Stored(1, "state", "pressure"),
+    Stored(1, "signals", "shaft_speed"),
+)
+"""What a march leaves; for all else it is marched again when it is first asked for."""
+INSIDE = ("solenoid_force", "spool_position", "orifice_opening", "swash_angle", *MOTOR)
 
 
 class Limit(IntFlag):
@@ -160,10 +166,10 @@ class Simulation(Signals):
     """The model with its numbers."""
     driven_by: str
     """``"voltage"`` or ``"current"``."""
-    kept: tuple[Stored, ...] = field(repr=False)
-    """What the march left on its grid, in the order of `out`."""
+    started: Started = field(repr=False)
+    """Where it began."""
     out: Array = field(repr=False)
-    flags: Flags = field(repr=False)
+    """`KEPT` on the march's grid."""
     measured: Mapping[str, Array] = field(default_factory=dict, repr=False)
     """Further inputs that were given as signals, on the march's grid."""
 
@@ -205,11 +211,21 @@ class Simulation(Signals):
     @cached_property
     def _fine(self) -> dict[str, Array]:
         """Signals on the march's grid, as far as they were asked for."""
-        return {
-            "current_positive": self.out[0],
-            "current_negative": self.out[1],
-            "stroker_pressure": self.out[self.kept.index(Stored(1, "state", "pressure"))],
-        }
+        names = ("current_positive", "current_negative", "stroker_pressure", "shaft_speed")
+        return dict(zip(names, self.out, strict=True))
+
+    @cached_property
+    def _limits(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """Limits of card and pump on the march's grid, bits of each."""
+        parts = self.instance.model.parts
+        wanted = [Stored(1, "signals", name) for name in INSIDE]
+        wanted += [Stored(i, "limits") for i in (0, 1) if parts[i].limits is not None]
+        records = {self.driven_by: self.record.values, **self.measured}
+        step, begun = self.record.step, self.started
+        out = marched(self.instance, records, step, begun, tuple(wanted), self.driven_by)
+        self._fine.update(zip(INSIDE, out, strict=False))
+        *card, pump = out[len(INSIDE) :].astype(np.uint8)
+        return card[0] if card else np.zeros_like(pump), pump
 
     def fine(self, signal: str) -> Array:
         """A signal on the march's grid, `substeps` points a sample.
@@ -230,18 +246,8 @@ class Simulation(Signals):
             elif signal == "shaft_position":
                 found[signal] = self.turned()
             else:
-                group = next((each for each in (INSIDE, MOTOR) if signal in each), (signal,))
-                out = self._observed(tuple(Stored(1, "signals", each) for each in group))
-                found |= dict(zip(group, out, strict=True))
+                _ = self._limits
         return found[signal]
-
-    def _observed(self, wanted: tuple[Stored, ...]) -> Array:
-        """Signals of the pump at the states that the march left."""
-        kept = (each for each in self.kept if each.kind != "limits")
-        known = dict(zip(kept, self.out, strict=True))
-        known |= {Stored(1, "input", name): values for name, values in self.measured.items()}
-        signals = (self.driven_by, *self.measured)
-        return observed_at(self.instance, 1, known, signals, self.record.step, wanted)
 
     current_positive = Named(signal)
     """Current of the solenoid towards positive speed, never negative. [A]"""
@@ -276,10 +282,8 @@ class Simulation(Signals):
     def limits(self) -> Flags:
         """Limits that act at each sample, bits of `Limit`."""
         # the pump's limits in their order, with the card's between the first and the second
-        pump = self._observed((Stored(1, "limits"),))[0].astype(np.uint8)
-        bits = (pump & 1) | ((pump & 0b11110) << 1)
-        if self.driven_by_voltage:
-            bits = bits | (self.flags[0] << 1)
+        card, pump = self._limits
+        bits = (pump & 1) | ((pump & 0b11110) << 1) | (card << 1)
         return self.sampled(bits.astype(np.uint8))
 
     def active(self, limit: Limit | str) -> NDArray[np.bool_]:
@@ -299,7 +303,7 @@ class Simulation(Signals):
 
     def rate_limited(self) -> NDArray[np.bool_]:
         """Points of the march's grid at which a rate limit of the card sets a current."""
-        return np.asarray(self.flags[0] > 0)
+        return np.asarray(self._limits[0] > 0)
 
     def at(self, time: ArrayLike, signal: str) -> Array:
         """A signal at other time stamps, by linear interpolation.

@@ -10,12 +10,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.code import generating
-from swashplate.equations.marching.march import Sampler
 from swashplate.equations.marching.part import Stored
-from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.record import Record, column
 from swashplate.equations.marching.run import Instance, Start, Started, called, marched
-from swashplate.equations.model import Model
 from swashplate.errors import DomainError, InputError
 from swashplate.models.displacement_control import PumpConstants
 from swashplate.models.pump import PumpInputs, PumpState
@@ -27,7 +24,7 @@ from swashplate.simulation.instance import (
     models_of,
     without_ripple,
 )
-from swashplate.simulation.result import Simulation
+from swashplate.simulation.result import KEPT, Simulation
 
 Array = NDArray[np.float64]
 Driver = Literal["voltage", "current"]
@@ -45,21 +42,6 @@ def check_voltage(record: Record, clip: bool) -> Record:
     raise InputError(
         f"The voltage is {record.values[first]:g} V at {record.start + first * record.step:g} s, "
         f"but the card takes ±{FULL_VOLTAGE:g} V; check its unit, or clip it."
-    )
-
-
-@generating
-def kept_of(model: Model, signals: tuple[str, ...], options: tuple[Any, ...]) -> tuple[Stored, ...]:
-    """What a march leaves: currents, and the states from which all else follows."""
-    card, pump = model.parts
-    assert pump.signals is not None
-    inside = [Stored(1, "signals", path) for path in pump.signals._fields]
-    sampler = Sampler(model, signals, options, [*inside, Stored(1, "limits")])
-    return (
-        Stored(0, "signals", "current_positive"),
-        Stored(0, "signals", "current_negative"),
-        *(Stored(1, "state", path) for path in sampler.carried[1]),
-        Stored(0, "signals", "current") if card.limits is None else Stored(0, "limits"),
     )
 
 
@@ -82,9 +64,8 @@ def simulate_drive(
     others = measured or {}
     records = {driver: record.values, **others}
     started = started_at(instance, records, record.step, start, start_pressure)
-    kept = kept_of(instance.model, tuple(records), instance.options)
-    out, flags = marched(instance, records, record.step, started, kept, driver)
-    return Simulation(parameters.name, record, instance, driver, kept, out, flags, others)
+    out = marched(instance, records, record.step, started, KEPT, driver)
+    return Simulation(parameters.name, record, instance, driver, started, out, others)
 
 
 simulate_pump = partial(simulate_drive, driver="current")
@@ -144,20 +125,15 @@ def measured_records(
         "supply_pressure": supply_pressure,
     }
     found: dict[str, Array] = {}
-    size = (record.values.size - 1) // record.substeps + 1
+    fine = np.arange(record.values.size)
+    grid = fine[:: record.substeps]
     for name, values in given.items():
         if values is None:
             continue
-        samples = np.asarray(values, dtype=np.float64)
-        if samples.ndim == 0:
-            samples = np.full(size, float(samples))
-        if samples.shape != (size,):
-            raise InputError(f"{name} has {samples.size} samples, but the command has {size}.")
-        if not np.isfinite(samples).all():
-            bad = int(np.argmax(~np.isfinite(samples)))
-            raise InputError(f"{name} is {samples[bad]} at sample {bad}; it must be finite.")
-        grid = np.arange(record.values.size)
-        found[name] = np.interp(grid, grid[:: record.substeps], samples)
+        samples = column(np.full(grid.size, values) if np.ndim(values) == 0 else values, name)
+        if samples.size != grid.size:
+            raise InputError(f"{name} has {samples.size} samples, but the command has {grid.size}.")
+        found[name] = np.interp(fine, grid, samples)
     return found
 
 
@@ -170,7 +146,7 @@ def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Arra
     settled = replace(whole, model=models_of(parameters.equations).settled_drive)
     wanted = (Stored(0, "signals", "current"), Stored(1, "signals", "shaft_speed"))
     begun = Started((), {"voltage": 0.0}, ())
-    (current, speed), _ = marched(settled, {"voltage": voltage}, 1.0, begun, wanted)
+    current, speed = marched(settled, {"voltage": voltage}, 1.0, begun, wanted)
     return current, speed
 
 

@@ -54,7 +54,7 @@ def _steps(step: Callable[[Machine], float]) -> Callable[..., float]:
     @kernel
     def steps(
         last: float, voltage: float, held: bool, substeps: int, begun: bool, machine: Machine,
-        shown: Array,
+        position: Array,
     ) -> float:  # fmt: skip
         """Advance by one sample of a record, or take the first one."""
         worst = inf
@@ -65,17 +65,20 @@ def _steps(step: Callable[[Machine], float]) -> Callable[..., float]:
             before = machine.outputs[7]
             worst = min(worst, step(machine))
             if begun:
-                shown[0] = shown[0] + 0.5 * machine.h * (before + machine.outputs[7])
+                position[0] = position[0] + 0.5 * machine.h * (before + machine.outputs[7])
         return worst
 
     return steps
 
 
 class StepperState(NamedTuple):
-    """All that a stepper remembers; read-only, good to keep and to return to."""
+    """All that a stepper remembers, good to keep and to return to."""
 
-    numbers: Array
-    line: Array
+    machine: Machine
+    position: float
+    """[rad]"""
+    last: float | None
+    """Command of the sample before, None if there was none. [V]"""
 
 
 class Stepper:
@@ -104,29 +107,23 @@ class Stepper:
         self._compiled = CompiledStep(self._instance, ("voltage",), SHOWN, self._step)
         self._steps = _steps(self._compiled.step)
         self._machine = self._compiled.machine()
-        self._shown = np.zeros(1)
-        self._last, self._begun = 0.0, False
+        self._position = np.zeros(1)
+        self._last: float | None = None
 
     @property
     def state(self) -> StepperState:
         """A copy of the present state; assign it to return to that instant."""
-        rest = [self._last, float(self._begun)]
-        m = self._machine
-        numbers = np.concatenate([m.states, m.outputs, self._shown, rest])
-        line = m.lines[0].copy()
-        numbers.flags.writeable = line.flags.writeable = False
-        return StepperState(numbers, line)
+        return StepperState(self._machine.copied(), float(self._position[0]), self._last)
 
     @state.setter
     def state(self, state: StepperState) -> None:
-        m = self._machine
-        size = m.states.size
-        if state.line.shape != m.lines[0].shape or state.numbers.size != size + len(SHOWN) + 3:
+        own, given = self._machine, state.machine.copied()
+        if given.lines.shape != own.lines.shape or given.states.size != own.states.size:
             raise InputError("This state belongs to a stepper of another drive, delay or rate.")
-        m.states[:] = state.numbers[:size]
-        m.outputs[:], self._shown[:] = state.numbers[size:-3], state.numbers[-3]
-        self._last, self._begun = float(state.numbers[-2]), bool(state.numbers[-1])
-        m.lines[0] = state.line
+        self._machine = own._replace(
+            states=given.states, outputs=given.outputs, lines=given.lines, inputs=given.inputs
+        )
+        self._position[0], self._last = state.position, state.last
 
     def step(self, voltage: float) -> Sample:
         """Advance by one sample interval.
@@ -151,18 +148,14 @@ class Stepper:
         voltage = float(voltage)
         if not -FULL_VOLTAGE <= voltage <= FULL_VOLTAGE:
             raise InputError(f"The voltage is {voltage:g} V, but the card takes ±10 V.")
-        if self._start == "steady" and not self._begun:
+        begun = self._last is not None
+        if self._start == "steady" and not begun:
             self._machine = self._compiled.machine({"voltage": voltage}, "steady")
+        last = 0.0 if self._last is None else self._last
         worst = self._steps(
-            self._last,
-            voltage,
-            self._held,
-            self._substeps,
-            self._begun,
-            self._machine,
-            self._shown,
+            last, voltage, self._held, self._substeps, begun, self._machine, self._position
         )
         self._compiled.check(self._machine, worst, "voltage")
-        self._last, self._begun = voltage, True
+        self._last = voltage
         plus, minus, *inside = self._machine.outputs.tolist()
-        return Sample._make([voltage, plus, minus, plus - minus, *inside, float(self._shown[0])])
+        return Sample._make([voltage, plus, minus, plus - minus, *inside, float(self._position[0])])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.metadata import version
@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from swashplate.__about__ import __version__
 from swashplate.campaign.rig.instruments import (
     COLUMNS,
+    FULL_SCALE,
     SEVERITIES,
     Instruments,
     Severity,
+    converted,
     logged,
-    put_out,
     stream,
 )
 from swashplate.campaign.schema import (
@@ -98,7 +99,7 @@ class VirtualTests:
 
 def run(
     drive: str | Drive,
-    maneuvers: Mapping[str, Maneuver] | Iterable[Maneuver] | None = None,
+    maneuvers: Mapping[str, Maneuver] | Sequence[Maneuver] | None = None,
     *,
     seed: int = 1,
     severity: Severity = "realistic",
@@ -116,7 +117,7 @@ def run(
     ----------
     drive : str or Drive
         Name of a packaged drive, or a drive: the one that a fit starts from.
-    maneuvers : mapping or iterable of Maneuver, optional
+    maneuvers : mapping or sequence of Maneuver, optional
         By default Kruse's tests of the axis.
     seed : int
         Not negative. The same seed gives the same logs, each of them whatever runs beside it.
@@ -162,7 +163,12 @@ def run(
     # a real card's decay does not wait for the next sample of a log (docs/decisions/0008)
     simulated = Drive(replace(simulated.parameters, card_switch="split"))
     axis = axis or nominal.name
-    tests = _named(maneuvers, axis)
+    listed = source_tests(axis) if maneuvers is None else maneuvers
+    tests = dict(listed if isinstance(listed, Mapping) else ((m.name, m) for m in listed))
+    if len(tests) < len(listed):
+        raise InputError("Two maneuvers have the same name; give them in a mapping by name.")
+    if not tests:
+        raise InputError("A campaign needs at least one maneuver.")
     possible = [kind for kind in CHANNEL_KINDS if kind != "other"]
     for kind in channels:
         if kind not in possible:
@@ -185,7 +191,11 @@ def run(
     tools = SEVERITIES[severity] if instruments is None else instruments
     runs = {}
     for name, maneuver in tests.items():
-        happened = simulated.simulate(put_out(maneuver.sample(SOURCE_RATE), tools))
+        command = maneuver.sample(SOURCE_RATE)
+        largest = float(np.abs(command).max())
+        if largest > FULL_SCALE:
+            raise InputError(f"The command reaches {largest:g} V, but the card takes ±10 V.")
+        happened = simulated.simulate(converted(command, tools.command_bits))
         columns = logged(happened, kinds, tools, turn, seed, name)
         role: Literal["fit", "validate"] = "validate" if name in held_back else "fit"
         # as a file's name: hoist_step_+4_V, hoist_ramp_+1_V-s
@@ -206,23 +216,6 @@ def run(
         turn,
         runs,
     )
-
-
-def _named(
-    maneuvers: Mapping[str, Maneuver] | Iterable[Maneuver] | None, axis: str
-) -> dict[str, Maneuver]:
-    if maneuvers is None:
-        return source_tests(axis)
-    if isinstance(maneuvers, Mapping):
-        tests = dict(maneuvers)
-    else:
-        listed = list(maneuvers)
-        tests = {each.name: each for each in listed}
-        if len(tests) < len(listed):
-            raise InputError("Two maneuvers have the same name; give them in a mapping by name.")
-    if not tests:
-        raise InputError("A campaign needs at least one maneuver.")
-    return tests
 
 
 def perturbed(drive: Drive, spread: float, seed: int) -> Drive:

@@ -194,55 +194,50 @@ def logged(
     name: str,
 ) -> dict[str, Array]:
     """What the instruments make of a run; each has its own stream of chance."""
-    grid = truth.time
-    instants, stamps = sampled_instants(grid, instruments, stream(seed, name, "time"))
-    assert truth.voltage is not None
-    at_voltage = interpolated(instants, grid, truth.voltage)
-    columns = {
-        "time": stamps,
-        "voltage": read_voltage(at_voltage, instruments, stream(seed, name, "voltage")),
-    }
-    for kind in kinds:
-        chance = stream(seed, name, kind)
-        if kind == "rectified_current":
-            currents = truth.current_positive, truth.current_negative
-            reading = read_current(grid, *currents, instants, instruments, chance)
-        else:
-            signal: Array = getattr(truth, SIGNALS.get(kind, kind))
-            if kind in ("position", "encoder_counts") and instruments.backlash:
-                signal = play(signal, instruments.backlash)
-            signal = interpolated(instants, grid, signal)
-            if kind == "encoder_counts":
-                reading = read_counts(signal, counts_per_turn, instruments, chance)
-            else:
-                reading = read_transducer(signal, instruments, chance)
-        columns[COLUMNS.get(kind, kind)] = reading
-    for column, values in columns.items():
-        if column != "time" and instruments.empty_cells:
-            chance = stream(seed, name, "empty", column)
-            gaps = lost(values.size, instruments.empty_cells, instruments.longest_gap, chance)
-            columns[column] = np.where(gaps, np.nan, values)
-    gone = lost(
-        grid.size, instruments.lost_rows, instruments.longest_loss, stream(seed, name, "rows")
-    )
-    if gone.all():
-        raise InputError(f"{name}: lost_rows leaves no row; take a smaller share.")
-    return {column: values[~gone] for column, values in columns.items()}
-
-
-def sampled_instants(
-    grid: Array, instruments: Instruments, generator: Generator
-) -> tuple[Array, Array]:
-    """Instants (n,) about an even grid (n,) of the samples, and their stamps (n,). [s]"""
-    strayed = instruments.jitter * generator.standard_normal(grid.size)
+    tools, grid = instruments, truth.time
+    # the stamps are those of the instants sampled, which stay in order however large the jitter is
+    strayed = tools.jitter * stream(seed, name, "time").standard_normal(grid.size)
     bound = FARTHEST * (grid[1] - grid[0] if grid.size > 1 else 0.0)
     instants = np.clip(grid + np.clip(strayed, -bound, bound), grid[0], grid[-1])
-    step = instruments.stamp_resolution
-    return instants, rounded(instants, step) if step else instants
+
+    def at_instants(signal: Array | None) -> Array:
+        # the drive is marched on the grid: what lies between is not known better than by lines
+        assert signal is not None
+        return signal if not tools.jitter else np.interp(instants, grid, signal)
+
+    def read(kind: str) -> Array:
+        chance = stream(seed, name, kind)
+        if kind == "rectified_current":
+            both = at_instants(truth.current_positive), at_instants(truth.current_negative)
+            return read_current(instants, both, tools, chance)
+        signal: Array = getattr(truth, SIGNALS.get(kind, kind))
+        if kind in ("position", "encoder_counts") and tools.backlash:
+            signal = play(signal, tools.backlash)
+        signal = at_instants(signal)
+        if kind == "voltage":
+            noise = tools.voltage_noise * chance.standard_normal(grid.size)
+            return converted(signal + tools.voltage_offset + noise, tools.voltage_bits)
+        if kind == "encoder_counts":
+            return read_counts(signal * (counts_per_turn / (2.0 * np.pi)), tools, chance)
+        noise = tools.transducer_noise * np.abs(signal).max() * chance.standard_normal(grid.size)
+        return np.asarray(signal + noise)
+
+    columns = {COLUMNS.get(kind, kind): read(kind) for kind in ("voltage", *kinds)}
+    for column, values in columns.items():
+        chance = stream(seed, name, "empty", column)
+        gaps = lost(grid.size, tools.empty_cells, tools.longest_gap, chance)
+        columns[column] = np.where(gaps, np.nan, values) if tools.empty_cells else values
+    kept = ~lost(grid.size, tools.lost_rows, tools.longest_loss, stream(seed, name, "rows"))
+    if not kept.any():
+        raise InputError(f"{name}: lost_rows leaves no row; take a smaller share.")
+    columns = {"time": rounded(instants, tools.stamp_resolution), **columns}
+    return {column: values[kept] for column, values in columns.items()}
 
 
 def rounded(values: Array, step: float) -> Array:
-    """Values rounded to whole steps, as the nearest decimals where the step is one."""
+    """Values rounded to whole steps, as the nearest decimals where the step is one; 0 is none."""
+    if not step:
+        return values
     per_unit = 1.0 / step
     if abs(per_unit - round(per_unit)) < 1e-6 * per_unit:
         # division by a whole number gives the float that the decimal number is read as
@@ -260,38 +255,7 @@ def lost(size: int, share: float, longest: int, generator: Generator) -> Mask:
     return mask
 
 
-def interpolated(instants: Array, time: Array, signal: Array) -> Array:
-    """A signal of the grid at other instants, on straight lines; on the grid itself, its samples.
-
-    The drive is marched on the grid, so what lies between is not known better. At an instant that
-    strays by a hundredth of a sample the line is off by 4 % of what it is half way between two.
-    """
-    if instants is time or np.array_equal(instants, time):
-        return signal
-    return np.interp(instants, time, signal)
-
-
-def put_out(voltage: Array, instruments: Instruments) -> Array:
-    """The command as the converter that puts it out makes it. [V]
-
-    Raises
-    ------
-    InputError
-        If it goes beyond ±10 V, which a converter would clip. At 10 V it stays one step below.
-    """
-    largest = float(np.abs(voltage).max())
-    if largest > FULL_SCALE:
-        raise InputError(f"The command reaches {largest:g} V, but the card takes ±10 V; scale it.")
-    return _converted(voltage, instruments.command_bits)
-
-
-def read_voltage(voltage: Array, instruments: Instruments, generator: Generator) -> Array:
-    """The command as it is read back at the instants sampled. [V]"""
-    noise = instruments.voltage_noise * generator.standard_normal(voltage.size)
-    return _converted(voltage + instruments.voltage_offset + noise, instruments.voltage_bits)
-
-
-def _converted(voltage: Array, bits: int) -> Array:
+def converted(voltage: Array, bits: int) -> Array:
     """Codes of b bits over ±10 V: whole multiples of 20/2ᵇ V, up to one below 10 V. [V]"""
     if not bits:
         return voltage
@@ -301,71 +265,44 @@ def _converted(voltage: Array, bits: int) -> Array:
     return np.asarray(codes * (FULL_SCALE / half) + 0.0)
 
 
-def dither_ripple(time: Array, current: Array, phase: float, instruments: Instruments) -> Array:
-    """What pulse width modulation adds to the mean of a channel's current (n,), not negative. [A]
-
-    `phase` is the share of a period that has passed at 0 s. Pulses of the length D T, D = I /
-    I_full, raise the current of an inductive coil along a straight line and let it fall along
-    another: a triangle of mean zero whose height goes with D (1 − D). It has all multiples of the
-    frequency; at 512 Hz the fifth of 100 Hz shows at 12 Hz.
-    """
-    duty = np.clip(current / instruments.full_current, 0.0, 1.0)
-    height = 4.0 * instruments.dither * duty * (1.0 - duty)
-    passed = np.mod(instruments.dither_frequency * time + phase, 1.0)
-    rising = 2.0 * passed / np.maximum(duty, 1e-9) - 1.0
-    falling = 1.0 - 2.0 * (passed - duty) / np.maximum(1.0 - duty, 1e-9)
-    return np.asarray(height * np.where(passed < duty, rising, falling))
-
-
 def read_current(
-    time: Array,
-    plus: Array,
-    minus: Array,
-    instants: Array,
-    instruments: Instruments,
-    generator: Generator,
+    instants: Array, both: tuple[Array, Array], tools: Instruments, chance: Generator
 ) -> Array:
-    """The ammeter around both leads, read at some instants (m,). [A]
+    """The ammeter around both leads, from their currents (m,), magnitudes, at instants (m,). [A]
 
-    `plus` and `minus` are the currents (n,) of both channels on an even grid, magnitudes. The
-    reading is (1 + gain error) (|I₊ + ripple| + |I₋ + ripple|) + zero error + noise.
+    The reading is (1 + gain error) (|I₊ + ripple| + |I₋ + ripple|) + zero error + noise. Pulses of
+    the length D T, D = I / I_full, raise the current of an inductive coil along a straight line and
+    let it fall along another: a triangle of mean zero whose height goes with D (1 − D). It has all
+    multiples of the frequency; at 512 Hz the fifth of 100 Hz shows at 12 Hz.
     """
-    phase = float(generator.random())
+    passed = np.mod(tools.dither_frequency * instants + float(chance.random()), 1.0)
     reading = np.zeros(instants.size)
-    for channel in (plus, minus):
-        mean = interpolated(instants, time, channel)
-        ripple = dither_ripple(instants, mean, phase, instruments) if instruments.dither else 0.0
-        reading += np.abs(mean + ripple)
-    noise = instruments.current_noise * generator.standard_normal(instants.size)
-    reading = (1.0 + instruments.current_gain_error) * reading + instruments.current_zero + noise
-    step = instruments.current_resolution
-    return rounded(reading, step) if step else np.asarray(reading)
+    for mean in both:
+        duty = np.clip(mean / tools.full_current, 0.0, 1.0)
+        rising = 2.0 * passed / np.maximum(duty, 1e-9) - 1.0
+        falling = 1.0 - 2.0 * (passed - duty) / np.maximum(1.0 - duty, 1e-9)
+        height = 4.0 * tools.dither * duty * (1.0 - duty)
+        reading += np.abs(mean + height * np.where(passed < duty, rising, falling))
+    noise = tools.current_noise * chance.standard_normal(instants.size)
+    reading = (1.0 + tools.current_gain_error) * reading + tools.current_zero + noise
+    return rounded(reading, tools.current_resolution)
 
 
-def read_counts(
-    position: Array, counts_per_turn: float, instruments: Instruments, generator: Generator
-) -> Array:
-    """The encoder's counter, 0 at the first sample, from angles of the shaft (n,). [count]
+def read_counts(counts: Array, tools: Instruments, chance: Generator) -> Array:
+    """The encoder's counter, 0 at the first sample, from positions (n,). [count]
 
-    The counter shows how many edges were passed. Where between two edges the shaft stands at first
-    is chance, so that on average the steps are no error. A counter of b bits counts from −2ᵇ⁻¹ to
+    It shows how many edges were passed. Where between two edges the shaft stands at first is
+    chance, so that on average the steps are no error. A counter of b bits counts from −2ᵇ⁻¹ to
     2ᵇ⁻¹ − 1 and begins anew.
     """
-    counts = position * (counts_per_turn / (2.0 * np.pi))
-    first = float(generator.random())
-    if instruments.encoder_step:
-        step = float(instruments.encoder_step)
+    first = float(chance.random())
+    if tools.encoder_step:
+        step = float(tools.encoder_step)
         counts = step * (np.floor(counts / step + first) - np.floor(counts[:1] / step + first))
-    if instruments.counter_bits:
-        half = 2.0 ** (instruments.counter_bits - 1)
+    if tools.counter_bits:
+        half = 2.0 ** (tools.counter_bits - 1)
         counts = np.mod(counts + half, 2.0 * half) - half
     return np.asarray(counts)
-
-
-def read_transducer(signal: Array, instruments: Instruments, generator: Generator) -> Array:
-    """Any other signal: itself and white noise in proportion to its largest magnitude."""
-    noise = generator.standard_normal(signal.size)
-    return np.asarray(signal + instruments.transducer_noise * np.abs(signal).max() * noise)
 
 
 def play(position: Array, width: float) -> Array:

@@ -10,8 +10,8 @@ each other (`recur` kernels: strongly connected components), each behind those t
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from graphlib import TopologicalSorter
 from typing import Any, NamedTuple
 
@@ -20,11 +20,11 @@ from swashplate.equations.adjoints import Derivatives, Derived, derived_function
 from swashplate.equations.code import Code, Let, generating, leaves
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.marching.march import Sampler, march_source, output_of
-from swashplate.equations.marching.part import PartCode, Start, Stored, rest_of, settled_of
+from swashplate.equations.marching.part import PartCode, Stored, rest_of, settled_of
 from swashplate.equations.marching.pieces import PIECE, Planned, piece
 from swashplate.equations.marching.rows import STRIDE
 from swashplate.equations.marching.run import module
-from swashplate.equations.model import Model, Source, arguments_of
+from swashplate.equations.model import Model, arguments_of
 from swashplate.equations.reading import read
 from swashplate.equations.writing import Writer, function_source, indented, lines_of
 from swashplate.errors import InputError
@@ -60,82 +60,36 @@ class Group:
     piece: int = -1  # Piece that runs the recurrence; -1 where a kernel does, for one state.
 
 
-@dataclass
-class Component:
-    """States of a part that share no derivative with its others: one piece fills them in."""
-
-    piece: int
-    groups: list[Group]
-    signals: bool = False  # Whether the piece fills in signals and their derivatives as well.
-
-
-@dataclass
-class PartGraph:
+class PartGraph(NamedTuple):
     """A part: its partial derivatives and the order in which they are used."""
 
-    part: int
-    entries: dict[tuple[str, By], Entry] = field(default_factory=dict)
+    code: PartCode
+    entries: dict[str, dict[By, Entry]]
     """By result (``state.x``, ``signals.y``) and what it is derived by."""
-    components: list[Component] = field(default_factory=list)
-    signal_piece: int = -1  # Piece that fills in the derivatives of signals, -1 for none.
-    value_piece: int = -1
-    """Piece that computes signals which the march does not leave, -1 for none."""
-    aliases: dict[str, str] = field(default_factory=dict)
+    groups: list[Group]
+    fill: int  # Piece that fills in partial derivatives and signals, -1 for none.
+    signals: int  # Piece that computes signals alone which the march does not leave, -1 for none.
+    aliases: dict[str, str]
     """Signals that are a state behind the sample, as far as derivatives go."""
-    constants: set[tuple[str, str]] = field(default_factory=set)
-    """Constant and parameter that it depends on."""
-    delays: dict[int, str] = field(default_factory=dict)  # Path of the delay of each tap.
-    started: set[tuple[str, str]] = field(default_factory=set)
-    """State and parameter that it depends on at the start."""
+
+
+Known = tuple[str, int, str]
+"""Constant (``k``) or state (``state``) of a part, by its name or path."""
 
 
 class Starting(NamedTuple):
-    """What is known of a part at the start, with its derivatives, as a function of scalars.
+    """Constants and states at the start with their derivatives, as a function of scalars."""
 
-    Results are the constants that a sample reads (``k``), the states (``state``), and the signals
-    that other parts need (``signal``).
-    """
-
-    results: tuple[tuple[str, str], ...]  # Kind and name of each.
-    arguments: tuple[str, ...]
-    by: tuple[By, ...]
-    """What each input of `derived` is: a parameter, or a signal of a part before."""
+    arguments: tuple[tuple[str, int, str], ...]
+    """What each argument is: kind, part, and path or signal."""
+    moves: tuple[tuple[Known, str], ...]
+    """What is derived, by which column: the last numbers that `derived` gives."""
     derived: Derived
 
-    def entries(self) -> Iterator[tuple[tuple[str, str], By]]:
-        """Results, each with what it is differentiated by."""
-        for out, inp in self.derived.entries:
-            yield self.results[out], self.by[inp]
 
-
-@dataclass(eq=False)
 class Graph:
-    """A model's whole structure."""
+    """A model's whole structure for some observed signals, and the pieces of its march."""
 
-    parts: list[PartGraph]
-    stored: dict[Stored, int]  # Rows of the numbers that the march leaves in the block.
-    rows: int  # Rows of numbers and partial derivatives together.
-    links: dict[str, dict[str, float]]  # Partial derivatives of observed links by their sources.
-    observed: list[tuple[Stored, bool]]  # What is observed, and whether as an integral.
-    values: dict[tuple[int, str], int]
-    """Row of each signal that the march does not leave, by part and path."""
-    sources: list[Source]  # Signals that other parts or observed links need.
-    starts: list[dict[str, Starting]]
-    """What is known of each part where it starts at rest and, if it can, settled."""
-    codes: list[PartCode]  # The parts' code.
-    signals: tuple[str, ...]  # External signals that are given as records.
-    pieces: tuple[Planned, ...]  # The march, and what the parts' graphs name by number.
-
-
-@generating
-def graph_of(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], observed: tuple[str, ...]
-) -> Graph:
-    """A model's structure for some observed signals, and the pieces of its march."""
-    return _Builder(model, signals, options, observed).build()
-
-
-class _Builder:
     def __init__(
         self,
         model: Model,
@@ -143,49 +97,28 @@ class _Builder:
         options: tuple[Any, ...],
         observed: tuple[str, ...],
     ) -> None:
-        self.model, self.signals, self.options = model, signals, options
+        self.model = model
         self.observed = [output_of(model, each) for each in observed]
+        """What is observed, and whether as an integral."""
         self.sampler = Sampler(
             model, signals, options, [place for place, _ in self.observed], ruled=True
         )
-        self.parts = self.sampler.used()
-        self.pieces: list[Planned] = []  # The march, made last, comes first.
-        self.stored: dict[Stored, int] = {}
-        self.row_of: dict[str, int] = {}  # Row of each number by its name in the code.
-        self.rows = 0
-        self.graphs: list[PartGraph] = []
-        self.starts: list[dict[str, Starting]] = []
-        self.found: list[tuple[Derivatives, dict[tuple[str, By], Node]]] = []
-        """What was differentiated of each part, and its partial derivatives."""
+        self.rows = 0  # Of numbers and partial derivatives together.
+        self.stored: dict[Stored, int] = {}  # Rows of the numbers that the march leaves.
         self.values: dict[tuple[int, str], int] = {}
-
-    def build(self) -> Graph:
-        for part in self.parts:
-            self._begin(part)
+        """Row of each signal that the march does not leave, by part and path."""
+        self._row_of: dict[str, int] = {}  # Row of each number by its name in the code.
+        self.pieces: list[Planned] = []  # The march, made last, comes first.
         # part by part, so that the pieces of the first ones are the same whatever follows
-        for graph, part in zip(self.graphs, self.parts, strict=True):
-            self._keep(graph, part)
-            self._values(graph, part)
-            self._part(graph, part)
-        for place, _ in self.observed:
-            if place.kind == "link":
-                self._row_for(place)
+        self.parts = [self._part(part) for part in self.sampler.used()]
+        links = [place for place, _ in self.observed if place.kind == "link"]
+        for place in links:
+            self._row_for(place)
         rows = {each: _place(row, "n - first") for each, row in self.stored.items()}
-        text, names = march_source(self.model, self.signals, self.options, rows)
-        march = self._planned("march", text, names)
-        return Graph(
-            self.graphs,
-            self.stored,
-            self.rows,
-            self._links(),
-            self.observed,
-            self.values,
-            list(self.sampler.sources),
-            self.starts,
-            self.parts,
-            self.signals,
-            (march, *self.pieces),
-        )
+        self.pieces.insert(0, self._planned("march", *march_source(model, signals, options, rows)))
+        self.links = {place.path: self._factors(place.path) for place in links}
+        """Partial derivatives of observed links by their sources."""
+        self._starting: dict[str, Starting] = {}
 
     def _planned(self, name: str, text: str, names: Mapping[str, Any]) -> Planned:
         """A piece, in a module of its own."""
@@ -193,27 +126,23 @@ class _Builder:
         return Planned(lambda: module(file, text, {"piece": piece, **names})[name])
 
     def _piece(
-        self,
-        name: str,
-        says: str,
-        lines: Sequence[str],
-        names: Mapping[str, Any],
-        arguments: str = PIECE,
+        self, name: str, says: str, lines: Sequence[str], names: Any = None, arguments: str = PIECE
     ) -> int:
         """Number of a new piece."""
         text = function_source(f"{name}({arguments})", says, lines, "@piece")
-        self.pieces.append(self._planned(name, text, {**self.sampler.names, **names}))
+        self.pieces.append(self._planned(name, text, {**self.sampler.names, **(names or {})}))
         return len(self.pieces)
 
     def _new_row(self) -> int:
         self.rows += 1
         return self.rows - 1
 
-    def _row_for(self, stored: Stored) -> int:
-        """Row in which the march leaves a number."""
+    def _row_for(self, stored: Stored, name: str = "") -> None:
+        """Have the march leave a number, which has a name in the code."""
         if stored not in self.stored:
             self.stored[stored] = self._new_row()
-        return self.stored[stored]
+        if name:
+            self._row_of[name] = self.stored[stored]
 
     # -- scalar functions ----------------------------------------------------------------------
 
@@ -222,19 +151,9 @@ class _Builder:
         places = [place for place, _ in self.observed if place.part == part.part]
         return [place.path for place in places if place.kind == kind]
 
-    def _signals(self, part: PartCode) -> list[str]:
-        """Signals of a part whose derivatives somebody needs."""
-        needed = [s.signal for s in self.sampler.sources if s.part == part.part]
-        return list(dict.fromkeys([*needed, *self._observed(part, "signals")]))
-
-    def _results(self, part: PartCode) -> dict[str, Node]:
-        """States behind the sample and signals that are needed, by result."""
-        following = dict(leaves(part.following))
-        made = {f"state.{path}": following[path] for path in self._states(part)}
-        for signal in self._signals(part):
-            if f"state.{signal}" not in made or signal not in dict(leaves(part.state)):
-                made[f"signals.{signal}"] = part.signal(signal)
-        return made
+    def _needed(self, part: PartCode) -> list[str]:
+        """Signals of a part that other parts or links need."""
+        return [s.signal for s in self.sampler.sources if s.part == part.part]
 
     def _states(self, part: PartCode) -> list[str]:
         carried = self.sampler.carried[part.part]
@@ -247,9 +166,7 @@ class _Builder:
             every = {each for _, node in leaves(part.known["k"]) for each in node.reads}
             found |= {name: By("k", name) for name in every if name not in found}
         found |= {node.value: By("state", path) for path, node in leaves(part.state)}
-        for tap in part.taps:
-            if tap.tap.delay:
-                found[part.fraction(tap)] = By("tap", str(tap.number))
+        found |= {part.fraction(t): By("tap", str(t.number)) for t in part.taps if t.tap.delay}
         for source in self.sampler.sources:
             found[part.source(source)] = By("signal", source.signal, source.part)
         return found
@@ -264,218 +181,189 @@ class _Builder:
             line
             for line in lines
             if (line in made or line.split(" = ")[0] in wanted)
-            and line.split(" = ")[0] not in self.row_of
+            and line.split(" = ")[0] not in self._row_of
         ]
         ahead += [
             f"{part.fraction(tap)} = fraction[{tap.number}]"
             for tap in part.taps
             if part.fraction(tap) in names
         ]
-        rows = [
-            f"{name} = {_place(self.row_of[name], 'm')}"
-            for name in sorted(names)
-            if name in self.row_of
-        ]
-        return ahead, rows
+        here = sorted(names & self._row_of.keys())
+        return ahead, [f"{name} = {_place(self._row_of[name], 'm')}" for name in here]
 
     # -- what flows ----------------------------------------------------------------------------
 
-    def _begin(self, part: PartCode) -> None:
-        """Differentiate what is needed of a part, and find its aliases."""
-        graph = PartGraph(part.part)
-        self.graphs.append(graph)
-        graph.delays = {tap.number: tap.tap.delay for tap in part.taps if tap.tap.delay}
-        results, known = self._results(part), self._by(part)
-        nodes, order = [*results.values()], [*results]
-        active = sorted(part.code.reads(nodes) & known.keys())
-        found = Derivatives(part.code, nodes, active)
+    def _part(self, part: PartCode) -> PartGraph:
+        """Differentiate what is needed of a part, and plan its pieces."""
+        following, here = dict(leaves(part.following)), dict(leaves(part.state))
+        results = {f"state.{path}": following[path] for path in self._states(part)}
+        states = [*results]
+        watched = self._observed(part, "signals")
+        wanted = dict.fromkeys([*self._needed(part), *watched])
+        for signal in wanted:
+            if f"state.{signal}" not in results or signal not in here:
+                results[f"signals.{signal}"] = part.signal(signal)
+        known = self._by(part)
+        active = sorted(part.code.reads(results.values()) & known.keys())
+        found, order = Derivatives(part.code, [*results.values()], active), [*results]
         keys = [(order[out], known[active[inp]]) for out, inp in found.entries]
-        self.found.append((found, dict(zip(keys, found.partials, strict=True))))
-        states = [each for each in results if each.startswith("state.")]
-        for signal in [each for each in results if each.startswith("signals.")]:
-            for state in states:
-                if results[signal] is results[state]:
-                    graph.aliases[signal.removeprefix("signals.")] = state.removeprefix("state.")
+        partials = dict(zip(keys, found.partials, strict=True))
+        aliases = {
+            signal: state.removeprefix("state.")
+            for signal in wanted
+            for state in states
+            if results.get(f"signals.{signal}") is results[state]
+        }
+        self._keep(part, wanted, aliases)
+        alone = self._values(part, list(dict.fromkeys(watched)))
+        at_sample = {
+            by.path
+            for out, by in partials
+            if by.kind == "state" and out.startswith("signals.") and out[8:] not in aliases
+        }.union(self._observed(part, "state"), self._needed(part))
+        aliases = {s: path for s, path in aliases.items() if path not in at_sample}
+        for signal in aliases:
+            partials = {k: node for k, node in partials.items() if k[0] != f"signals.{signal}"}
+        entries: dict[str, dict[By, Entry]] = {}
+        filled = self._fill(part, found, partials, entries)
+        flows = {
+            path: {by.path for by in entries.get(f"state.{path}", {}) if by.kind == "state"}
+            for path in self._states(part)
+            if f"state.{path}" in entries
+        }
+        groups = []
+        for members in _strongly_connected(flows):
+            others = [into for path, into in flows.items() if path not in members]
+            elsewhere = [any(path in into for into in others) for path in members]
+            after = tuple(
+                path in aliases.values() and not read
+                for path, read in zip(members, elsewhere, strict=True)
+            )
+            stored = tuple(
+                path in at_sample or read or behind
+                for path, read, behind in zip(members, elsewhere, after, strict=True)
+            )
+            group = Group(members, after, stored)
+            if len(members) > 1:
+                group.piece = self._recurrence(part, entries, group)
+            groups.append(group)
+        return PartGraph(part, entries, groups, filled, alone, aliases)
 
-    def _keep(self, graph: PartGraph, part: PartCode) -> None:
+    def _keep(self, part: PartCode, wanted: Iterable[str], aliases: Mapping[str, str]) -> None:
         """Numbers of a part that the march leaves: states, inputs as they come, known signals."""
-        names = dict(leaves(part.state))
+        names, read = dict(leaves(part.state)), self.sampler.read(part)
         for path in self._states(part):
-            self._store(Stored(part.part, "state", path), names[path].value)
-        read = self.sampler.read(part)
+            self._row_for(Stored(part.part, "state", path), names[path].value)
         for tap in part.taps:
             for j, name in enumerate(part.tap_samples(tap)):
                 if name in read:
-                    self._store(Stored(part.part, "tap", f"{tap.input}.{j}"), name)
+                    self._row_for(Stored(part.part, "tap", f"{tap.input}.{j}"), name)
         for name in part.own.input_types:
             signal = part.own.tap(name).signal
-            if f"x_{signal}" in read and signal in self.signals:
-                self._store(Stored(part.part, "input", name), f"x_{signal}")
+            if f"x_{signal}" in read and signal in self.sampler.signals:
+                self._row_for(Stored(part.part, "input", name), f"x_{signal}")
         for source in self.sampler.sources:
             if source.part == part.part:
-                stored = Stored(part.part, "signals", source.signal)
-                if source.signal in names:
-                    stored = stored._replace(kind="state")
-                self._store(stored, part.source(source))
-        for signal in self._signals(part):
+                kind = "state" if source.signal in names else "signals"
+                self._row_for(Stored(part.part, kind, source.signal), part.source(source))
+        for signal in wanted:
             # what sub-steps lead to is not computed again
-            known = signal in graph.aliases or part.code.repeats
-            if known and (part.part, signal) not in self.values:
-                stored = Stored(part.part, "signals", signal)
-                if stored not in self.stored:
-                    self._store(stored, f"signal {part.part} {signal}")
+            if signal in aliases or part.code.repeats:
+                self._row_for(Stored(part.part, "signals", signal))
 
-    def _store(self, stored: Stored, name: str) -> None:
-        self.row_of[name] = self._row_for(stored)
-
-    def _values(self, graph: PartGraph, part: PartCode) -> None:
+    def _values(self, part: PartCode, observed: Sequence[str]) -> int:
         """Piece that computes signals which the march does not leave, at known states."""
-        asked = dict.fromkeys(self._observed(part, "signals"))
-        late = [each for each in asked if Stored(part.part, "signals", each) not in self.stored]
+        late = [each for each in observed if Stored(part.part, "signals", each) not in self.stored]
         if not late:
-            return
+            return -1
         nodes = [part.signal(signal) for signal in late]
         ahead, rows = self._arguments(part, part.code.reads(nodes))
         inner = [*rows, *lines_of(part.code, nodes, straight=True)]
         for signal, node in zip(late, nodes, strict=True):
             self.values[part.part, signal] = self._new_row()
             inner.append(f"{_place(self.values[part.part, signal], 'm')} = {text(node)}")
-        graph.value_piece = self._piece(
+        return self._piece(
             f"values_{part.own.name}",
             f"Signals of {part.own.name} at known states.",
             [*ahead, "for m in range(count):", *indented(inner)],
-            {},
         )
 
-    def _part(self, graph: PartGraph, part: PartCode) -> None:
-        own = part.own.name
-        derivatives, partials = self.found[self.graphs.index(graph)]
+    def _factors(self, name: str) -> dict[str, float]:
+        """Partial derivatives of a link: numbers, or refused."""
+        link = self.model.links[name]
+        assert link.equation is not None
+        arguments = arguments_of(link.equation)
+        code = Code(arguments, ruled=True)
+        made = read(code, link.equation, {each: ex.name(each) for each in arguments})
+        assert isinstance(made, Node)
+        derived = Derivatives(code, [made], arguments)
+        if any(each.op != "number" for each in derived.partials):
+            raise InputError(
+                f"Model {self.model.name}: the link {name} must be a sum of signals with "
+                "constant factors; put anything else into a part's sample."
+            )
+        pairs = zip(derived.entries, derived.partials, strict=True)
+        return {arguments[inp]: float(each.value) for (_, inp), each in pairs}
 
-        def fill(name: str, outs: Iterable[str], values: Mapping[int, Node]) -> int:
-            wanted = {*outs}
-            some = {key: node for key, node in partials.items() if key[0] in wanted}
-            return self._fill(graph, part, name, derivatives, some, values)
+    def starting(self, start: str) -> Starting:
+        """Constants and states where a record begins at rest or settled; call it `generating`."""
+        if start not in self._starting:
+            self._starting[start] = self._started(start)
+        return self._starting[start]
 
-        signals = [
-            each
-            for each in self._results(part)
-            if each.startswith("signals.") and each.removeprefix("signals.") not in graph.aliases
-        ]
-        states = list(dict.fromkeys(out for out, _ in partials if out.startswith("state.")))
-        flows = {
-            out: {f"state.{by.path}" for each, by in partials if each == out and by.kind == "state"}
-            & {*states}
-            for out in states
-        }
-        components = _weakly_connected(states, flows)
-        # what leads to states leads to signals, sub-steps above all: once for both
-        together = part.code.repeats or (bool(signals) and len(components) == 1)
-        if together:
-            components = [states]
-            values = {
-                row: part.signal(path)
-                for (number, path), row in self.values.items()
-                if number == part.part
+    def _started(self, start: str) -> Starting:
+        codes = [graph.code for graph in self.parts]
+        code = Code(codes[0].code.taken, ruled=True)
+        results: dict[Known, Node] = {}
+        by: dict[str, str] = {}
+        outside: dict[str, tuple[str, int, str]] = {"h": ("h", 0, "")}
+        for part in codes:
+            # what has no equation for a steady state has no state, and is always settled
+            begun = (settled_of(part) if start == "steady" else None) or rest_of(part)
+            begins, states = dict(leaves(begun.value)), dict(leaves(part.state))
+            code.items += [*part.prologue.items, *begun.code.items]
+            code.items += [Let(states[path].value, node) for path, node in begins.items()]
+            code.items += part.code.items
+            code.items += [
+                Let(part.source(s), part.signal(s.signal))
+                for s in self.sampler.sources
+                if s.part == part.part
+            ]
+            results |= {
+                ("k", part.part, name): ex.name(name) for name in self.sampler.constants(part)
             }
-            filled = fill(own, [*states, *signals], values)
-        elif signals:
-            graph.signal_piece = fill(f"{own}_signals", signals, {})
-        at_sample = {
-            by.path
-            for out, by in graph.entries
-            if out.startswith("signals.") and by.kind == "state"
-        } | {*self._observed(part, "state")}
-        at_sample |= {s.signal for s in self.sampler.sources if s.part == part.part}
-        graph.aliases = {s: path for s, path in graph.aliases.items() if path not in at_sample}
-        for c, outs in enumerate(components):
-            name = f"{own}_{c}" if len(outs) < len(states) else own
-            if not together:
-                filled = fill(name, outs, {})
-            groups = []
-            for members in _strongly_connected(outs, flows):
-                bare = tuple(each.removeprefix("state.") for each in members)
-                elsewhere = {
-                    path
-                    for path in bare
-                    if any(f"state.{path}" in flows[out] for out in outs if out not in members)
-                }
-                after = tuple(
-                    path in graph.aliases.values() and path not in elsewhere for path in bare
-                )
-                stored = tuple(
-                    path in at_sample or path in elsewhere or behind
-                    for path, behind in zip(bare, after, strict=True)
-                )
-                groups.append(Group(bare, after, stored))
-                if len(bare) > 1:
-                    groups[-1].piece = self._recurrence(graph, f"{own}_{bare[0]}", groups[-1])
-            graph.components.append(Component(filled, groups, together))
-        starts = {"rest": self._starting(part, rest_of(part))}
-        settled = settled_of(part)
-        if settled is not None:
-            starts["steady"] = self._starting(part, settled)
-        self.starts.append(starts)
-        for each in starts.values():
-            for (kind, name), by in each.entries():
-                if kind == "k":
-                    graph.constants.add((name, by.path))
-                elif kind == "state" and by.kind == "p":
-                    graph.started.add((name, by.path))
-
-    def _starting(self, part: PartCode, start: Start) -> Starting:
-        """Constants, states and signals of a part at the start, with their derivatives."""
-        begins, states = dict(leaves(start.value)), dict(leaves(part.state))
-        code = Code(part.code.taken, ruled=True)
-        code.items = [*part.prologue.items, *start.code.items]
-        code.items += [Let(states[path].value, node) for path, node in begins.items()]
-        code.items += part.code.items
-        results = {("k", name): ex.name(name) for name in self.sampler.constants(part)}
-        results |= {("state", path): begins[path] for path in self._states(part)}
-        results |= {
-            ("signal", s.signal): part.signal(s.signal)
-            for s in self.sampler.sources
-            if s.part == part.part
-        }
-        known = {name: by for name, by in self._by(part).items() if by.kind in ("p", "signal")}
-        given = {"h", *map(part.fraction, part.taps), *(n.value for _, n in leaves(part.given))}
-        outside = given.union(known, *map(part.tap_samples, part.taps))
-        read = code.reads(results.values())
-        arguments = sorted(each for each in read if each in outside or each.startswith("x_"))
-        active = [each for each in arguments if each in known]
-        named = [(f"{kind} {name}", node) for (kind, name), node in results.items()]
-        name = f"{part.own.name}_start"
-        says = f"Constants, states and signals of {part.own.name} at the start."
-        by = [(each, each) for each in active]
-        derived = derived_function(name, says, arguments, code, named, by, chained=True)
-        return Starting((*results,), (*arguments,), tuple(known[a] for a in active), derived)
-
-    def _links(self) -> dict[str, dict[str, float]]:
-        """Partial derivatives of observed links: numbers, or refused."""
-        found: dict[str, dict[str, float]] = {}
-        for place, _ in self.observed:
-            if place.kind != "link":
-                continue
-            link = self.model.links[place.path]
-            assert link.equation is not None
-            arguments = arguments_of(link.equation)
-            code = Code(arguments, ruled=True)
-            made = read(code, link.equation, {each: ex.name(each) for each in arguments})
-            assert isinstance(made, Node)
-            derived = Derivatives(code, [made], arguments)
-            if any(each.op != "number" for each in derived.partials):
-                raise InputError(
-                    f"Model {self.model.name}: the link {link.name} must be a sum of signals with "
-                    "constant factors; put anything else into a part's sample."
-                )
-            found[link.name] = {
-                arguments[inp]: float(each.value)
-                for (_, inp), each in zip(derived.entries, derived.partials, strict=True)
-            }
-        return found
+            results |= {("state", part.part, path): begins[path] for path in self._states(part)}
+            prefix = self.model.prefix(part.part)
+            by |= {name: f"{prefix}{path}" for name, path in part.parameters.items()}
+            outside |= {name: ("p", part.part, path) for name, path in part.parameters.items()}
+            for path, node in leaves(part.given):
+                outside[node.value] = ("given", part.part, path)
+            for tap in part.taps:
+                found = ("signal", part.part, tap.tap.signal)
+                outside |= dict.fromkeys(part.tap_samples(tap), found)
+                outside[part.fraction(tap)] = ("zero", part.part, "")
+        outside |= {f"x_{name}": ("signal", 0, name) for name in self.sampler.signals}
+        arguments = sorted(code.reads(results.values()) & outside.keys())
+        active = [each for each in arguments if each in by]
+        named = [(" ".join(map(str, key)), node) for key, node in results.items()]
+        derived = derived_function(
+            f"{self.model.name}_start",
+            f"Constants and states of {self.model.name} at the start.",
+            arguments,
+            code,
+            named,
+            [(each, each) for each in active],
+            chained=True,
+        )
+        keys = [*results]
+        moves = tuple((keys[out], by[active[inp]]) for out, inp in derived.entries)
+        return Starting(tuple(outside[name] for name in arguments), moves, derived)
 
     # -- pieces --------------------------------------------------------------------------------
 
-    def _recurrence(self, graph: PartGraph, name: str, group: Group) -> int:
+    def _recurrence(
+        self, part: PartCode, entries: Mapping[str, Mapping[By, Entry]], group: Group
+    ) -> int:
         """Piece that runs y[n+1] = A[n] y[n] + g[n] for some columns, PAIR of them side by side.
 
         Its second argument is the number of columns. In place of ``whole`` it takes, for each state
@@ -493,8 +381,7 @@ class _Builder:
                 behind.append(f"tangent[p{i}_{j}] = y{i}_{j}")
                 terms = [f"flat[g{i}_{j} + m]"]
                 for l in states:
-                    by = By("state", group.states[l])
-                    entry = graph.entries.get((f"state.{group.states[i]}", by))
+                    entry = entries[f"state.{group.states[i]}"].get(By("state", group.states[l]))
                     if entry is not None and entry.row >= 0:
                         loads[f"a{i}_{l}"] = f"a{i}_{l} = {_place(entry.row, 'm')}"
                         terms.append(f"a{i}_{l} * y{l}_{j}")
@@ -507,52 +394,51 @@ class _Builder:
         inner += [f"y{i}_{j} = n{i}_{j}" for i in states for j in abreast]
         head = PIECE.replace("first", "width").replace("whole", "columns")
         return self._piece(
-            f"recur_{name.replace('.', '_')}",
+            f"recur_{part.own.name}_{group.states[0].replace('.', '_')}",
             f"Derivatives of {', '.join(group.states)}.",
             [
                 f"for c in range(0, width, {PAIR}):",
                 *indented([*ahead, "for m in range(count):", *indented([*loads.values(), *inner])]),
                 *indented(behind),
             ],
-            {},
-            head.replace("params", "tangent"),
+            arguments=head.replace("params", "tangent"),
         )
 
     def _fill(
         self,
-        graph: PartGraph,
         part: PartCode,
-        name: str,
         derivatives: Derivatives,
         partials: Mapping[tuple[str, By], Node],
-        values: Mapping[int, Node],
+        entries: dict[str, dict[By, Entry]],
     ) -> int:
-        """Piece that writes partial derivatives, and values, at known states into rows."""
-        rows = {}
+        """Piece that writes partial derivatives, and signals, at known states into rows."""
+        wanted: dict[int, Node] = {}
         # what moves constants, too, last: it is summed up elsewhere, the others lie side by side
         constants = [ex.name(name) for name in self.sampler.constants(part)]
         twice = {part.parameters.get(name, "") for name in part.prologue.reads(constants)}
         for key, partial in sorted(partials.items(), key=lambda each: each[0][1].path in twice):
             if partial.op == "number":
-                graph.entries[key] = Entry(-1, float(partial.value))
+                entry = Entry(-1, float(partial.value))
             else:
-                rows[key] = self._new_row()
-                graph.entries[key] = Entry(rows[key])
-        if not rows and not values:
+                entry = Entry(self._new_row())
+                wanted[entry.row] = partial
+            entries.setdefault(key[0], {})[key[1]] = entry
+        for (number, path), row in self.values.items():
+            if number == part.part:
+                wanted[row] = part.signal(path)
+        if not wanted:
             return -1
-        wanted = [*(partials[key] for key in rows), *values.values()]
         taken = {*part.code.taken, *derivatives.taken}
-        writer = Writer(taken, derivatives.items, wanted, derivatives.hints, straight=True)
+        nodes = [*wanted.values()]
+        writer = Writer(taken, derivatives.items, nodes, derivatives.hints, straight=True)
         ahead, loads = self._arguments(part, writer.needed)
         # what only one side of a choice makes would carry its value from one sample to the next, as
         # far as a compiler can know, and the loop would not become vector instructions
         begun = [f"{name} = {value}" for name, value in writer.inner.items()]
-        stores = [
-            f"{_place(row, 'm')} = {made}"
-            for row, made in zip([*rows.values(), *values], writer.texts, strict=True)
-        ]
+        pairs = zip(wanted, writer.texts, strict=True)
+        stores = [f"{_place(row, 'm')} = {made}" for row, made in pairs]
         return self._piece(
-            f"fill_{name}",
+            f"fill_{part.own.name}",
             "Partial derivatives at known states.",
             [
                 *ahead,
@@ -561,6 +447,14 @@ class _Builder:
             ],
             writer.functions,
         )
+
+
+@generating
+def graph_of(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], observed: tuple[str, ...]
+) -> Graph:
+    """A model's structure for some observed signals, made once."""
+    return Graph(model, signals, options, observed)
 
 
 def _place(row: int, at: str) -> str:
@@ -574,27 +468,17 @@ def _sum(terms: Sequence[str]) -> str:
     return terms[0] if not half else f"({_sum(terms[:half])} + {_sum(terms[half:])})"
 
 
-def _weakly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> list[list[str]]:
-    """States in groups that share no derivative."""
-    group = {each: frozenset((each,)) for each in states}
-    for out, inputs in flows.items():
-        for inp in inputs:
-            merged = group[out] | group[inp]
-            group |= dict.fromkeys(merged, merged)
-    return [[each for each in states if each in some] for some in dict.fromkeys(group.values())]
-
-
-def _strongly_connected(states: Sequence[str], flows: Mapping[str, set[str]]) -> list[list[str]]:
+def _strongly_connected(flows: Mapping[str, set[str]]) -> list[tuple[str, ...]]:
     """States in groups that wait for each other, each group behind those that it needs."""
-    reach = {each: {each} for each in states}
-    for _ in states:  # no way is longer
-        for out in states:
+    reach = {each: {each} for each in flows}
+    for _ in flows:  # no way is longer
+        for out in flows:
             reach[out].update(*(reach[inp] for inp in flows[out] if inp in reach))
     group = {
-        each: tuple(other for other in states if other in reach[each] and each in reach[other])
-        for each in states
+        each: tuple(other for other in flows if other in reach[each] and each in reach[other])
+        for each in flows
     }
     order: TopologicalSorter[tuple[str, ...]] = TopologicalSorter()
-    for each in states:
+    for each in flows:
         order.add(group[each], *({group[i] for i in flows[each] if i in group} - {group[each]}))
-    return [list(members) for members in order.static_order()]
+    return list(order.static_order())

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -29,7 +28,7 @@ from swashplate.equations.code import Call, Choice, Code, Item, Let, Rule, gener
 from swashplate.equations.equation import JIT_OFF
 from swashplate.equations.expressions import Node, text
 from swashplate.equations.marching.march import Sampler, lower, output_of
-from swashplate.equations.marching.part import choose, rest_of
+from swashplate.equations.marching.part import Stored, choose, rest_of
 from swashplate.equations.marching.run import module
 from swashplate.equations.marching.triangle import aligned
 from swashplate.equations.model import Model
@@ -209,96 +208,6 @@ def over_lanes(lines: Sequence[str]) -> list[str]:
     return ["for lane in range(LANES):", *indented(lines)] if lines else []
 
 
-def lanes_source(
-    model: Model, signals: Sequence[str], options: Sequence[Any], output: str
-) -> tuple[str, dict[str, Any], dict[str, int], Sampler]:
-    """Text of the march of LANES sets over one record, its names, and the rows of its block.
-
-    Two kernels:
-
-    - ``prepare(h, flat)`` computes what does not change, and states at rest, of every lane;
-    - ``march(records, whole, h, flat, measured, weight, outputs)`` marches: costs and the worst
-      margins are rows of the block, and ``outputs``, unless empty, are a row for each lane.
-    """
-    place, is_rate = output_of(model, output)
-    sampler, rows = Sampler(model, signals, options, [place]), Rows()
-    parts = sampler.used()
-    straight, known = straight_of(sampler)
-
-    # what rows become at the end of a sample
-    following: dict[str, Node] = {}
-    shown = ex.name("value")
-    for part in parts:
-        straight.cut()
-        straight.add(part.code, part.code.kept(sampler.ends[part.part]))
-        for source, node in sampler.sources.items():
-            if source.part == part.part:
-                straight.let(part.source(source), node)
-        if part.margin is not None:
-            worst = following.get("worst", ex.name("worst"))
-            following["worst"] = lower(worst, part.margin)
-        if place.part == part.part:
-            code, node = sampler.observed(part, place)
-            straight.add(code, code.kept([node]))
-            straight.let("value", node)
-        state, step = dict(leaves(part.state)), dict(leaves(part.following))
-        following |= {state[path].value: step[path] for path in sampler.carried[part.part]}
-    if is_rate:
-        trapezium = ex.make("*", ex.name("half"), ex.make("+", ex.name("rate"), shown))
-        following["rate"] = shown
-        straight.let("integral", ex.make("+", ex.name("total"), trapezium))
-        following["total"] = shown = ex.name("integral")
-    straight.let("error", ex.make("-", shown, ex.name("target")))
-    square = ex.make("*", ex.make("*", ex.name("counts"), ex.name("error")), ex.name("error"))
-    following |= {"cost": ex.make("+", ex.name("cost"), square), "shown": shown}
-
-    # what a lane sees of a record at a place of its own is fetched a sample ahead of its use: a row
-    # that was just written number by number cannot be read as a whole at once
-    first: list[str] = []
-    fetched: list[str] = []
-    for part in parts:
-        for tap in part.taps:
-            samples, record = part.tap_samples(tap), sampler.signals.index(tap.tap.signal)
-            queue = [f"{part.fraction(tap)}_coming", *samples]
-            for lines, name, n in ((first, queue[1], "0"), (fetched, queue[0], "coming")):
-                index = f"{n} - whole[{tap.number}, lane]"
-                lines.append(f"{rows.text(name)} = sample_at(records[{record}], {index}, 0.0)")
-            following |= {older: ex.name(newer) for newer, older in pairwise(queue)}
-    for name, node in following.items():
-        straight.become(rows.text(name), node)
-
-    read = {name for loop in straight.loops for each in loop for name in each.reads}
-    shared = {"target": "measured[n]", "counts": "weight[n]"}
-    shared["half"] = "0.5 * h if n > 0 else 0.0"
-    shared |= {f"x_{name}": f"records[{k}][n]" for k, name in enumerate(sampler.signals)}
-    inner = [f"{name} = {value}" for name, value in shared.items() if name in read]
-    if fetched:
-        inner += ["coming = min(n + 1, last)", *over_lanes(fetched)]
-    inner += rows.loops(straight.loops, {"h", *shared})
-    kept = over_lanes([f"outputs[lane, n] = {rows.text('shown')}"])
-    inner += ["if outputs.size > 0:", *indented(kept)]
-
-    texts = [
-        function_source(
-            "prepare(h, flat)",
-            f"What does not change, and states at rest, of LANES sets of {model.name}.",
-            over_lanes(prepared(sampler, straight, rows, known, read)),
-        ),
-        function_source(
-            "march(records, whole, h, flat, measured, weight, outputs)",
-            f"March LANES sets of {model.name} over one record.",
-            [
-                "last = measured.size - 1",
-                *over_lanes(first),
-                "for n in range(measured.size):",
-                *indented(inner),
-            ],
-        ),
-    ]
-    called = {**sampler.names, **CALLED, "LANES": LANES}
-    return "\n\n".join(texts), called, rows.number, sampler
-
-
 def straight_of(sampler: Sampler) -> tuple[Straight, set[str]]:
     """Room for a sample without branches, and the names of numbers that are known ahead of it."""
     parts = sampler.used()
@@ -357,78 +266,6 @@ def report(model: Model, output: str | None = None, *, options: Any = None) -> s
     return "\n".join([f"{model.name} is not all vector instructions:", *found])
 
 
-def prepared(
-    sampler: Sampler, straight: Straight, rows: Rows, known: set[str], read: set[str]
-) -> list[str]:
-    """Lines of a lane ahead of the march, from what is known to what is read in it."""
-    lines = [line for each in straight.ahead for line in each.lines]
-    lines += rows.saves(read & straight.still - known - {"h"})
-    used = {name for each in straight.ahead for name in each.reads}
-    for part in sampler.used():
-        rest = rest_of(part)
-        state, nodes = dict(leaves(part.state)), dict(leaves(rest.value))
-        at_rest = {state[path].value: nodes[path] for path in sampler.carried[part.part]}
-        lines += lines_of(rest.code, at_rest.values())
-        lines += [f"{rows.text(name)} = {text(node)}" for name, node in at_rest.items()]
-        reads = {*sampler.constants(part), *rest.code.reads(at_rest.values())}
-        needed = [ex.name(name) for name in reads]
-        lines[:0] = lines_of(part.prologue, needed)
-        used |= part.prologue.reads(needed)
-    return [*rows.loads(used & known), *lines]
-
-
-# --- marching -------------------------------------------------------------------------------------
-
-
-class Delayed(NamedTuple):
-    """How one of the model's taps looks at its signal."""
-
-    number: int
-    delay: str | None  # Path of the parameter.
-    ahead: float
-    fraction: int | None  # Row of the fraction of a sample, if anything reads it.
-
-
-@dataclass(frozen=True, eq=False)
-class Lanes:
-    """Kernels of LANES sets side by side, and the rows of their block."""
-
-    prepare: Callable[..., None]
-    march: Callable[..., None]
-    rows: Mapping[str, int]
-    columns: Mapping[str, tuple[int, float | None]]
-    """Row and default of each parameter and given that is read, as `march_lanes` takes them."""
-    taps: Sequence[Delayed]
-    starts: Mapping[str, int]  # Row of each state, as `march_lanes` takes them.
-
-
-@generating
-def lanes_of(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], output: str
-) -> Lanes:
-    """The compiled lanes of a model for one output."""
-    source, names, rows, sampler = lanes_source(model, signals, options, output)
-    made = module(f"{model.name}_lanes", source, names)
-    columns: dict[str, tuple[int, float | None]] = {}
-    taps, starts = [], {}
-    for part in sampler.used():
-        prefix = model.prefix(part.part)
-        defaults, states = part.own.parameters._field_defaults, dict(leaves(part.state))
-        for name, path in part.parameters.items():
-            if name in rows:
-                columns[f"{prefix}{path}"] = rows[name], defaults.get(path)
-        for path, node in leaves(part.given):
-            if node.value in rows:
-                columns[f"given {prefix}{path}"] = rows[node.value], None
-        for each in part.taps:
-            delay = f"{prefix}{each.tap.delay}" if each.tap.delay else None
-            fraction = rows.get(part.fraction(each))
-            taps.append(Delayed(each.number, delay, each.tap.ahead, fraction))
-        for path in sampler.carried[part.part]:
-            starts[f"start.{prefix}{path}"] = rows[states[path].value]
-    return Lanes(made["prepare"], made["march"], rows, columns, taps, starts)
-
-
 class Marched(NamedTuple):
     """What LANES sets leave."""
 
@@ -438,47 +275,178 @@ class Marched(NamedTuple):
     outputs: Array  # (LANES, n) the output, or (LANES, 0).
 
 
-def march_lanes(
-    model: Model,
-    options: tuple[Any, ...],
-    numbers: Mapping[str, Array],
-    records: Mapping[str, Array],
-    h: float,
-    output: str,
-    *,
-    measured: Array,
-    weight: Array,
-    keep: bool,
-) -> Marched:
-    """March LANES sets over one record, from rest but for what the numbers say.
+class Lanes:
+    """The march of LANES sets of a model over one record, for one output.
 
-    `numbers` has (LANES,) values of every parameter by its path, and every given, ``"given "``
-    before it; parameters that a type has a default for may be left out. States at the first sample,
-    ``"start."`` before their paths, where they are not those at rest. The output is compared with
-    (n,) `measured` values under the `weight` of each squared error.
+    Attributes
+    ----------
+    prepare : callable
+        ``prepare(h, flat)`` computes what does not change, and states at rest, of every lane.
+    march : callable
+        ``march(records, whole, h, flat, measured, weight, outputs)`` marches: costs and the worst
+        margins are rows of the block, and ``outputs``, unless empty, are a row for each lane.
     """
-    lanes = lanes_of(model, tuple(records), options, output)
-    block = aligned(len(lanes.rows), LANES)
-    for path, (row, default) in lanes.columns.items():
-        block[row] = numbers[path] if default is None else numbers.get(path, default)
-    highest = max((tap.number for tap in lanes.taps), default=0)
-    whole = np.zeros((highest + 1, LANES), dtype=np.int64)
-    for tap in lanes.taps:
-        delay = numbers[tap.delay] / h if tap.delay is not None else np.zeros(LANES)
-        end = np.maximum(delay, tap.ahead) - tap.ahead
-        whole[tap.number] = np.floor(end)
-        if tap.fraction is not None:
-            block[tap.fraction] = end - whole[tap.number]
-    worst = block[lanes.rows["worst"]] if "worst" in lanes.rows else np.empty(LANES)
-    worst[:] = np.inf
-    size = measured.size
-    # rows an odd number of cache lines apart, so that they do not share places in a cache
-    outputs = np.empty((LANES, (size | 15) + 9 if keep else 0))
-    values = tuple(np.require(each, np.float64, ["C", "W"]) for each in records.values())
-    with np.errstate(all="ignore"):  # of ways that are not taken there is nothing to say
-        lanes.prepare(h, block.reshape(-1))
-        for path in lanes.starts.keys() & numbers.keys():
-            block[lanes.starts[path]] = numbers[path]
-        lanes.march(values, whole, h, block.reshape(-1), measured, weight, outputs)
-    end = block[[lanes.rows["cost"], *lanes.starts.values()]].sum(axis=0)
-    return Marched(block[lanes.rows["cost"]], worst, end, outputs[:, :size])
+
+    def __init__(
+        self, model: Model, signals: Sequence[str], options: Sequence[Any], output: str
+    ) -> None:
+        place, is_rate = output_of(model, output)
+        self._sampler, self._rows = Sampler(model, signals, options, [place]), Rows()
+        self._straight, self._known = straight_of(self._sampler)
+        text = "\n\n".join(self._texts(place, is_rate))
+        made = module(
+            f"{model.name}_lanes", text, {**self._sampler.names, **CALLED, "LANES": LANES}
+        )
+        self.prepare: Callable[..., None] = made["prepare"]
+        self.march: Callable[..., None] = made["march"]
+
+    def _texts(self, place: Stored, is_rate: bool) -> list[str]:
+        """Texts of both kernels."""
+        sampler, rows, straight = self._sampler, self._rows, self._straight
+        parts, model = sampler.used(), sampler.model
+        # what rows become at the end of a sample
+        following: dict[str, Node] = {}
+        shown = ex.name("value")
+        for part in parts:
+            straight.cut()
+            straight.add(part.code, part.code.kept(sampler.ends[part.part]))
+            for source, node in sampler.sources.items():
+                if source.part == part.part:
+                    straight.let(part.source(source), node)
+            if part.margin is not None:
+                worst = following.get("worst", ex.name("worst"))
+                following["worst"] = lower(worst, part.margin)
+            if place.part == part.part:
+                code, node = sampler.observed(part, place)
+                straight.add(code, code.kept([node]))
+                straight.let("value", node)
+            state, step = dict(leaves(part.state)), dict(leaves(part.following))
+            following |= {state[path].value: step[path] for path in sampler.carried[part.part]}
+        if is_rate:
+            trapezium = ex.make("*", ex.name("half"), ex.make("+", ex.name("rate"), shown))
+            following["rate"] = shown
+            straight.let("integral", ex.make("+", ex.name("total"), trapezium))
+            following["total"] = shown = ex.name("integral")
+        straight.let("error", ex.make("-", shown, ex.name("target")))
+        square = ex.make("*", ex.make("*", ex.name("counts"), ex.name("error")), ex.name("error"))
+        following |= {"cost": ex.make("+", ex.name("cost"), square), "shown": shown}
+
+        # what a lane sees of a record at a place of its own is fetched a sample ahead of its use: a
+        # row that was just written number by number cannot be read as a whole at once
+        first: list[str] = []
+        fetched: list[str] = []
+        for tap in (tap for part in parts for tap in part.taps):
+            part = sampler.parts[tap.part]
+            samples, record = part.tap_samples(tap), sampler.signals.index(tap.tap.signal)
+            queue = [f"{part.fraction(tap)}_coming", *samples]
+            for lines, name, n in ((first, queue[1], "0"), (fetched, queue[0], "coming")):
+                index = f"{n} - whole[{tap.number}, lane]"
+                lines.append(f"{rows.text(name)} = sample_at(records[{record}], {index}, 0.0)")
+            following |= {older: ex.name(newer) for newer, older in pairwise(queue)}
+        for name, node in following.items():
+            straight.become(rows.text(name), node)
+
+        read = {name for loop in straight.loops for each in loop for name in each.reads}
+        shared = {"target": "measured[n]", "counts": "weight[n]"}
+        shared["half"] = "0.5 * h if n > 0 else 0.0"
+        shared |= {f"x_{name}": f"records[{k}][n]" for k, name in enumerate(sampler.signals)}
+        inner = [f"{name} = {value}" for name, value in shared.items() if name in read]
+        if fetched:
+            inner += ["coming = min(n + 1, last)", *over_lanes(fetched)]
+        inner += rows.loops(straight.loops, {"h", *shared})
+        kept = over_lanes([f"outputs[lane, n] = {rows.text('shown')}"])
+        inner += ["if outputs.size > 0:", *indented(kept)]
+        lines = ["last = measured.size - 1", *over_lanes(first)]
+        lines += ["for n in range(measured.size):", *indented(inner)]
+        return [
+            function_source(
+                "prepare(h, flat)",
+                f"What does not change, and states at rest, of LANES sets of {model.name}.",
+                over_lanes(self._prepared(read)),
+            ),
+            function_source(
+                "march(records, whole, h, flat, measured, weight, outputs)",
+                f"March LANES sets of {model.name} over one record.",
+                lines,
+            ),
+        ]
+
+    def _prepared(self, read: set[str]) -> list[str]:
+        """Lines of a lane ahead of the march, from what is known to what is read in it."""
+        sampler, rows, straight = self._sampler, self._rows, self._straight
+        lines = [line for each in straight.ahead for line in each.lines]
+        lines += rows.saves(read & straight.still - self._known - {"h"})
+        used = {name for each in straight.ahead for name in each.reads}
+        for part in sampler.used():
+            rest = rest_of(part)
+            state, nodes = dict(leaves(part.state)), dict(leaves(rest.value))
+            at_rest = {state[path].value: nodes[path] for path in sampler.carried[part.part]}
+            lines += lines_of(rest.code, at_rest.values())
+            lines += [f"{rows.text(name)} = {text(node)}" for name, node in at_rest.items()]
+            reads = {*sampler.constants(part), *rest.code.reads(at_rest.values())}
+            needed = [ex.name(name) for name in reads]
+            lines[:0] = lines_of(part.prologue, needed)
+            used |= part.prologue.reads(needed)
+        return [*rows.loads(used & self._known), *lines]
+
+    def __call__(
+        self,
+        numbers: Mapping[str, Array],
+        records: Mapping[str, Array],
+        h: float,
+        *,
+        measured: Array,
+        weight: Array,
+        keep: bool,
+    ) -> Marched:
+        """March LANES sets over one record, from rest but for what the numbers say.
+
+        `numbers` has (LANES,) values of every parameter by its path, and every given, ``"given "``
+        before it; parameters that a type has a default for may be left out. States at the first
+        sample, ``"start."`` before their paths, where they are not those at rest. The output is
+        compared with (n,) `measured` values under the `weight` of each squared error.
+        """
+        rows, model, parts = self._rows.number, self._sampler.model, self._sampler.used()
+        block = aligned(len(rows), LANES)
+        taps = [tap for part in parts for tap in part.taps]
+        whole = np.zeros((max((tap.number for tap in taps), default=0) + 1, LANES), dtype=np.int64)
+        starts: dict[str, int] = {}
+        for part in parts:
+            prefix, states = model.prefix(part.part), dict(leaves(part.state))
+            for name, path in part.parameters.items():
+                if name in rows:
+                    default = part.own.parameters._field_defaults.get(path)
+                    value = numbers.get(f"{prefix}{path}", default)
+                    block[rows[name]] = numbers[f"{prefix}{path}"] if value is None else value
+            for path, node in leaves(part.given):
+                if node.value in rows:
+                    block[rows[node.value]] = numbers[f"given {prefix}{path}"]
+            for tap in part.taps:
+                late = numbers[f"{prefix}{tap.tap.delay}"] / h if tap.tap.delay else np.zeros(LANES)
+                end = np.maximum(late, tap.tap.ahead) - tap.tap.ahead
+                whole[tap.number] = np.floor(end)
+                if part.fraction(tap) in rows:
+                    block[rows[part.fraction(tap)]] = end - whole[tap.number]
+            for path in self._sampler.carried[part.part]:
+                starts[f"start.{prefix}{path}"] = rows[states[path].value]
+        worst = block[rows["worst"]] if "worst" in rows else np.empty(LANES)
+        worst[:] = np.inf
+        size = measured.size
+        # rows an odd number of cache lines apart, so that they do not share places in a cache
+        outputs = np.empty((LANES, (size | 15) + 9 if keep else 0))
+        values = tuple(np.require(each, np.float64, ["C", "W"]) for each in records.values())
+        with np.errstate(all="ignore"):  # of ways that are not taken there is nothing to say
+            self.prepare(h, block.reshape(-1))
+            for path in starts.keys() & numbers.keys():
+                block[starts[path]] = numbers[path]
+            self.march(values, whole, h, block.reshape(-1), measured, weight, outputs)
+        end = block[[rows["cost"], *starts.values()]].sum(axis=0)
+        return Marched(block[rows["cost"]], worst, end, outputs[:, :size])
+
+
+@generating
+def lanes_of(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], output: str
+) -> Lanes:
+    """The compiled lanes of a model for one output."""
+    return Lanes(model, signals, options, output)

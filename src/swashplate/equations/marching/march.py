@@ -4,7 +4,6 @@ Every march is generated as readable source in which the model's equations stand
 over scalars (`scalars`). `PartCode` has one sample of a part, and the functions below wrap it as
 
 - `march_source`: the march, over whole records or a block of them for the Jacobian,
-- `observe_source`: signals at states that are known already,
 - `advance_source`: one sample, for steppers and for kernels that close loops.
 
 Many sets side by side are in `lanes`.
@@ -377,44 +376,6 @@ def advance_source(
         ),
     ]
     return "\n\n".join(texts), sampler.names
-
-
-def observe_source(
-    model: Model,
-    part: int,
-    signals: Sequence[str],
-    options: Sequence[Any],
-    kept: Sequence[Stored],
-    wanted: Sequence[Stored],
-) -> tuple[str, dict[str, Any]]:
-    """Text of a `piece` that computes signals of one part where its states are known.
-
-    In place of records it takes rows of states, inputs and taps' samples in the order of `kept`,
-    and fills rows in the order of `wanted`.
-    """
-    sampler = Sampler(model, signals, options, wanted)
-    own = sampler.parts[part]
-    # neither what follows nor the margin is asked for here
-    sampler.ends[part] = [
-        node
-        for each in wanted
-        for node in (own.limits if each.kind == "limits" else [own.node(each)])
-    ]
-    read = sampler.read(own)
-    lines = [*sampler.ahead([own]), "for m in range(count):"]
-    inner = []
-    for row, each in enumerate(kept):
-        if each.part == part:
-            name = own.node(each).value if own.node(each).op == "name" else ""
-        else:
-            name = own.source(Source(each.part, each.path))
-        if name in read:
-            inner.append(f"{name} = records[{row}][m]")
-    inner += lines_of(own.code, sampler.ends[part], straight=True)
-    inner += sampler.stored(own, wanted, lambda row: f"flat[{row} * count + m]")
-    lines += indented(inner)
-    says = f"Signals of {own.own.name} at known states."
-    return function_source(f"observe({PIECE})", says, lines, "@piece"), sampler.names
 
 
 def output_of(model: Model, output: str) -> tuple[Stored, bool]:

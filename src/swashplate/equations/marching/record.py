@@ -77,7 +77,7 @@ def record_of(
     InputError
         For an empty, non-finite or unsorted record or a rate out of range, naming the sample.
     """
-    data = _checked(values, what)
+    data = column(values, f"The {what}")
     least = least_substeps(rate)
     if substeps is None:
         substeps = least
@@ -115,29 +115,38 @@ def least_substeps(rate: float) -> int:
     return max(ceil(SOURCE_RATE / rate - 1e-9), 1)
 
 
-def _checked(values: ArrayLike, what: str) -> Array:
+def column(values: ArrayLike, what: str, *, finite: bool = True) -> Array:
+    """A copy of one column of real numbers, so that nothing changes with the user's array.
+
+    Raises
+    ------
+    InputError
+        For anything else, no number at all or one that is not finite; `what` names it.
+    """
     try:
-        # a copy, so that a result never changes with the user's array
-        data = np.array(values, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise InputError(f"The {what} must be a sequence of numbers.") from None
-    if data.ndim != 1:
-        raise InputError(f"The {what} must be one column of samples, not {data.ndim}-dimensional.")
-    if data.size == 0:
-        raise InputError(f"The {what} is empty.")
+        given = np.asarray(values)
+    except ValueError:  # rows of different lengths
+        given = np.array("")
+    if given.dtype.kind not in "fiub":
+        raise InputError(f"{what} must be a sequence of real numbers.")
+    if given.ndim != 1:
+        raise InputError(f"{what} must be one column, not {given.ndim}-dimensional.")
+    if given.size == 0:
+        raise InputError(f"{what} is empty.")
+    data = np.array(given, dtype=np.float64, order="C")
     # one pass: a sum is finite if and only if no sample is NaN or infinite, overflow apart
-    if not np.isfinite(data.sum()):
+    if finite and not np.isfinite(data.sum()):
         bad = np.flatnonzero(~np.isfinite(data))
         if bad.size:
             raise InputError(
-                f"The {what} has {bad.size} sample(s) that are not finite, the first {data[bad[0]]}"
-                f" at sample {bad[0]}; fill or cut them."
+                f"{what} has {bad.size} sample(s) that are not finite, the first {data[bad[0]]} at "
+                f"sample {bad[0]}; fill or cut them."
             )
     return data
 
 
 def _checked_stamps(time: ArrayLike, size: int, what: str) -> Array:
-    stamps = _checked(time, "time")
+    stamps = column(time, "The time")
     if stamps.size != size:
         raise InputError(f"There are {stamps.size} time stamps for {size} samples of {what}.")
     steps = np.diff(stamps)

@@ -27,8 +27,6 @@ CARRIED = 8
 others only keep the block's first sample at the beginning of a cache line."""
 ABREAST = 4
 """Columns of a recurrence side by side: they fill the time that each waits for its last number."""
-OUTWARDS = 8
-"""The same, where results go out at once."""
 
 
 class Terms(NamedTuple):
@@ -51,21 +49,18 @@ class Program(NamedTuple):
     - CALL, number of a piece: call it;
     - COMBINE, first and end of the terms' targets: make rows of the block;
     - RECUR, 0, first place and end in `columns`: run a recurrence of one state;
-    - CHAIN, number of a piece, first place and end in `columns`: run one of several states;
-    - FOLLOW, an observation, first place and end in `columns`: run a recurrence of one state whose
-      weighted results are that observation's derivatives.
+    - CHAIN, number of a piece, first place and end in `columns`: run one of several states.
     """
     terms: Terms  # Of all rows that are made, those of the observations behind the others.
     seen: int  # First target that is a row of the observations.
     columns: Indices
     """For each recurrence what runs it takes: the place of its factor, then the `columns` of
-    `follow`; the number of columns, then theirs; what `follow_out` takes."""
+    `follow`; or the number of columns, then theirs."""
     value: Indices  # (r,) row of each observation's signal.
     integral: NDArray[np.bool_]  # (r,) whether an observation is its signal's integral.
 
 
-CALL, COMBINE, RECUR, FOLLOW, CHAIN = 0, 1, 2, 3, 4
-SET, ADD, DONE = 0, 1, 2
+CALL, COMBINE, RECUR, CHAIN = 0, 1, 2, 3
 
 
 class Plan(NamedTuple):
@@ -86,8 +81,6 @@ class Plan(NamedTuple):
     """(r, q) what a step leaves of a value that passes a low pass; 0 where there is none."""
     offset_column: Indices  # (r,) column of the derivative by the offset, -1 if not wanted.
     clock_column: Indices  # (r,) column of the derivative by the clock offset, -1 if not wanted.
-    way: Indices
-    """(r, d) how the derivatives that the march gives get to the sink, one of SET, ADD and DONE."""
 
 
 class Sink(NamedTuple):
@@ -104,7 +97,6 @@ class Room(NamedTuple):
     """Memory to work in; d columns, r observations, up to q low passes each."""
 
     flat: Array  # The block.
-    table: Array  # (rows, STRIDE) the same.
     seen: Array
     """(r, d + 2, STRIDE) of each observation its derivatives, the signal, and an idle row."""
     flat_seen: Array  # The same.
@@ -117,14 +109,12 @@ class Room(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def rooms(
-    rows: int, constant: tuple[tuple[int, float], ...], derived: int, kept: tuple[int, int]
-) -> deque[Room]:
+def rooms(layout: Any, kept: tuple[int, int]) -> deque[Room]:
     """Memory of marches that have ended: new memory takes longer to get than a short march."""
     return deque(maxlen=8)
 
 
-def room_for(spare: deque[Room], layout: Any, derived: int, plan: Plan) -> Room:
+def room_for(spare: deque[Room], layout: Any, plan: Plan) -> Room:
     """Memory for a march of some columns, a room of earlier ones if there is any."""
     if spare:
         with suppress(IndexError):  # another thread was faster
@@ -133,13 +123,12 @@ def room_for(spare: deque[Room], layout: Any, derived: int, plan: Plan) -> Room:
             return room._replace(progress=plan.first[:-1].copy())
     flat = aligned_room(layout.rows * STRIDE)
     table = flat.reshape(layout.rows, STRIDE)
-    for row, value in layout.constant.items():
+    for value, row in layout.constant.items():
         table[row] = value
-    observations, low_passes = plan.kept.shape
+    (observations, low_passes), derived = plan.kept.shape, layout.program.derived
     seen = aligned(observations, derived + 2, STRIDE)
     return Room(
         flat,
-        table,
         seen,
         seen.reshape(-1),
         _columns(observations, derived),
@@ -215,45 +204,6 @@ def follow(a: Array, columns: Indices, width: int, flat: Array, count: int, tang
         tangent[p0], tangent[p1], tangent[p2], tangent[p3] = y0, y1, y2, y3
 
 
-@subroutine
-def follow_out(
-    columns: Indices,
-    size: int,
-    flat: Array,
-    tangent: Array,
-    q: Array,
-    sink: Sink,
-    at: int,
-    count: int,
-) -> None:
-    """Run y[n+1] = a[n] y[n] + g[n] as `follow`, and put q[n] y[n] into the sink from `at` on.
-
-    `columns` are, `size` in all, the place of a in `flat`, then for each OUTWARDS columns the place
-    of the first g, the others in the rows behind it; their places in `tangent`; and their numbers
-    among the derivatives. A column may stand there several times.
-    """
-    a, out, long = behind(flat, columns[0]), behind(sink.rows, at), sink.rows.shape[1]
-    for c in range(1, size, 1 + 2 * OUTWARDS):
-        g, p, to = behind(flat, columns[c]), behind(columns, c + 1), behind(columns, c + 9)
-        d0, d1 = behind(out, sink.to[to[0]] * long), behind(out, sink.to[to[1]] * long)
-        d2, d3 = behind(out, sink.to[to[2]] * long), behind(out, sink.to[to[3]] * long)
-        d4, d5 = behind(out, sink.to[to[4]] * long), behind(out, sink.to[to[5]] * long)
-        d6, d7 = behind(out, sink.to[to[6]] * long), behind(out, sink.to[to[7]] * long)
-        y0, y1, y2, y3 = tangent[p[0]], tangent[p[1]], tangent[p[2]], tangent[p[3]]
-        y4, y5, y6, y7 = tangent[p[4]], tangent[p[5]], tangent[p[6]], tangent[p[7]]
-        for m in range(count):
-            f, s = a[m], q[m]
-            n0, n1 = f * y0 + g[m], f * y1 + g[STRIDE + m]
-            n2, n3 = f * y2 + g[2 * STRIDE + m], f * y3 + g[3 * STRIDE + m]
-            n4, n5 = f * y4 + g[4 * STRIDE + m], f * y5 + g[5 * STRIDE + m]
-            n6, n7 = f * y6 + g[6 * STRIDE + m], f * y7 + g[7 * STRIDE + m]
-            d0[m], d1[m], d2[m], d3[m] = s * y0, s * y1, s * y2, s * y3
-            d4[m], d5[m], d6[m], d7[m] = s * y4, s * y5, s * y6, s * y7
-            y0, y1, y2, y3, y4, y5, y6, y7 = n0, n1, n2, n3, n4, n5, n6, n7
-        tangent[p[0]], tangent[p[1]], tangent[p[2]], tangent[p[3]] = y0, y1, y2, y3
-        tangent[p[4]], tangent[p[5]], tangent[p[6]], tangent[p[7]] = y4, y5, y6, y7
-
-
 @pasted
 def integrate_row(row: Array, count: int, step: float, state: Array) -> None:
     """Replace a rate, in `count` places, by its trapezoidal integral over the whole record.
@@ -310,16 +260,10 @@ def place(
     begin = cell[0] - base
     for c in range(derived):
         column, row = behind(sink.rows, sink.to[c] * long + to), behind(seen, c * STRIDE)
-        if plan.way[r, c] == DONE:
-            continue
         if plan.regular[r]:
             row = behind(row, begin)
-            if plan.way[r, c] == ADD:
-                for i in range(count):
-                    column[i] += weight[i] * row[i]
-            else:
-                for i in range(count):
-                    column[i] = weight[i] * row[i]
+            for i in range(count):
+                column[i] = weight[i] * row[i]
         else:
             for i in range(count):
                 n, f = cell[i] - base, fraction[i]
@@ -431,7 +375,7 @@ def deliver(
 def march_observed(
     pieces: Any,
     arrays: tuple[Any, ...],
-    grid: tuple[int, int, float],
+    grid: tuple[int, float],
     tangent: Array,
     program: Program,
     plan: Plan,
@@ -441,18 +385,18 @@ def march_observed(
     """March block by block, and compare what comes with what was observed.
 
     `pieces` are addresses, of the march first, and `arrays` what they take from ``records`` on (see
-    `pieces.PIECE`). `grid` says how many samples the record has and a block at most, and the step.
+    `pieces.PIECE`). `grid` says how many samples the record has, and the step.
     `tangent` holds the derivatives of the states at the first sample, replaced by those behind the
     last.
     """
-    size, block, h = grid
+    size, h = grid
     used, count, flat = plan.first[0], 0, room.flat
-    for first in range(0, size, block):
+    for first in range(0, size, BLOCK):
         for k in range(0, room.flat_seen.size, STRIDE):
             # what interpolation looks back at, from the end of the block before
             row = behind(room.flat_seen, k + CARRIED - 2)
             row[0], row[1] = row[count], row[count + 1]
-        count = block if block < size - first else size - first
+        count = BLOCK if size - first > BLOCK else size - first
         for step in range(program.todo.shape[0]):
             what, a, b = program.todo[step, 0], program.todo[step, 1], program.todo[step, 2]
             taken, many = behind(program.columns, b + 1), program.todo[step, 3] - b - 1
@@ -463,14 +407,9 @@ def march_observed(
             elif what == RECUR:
                 factor = behind(flat, program.columns[b])
                 follow(factor, taken, many // 4, flat, count, tangent)
-            elif what == CHAIN:
+            else:
                 given = (arrays[0], arrays[1], taken, arrays[3], tangent, *arrays[5:])
                 call(pieces[a], count, program.columns[b], h, given)
-            else:
-                at, through = plan.first[a] + first, behind(flat, program.columns[b])
-                for m in range(count):
-                    room.aside[m] = plan.weight[at + m] * through[m]
-                follow_out(taken, many, flat, tangent, behind(room.aside, 0), sink, at, count)
         used = deliver(program, plan, sink, room, used, (first, count, size), h)
     if used > 0 and sink.factor.size > 0:
         for c in range(sink.rows.shape[0]):

@@ -16,7 +16,7 @@ from swashplate.equations.cache import generated, kernel
 from swashplate.equations.code import compiled_names, generating
 from swashplate.equations.equation import inlined, interpreted
 from swashplate.equations.fields import floats_of, is_real, made, numbers_of, value_at
-from swashplate.equations.marching.march import march_source, observe_source
+from swashplate.equations.marching.march import march_source
 from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.pieces import Planned, addresses, piece, pointers, run_once
 from swashplate.equations.model import Link, Model, Place, Window, arguments_of, place, state_paths
@@ -25,7 +25,6 @@ from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-Flags = NDArray[np.uint8]
 Start = Literal["rest", "steady"]
 
 K = TypeVar("K")
@@ -296,38 +295,6 @@ def march_of(
     return Planned(lambda: module(f"{model.name}_march", text, names)["march"])
 
 
-@generating
-def observer_of(
-    model: Model,
-    part: int,
-    signals: tuple[str, ...],
-    options: tuple[Any, ...],
-    kept: tuple[Stored, ...],
-    wanted: tuple[Stored, ...],
-) -> Planned:
-    """The piece that computes signals at known states."""
-    text, names = observe_source(model, part, signals, options, kept, wanted)
-    names["piece"] = piece
-    return Planned(lambda: module(f"{model.parts[part].name}_observe", text, names)["observe"])
-
-
-def observed_at(
-    instance: Instance,
-    part: int,
-    known: Mapping[Stored, Array],
-    signals: tuple[str, ...],
-    h: float,
-    wanted: tuple[Stored, ...],
-) -> Array:
-    """(r, n) signals of a part where its states, and the external `signals`, are known."""
-    observer = observer_of(instance.model, part, signals, instance.options, tuple(known), wanted)
-    rows = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in known.values())
-    out, none, no_places = np.empty((len(wanted), rows[0].size)), np.empty(0), np.empty(0, np.int64)
-    arrays = (pointers(rows), none, no_places, none, instance.params, instance.given, none, none)
-    run_once(addresses((observer,), (0,)), (*arrays, out.reshape(-1)), rows[0].size, h)
-    return out
-
-
 def marched(
     instance: Instance,
     records: Mapping[str, Array],
@@ -336,13 +303,13 @@ def marched(
     stored: tuple[Stored, ...],
     cause: str = "input",
     begin: Mapping[str, float] = MappingProxyType({}),
-) -> tuple[Array, Flags]:
-    """March over whole records from where it begins, or from states by path, keeping some numbers.
+) -> Array:
+    """March over whole records from where it begins, or from states by path.
 
     Returns
     -------
-    out, flags : (r, n), (f, n) arrays
-        What is kept, in its order: numbers, and limits as bits.
+    (r, n) array
+        What is kept, in the order of `stored`; limits as the sum of their bits.
 
     Raises
     ------
@@ -350,9 +317,7 @@ def marched(
         If the model leaves its domain, or a number overflows; `cause` is what drives the model.
     """
     signals, size = tuple(records), next(iter(records.values())).size
-    numbers = tuple(each for each in stored if each.kind != "limits")
-    ordered = (*numbers, *(each for each in stored if each.kind == "limits"))
-    planned = march_of(instance.model, signals, instance.options, ordered)
+    planned = march_of(instance.model, signals, instance.options, stored)
     table, met = np.empty((len(stored), size)), np.array([np.inf])
     states = begun(instance, started, begin)
     values = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
@@ -360,7 +325,7 @@ def marched(
     arrays = arrays_of(instance, values, started, places, states, met, table.reshape(-1))
     run_once(addresses((planned,), (0,)), arrays, size, h)
     check_domain(instance, states, float(met[0]), cause)
-    return table[: len(numbers)], table[len(numbers) :].astype(np.uint8)
+    return table
 
 
 def begun(instance: Instance, started: Started, begin: Mapping[str, float]) -> Array:

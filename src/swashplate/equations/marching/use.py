@@ -32,7 +32,7 @@ from swashplate.equations.marching.jacobian import jacobian
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Own, every_sample
 from swashplate.equations.marching.part import Stored
-from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.record import Record, column
 from swashplate.equations.marching.run import Instance, Part, Start, marched
 from swashplate.equations.model import Model, parameter_paths
 from swashplate.errors import InputError
@@ -132,16 +132,7 @@ def records_of(
     """
     if not is_real(rate) or not 0.0 < rate < np.inf:
         raise InputError(f"The rate is {rate!r} Hz, but must be a number above 0.")
-    found: dict[str, Array] = {}
-    for name, values in inputs.items():
-        given = np.asarray(values)
-        if given.ndim != 1 or given.size == 0 or given.dtype.kind not in "fiub":
-            raise InputError(f"{name} must be one column of real numbers, at least one.")
-        samples = np.array(given, dtype=np.float64)
-        if not np.isfinite(samples).all():
-            bad = int(np.argmax(~np.isfinite(samples)))
-            raise InputError(f"{name} is {samples[bad]} at sample {bad}; it must be finite.")
-        found[name] = samples
+    found = {name: column(values, name) for name, values in inputs.items()}
     sizes = {name: samples.size for name, samples in found.items()}
     if len(set(sizes.values())) > 1:
         listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
@@ -201,7 +192,7 @@ def simulate(
     for name, link in model.links.items():
         stored.append(Stored(link.after, "link", name))
         names.append(name)
-    out, _ = marched(instance, records, h, begun, tuple(stored), begin=begin or {})
+    out = marched(instance, records, h, begun, tuple(stored), begin=begin or {})
     signals = dict(zip(names, out, strict=True))
     for name, rate_of in model.integrals.items():
         total = np.zeros_like(signals[rate_of])

@@ -14,7 +14,6 @@ from .crane_studies import plot_operability as plot_operability
 from .crane_studies import plot_orifice as plot_orifice
 from .crane_studies import plot_residuals as plot_residuals
 from .crane_studies import plot_sectors as plot_sectors
-from .fit import plot_fit as plot_fit
 from .linear import plot_bode as plot_bode
 from .simulation import plot_comparison as plot_comparison
 from .simulation import plot_full_order as plot_full_order

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -17,13 +16,11 @@ from swashplate.analysis import (
     AS_IS,
     CHANGED,
     AcceleratedBy,
-    AccelerationCurve,
     Bands,
     Envelope,
     Improvement,
     InverseMap,
     OneAtATime,
-    Outcome,
     Way,
     WhatIf,
     outcome_unit,
@@ -125,22 +122,15 @@ def plot_envelope(envelope: Envelope, *, title: str | None = None) -> Figure:
         most.append(float(np.abs(up).max()))
         # part of the grey line lies under another, and is wider
         width, above = (LINE, 2.0) if sign else (3.0, 1.7)
-        for by, start, stop in _causes(curve):
-            part = slice(start, stop)
+        turns = [0, *(n for n in range(1, len(curve.by)) if curve.by[n] != curve.by[n - 1])]
+        for start, stop in zip(turns, [*turns[1:], len(curve.by)], strict=True):
+            part, by = slice(start, stop + 1), curve.by[start]  # up to the first of the next
             ax.plot(across[part], up[part], color=color, ls=DASHES[by], lw=width, zorder=above)
     height = 1.3 * max(most[:2]) or 1.0
     ax.set_ylim(-height, height)
     for way, color in ((envelope.plus, BLUE), (envelope.minus, VERMILION)):
         _mark_way(ax, way, color, height)
     return figure
-
-
-def _causes(curve: AccelerationCurve) -> list[tuple[AcceleratedBy, int, int]]:
-    """Stretches of one cause; each reaches to the first point of the next."""
-    parts = curve.by
-    starts = [n for n in range(len(parts)) if n == 0 or parts[n] != parts[n - 1]]
-    stops = [*(start + 1 for start in starts[1:]), len(parts)]
-    return [(parts[start], start, stop) for start, stop in zip(starts, stops, strict=True)]
 
 
 def _mark_way(ax: Axes, way: Way, color: str, height: float) -> None:
@@ -356,20 +346,28 @@ def plot_tornado(result: OneAtATime, *, title: str | None = None) -> Figure:
     shown = [k for k in range(len(result.outcomes)) if np.isfinite(result.base[k])]
     if not shown:
         raise InputError("None of the outcomes is defined for this command: nothing to draw.")
-    legend = [
-        Patch(color=BLUE, label=_ends(result, 0, "lower")),
-        Patch(color=VERMILION, label=_ends(result, 1, "upper")),
-    ]
-    words = "Each lever by itself" if title is None else title
-    figure, panels = _outcome_panels(len(shown), len(result.levers), words, legend)
-    for ax, k in zip(panels, shown, strict=True):
+    columns = min(len(shown), 2)
+    rows = -(-len(shown) // columns)
+    figure = new_figure(WIDTH, HEAD + ROW + rows * (0.22 * len(result.levers) + 0.75) + 0.5 * FOOT)
+    write_title(figure, "Each lever by itself" if title is None else title)
+    legend = []
+    for end, (words, color) in enumerate((("lower", BLUE), ("upper", VERMILION))):
+        factors = {pair[end] for pair in result.ranges.values()}
+        label = f"factor {factors.pop():g}" if len(factors) == 1 else f"{words} factor"
+        legend.append(Patch(color=color, label=label))
+    how = {"ncols": 3, "frameon": False, "fontsize": SMALL}
+    figure.legend(handles=legend, loc="outside lower left", **how)
+    panels = list(figure.subplots(rows, columns, squeeze=False).flat)
+    for ax in panels[len(shown) :]:
+        ax.axis("off")
+    for ax, k in zip(panels, shown, strict=False):
         outcome, swings = result.outcomes[k], np.nan_to_num(result.swings[:, k])
-        order = np.argsort(swings, kind="stable")
-        factor = outcome_unit(outcome).factor
-        base = factor * result.base[k]
+        order, unit = np.argsort(swings, kind="stable"), outcome_unit(outcome)
+        base = unit.factor * result.base[k]
+        dress(ax, "", unit.label(outcome.words))
         for place, lever in enumerate(order):
             for values, color in ((result.low, BLUE), (result.high, VERMILION)):
-                change = factor * values[lever, k] - base
+                change = unit.factor * values[lever, k] - base
                 if np.isfinite(change):
                     ax.barh(place, change, THICK, left=base, color=color, zorder=2.0)
         if not (swings > NOTHING * abs(result.base[k])).any():
@@ -377,54 +375,14 @@ def plot_tornado(result: OneAtATime, *, title: str | None = None) -> Figure:
             ax.set_xlim(base - half, base + half)
             ax.text(0.5, 0.5, "no lever moves it", transform=ax.transAxes, fontsize=SMALL)
         ax.axvline(base, color=INK, linewidth=0.8, zorder=3.0)
-        _name_levers(ax, [result.levers[lever] for lever in order])
-        _head(ax, outcome, _outcome_words(outcome, result.base[k]))
+        names = [result.levers[lever].replace("_", " ") for lever in order]
+        ax.set_yticks(range(len(names)), labels=names)
+        ax.set_ylim(-0.6, len(names) - 0.4)
+        ax.grid(False, axis="y")
+        ax.tick_params(axis="y", length=0.0, labelsize=SMALL)
+        words = f"{outcome.words}, {base:z.{3 if outcome.unit == 's' else 2}f} {unit.name}"
+        ax.set_title(words, loc="left", fontsize=NORMAL, color=INK)
     return figure
-
-
-def _outcome_panels(
-    count: int, levers: int, title: str, legend: Sequence[Artist]
-) -> tuple[Figure, list[Axes]]:
-    """A figure with a panel an outcome, two beside each other."""
-    columns = min(count, 2)
-    rows = -(-count // columns)
-    figure = new_figure(WIDTH, HEAD + ROW + rows * (0.22 * levers + 0.75) + 0.5 * FOOT)
-    grid = figure.subplots(rows, columns, squeeze=False)
-    panels = list(grid.flat)
-    for ax in panels[count:]:
-        ax.axis("off")
-    for ax in panels[:count]:
-        dress(ax)
-    write_title(figure, title)
-    figure.legend(
-        handles=list(legend), loc="outside lower left", ncols=3, frameon=False, fontsize=SMALL
-    )
-    return figure, panels[:count]
-
-
-def _outcome_words(outcome: Outcome, value: float) -> str:
-    number = outcome_unit(outcome).factor * value
-    return "none" if np.isnan(value) else f"{number:z.{3 if outcome.unit == 's' else 2}f}"
-
-
-def _name_levers(ax: Axes, levers: list[str]) -> None:
-    ax.set_yticks(range(len(levers)), labels=[each.replace("_", " ") for each in levers])
-    ax.set_ylim(-0.6, len(levers) - 0.4)
-    ax.grid(False, axis="y")
-    ax.spines["left"].set_color(FAINT)
-    ax.tick_params(axis="y", length=0.0, labelsize=SMALL)
-
-
-def _head(ax: Axes, outcome: Outcome, words: str) -> None:
-    unit = outcome_unit(outcome)
-    ax.set_title(f"{outcome.words}, {words} {unit.name}", loc="left", fontsize=NORMAL, color=INK)
-    label_below(ax, unit.label(outcome.words))
-
-
-def _ends(result: OneAtATime, index: int, words: str) -> str:
-    """The factor of that end, if it is the same for all levers."""
-    factors = {pair[index] for pair in result.ranges.values()}
-    return f"factor {factors.pop():g}" if len(factors) == 1 else f"{words} factor"
 
 
 # --- inverse map ----------------------------------------------------------------------------------

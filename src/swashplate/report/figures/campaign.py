@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -315,7 +315,10 @@ def _fill(ax: Axes, column: Column, signal: InputSignal | Channel, experiment: E
     margin = _ROOM * (high - low) or 1.0
     ax.set_ylim(low - margin, high + margin)
     if weight is None:
-        shade(ax, _ignored(experiment, signal.time), IGNORED)
+        windows = sorted((start, stop) for start, stop, _ in experiment.ignored)
+        ends = (float(signal.time[0]), float(signal.time[-1]))
+        inside = np.clip(np.array(windows).reshape(-1, 2), *ends)
+        shade(ax, inside[inside[:, 0] < inside[:, 1]], IGNORED)
     else:
         shade(ax, stretches(signal.time, weight == 0.0), IGNORED)
         mark_weights(ax, signal.time, weight)
@@ -326,15 +329,6 @@ def _fill(ax: Axes, column: Column, signal: InputSignal | Channel, experiment: E
     mark_gaps(ax, signal.time)
     color = INK if weight is None else BLUE
     draw(ax, signal.time, values, color, held=held, width=THIN, columns=COARSE)
-
-
-def _ignored(experiment: Experiment, time: Array) -> Array:
-    """Windows that are left out of every channel, as far as there are stamps."""
-    windows = [
-        (max(start, float(time[0])), min(stop, float(time[-1])))
-        for start, stop, _ in experiment.ignored
-    ]
-    return np.array(sorted(w for w in windows if w[0] < w[1])).reshape(-1, 2)
 
 
 def _heading(ax: Axes, experiment: Experiment) -> None:
@@ -348,33 +342,20 @@ def _heading(ax: Axes, experiment: Experiment) -> None:
 
 
 def _stamps_in_words(experiment: Experiment) -> list[str]:
-    """The rates, and the gaps of the signal that has most."""
-    stamps = {name or "input": each.time for (name, _), each in signals_of(experiment).items()}
-    words = _rates_in_words(
-        {name: 1.0 / float(np.median(np.diff(time))) for name, time in stamps.items()}
-    )
-    gaps = max((np.diff(time)[gap_rows(time)] for time in stamps.values()), key=np.size)
+    """The rates, from the lowest to the highest, and the gaps of the signal that has most."""
+    stamps = [each.time for each in signals_of(experiment).values()]
+    rates = [1.0 / float(np.median(np.diff(time))) for time in stamps]
+    ends = [f"{r:.0f}" if r >= 100.0 else f"{r:.3g}" for r in (min(rates), max(rates))]
+    # stamps that jitter do not have quite the same rate
+    alike = max(rates) < 1.01 * min(rates)
+    words = [f"{ends[0]} Hz" if alike else f"{ends[0]} to {ends[1]} Hz"]
+    gaps = max((np.diff(time)[gap_rows(time)] for time in stamps), key=np.size)
     if gaps.size:
         longest = f"{float(gaps.max()):.3g} s"
         words.append(
             f"a gap of {longest}" if gaps.size == 1 else f"{gaps.size} gaps, longest {longest}"
         )
     return words
-
-
-def _rates_in_words(rates: Mapping[str, float]) -> list[str]:
-    """The rate of all signals, or of each of two groups, or from which to which rates go. [Hz]"""
-    groups: dict[float, list[str]] = {}
-    for name, rate in rates.items():
-        # stamps that jitter do not have quite the same rate
-        same = (known for known in groups if abs(rate - known) < 0.01 * known)
-        groups.setdefault(next(same, rate), []).append(name)
-    written = {f"{rate:.0f}" if rate >= 100.0 else f"{rate:.3g}": rate for rate in groups}
-    if len(groups) == 1:
-        return [f"{next(iter(written))} Hz"]
-    if len(groups) == 2:
-        return [f"{', '.join(groups[rate])} {words} Hz" for words, rate in written.items()]
-    return [f"{min(written, key=float)} to {max(written, key=float)} Hz"]
 
 
 # --- one channel closely --------------------------------------------------------------------------

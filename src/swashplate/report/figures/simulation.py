@@ -1,4 +1,4 @@
-"""Figures of simulations: one with its chain of signals, and several compared."""
+"""Figures of simulations: one with all its signals, and several compared."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ SIGNAL_UNITS = {
 
 
 class Panel(NamedTuple):
-    """What one panel of the chain shows: signals in SI, drawn in the units that people read."""
+    """What one panel shows: signals in SI, drawn in the units that people read."""
 
     words: str
     si: str
@@ -85,7 +85,7 @@ def plot_simulation(
     window: tuple[float, float] | None = None,
     title: str | None = None,
 ) -> Figure:
-    """Figure of the chain's signals over time, with the active limits shaded.
+    """Figure of the drive's signals over time, with the active limits shaded.
 
     Parameters
     ----------

@@ -16,8 +16,9 @@ from swashplate.campaign import Campaign, examine, quality_table
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
-from swashplate.identification.assessment import Assessment, StageProfile, assess, motion_of
+from swashplate.identification.assessment import Assessment, Judged, StageProfile, motion_of
 from swashplate.identification.fitting import Fit, StageFit
+from swashplate.identification.identifiability import Identifiability
 from swashplate.identification.resampling import CrossValidation
 from swashplate.identification.setup import ModelParameters
 from swashplate.identification.solving import StartResult
@@ -40,59 +41,32 @@ from swashplate.tables import NONE, Cell, Column, Table, count, ended, joined, l
 from swashplate.units import chosen_unit, show_rod, shown_in, unit_text
 
 Role = Literal["fit", "validate"]
+MOST_PAIRS = 12
+"""Correlations that are listed."""
 _PARTS = {
     "card": "the control card alone, from the command to the currents",
     "pump": "pump and motor, driven by the current",
-    "chain": "the whole chain, from the command to the speed",
+    "chain": "card, pump and motor, from the command to the speed",
     "model": "a model of one's own, from its inputs to its channels",
 }
 
 
-def write_fit_report(
-    fit: Fit,
-    campaign: Campaign,
-    path: str | Path,
-    *,
-    assessments: Sequence[Assessment] | None = None,
-    validation: Sequence[RunQuality] = (),
-    starts: Sequence[StartResult] = (),
-    profiles: Sequence[StageProfile] = (),
-    folds: CrossValidation | None = None,
-    truth: ParameterSet | None = None,
-    judged: Verdict | None = None,
-    notes: Mapping[str, str] | None = None,
-) -> None:
+def write_fit_report(found: Judged, path: str | Path, *, truth: ParameterSet | None = None) -> None:
     """Write the report of a fit: one HTML file, whole or not at all, that needs no network.
 
     Parameters
     ----------
-    fit : Fit
-        What was fitted.
-    campaign : Campaign
-        The tests that it was fitted to.
+    found : Judged
+        The fit, its campaign, and what was found out about it.
     path : path
         The file, which replaces an older one.
-    assessments : sequence of Assessment, optional
-        One for each stage; made here by default.
-    validation : sequence of RunQuality
-        Of runs that were held out.
-    starts : sequence of StartResult
-        Of a search that is not kept in the fit's stages.
-    profiles : sequence of StageProfile
-        Profiles that were computed.
-    folds : CrossValidation, optional
-        Of the same runs and set-up.
     truth : ParameterSet, optional
         What virtual tests were simulated with; it stands beside the estimates.
-    judged : Verdict, optional
-        The verdict; made here by default.
-    notes : mapping of str to str, optional
-        What belongs to the report besides: versions, seed, command.
 
     Raises
     ------
     InputError
-        If there is an assessment too many or too few, or a profile of no stage.
+        If a profile belongs to no stage.
     FileError
         If the file cannot be written.
 
@@ -101,14 +75,8 @@ def write_fit_report(
     The page holds what the eye can tell of every run, a few bytes a sample (`runs.run_data`): it
     grows with the number of runs, not with their length.
     """
-    assessed = assess(fit.stages) if assessments is None else tuple(assessments)
-    if [each.stage.stage.name for each in assessed] != [each.stage.name for each in fit.stages]:
-        raise InputError("The report needs one assessment for each stage of the fit, in order.")
-    if judged is None:
-        planned = [each.name for each in fit.setup.stages]
-        judged = verdict(assessed, validation, planned=planned)
-    several = starts_of(assessed, starts)
-    runs = shown_runs(assessed, validation)
+    fit, assessed = found.result, found.assessments
+    runs = shown_runs(assessed, found.predicted)
     held_out = sum(run.validates for run in runs)
     samples = sum(each.problem.samples for each in fit.stages)
     facts = (
@@ -117,24 +85,24 @@ def write_fit_report(
         f"{count(samples, 'sample')} that count"
     )
     drive = fit.parameters
-    found = Drive(drive) if isinstance(drive, ParameterSet) else None
-    head, shared = _shared(campaign, runs, fit.nominal)
+    known = Drive(drive) if isinstance(drive, ParameterSet) else None
+    head, shared = _shared(found.campaign, runs, fit.nominal)
     with _units_of_people():
         if motion_of(run.experiment for run in runs) == "rod":
             show_rod()
         sections = [
-            summary_section(judged, campaign, found, assessed, runs, head["findings"]),
+            summary_section(found.verdict, found.campaign, known, assessed, runs, head["findings"]),
             *shared[:2],
-            _live_section(fit, campaign, runs),
+            _live_section(fit, found.campaign, runs),
             _parameter_section(fit, assessed, truth),
             _identifiability_section(assessed),
-            _profile_section(fit, profiles),
-            _starts_section(several),
-            _folds_section(folds, assessed),
+            _profile_section(fit, found.profiles),
+            _starts_section(starts_of(assessed)),
+            _folds_section(found.folds, assessed),
             shared[2],
-            _verdict_section(judged, assessed, runs, head["findings"]),
+            _verdict_section(found.verdict, assessed, runs, head["findings"]),
             shared[3],
-            _setup_section(campaign, fit.nominal, fit.setup.title, notes, fit.stages),
+            _setup_section(found.campaign, fit.nominal, fit.setup.title, found.notes, fit.stages),
         ]
         content = {**head, "what": "Fit", "facts": f"{head['drive']} · {facts}"}
         made = page([each for each in sections if each.blocks], content)
@@ -344,7 +312,17 @@ def _residual_section(runs: Sequence[ShownRun]) -> Section:
     made = Table("", tuple(map(Column, (*heads, "verdict"))))
     for each in _qualities(runs):
         if (test := each.test) is not None:
-            drawn = charts.autocorrelation_chart(test), charts.cross_correlation_chart(test)
+            lag, value = test.peak
+            said = (
+                f"autocorrelation over {test.lags[-1]:.2g} s",
+                f"cross-correlation, largest {value:+.2f} at {lag:.2g} s",
+            )
+            drawn = (
+                charts.lags_chart(test.lags, test.autocorrelation, test.white_band, said[0]),
+                charts.lags_chart(
+                    test.cross_lags, test.cross_correlation, test.cross_band, said[1]
+                ),
+            )
             run = each.experiment
             made.add(run.name, run.role, each.channel, *drawn, test.verdict)
     return Section("residuals", "Residuals", [text(words), Block("table", made, "residuals")])
@@ -499,33 +477,35 @@ def _identifiability_section(assessments: Sequence[Assessment]) -> Section:
             blocks += listed_block(each.uncertainty.sentences())
         except InputError as error:
             blocks.append(text(f"There are no intervals: {error}"))
-        without = f"; none: {', '.join(found.unexcited)}" if found.unexcited else ""
-        words = f"Change of all weighted residuals for 1 % of each parameter{without}"
-        drawn = [Block("figure", charts.sensitivity_chart(found, general), words)]
-        blocks.append(Block("details", drawn, "Sensitivity"))
+        blocks += _effects(found, general)
         blocks += _correlations(each, general)
     return Section("identifiability", "Uncertainty", blocks)
 
 
+def _effects(found: Identifiability, shown: Sequence[bool]) -> list[Block]:
+    """How much all weighted residuals change for 1 % of each parameter, the largest first."""
+    made = Table("", (Column("parameter"), Column("change of the residuals for 1 %", ".3g")))
+    pairs = zip(found.sensitivity, found.variables.names, shown, strict=True)
+    for effect, name in sorted((float(e), name) for e, name, own in pairs if own)[::-1]:
+        made.add(name, effect)
+    return [Block("details", [Block("table", made, "effects")], "Sensitivity")]
+
+
 def _correlations(assessment: Assessment, general: Sequence[bool]) -> list[Block]:
-    """Correlations of the estimates, and spectral lines of the residuals, if there are any."""
+    """The estimates that move together most, if there are any."""
     try:
-        drawn = charts.correlation_chart(assessment.uncertainty.quoted, general)
+        quoted = assessment.uncertainty.quoted
     except InputError:  # the sentences above say why there are none
         return []
-    blocks, lines = [], assessment.uncertainty.lines
-    if drawn is not None:
-        words = "Of the covariance that is quoted: vermilion +1, white 0, blue −1"
-        drawing = [Block("figure", drawn, words)]
-        blocks.append(Block("details", drawing, "Correlations of the estimates"))
-    if len(lines) > 1:
-        share = "share of the residuals' variance"
-        columns = (Column("channel"), Column("frequency", ".3g", "Hz"), Column(share, ".1%"))
-        made = Table("", columns)
-        for line in lines:
-            made.add(line.channel, line.frequency, line.share)
-        summary = f"The {count(len(lines), 'spectral line')} in the residuals"
-        blocks.append(Block("details", [Block("table", made, "lines")], summary))
+    kept = [k for k, own in enumerate(general) if own and quoted.determined[k]]
+    names, values = quoted.variables.names, quoted.correlation
+    pairs = [(float(values[i, j]), names[i], names[j]) for i in kept for j in kept if i < j]
+    blocks, made = [], Table("", (Column("parameter"), Column("with"), Column("r", "+.3f")))
+    for value, name, other in sorted(pairs, key=lambda pair: -abs(pair[0]))[:MOST_PAIRS]:
+        made.add(name, other, value)
+    if made.rows:
+        drawing = [Block("table", made, "correlations")]
+        blocks.append(Block("details", drawing, "Strongest correlations of the estimates"))
     return blocks
 
 
@@ -535,8 +515,13 @@ def _starts_section(several: Mapping[str, Sequence[StartResult]]) -> Section:
         failed = sum(not each.cost < 1e300 for each in results)
         more = f"; {failed} left the model's domain" if failed else ""
         blocks += [Block("heading", f"Stage {stage}", "h3")] if stage else []
-        words = f"Where each of {len(results)} starts ended; hollow points did not converge{more}."
-        blocks.append(Block("figure", charts.waterfall_chart(results), words))
+        made = Table("", (Column("start"), Column("cost, best = 1", ".7g"), Column("ended")))
+        best = min(each.cost for each in results) or 1.0
+        for each in sorted(results, key=lambda each: each.cost):
+            if each.cost < 1e300:
+                made.add(str(each.number), each.cost / best, each.message)
+        words = f"Where each of {len(results)} starts ended, the best first{more}."
+        blocks += [text(words), Block("table", made, "starts")]
     return Section("starts", "Starts", blocks)
 
 

@@ -96,9 +96,7 @@ def html_table(table: Table, look: str = "") -> Markup:
         if column.name == "meaning":
             continue
         name = escape("unit" if column is UNIT else head)
-        classes = "n turned" if column.shade else "n" if column.spec else ""
-        inner = f"<span>{name}</span>" if column.shade else name
-        parts.append(f'<th class="{classes}">{inner}</th>')
+        parts.append(f'<th class="{"n" if column.spec else ""}">{name}</th>')
     parts.append("</tr></thead><tbody>")
     parts += [_html_row(shown, row) for row in shown.rows]
     return Markup("".join([*parts, "</tbody></table>"]))
@@ -124,9 +122,6 @@ def _html_row(table: Table, row: Row) -> str:
             symbol = f'{escape(meaning)} <span class="symbol">{shown}</span>' if meaning else shown
             look = ' class="n"' if column.spec else ""
             parts.append(f'<th scope="row"{look}>{symbol}</th>')
-        elif column.shade:
-            share = float(getattr(value, "value", value))
-            parts.append(f'<td class="n share" style="--share: {share:.3f}">{shown}</td>')
         else:
             missed = " miss" if column.name == "holds" and cell == "no" else ""
             look = "unit" if column is UNIT else f"n{missed}" if column.spec else missed.strip()
