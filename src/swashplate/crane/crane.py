@@ -121,8 +121,13 @@ class Crane:
 
     def __repr__(self) -> str:
         drives = ", ".join(f"{axis} {getattr(self, axis).name!r}" for axis in AXES)
-        assumed = sum(each.status == "assumed" for each in self.quantities.values())
-        return f"Crane({self.name!r}, {drives}; {assumed} of {len(GEOMETRY)} quantities assumed)"
+        return f"Crane({self.name!r}, {drives}; {self.assumed or 'no quantities'} assumed)"
+
+    @property
+    def assumed(self) -> str:
+        """How much of the geometry is assumed: ``"12 of 13 quantities"``, empty if nothing is."""
+        count = sum(each.status == "assumed" for each in self.quantities.values())
+        return f"{count} of {len(self.quantities)} quantities" if count else ""
 
     def with_drive(
         self,
