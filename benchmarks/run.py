@@ -6,6 +6,7 @@ python benchmarks/run.py [--write]
 import argparse
 from collections.abc import Iterator
 
+import exports
 import fits
 import processes
 import rows
@@ -24,6 +25,7 @@ def measured() -> Iterator[table.Row]:
     yield from rows.batch_rows(marches)
     yield from studies.fit_study_rows()
     yield from studies.full_order_rows()
+    yield from exports.export_rows()
     yield from processes.memory_rows()
     yield from processes.hour_rows()
     yield from processes.command_rows()

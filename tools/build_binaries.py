@@ -21,6 +21,7 @@ import tomlkit
 
 from swashplate import Drive, export
 from swashplate.export import fmi, libraries
+from swashplate.export.variables import NONE
 
 ROOT = Path(__file__).parents[1]
 BINARIES = ROOT / "src" / "swashplate" / "export" / "binaries"
@@ -35,11 +36,11 @@ LOADERS = ("/usr/aarch64-linux-gnu", "/usr/lib/aarch64-linux-gnu")
 
 def main() -> None:
     """Compile everything and write the manifest."""
-    texts = libraries.library_sources()
+    sources = libraries.sources()
     BINARIES.mkdir(exist_ok=True)
     made = tomlkit.document()
     made.add(tomlkit.comment("Made by `make binaries`: what the libraries are and come from."))
-    made["sources"] = libraries.digest(libraries.all_sources())
+    made["sources"] = libraries.digest(sources.texts)
     made["compiler"] = f"zig {version('ziglang')}"
     made["flags"] = " ".join(libraries.FLAGS)
     made["wasm_flags"] = " ".join(libraries.WASM_FLAGS)
@@ -47,9 +48,9 @@ def main() -> None:
     contents = {}
     for each in libraries.PLATFORMS.values():
         print(f"{each.library} ...", flush=True)
-        contents[each.library] = libraries.compiled(texts, each)
+        contents[each.library] = libraries.compiled(sources, each)
     print(f"{libraries.WASM} ...", flush=True)
-    contents[libraries.WASM] = libraries.compiled_wasm(libraries.all_sources())
+    contents[libraries.WASM] = libraries.compiled_wasm(sources)
     for name, content in contents.items():
         entry = tomlkit.table()
         entry["sha256"] = sha256(content).hexdigest()
@@ -57,7 +58,6 @@ def main() -> None:
         entry["equal_bits"] = verdict(name, content)
         print(f"{name}: {len(content)} bytes; {entry['equal_bits']}")
         entries[name] = entry
-    made["feedthrough"] = {name: sorted(read) for name, read in export.feedthrough().items()}
     made["libraries"] = entries
     for name, content in contents.items():
         (BINARIES / name).write_bytes(content)
@@ -111,7 +111,7 @@ def wasm_verdict(content: bytes) -> str:
         names = export.exported_drive().names
         for place, signal in enumerate(WATCHED):
             called("select", place, names.index(signal))
-        memory.write(store, voltage.astype("<f8").tobytes(), called("input"))
+        memory.write(store, voltage.astype("<f8").tobytes(), called("input", 0))
         assert called("run", 0) == 0
         found = np.empty((SAMPLES, len(WATCHED)))
         for place in range(len(WATCHED)):
@@ -157,9 +157,8 @@ def largest_difference(
         library.write_bytes(content)
         (folder / "resources").mkdir()
         token = "{test}"
-        layout = libraries.layout_of(drive_texts())
-        values = fmi.finite_values(drive, STEP)
-        resource = fmi.resource(values, layout, token)
+        values = np.minimum(export.values_of(drive, STEP), NONE)
+        resource = fmi.resource(values, libraries.sources().layout, token)
         (folder / "resources" / "drive.bin").write_bytes(resource)
         (folder / "command").write_bytes(voltage.astype("<f8").tobytes())
         program = player(platform, folder)
@@ -182,13 +181,6 @@ def largest_difference(
             return float("inf")
         found = np.frombuffer((folder / "result").read_bytes(), "<f8").reshape(-1, 3)
     return float(np.abs(found - stepped(drive)).max())
-
-
-def drive_texts() -> dict[str, str]:
-    """The generated texts that numbers and library must have in common."""
-    names = ("swashplate_drive.c", "swashplate_drive.h")
-    texts = libraries.library_sources()
-    return {name: texts[name] for name in names}
 
 
 def command() -> np.ndarray:

@@ -1,5 +1,8 @@
 """The C interface: refusals, copies of a state, changes on the way, a provisional command."""
 
+import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +12,8 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError
-from swashplate.export import drive_sources, feedthrough, values_of
+from swashplate.equations.c_source import feedthrough
+from swashplate.export import content_of, drive_sources, libraries, values_of
 from swashplate.simulation.stepper import Sample
 
 OK, BAD_VALUE, UNSTABLE, BAD_DELAY, DOMAIN = range(5)
@@ -298,25 +302,46 @@ def test_inputs_set_and_cleared(hoist: Drive, in_c: Any) -> None:
     assert (one["shaft_speed"] == two["shaft_speed"]).all()
 
 
-def test_feedthrough_is_what_a_jump_of_an_input_moves_at_once(in_c: Any) -> None:
-    drive = Drive.preset("hoist").replace(
-        motor_leakage=1e-6, load_inertia=5e3, line_stiffness=1e6, cam_ripple=0.01,
-        cam_ripple_per_torque=5e-7, motor_constant=250.0, Z12=0.1, load_torque=1e4,
-    )  # fmt: skip
-    said = feedthrough()
-    values = {"load_torque": 3e4, "pump_speed": 1.2, "supply_pressure": 2.5e6}
+LOAD = {"load_inertia": 5e3, "motor_constant": 250.0, "load_torque": 1e4}
+FREE = {"lim1": float("inf"), "lim2": float("inf"), "a": float("inf")}
+FORMS: dict[str, dict[str, float]] = {
+    "plain": LOAD,
+    "acceleration": {**LOAD, "Z12": 0.1},
+    "leaky motor": {**LOAD, "motor_leakage": 1e-6},
+    "line": {**LOAD, "line_stiffness": 1e6},
+    "ripple": {**LOAD, "cam_ripple": 0.01, "cam_ripple_per_torque": 5e-7},
+    "late": {**LOAD, **FREE, "tau": 1.2 * H},
+    "no delay": {**LOAD, **FREE, "tau": 0.0, "Z12": 0.1},
+}
+
+
+@pytest.mark.parametrize("changes", FORMS.values(), ids=FORMS)
+def test_feedthrough_is_what_a_jump_of_an_input_moves_at_once(
+    in_c: Any, changes: dict[str, float]
+) -> None:
+    """Of the form that is exported: what moves is declared, and what is declared can move."""
+    drive = Drive.preset("hoist").replace(**changes)  # type: ignore[arg-type]
+    content = content_of(drive, H)
+    said = feedthrough(content.exported, content.instance, H)
+    jumps = {"load_torque": 3e4, "pump_speed": 1.2, "supply_pressure": 1.2e7}
     moved: dict[str, set[str]] = {name: set() for name in said}
-    for changes in ({}, {"line_stiffness": 0.0}):
-        for signal, value in values.items():
-            one, two = in_c(drive.replace(**changes)), in_c(drive.replace(**changes))
-            for model in (one, two):
-                model.run(COMMAND[:400], NAMES)
-            assert two.set_input(two.number("_input", signal), value) == OK
-            one.step(3.0), two.step(3.0)
-            for name in said:
-                number = one.number("_output", name)
-                if one.output(number) != two.output(number):
-                    moved[name].add(signal)
+    model = in_c(drive)
+    places = [model.number("_output", name) for name in said]
+    for n, voltage in enumerate(COMMAND[:420].tolist()):
+        if n % 7 == 6:
+            before = bytes(model.model)
+            assert model.step(5.0) == OK
+            plain = [model.output(place) for place in places]
+            for signal, value in (*jumps.items(), ("voltage", 0.0), ("voltage", -5.0)):
+                model.model.raw = before
+                if signal != "voltage":
+                    assert model.set_input(model.number("_input", signal), value) == OK
+                assert model.step(value if signal == "voltage" else 5.0) == OK
+                for name, place, known in zip(said, places, plain, strict=True):
+                    if model.output(place) != known:
+                        moved[name].add(signal)
+            model.model.raw = before
+        assert model.step(voltage) == OK
     assert moved == {name: set(inputs) for name, inputs in said.items()}
 
 
@@ -330,6 +355,22 @@ def test_a_state_is_small(hoist: Drive, in_c: Any, compiled: Callable[..., Path]
     assert model.function("size")() <= 2_000
     run = hoist.simulate(COMMAND, 512.0, interpolation="previous")
     assert (model.run(COMMAND, ["shaft_speed"])["shaft_speed"] == run.shaft_speed).all()
+
+
+@pytest.mark.slow
+def test_a_controller_has_room_for_the_equations(tmp_path: Path) -> None:
+    """An object for a Cortex-M7 with double precision."""
+    if not libraries.has_zig() or not shutil.which("size"):
+        pytest.skip("ziglang is not installed")
+    libraries.written(drive_sources(), tmp_path)
+    machine = ["-target", "thumb-linux-musleabihf", "-mcpu=cortex_m7+fp_armv8d16"]
+    flags = ["-Os", "-g0", "-ffp-contract=off", "-fno-math-errno", "-fno-unwind-tables"]
+    command = [sys.executable, "-m", "ziglang", "cc", *machine, *flags, "-c", "swashplate_drive.c"]
+    subprocess.run([*command, "-o", "drive.o"], cwd=tmp_path, check=True)
+    said = subprocess.run(
+        ["size", "drive.o"], cwd=tmp_path, capture_output=True, text=True, check=True
+    ).stdout
+    assert int(said.splitlines()[1].split()[3]) <= 16_000
 
 
 def test_fast_mathematics_does_not_compile(compiled: Callable[..., Path]) -> None:

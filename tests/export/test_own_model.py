@@ -1,5 +1,6 @@
 """A model of one's own in C: a folder that compiles, and the bits of its march."""
 
+import shutil
 import subprocess
 from math import floor
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from tests.equations.test_own_model import COMMAND, STROKE, P, valve
 from tests.export.conftest import InC
+from tests.export.webassembly import Page
 
 from swashplate import Drive, FileError, InputError
 from swashplate.equations import (
@@ -25,7 +27,7 @@ from swashplate.equations import (
 )
 from swashplate.equations.c_source import interface
 from swashplate.errors import EquationError
-from swashplate.export import c, drive_sources, exported_model, model_values, values_of
+from swashplate.export import c, content_of, drive_sources, fmu, libraries, values_of, wasm
 from swashplate.models import displacement_control
 
 OFF = None
@@ -126,8 +128,8 @@ PUMPED = 0.3 + 0.4 * np.sin(np.arange(400) / 9.0)
 
 
 def exported(model: Model, compiled: Any, rate: float, **numbers: Any) -> InC:
-    library = compiled(interface(exported_model(model)))
-    return InC(library, model.name, model_values(model, 1.0 / rate, **numbers))
+    content = content_of(model, 1.0 / rate, prefix=model.name, **numbers)
+    return InC(compiled(interface(content.exported)), model.name, content.values)
 
 
 def test_a_valve_has_the_bits_of_its_march(compiled: Any) -> None:
@@ -230,6 +232,67 @@ def test_limits_are_bits(compiled: Any) -> None:
         assert model.step(pumped) == 0
         seen.add(model.limits())
     assert seen == {0, 1, 2}
+
+
+# --- FMU and WebAssembly --------------------------------------------------------------------------
+
+INPUTS = {"pumped": PUMPED, "outside": 0.1 + 0.05 * np.cos(np.arange(400) / 30.0)}
+NAMES = ("head", "steps", "level", "flow", "drained")
+FINE = 64.0
+"""Rate whose times are binary, so that an importer interpolates no input. [Hz]"""
+
+
+@pytest.fixture
+def machine() -> list[str]:
+    """This machine's platform, if a library can be compiled for it."""
+    own = libraries.this_machine()
+    if own is None or not (libraries.has_zig() or shutil.which("cc")):
+        pytest.skip("there is no C compiler here")
+    return [name for name, each in libraries.PLATFORMS.items() if each is own]
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_an_fmu_of_a_model_has_the_bits_of_its_march(
+    fmi: Any, tmp_path: Path, machine: list[str]
+) -> None:
+    fmpy = pytest.importorskip("fmpy")
+    path = fmu(
+        tank, tmp_path / "tank.fmu", fmi=fmi, step=1.0 / FINE, platforms=machine,
+        parameters=NUMBERS, options=Ways(stepped=True), given=AROUND,
+    )  # fmt: skip
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(str(path)) == []
+    read = fmpy.read_model_description(str(path))
+    variables = {each.name: each for each in read.modelVariables}
+    assert float(variables["outlet"].start) == NUMBERS.outlet
+    assert variables["area"].variability == "tunable"
+    assert variables["stepped"].start == "true"
+    assert {each.name for each in read.modelVariables if each.causality == "output"} == {*NAMES}
+    columns = {"time": np.arange(400) / FINE, **INPUTS}
+    signals = np.rec.fromarrays(list(columns.values()), names=list(columns))
+    for options in (Ways(stepped=True), Ways(True, True)):
+        run = simulate(tank, NUMBERS, INPUTS, FINE, options=options, given=AROUND)
+        found = fmpy.simulate_fmu(
+            str(path), stop_time=399.0 / FINE, output_interval=1.0 / FINE, input=signals,
+            output=NAMES, start_values={"rough": options.rough is not None},
+        )  # fmt: skip
+        for name in NAMES:
+            assert (found[name] == run[name]).all(), name
+
+
+@pytest.mark.slow
+def test_webassembly_of_a_model_has_the_bits_of_its_march(tmp_path: Path) -> None:
+    if not libraries.has_zig():
+        pytest.skip("ziglang is not installed")
+    numbers = {"parameters": NUMBERS, "given": AROUND}
+    page = Page(wasm(tank, tmp_path / "a.wasm", step=1.0 / RATE, **numbers))
+    names = content_of(tank, 1.0 / RATE, **numbers).exported.names
+    found = page.run([PUMPED], 1.0 / RATE, [names.index(each) for each in NAMES])
+    run = simulate(tank, NUMBERS, {"pumped": PUMPED}, RATE, given=AROUND)
+    for name, values in zip(NAMES, found, strict=True):
+        assert (values == run[name]).all(), name
+    assert page.call("run", 1) == 1  # it has no equation for a settled start
 
 
 # --- folders --------------------------------------------------------------------------------------

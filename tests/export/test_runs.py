@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from tests.export.webassembly import Page
 
 from swashplate import Drive
-from swashplate.export import drive_sources, values_of
+from swashplate.export import content_of, drive_sources, values_of, wasm
 from swashplate.models.displacement_control import PumpOptions
 from swashplate.simulation.stepper import Sample
 
@@ -156,6 +157,43 @@ def test_a_packaged_drive_has_the_bits_of_the_march(case: Case, in_c: Any) -> No
 @pytest.mark.parametrize("case", BATTERY, ids=names_of(BATTERY))
 def test_the_battery_has_the_bits_of_the_march(case: Case, in_c: Any) -> None:
     compared(case, in_c, anew=True)
+
+
+# --- another library of functions -----------------------------------------------------------------
+
+SIZES = {  # of what each signal is compared with
+    "current": 1.0, "shaft_speed": 1.0, "shaft_position": 1.0, "swash_angle": 0.1,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("start", ["rest", "steady"])
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"omega": (60.0, 48.0), "zeta": 0.9, "a": 15.0}, {"Z13": (0.2, 0.25)},
+     {**EVERY, "tau": 0.02}],
+    ids=["plain", "filter", "stops", "every"],
+)  # fmt: skip
+def test_another_library_of_functions_gives_the_same_to_1e_12(
+    changes: dict[str, Any], start: str, tmp_path: Path
+) -> None:
+    """WebAssembly's own `exp`, `tan`, `sin`: values set there, so that it computes constants."""
+    base, command = Drive.preset("hoist").at_every_rate(), Case().command()
+    drive = base.replace(**changes)
+    page = Page(wasm(base, tmp_path / "a.wasm"))
+    content = content_of(drive, H)
+    for number, (_, _, name) in enumerate(content.exported.named("parameters")):
+        if name in drive.parameters.numbers:
+            assert page.call("set", number, min(drive.parameters.numbers[name], 1e30)) == 0
+    assert page.call("update") == 0
+    places = [content.exported.names.index(name) for name in SIZES]
+    found = page.run([command], H, places, int(start == "steady"))
+    run = drive.simulate(command, interpolation="previous", start=start)  # type: ignore[arg-type]
+    for (name, size), values in zip(SIZES.items(), found, strict=True):
+        wanted = getattr(run, name)
+        assert np.ptp(wanted) > 0.1 * size
+        np.testing.assert_allclose(values, wanted, rtol=0.0, atol=1e-12 * np.abs(wanted).max())
+        if not changes and start == "rest":
+            assert (values == wanted).all()
 
 
 # --- how much of the C the battery reaches --------------------------------------------------------

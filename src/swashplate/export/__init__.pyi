@@ -1,9 +1,9 @@
+from .c_folder import LONGEST_STEP as LONGEST_STEP
+from .c_folder import Content as Content
 from .c_folder import c as c
+from .c_folder import content_of as content_of
 from .c_folder import drive_sources as drive_sources
 from .c_folder import exported_drive as exported_drive
-from .c_folder import exported_model as exported_model
-from .c_folder import feedthrough as feedthrough
-from .c_folder import model_values as model_values
 from .c_folder import values_of as values_of
 from .fmi import Comparison as Comparison
 from .fmi import compare as compare
@@ -11,6 +11,5 @@ from .fmi import fmu as fmu
 from .libraries import PLATFORMS as PLATFORMS
 from .libraries import compiled_c as compiled_c
 from .libraries import wasm as wasm
-from .variables import LONGEST_STEP as LONGEST_STEP
 from .variables import Variable as Variable
 from .variables import variables as variables

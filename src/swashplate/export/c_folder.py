@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 
 from swashplate.drive import Drive
 from swashplate.equations.c_source import Exported, c_name, interface, literal
-from swashplate.equations.c_source import feedthrough as feedthrough_of
 from swashplate.equations.c_source.model import Writer
 from swashplate.equations.fields import numbers_of
 from swashplate.equations.marching.record import SOURCE_RATE
@@ -20,6 +20,7 @@ from swashplate.equations.marching.run import Instance, called
 from swashplate.equations.marching.use import instance_of as instance_of_model
 from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError
+from swashplate.export.variables import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of
 from swashplate.models.card import stable_step
 from swashplate.models.displacement_control import steep_stops
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -33,7 +34,7 @@ from swashplate.simulation.stepper import Sample
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
-STEP = 1.0 / SOURCE_RATE
+LONGEST_STEP = 1.0 / SOURCE_RATE
 
 
 def exported_drive(drive: Drive | None = None) -> Exported:
@@ -51,7 +52,8 @@ def exported_drive(drive: Drive | None = None) -> Exported:
         stable={0: stable_step},
         follows={(1, "steep"): steep_stops},
         internal=frozenset({"own"}),
-        longest=STEP,
+        longest=LONGEST_STEP,
+        free_step="exact",
     )
 
 
@@ -60,12 +62,7 @@ def drive_sources(drive: Drive | None = None) -> dict[str, str]:
     return interface(exported_drive(drive))
 
 
-def feedthrough(drive: Drive | None = None) -> dict[str, frozenset[str]]:
-    """Inputs that each output follows at the same sample, by output; a delayed command is none."""
-    return feedthrough_of(exported_drive(drive))
-
-
-def values_of(drive: Drive, step: float = STEP) -> Array:
+def values_of(drive: Drive, step: float = LONGEST_STEP) -> Array:
     """All numbers that ``swp_init`` takes, as Python computed them.
 
     Parameters
@@ -85,12 +82,7 @@ def values_of(drive: Drive, step: float = STEP) -> Array:
     InputError
         If the card's filter is unstable at that step, or the step is none.
     """
-    if not 0.0 < step <= STEP:
-        raise InputError(
-            f"The step is {step:g} s, but must be above 0 and at most 1/{SOURCE_RATE:g} s."
-        )
-    check_filter_stability(drive.parameters, step)
-    return _values(instance_of(drive.parameters, True), step)
+    return content_of(drive, step).values
 
 
 def _values(instance: Instance, step: float) -> Array:
@@ -104,27 +96,85 @@ def _values(instance: Instance, step: float) -> Array:
     return np.array([step, *instance.params, *instance.given, *options, *constants])
 
 
+# --- what is exported -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """A drive, or a model of one's own, with its numbers, as it is exported."""
+
+    exported: Exported
+    instance: Instance
+    values: Array
+    """Numbers that its ``init`` takes."""
+    name: str
+    title: str
+    packaged: bool
+    """Whether the package's libraries have its equations."""
+    references: References
+    words: Mapping[str, Words]
+    """Meaning and unit of signals and options."""
+
+    def __repr__(self) -> str:
+        return f"Content({self.name!r}, {self.values.size} values)"
+
+    @property
+    def step(self) -> float:
+        """Step of its grid. [s]"""
+        return float(self.values[0])
+
+    @property
+    def identifier(self) -> str:
+        """Its name as one of C's."""
+        made = re.sub(r"\W", "_", self.name, flags=re.ASCII).strip("_").lower() or "model"
+        return f"_{made}" if made[0].isdigit() else made
+
+
+def content_of(
+    what: Drive | Model,
+    step: float,
+    *,
+    parameters: Any = None,
+    options: Any = None,
+    given: Any = None,
+    prefix: str = "swp",
+) -> Content:
+    """What is exported of a drive, or of a model of one's own with its numbers.
+
+    Functions of the latter begin with `prefix`; the other arguments are those of `c`.
+
+    Raises
+    ------
+    InputError
+        If the step is none, the filter of a drive is unstable at it, or numbers are none.
+    """
+    if isinstance(what, Drive):
+        if not 0.0 < step <= LONGEST_STEP:
+            raise InputError(
+                f"The step is {step:g} s, but must be above 0 and at most 1/{SOURCE_RATE:g} s; "
+                "the steps of an FMU's master may be longer."
+            )
+        check_filter_stability(what.parameters, step)
+        exported, instance = exported_drive(what), instance_of(what.parameters, True)
+        name, title, references, words = what.name, what.parameters.title, DRIVE, DRIVE_WORDS
+    else:
+        if not step > 0.0:
+            raise InputError(f"The step is {step:g} s, but must be above 0.")
+        instance = instance_of_model(what, parameters, options=options, given=given)
+        exported, name, title = Exported(what, prefix), what.name, f"Model {what.name}"
+        references, words = OWN, words_of(exported)
+    values = _values(instance, step)
+    packaged = isinstance(what, Drive) and not what.parameters.equations
+    return Content(exported, instance, values, name, title, packaged, references, words)
+
+
 # --- a folder -------------------------------------------------------------------------------------
-
-
-def exported_model(model: Model) -> Exported:
-    """A model of one's own as it is in C: its functions begin with its name."""
-    return Exported(model, c_name(model.name))
-
-
-def model_values(
-    model: Model, step: float, parameters: Any, *, options: Any = None, given: Any = None
-) -> Array:
-    """All numbers that the ``init`` of a model of one's own takes, as `values_of` has them."""
-    if not step > 0.0:
-        raise InputError(f"The step is {step:g} s, but must be above 0.")
-    return _values(instance_of_model(model, parameters, options=options, given=given), step)
 
 
 def c(
     what: Drive | Model,
     folder: str | Path,
-    step: float = STEP,
+    step: float = LONGEST_STEP,
     *,
     parameters: Any = None,
     options: Any = None,
@@ -157,12 +207,11 @@ def c(
     FileError
         If the folder cannot be written.
     """
-    if isinstance(what, Drive):
-        exported, values, name = exported_drive(what), values_of(what, step), what.name
-    else:
-        values = model_values(what, step, parameters, options=options, given=given)
-        exported, name = exported_model(what), what.name
-    name = re.sub(r"\W", "_", name, flags=re.ASCII).strip("_").lower() or "model"
+    own = "swp" if isinstance(what, Drive) else c_name(what.name)
+    content = content_of(
+        what, step, parameters=parameters, options=options, given=given, prefix=own
+    )
+    exported, values, name = content.exported, content.values, content.identifier
     texts = interface(exported)
     words = {
         "file": exported.file,

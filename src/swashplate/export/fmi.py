@@ -1,82 +1,87 @@
-"""FMU of a drive, FMI 2.0 or 3.0 for co-simulation: what it declares, carries and promises.
+"""FMU of a drive or a model, FMI 2.0 or 3.0 for co-simulation: what it declares and carries.
 
-Inside, the drive runs on its own grid of samples, whatever the master's steps are. The library is
-the package's own; the drive's numbers are a resource that it reads.
+Inside, the model runs on its own grid of samples, whatever the master's steps are. The library of a
+drive is the package's own; the numbers are a resource that it reads.
 """
 
 from __future__ import annotations
 
 import warnings
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 from xml.etree import ElementTree as ET
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.__about__ import __version__
+from swashplate.drive import Drive
+from swashplate.equations.c_source import feedthrough, newest
+from swashplate.equations.fields import value_at
+from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError
-from swashplate.export.c_folder import exported_drive, feedthrough, values_of
+from swashplate.export.c_folder import LONGEST_STEP, Content, content_of
 from swashplate.export.libraries import (
-    NAME,
     Platform,
+    Sources,
     chosen_platforms,
     compiled,
-    layout_of,
-    library_sources,
-    manifest,
+    one_unit,
     packaged,
+    sources,
 )
-from swashplate.export.variables import LONGEST_STEP, NONE, TIME, Variable, variables
+from swashplate.export.variables import NONE, Variable, variables
 from swashplate.results import Result
-from swashplate.simulation.instance import check_filter_stability
 from swashplate.tables import UNIT, Column, Table, write_bytes
 from swashplate.units import si_exponents, to_si
-
-if TYPE_CHECKING:
-    from swashplate.drive import Drive
 
 Version = Literal["2.0", "3.0"]
 Array = NDArray[np.float64]
 
-LATE = 1.5
-"""Steps that a delay must have, so that no output depends on the voltage of its instant."""
 MAGIC, RESOURCE_VERSION, TOKEN_LENGTH = b"SWPDRIVE", 1, 64
 LONGEST_LINE = 1020
 """Steps that the delay line of the libraries can hold."""
 DISPLAYED = {"rad": ("deg",), "rad/s": ("deg/s", "rpm"), "Pa": ("bar",), "m": ("mm",), "s": ("ms",)}
 """Units that people read, offered beside SI ones."""
+WHOLE = "fmu.c"
+"""The source that an importer compiles."""
 _EARLIEST = (1980, 1, 1, 0, 0, 0)
 
 
 def fmu(
-    drive: Drive,
+    what: Drive | Model,
     path: str | Path,
     *,
     fmi: Version = "2.0",
     step: float = LONGEST_STEP,
     platforms: Sequence[str] | None = None,
+    parameters: Any = None,
+    options: Any = None,
+    given: Any = None,
 ) -> Path:
-    """Write a drive as an FMU for co-simulation.
+    """Write a drive, or a model of one's own, as an FMU for co-simulation.
 
     Parameters
     ----------
-    drive : Drive
-        Whose numbers and forms are the start values. One with an equation of its own is compiled,
-        which needs a compiler (extra ``binaries``).
+    what : Drive or Model
+        Whose numbers and forms are the start values. A drive with an equation of its own, or a
+        model, is compiled, which needs a compiler (extra ``binaries``).
     path : path
         The file, ``.fmu``; an older one is replaced.
     fmi : {"2.0", "3.0"}
         Version of the standard.
     step : float
-        Step of the drive's own grid, at most 1/512 s; the master's step may be any. [s]
+        Step of its own grid, of a drive at most 1/512 s; the master's step may be any. [s]
     platforms : sequence of str, optional
-        Of ``"linux64"``, ``"aarch64-linux"``, ``"win64"`` and ``"darwin64"``; by default all.
+        Of ``"linux64"``, ``"aarch64-linux"``, ``"win64"`` and ``"darwin64"``; by default all, or
+        this machine where a C compiler is all that there is.
+    parameters, options, given : named tuple
+        Numbers of a model of one's own, as `swashplate.equations.simulate` takes them.
 
     Returns
     -------
@@ -86,115 +91,95 @@ def fmu(
     Raises
     ------
     InputError
-        For an option that there is not, a step that the card's filter does not allow, or a delay
-        that is longer than the library's line.
+        For an option that there is not, a step that the card's filter does not allow, a delay that
+        is longer than the library's line, or a compiler that is missing.
+    EquationError
+        If an equation has no counterpart in C.
     FileError
         If the file cannot be written.
 
     Warns
     -----
     UserWarning
-        Where the delay is shorter than 1.5 steps, so that outputs depend on the voltage of their
-        own instant, and a master that does not set it before it reads them is a sample behind;
-        where the recursion of the card's filter was converted to another step.
+        Where a delay is so short that outputs depend on an input of their own instant (of a drive's
+        voltage 1.5 steps), and a master that does not set it before it reads them is a sample
+        behind; where the recursion of the card's filter was converted to another step.
     """
     if fmi not in ("2.0", "3.0"):
         raise InputError(f"fmi is '{fmi}'; it is '2.0' or '3.0'.")
     if Path(path).suffix.lower() != ".fmu":
         raise InputError(f"{path} must end in .fmu, as importers know it.")
-    chosen = chosen_platforms(platforms)
-    exported = exportable(drive, step)
-    content = packed(exported, fmi, step, chosen)
-    write_bytes(content, path)
+    chosen_platforms(platforms)
+    content = exportable(what, step, parameters=parameters, options=options, given=given)
+    write_bytes(packed(content, fmi, chosen_platforms(platforms, not content.packaged)), path)
     return Path(path)
 
 
-def exportable(drive: Drive, step: float) -> Drive:
-    """The drive as it can run at a step: a recursion for another rate becomes its equation.
+def exportable(what: Drive | Model, step: float, **numbers: Any) -> Content:
+    """What runs at a step: a drive's recursion for another rate becomes its equation.
 
     Raises
     ------
     InputError
         For a step out of range, or one that the filter or the delay line does not allow.
     """
-    if not 0.0 < step <= LONGEST_STEP:
-        raise InputError(
-            f"The step is {step:g} s, but must be above 0 and at most 1/512 s; the master's steps "
-            "may be longer."
-        )
-    rate = drive.parameters.rate
-    if rate is not None and abs(rate * step - 1.0) > 1e-9:
-        drive = drive.at_every_rate()
-        warnings.warn(
-            f"{drive.name}: the card's filter is a recursion for {rate:g} Hz; for a step of "
-            f"{step:g} s the differential equation with the same poles takes its place.",
-            stacklevel=3,
-        )
-    check_filter_stability(drive.parameters, step)
-    delay = drive.parameters.numbers["tau"]
-    if delay > LONGEST_LINE * step:
-        raise InputError(
-            f"{drive.name}: tau is {delay:g} s, but the library's line holds {LONGEST_LINE} steps, "
-            f"{LONGEST_LINE * step:g} s; choose a step of {delay / LONGEST_LINE:.3g} s or more."
-        )
-    if is_late(delay, step):
-        shorter = f"choose a step of {delay / LATE:.3g} s or less" if delay > 0.0 else ""
+    if isinstance(what, Drive):
+        rate = what.parameters.rate
+        if rate is not None and abs(rate * step - 1.0) > 1e-9 and 0.0 < step <= LONGEST_STEP:
+            what = what.at_every_rate()
+            warnings.warn(
+                f"{what.name}: the card's filter is a recursion for {rate:g} Hz; for a step of "
+                f"{step:g} s the differential equation with the same poles takes its place.",
+                stacklevel=3,
+            )
+    content = content_of(what, step, **numbers)
+    for i, _, tap in content.exported.taps:
+        delay = value_at(content.instance.parts[i].p, tap.delay) if tap.delay else 0.0
+        if delay > LONGEST_LINE * step:
+            raise InputError(
+                f"{what.name}: {tap.delay} is {delay:g} s, but the library's line holds "
+                f"{LONGEST_LINE} steps, {LONGEST_LINE * step:g} s; choose a step of "
+                f"{delay / LONGEST_LINE:.3g} s or more."
+            )
+    for signal, (delay, steps) in newest(content.exported, content.instance, step).items():
+        shorter = f"choose a step of {delay / steps:.3g} s or less" if delay > 0.0 else ""
         advice = shorter or "a master that sets inputs before it reads outputs gets them exactly"
+        words = "tau" if isinstance(what, Drive) else f"the delay of {signal}"
         warnings.warn(
-            f"{drive.name}: tau is {delay:g} s, below 1.5 steps of {step:g} s, so that outputs "
-            f"depend on the voltage of their own instant and may be a sample late; {advice}.",
+            f"{what.name}: {words} is {delay:g} s, below {steps:g} steps of {step:g} s, so that "
+            f"outputs depend on the {signal} of their own instant and may be a sample late; "
+            f"{advice}.",
             stacklevel=3,
         )
-    return drive
+    return content
 
 
-def is_late(delay: float, step: float) -> bool:
-    """Whether outputs depend on the voltage of their own instant."""
-    return delay < LATE * step * (1.0 - 1e-12)
-
-
-def packed(drive: Drive, fmi: Version, step: float, platforms: Iterable[Platform]) -> bytes:
+def packed(content: Content, fmi: Version, platforms: Collection[Platform]) -> bytes:
     """The file's content: the same bytes for the same drive and options."""
-    own = bool(drive.parameters.equations)
-    texts = library_sources(drive if own else None)
-    table = table_of(drive, step)
-    numbers = finite_values(drive, step)
-    layout = layout_of({name: texts[name] for name in ("swashplate_drive.c", "swashplate_drive.h")})
-    token = _token(fmi, texts, numbers, table)
-    units = _units(fmi)
-    described = description(drive, table, fmi, step, token)
+    made, table, name = sources(content), table_of(content), content.identifier
+    numbers = np.where(np.isinf(content.values), np.copysign(NONE, content.values), content.values)
+    token = _token(fmi, made, numbers, table)
     members = {
-        "modelDescription.xml": described,
-        "resources/drive.bin": resource(numbers, layout, token),
+        "modelDescription.xml": description(content, table, fmi, token),
+        "resources/drive.bin": resource(numbers, made.layout, token),
+        f"sources/{WHOLE}": one_unit(made, fmi, name).encode(),
     }
-    kept = [name for name in texts if name not in ("fmi2.c", "fmi3.c", "wasm.c") or name in units]
-    members |= {f"sources/{name}": texts[name].encode() for name in kept}
+    left = ("wasm.c", "fmi3.c" if fmi == "2.0" else "fmi2.c")
+    members |= {f"sources/{n}": text.encode() for n, text in made.texts.items() if n not in left}
     if fmi == "3.0":
-        members["sources/buildDescription.xml"] = _build_description(units)
+        members["sources/buildDescription.xml"] = _build_description(name)
     for each in platforms:
-        content = compiled(texts, each) if own else packaged(each.library)
+        library = packaged(each.library) if content.packaged else compiled(made, each)
         for folder in each.fmi2 if fmi == "2.0" else each.fmi3:
-            members[f"binaries/{folder}/{NAME}{each.ending}"] = content
+            members[f"binaries/{folder}/{name}{each.ending}"] = library
     return _zipped(members)
 
 
-def finite_values(drive: Drive, step: float) -> Array:
-    """Numbers of the library's `swp_init`, infinity as 1e30, as modelDescription.xml has it."""
-    values = values_of(drive, step)
-    return np.where(np.isinf(values), np.copysign(NONE, values), values)
-
-
-def table_of(drive: Drive, step: float) -> tuple[Variable, ...]:
-    """Every variable of a drive at a step [s]."""
-    return variables(exported_drive(drive), drive.parameters, step, direct(drive, step))
-
-
-def direct(drive: Drive, step: float) -> dict[str, set[str]]:
-    """By output, the inputs that it depends on at the same instant."""
-    at_once = {"voltage"} if is_late(drive.parameters.numbers["tau"], step) else set[str]()
-    own = bool(drive.parameters.equations)
-    read = feedthrough(drive) if own else manifest()["feedthrough"]
-    return {name: {*inputs, *at_once} for name, inputs in read.items()}
+def table_of(content: Content) -> tuple[Variable, ...]:
+    """Every variable of what is exported."""
+    direct = feedthrough(content.exported, content.instance, content.step)
+    values = content.values.tolist()
+    return variables(content.exported, values, direct, content.words, content.references)
 
 
 def resource(numbers: Array, layout: int, token: str) -> bytes:
@@ -204,13 +189,11 @@ def resource(numbers: Array, layout: int, token: str) -> bytes:
     return head + numbers.astype("<f8").tobytes()
 
 
-def _token(
-    fmi: Version, texts: Mapping[str, str], numbers: Array, table: Sequence[Variable]
-) -> str:
+def _token(fmi: Version, sources: Sources, numbers: Array, table: Sequence[Variable]) -> str:
     """GUID made of the sources, the numbers and the variables."""
     made = sha256(f"{fmi} {__version__}".encode())
-    for name in sorted(texts):
-        made.update(texts[name].encode())
+    for name in sorted(sources.texts):
+        made.update(sources.texts[name].encode())
     made.update(numbers.astype("<f8").tobytes())
     made.update(repr([(each.name, each.reference, each.start) for each in table]).encode())
     h = made.hexdigest()
@@ -240,12 +223,13 @@ def _xml(root: ET.Element) -> bytes:
 # --- modelDescription.xml -------------------------------------------------------------------------
 
 
-def description(
-    drive: Drive, table: Sequence[Variable], fmi: Version, step: float, token: str
-) -> bytes:
+def description(content: Content, table: Sequence[Variable], fmi: Version, token: str) -> bytes:
     """``modelDescription.xml``."""
-    root = ET.Element("fmiModelDescription", _head(drive, table, fmi, step, token))
-    steps = {"canHandleVariableCommunicationStepSize": "true", "modelIdentifier": NAME}
+    root = ET.Element("fmiModelDescription", _head(content, table, fmi, token))
+    steps = {
+        "canHandleVariableCommunicationStepSize": "true",
+        "modelIdentifier": content.identifier,
+    }
     if fmi == "2.0":
         slave = ET.SubElement(
             root,
@@ -259,15 +243,14 @@ def description(
             },
         )
         listed = ET.SubElement(slave, "SourceFiles")
-        for name in _units(fmi):
-            ET.SubElement(listed, "File", {"name": name})
+        ET.SubElement(listed, "File", {"name": WHOLE})
     else:
         ET.SubElement(
             root,
             "CoSimulation",
             {
                 **steps,
-                "fixedInternalStepSize": repr(step),
+                "fixedInternalStepSize": repr(content.step),
                 "canGetAndSetFMUState": "true",
                 "canSerializeFMUState": "true",
             },
@@ -277,7 +260,9 @@ def description(
     for name in ("logStatusWarning", "logStatusDiscard", "logStatusError"):
         ET.SubElement(categories, "Category", {"name": name})
     ET.SubElement(
-        root, "DefaultExperiment", {"startTime": "0", "stopTime": "10", "stepSize": repr(step)}
+        root,
+        "DefaultExperiment",
+        {"startTime": "0", "stopTime": "10", "stepSize": repr(content.step)},
     )
     listed = ET.SubElement(root, "ModelVariables")
     for each in table:
@@ -286,16 +271,18 @@ def description(
     if fmi == "2.0":
         _structure2(structure, table)
     else:
-        clock = {"name": "time", "valueReference": str(TIME), "causality": "independent"}
+        clock = {
+            "name": "time",
+            "valueReference": str(content.references.TIME),
+            "causality": "independent",
+        }
         ET.SubElement(listed, "Float64", {**clock, "variability": "continuous", "unit": "s"})
         _structure3(structure, table)
     return _xml(root)
 
 
-def _head(
-    drive: Drive, table: Sequence[Variable], fmi: Version, step: float, token: str
-) -> dict[str, str]:
-    words = f"{drive.parameters.title}. Own steps of {step:g} s."
+def _head(content: Content, table: Sequence[Variable], fmi: Version, token: str) -> dict[str, str]:
+    words = f"{content.title}. Own steps of {content.step:g} s."
     read = sorted({name for each in table for name in each.feedthrough})
     if read:
         words += (
@@ -305,7 +292,7 @@ def _head(
     named = "guid" if fmi == "2.0" else "instantiationToken"
     return {
         "fmiVersion": fmi,
-        "modelName": drive.name,
+        "modelName": content.name,
         named: token,
         "description": words,
         "generationTool": f"swashplate {__version__}",
@@ -393,21 +380,15 @@ def _structure3(structure: ET.Element, table: Sequence[Variable]) -> None:
         ET.SubElement(structure, "InitialUnknown", {"valueReference": str(each.reference)})
 
 
-def _units(fmi: Version) -> tuple[str, ...]:
-    """Sources that are compiled, of one version of the standard."""
-    return ("swashplate_drive.c", "fmi.c", "fmi2.c" if fmi == "2.0" else "fmi3.c")
-
-
-def _build_description(units: Sequence[str]) -> bytes:
+def _build_description(identifier: str) -> bytes:
     root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
-    configuration = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": NAME})
+    configuration = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
     sources = ET.SubElement(
         configuration,
         "SourceFileSet",
         {"language": "C11", "compilerOptions": "-ffp-contract=off"},
     )
-    for name in units:
-        ET.SubElement(sources, "SourceFile", {"name": name})
+    ET.SubElement(sources, "SourceFile", {"name": WHOLE})
     return _xml(root)
 
 
@@ -488,9 +469,11 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> Comparison:
     step = _step_of(Path(path), fmpy)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # said when it was exported
-        chosen = exportable(drive, step)
+        content = exportable(drive, step)
+    fits = content.instance.parts[0].options.exact is None  # a recursion for this step
+    chosen = drive if fits else drive.at_every_rate()
     run = chosen.simulate(command, 1.0 / step, interpolation="previous")
-    table = table_of(chosen, step)
+    table = table_of(content)
     inputs = {each.name: each.start for each in table if each.causality == "input"}
     columns = {"time": np.arange(command.size) * step, **inputs, "voltage": command}
     signals = np.empty(command.size, [(name, np.float64) for name in columns])

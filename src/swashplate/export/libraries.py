@@ -1,8 +1,8 @@
-"""Compiled libraries of the drive: for which machines, made from which sources, and how.
+"""Compiled libraries: for which machines, made from which sources, and how.
 
 The package carries one library for each platform, made once from the generated C and the same for
-every drive: its numbers travel beside it (`swashplate.export.fmu`). A drive with an equation of
-one's own has other C, which is compiled when it is exported.
+every drive: its numbers travel beside it (`swashplate.export.fmu`). A model of one's own, or a
+drive with an equation of one's own, has other C, which is compiled when it is exported.
 """
 
 from __future__ import annotations
@@ -22,9 +22,11 @@ from typing import Any, NamedTuple
 
 from swashplate.documents import parse_toml
 from swashplate.drive import Drive
+from swashplate.equations.c_source import Exported, interface
+from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError
-from swashplate.export.c_folder import STEP, drive_sources, exported_drive, values_of
-from swashplate.export.variables import c_header
+from swashplate.export.c_folder import LONGEST_STEP, Content, content_of, exported_drive
+from swashplate.export.variables import DRIVE, References, c_header
 from swashplate.tables import write_bytes
 
 NAME = "swashplate_drive"
@@ -91,7 +93,7 @@ FLAGS = (
     "-fno-stack-protector",
     "-DNDEBUG",
 )
-WASM_FLAGS = ("-std=c11", *SMALL, "-g0", "-ffp-contract=off", "-fno-ident", "-DNDEBUG")
+WASM_FLAGS = ("-std=c11", "-Os", "-g0", "-ffp-contract=off", "-fno-ident", "-DNDEBUG")
 FMI_HEADERS = (
     "fmi2FunctionTypes.h",
     "fmi2Functions.h",
@@ -103,8 +105,8 @@ FMI_HEADERS = (
 FMI_SOURCES = ("fmi.h", "fmi.c", "fmi2.c", "fmi3.c")
 
 
-def chosen_platforms(names: Sequence[str] | None) -> tuple[Platform, ...]:
-    """Platforms by name, all by default.
+def chosen_platforms(names: Sequence[str] | None, compiling: bool = False) -> tuple[Platform, ...]:
+    """Platforms by name; by default all, or those that can be compiled for.
 
     Raises
     ------
@@ -112,7 +114,8 @@ def chosen_platforms(names: Sequence[str] | None) -> tuple[Platform, ...]:
         For an unknown name, or none at all.
     """
     if names is None:
-        return tuple(PLATFORMS.values())
+        own = this_machine() if compiling and not has_zig() else None
+        return (own,) if own else tuple(PLATFORMS.values())
     for name in names:
         if name not in PLATFORMS:
             raise InputError(f"There is no platform '{name}'; there are {', '.join(PLATFORMS)}.")
@@ -124,11 +127,6 @@ def chosen_platforms(names: Sequence[str] | None) -> tuple[Platform, ...]:
 # --- sources --------------------------------------------------------------------------------------
 
 
-def layout_of(drive_texts: Mapping[str, str]) -> int:
-    """Hash of the drive's C texts, 64 bits: numbers and states of another are refused."""
-    return int(digest(drive_texts)[:16], 16)
-
-
 def digest(texts: Mapping[str, str]) -> str:
     """SHA-256 of named texts, in the order of their names."""
     made = sha256()
@@ -137,30 +135,63 @@ def digest(texts: Mapping[str, str]) -> str:
     return made.hexdigest()
 
 
-def library_sources(drive: Drive | None = None) -> dict[str, str]:
-    """Every C text of a library by its file's name, FMI's own headers apart.
+class Sources(NamedTuple):
+    """C texts of a library by their files' names, FMI's own headers apart."""
+
+    texts: dict[str, str]
+    model: str
+    """File with the model's equations."""
+    layout: int
+    """Hash of the model's texts, 64 bits: numbers and states of another are refused."""
+
+
+def sources(content: Content | None = None) -> Sources:
+    """C texts of libraries and WebAssembly.
 
     Parameters
     ----------
-    drive : Drive, optional
-        One with equations of its own; by default the packaged equations.
+    content : Content, optional
+        A drive with equations of its own, or a model; by default the packaged drive.
     """
-    if drive is None:
-        return dict(_packaged_sources())
-    texts = drive_sources(drive)
-    header = c_header(exported_drive(drive), layout_of(texts))
-    own = {name: _source(name) for name in FMI_SOURCES}
-    return {**texts, "fmi_variables.h": header, **own}
+    if content is None or content.packaged:
+        return _packaged_sources()
+    return _made(content.exported, content.references)
 
 
 @cache
-def _packaged_sources() -> dict[str, str]:
-    return library_sources(Drive.preset("neutral"))
+def _packaged_sources() -> Sources:
+    return _made(exported_drive(), DRIVE)
 
 
-def all_sources(drive: Drive | None = None) -> dict[str, str]:
-    """Every C text that libraries and WebAssembly are made of; as `library_sources`."""
-    return {**library_sources(drive), "wasm.c": _source("wasm.c")}
+def _made(exported: Exported, references: References) -> Sources:
+    texts = interface(exported)
+    layout = int(digest(texts)[:16], 16)
+    header = c_header(exported, layout, references)
+    own = {name: _source(name) for name in (*FMI_SOURCES, "wasm.c")}
+    return Sources({**texts, "variables.h": header, **own}, f"{exported.file}.c", layout)
+
+
+def one_unit(made: Sources, fmi: str, identifier: str) -> str:
+    """Text of ``fmu.c``, which an importer compiles: all of a library in one unit.
+
+    Whatever is not of the standard's is static, and the standard's functions begin with the model's
+    identifier unless the importer says otherwise, so that several can be linked into one program.
+    """
+    n = fmi[0]
+    return f"""\
+/* The FMU as one unit, of which FMI's functions alone are seen outside. Their names begin with the
+ * model's identifier, as the standard has it for source code; an importer that makes a shared
+ * library defines FMI{n}_FUNCTION_PREFIX itself as nothing, or FMI{n}_OVERRIDE_FUNCTION_PREFIX. */
+#if !defined(FMI{n}_FUNCTION_PREFIX) && !defined(FMI{n}_OVERRIDE_FUNCTION_PREFIX)
+#define FMI{n}_FUNCTION_PREFIX {identifier}_
+#endif
+#define SWP_API static inline
+#define SWP_FMU_API static inline
+
+#include "{made.model}"
+#include "fmi.c"
+#include "fmi{n}.c"
+"""
 
 
 @cache
@@ -204,17 +235,28 @@ VALUES_SECTION = "swashplate.values"
 ``WebAssembly.Module.customSections`` finds, and the function ``swp_page_init`` takes."""
 
 
-def wasm(drive: Drive, path: str | Path, *, step: float = STEP) -> Path:
-    """Write a drive as WebAssembly, its numbers in a section of their own.
+def wasm(
+    what: Drive | Model,
+    path: str | Path,
+    *,
+    step: float = LONGEST_STEP,
+    parameters: Any = None,
+    options: Any = None,
+    given: Any = None,
+) -> Path:
+    """Write a drive, or a model of one's own, as WebAssembly, with a section of its numbers.
 
     Parameters
     ----------
-    drive : Drive
-        Whose. One with an equation of its own is compiled, which needs the extra ``binaries``.
+    what : Drive or Model
+        What is exported. A drive with an equation of its own, or a model, is compiled, which needs
+        the extra ``binaries``.
     path : path
         The file; an older one is replaced.
     step : float
-        Step of its grid, at most 1/512. [s]
+        Step of its grid; of a drive at most 1/512. [s]
+    parameters, options, given : named tuple
+        Numbers of a model of one's own.
 
     Returns
     -------
@@ -228,12 +270,12 @@ def wasm(drive: Drive, path: str | Path, *, step: float = STEP) -> Path:
     FileError
         If the file cannot be written.
     """
-    numbers = values_of(drive, step).astype("<f8").tobytes()
-    own = bool(drive.parameters.equations)
-    code = compiled_wasm(all_sources(drive)) if own else packaged(WASM)
+    content = content_of(what, step, parameters=parameters, options=options, given=given)
+    numbers = content.values.astype("<f8").tobytes()
+    code = packaged(WASM) if content.packaged else compiled_wasm(sources(content))
     name = VALUES_SECTION.encode()
-    content = bytes([len(name)]) + name + numbers
-    made = code + b"\0" + _leb128(len(content)) + content
+    section = bytes([len(name)]) + name + numbers
+    made = code + b"\0" + _leb128(len(section)) + section
     write_bytes(made, path)
     return Path(path)
 
@@ -255,7 +297,7 @@ def has_zig() -> bool:
     return find_spec("ziglang") is not None
 
 
-def compiled(texts: Mapping[str, str], platform: Platform) -> bytes:
+def compiled(made: Sources, platform: Platform) -> bytes:
     """A library for a platform, made of C texts by Zig's compiler, or for this machine by ``cc``.
 
     Raises
@@ -265,11 +307,11 @@ def compiled(texts: Mapping[str, str], platform: Platform) -> bytes:
     """
     with TemporaryDirectory(prefix="swashplate-") as place:
         folder = Path(place)
-        written(texts, folder)
+        written(made.texts, folder)
         written(fmi_headers(), folder)
-        units = sorted(name for name in texts if name.endswith(".c") and name != "wasm.c")
+        units = sorted(name for name in made.texts if name.endswith(".c") and name != "wasm.c")
         if not has_zig():
-            if platform is not _this_machine() or not shutil.which("cc"):
+            if platform is not this_machine() or not shutil.which("cc"):
                 raise InputError(
                     f"A library {platform.library} needs a compiler: install the extra binaries "
                     "(pip install 'swashplate[binaries]'), or choose the platform of this machine "
@@ -298,7 +340,7 @@ def compiled_c(folder: Path, header: str) -> Path:
         If there is no compiler, or it fails.
     """
     stem = header.removesuffix(".h")
-    machine = _this_machine()
+    machine = this_machine()
     ending = machine.ending if machine else ".so"
     compiler = [shutil.which("cc") or shutil.which("gcc") or ""]
     if not compiler[0]:
@@ -314,16 +356,16 @@ def compiled_c(folder: Path, header: str) -> Path:
     return folder / f"{stem}{ending}"
 
 
-def compiled_wasm(texts: Mapping[str, str]) -> bytes:
-    """WebAssembly of the drive, made of C texts by Zig's compiler."""
+def compiled_wasm(made: Sources) -> bytes:
+    """WebAssembly, made of C texts by Zig's compiler."""
     if not has_zig():
         raise InputError("WebAssembly needs a compiler: pip install 'swashplate[binaries]'.")
     with TemporaryDirectory(prefix="swashplate-") as place:
         folder = Path(place)
-        written(texts, folder)
+        written(made.texts, folder)
         link = ["-mexec-model=reactor", "-Wl,--no-entry", "-Wl,--export-dynamic", "-s"]
         command = [*_zig("wasm32-wasi"), *WASM_FLAGS, "-fvisibility=hidden", *link]
-        _run([*command, "-o", WASM, "swashplate_drive.c", "wasm.c"], folder)
+        _run([*command, "-o", WASM, made.model, "wasm.c"], folder)
         return (folder / WASM).read_bytes()
 
 
@@ -372,7 +414,8 @@ def fmi_headers() -> dict[str, str]:
     return {name: (folder / name).read_text("utf-8") for name in FMI_HEADERS}
 
 
-def _this_machine() -> Platform | None:
+def this_machine() -> Platform | None:
+    """The platform that runs this, None if it is none of those above."""
     import platform
 
     names = {

@@ -1,22 +1,20 @@
-"""Variables of an exported drive: name, value reference, unit, range, meaning.
+"""Variables of an exported model: name, value reference, unit, range, meaning.
 
 Everything that names a variable outside Python follows from this table: the model description of an
 FMU, the C header that its library is compiled with, and what a page may call a slider. Parameters
-come from their definitions, signals from the drive's samples.
+come from their definitions, a drive's signals from its samples.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import Literal
+from typing import Literal, NamedTuple
 
-from swashplate.equations.c_source import Exported
+from swashplate.equations.c_source import Exported, c_name, literal
+from swashplate.equations.fields import Declared, declared_by
 from swashplate.linear.model import UNITS
-from swashplate.parameters.definitions import find
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
 
 Causality = Literal["input", "output", "parameter", "independent"]
 Variability = Literal["continuous", "tunable", "fixed"]
@@ -24,22 +22,35 @@ Variability = Literal["continuous", "tunable", "fixed"]
 NONE = 1e30
 """What stands for infinity, "no limit", where a number must be finite: the numbers that follow from
 it are the same to the last bit."""
-LONGEST_STEP = 1.0 / 512.0
-"""Longest step of the model's own grid. [s]"""
 
-# Value references. They never change: tests/export/value_references.csv is the stored list.
-INPUT, OUTPUT, PARAMETER, STEP, START_STEADY, CLIP, OPTION, TIME = (
-    0,
-    10,
-    100,
-    300,
-    310,
-    311,
-    400,
-    1000,
-)
-DEFAULTS = {"pump_speed": "pump_speed", "load_torque": "load_torque", "supply_pressure": "Z9"}
-"""Parameter that counts while an input beside the voltage is not set."""
+
+class References(NamedTuple):
+    """Value references: the first of each kind. They never change."""
+
+    INPUT: int
+    OUTPUT: int
+    PARAMETER: int
+    STEP: int
+    START_STEADY: int
+    CLIP: int
+    OPTION: int
+    TIME: int
+
+
+DRIVE = References(0, 10, 100, 300, 310, 311, 400, 1000)
+"""Those of a drive; tests/export/value_references.csv is the stored list."""
+OWN = References(0, 10_000, 20_000, 30_000, 30_001, 30_002, 40_000, 50_000)
+"""Those of a model of one's own, which may have any number of each."""
+
+
+class Words(NamedTuple):
+    """What a signal or an option is."""
+
+    meaning: str
+    unit: str = "1"
+    name: str = ""
+    """Its name outside the model, where it has another there."""
+
 
 _SIGNALS = {
     "voltage": "command of the card within ±10 V, positive towards positive speed",
@@ -65,17 +76,20 @@ _UNITS = {
     "current_negative": UNITS["current"],
     "shaft_position": "rad",
 }
-_OPTIONS = {
-    "literal": ("literal_coulomb_sign", "literal sign of the card's Coulomb term"),
-    "split": ("split_card_switch", "the card's limits take over within a step"),
-    "symmetric": ("symmetric_root", "root of the supply pressure less the signed pressure"),
+DRIVE_WORDS: dict[str, Words] = {
+    **{name: Words(meaning, _UNITS[name]) for name, meaning in _SIGNALS.items()},
+    "literal": Words("literal sign of the card's Coulomb term", name="literal_coulomb_sign"),
+    "split": Words("the card's limits take over within a step", name="split_card_switch"),
+    "symmetric": Words(
+        "root of the supply pressure less the signed pressure", name="symmetric_root"
+    ),
 }
-"""Options that can be set before a run, by the model's names; the others follow from parameters."""
+"""Signals of a drive, and options that can be set before a run, by the model's names."""
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable of an exported drive, SI."""
+    """A variable of an exported model, SI."""
 
     name: str
     reference: int
@@ -93,132 +107,163 @@ class Variable:
     """Of an output: inputs that it depends on at the same instant."""
 
 
-def finite(value: float) -> float:
-    """A number with infinity as `NONE`."""
-    return value if isfinite(value) else NONE
+def words_of(exported: Exported) -> dict[str, Words]:
+    """Meaning and unit of the signals of a model of one's own, as far as its types declare them."""
+    found = {}
+    for part in exported.model.parts:
+        for kind in (part.state, part.signals):
+            for each, path in _declared(kind) if kind is not None else ():
+                found[path] = Words(each.definition.name, each.definition.unit or "1")
+    return found
+
+
+def _declared(kind: type) -> Iterator[tuple[Declared, str]]:
+    """What a named tuple declares, by the path of each value."""
+    for each in declared_by(kind):
+        yield from ((each, path) for path in each.fields)
 
 
 def variables(
     exported: Exported,
-    parameters: ParameterSet,
-    step: float,
-    feedthrough: Mapping[str, Collection[str]],
+    values: Sequence[float],
+    feedthrough: Mapping[str, frozenset[str]],
+    words: Mapping[str, Words],
+    references: References,
 ) -> tuple[Variable, ...]:
-    """Every variable of a drive, inputs first, then outputs, parameters and settings.
+    """Every variable of a model: inputs, outputs, parameters, settings.
 
     Parameters
     ----------
     exported : Exported
-        The drive as it is in C, whose order of inputs, outputs, options and parameters counts.
-    parameters : ParameterSet
-        The drive's, for the start values.
-    step : float
-        Step of the model's grid. [s]
+        The model as it is in C, whose order of inputs, outputs, options and parameters counts.
+    values : (n,) sequence of float
+        Those of its ``init``: step, parameters, givens, options, constants.
     feedthrough : mapping
         By output, the inputs that it depends on at the same instant.
+    words : mapping
+        Meaning and unit of signals and options.
+    references : References
+        First value reference of each kind.
     """
-    starts = {name: finite(parameters[name].values[0]) for name in ("Z9", "load_torque")}
-    at_first = {"voltage": 0.0, "pump_speed": 1.0}
-    at_first |= {name: starts[DEFAULTS[name]] for name in ("load_torque", "supply_pressure")}
-    found = [
-        Variable(
-            name, INPUT + i, "input", "continuous", _SIGNALS[name], _UNITS[name], at_first[name]
-        )
-        for i, name in enumerate(("voltage", *exported.measured))
-    ]
-    for i, name in enumerate(exported.names):
-        direct = frozenset(feedthrough.get(name, ()))
+    r = references
+    parameters = exported.named("parameters")
+    starts = {name: values[1 + k] for k, (_, _, name) in enumerate(parameters)}
+    defaults = defaults_of(exported)
+    found: list[Variable] = []
+    for i, name in enumerate((*exported.signals, *exported.measured)):
+        start = min(starts[defaults[name]], NONE) if name in defaults else 0.0
+        said = words.get(name, Words(f"input {name}"))
         found.append(
-            Variable(
-                name,
-                OUTPUT + i,
-                "output",
-                "continuous",
-                _SIGNALS[name],
-                _UNITS[name],
-                feedthrough=direct,
-            )
+            Variable(name, r.INPUT + i, "input", "continuous", said.meaning, said.unit, start)
         )
-    numbers = parameters.numbers
-    for i, (_, _, name) in enumerate(exported.named("parameters")):
-        if name not in exported.measured:  # an input of that name has its value
-            value = numbers[name] if name in numbers else parameters[name].values[0]
-            found.append(_parameter(name, PARAMETER + i, value))
-    words = "step of the model's own grid, whatever the master's steps are"
-    found.append(
-        Variable(
-            "step", STEP, "parameter", "fixed", words, "s", step, lower=0.0, upper=LONGEST_STEP
-        )
-    )
-    forms = {
-        "literal": parameters.coulomb_sign == "literal",
-        "split": parameters.card_switch == "split",
-        "symmetric": parameters.pressure_root == "symmetric",
+    for i, name in enumerate(exported.names):
+        said, direct = words.get(name, Words(f"output {name}")), feedthrough[name]
+        found.append(
+            Variable(name, r.OUTPUT + i, "output", "continuous", said.meaning, said.unit,
+                     feedthrough=direct)
+        )  # fmt: skip
+    taken = {each.name for each in found}
+    declared = {
+        (i, path): each
+        for i, part in enumerate(exported.model.parts)
+        for each, path in _declared(part.parameters)
     }
-    settings = [
-        ("start_steady", START_STEADY, "start settled under the first voltage, not at rest", False),
-        ("clip", CLIP, f"clip a voltage beyond ±{FULL_VOLTAGE:g} V instead of failing", True),
-    ]
-    settings += [
-        (_OPTIONS[name][0], OPTION + i, _OPTIONS[name][1], forms[name])
-        for i, name in enumerate(name for _, name in exported.settable)
-        if name in _OPTIONS
-    ]
+    for i, (part_number, path, name) in enumerate(parameters):
+        if defaults.get(name) == name:  # an input of that name has its value
+            continue
+        known = f"{name}_parameter" if name in taken else name
+        made = declared[part_number, path]
+        found.append(_parameter(known, r.PARAMETER + i, made, path, starts[name]))
+    longest = exported.longest if isfinite(exported.longest) else None
+    meaning = "step of the model's own grid, whatever the master's steps are"
+    found.append(
+        Variable("step", r.STEP, "parameter", "fixed", meaning, "s", values[0], 0.0, longest)
+    )
+    settings = []
+    if exported.settles:
+        meaning = "start settled under the first inputs, not at rest"
+        settings.append(("start_steady", r.START_STEADY, meaning, False))
+    if exported.bounds:
+        bounds = ", ".join(f"{name} beyond ±{each:g}" for name, each in exported.bounds.items())
+        settings.append(("clip", r.CLIP, f"clip a {bounds} instead of failing", True))
+    behind = 1 + len(parameters) + len(exported.named("given"))
+    for i, option in enumerate(exported.settable):
+        said = words.get(option[1], Words(f"option {option[1]}"))
+        if option[1] != exported.free_step:
+            on = values[behind + exported.options.index(option)] != 0.0
+            settings.append((said.name or option[1], r.OPTION + i, said.meaning, on))
     for name, reference, meaning, on in settings:
         found.append(Variable(name, reference, "parameter", "fixed", meaning, start=on))
     return tuple(found)
 
 
-def _parameter(column: str, reference: int, value: float) -> Variable:
-    """A parameter's value as a variable that may change while the drive runs."""
-    definition = find(column)
-    words = definition.name
-    if column != definition.symbol:
-        words += f", {column.rpartition('_')[2]} direction"
+def defaults_of(exported: Exported) -> dict[str, str]:
+    """Name of the parameter that counts while an input is not set, by the input's name."""
+    named = {(i, path): name for i, path, name in exported.named("parameters")}
+    return {
+        part.tap(name).signal: named[i, path]
+        for i, part in enumerate(exported.model.parts)
+        for name, path in part.defaults.items()
+        if part.tap(name).signal in exported.measured
+    }
+
+
+def _parameter(name: str, reference: int, known: Declared, path: str, value: float) -> Variable:
+    """A parameter's value as a variable that may change while the model runs."""
+    definition = known.definition
+    meaning = definition.name
+    if len(known.fields) > 1:
+        meaning += f", {'plus' if path == known.fields[0] else 'minus'} direction"
     lower = definition.lower if isfinite(definition.lower) else None
     upper = definition.upper if isfinite(definition.upper) else None
     if upper is None and definition.can_be_off:
-        words += f"; {NONE:g} for none"
+        meaning += f"; {NONE:g} for none"
         upper = NONE
+    unit = definition.unit or "1"
+    start = min(value, NONE)
     return Variable(
-        column,
-        reference,
-        "parameter",
-        "tunable",
-        words,
-        definition.unit,
-        finite(value),
-        lower,
-        upper,
-    )
+        name, reference, "parameter", "tunable", meaning, unit, start, lower, upper
+    )  # fmt: skip
 
 
-def c_header(exported: Exported, layout: int) -> str:
-    """Text of ``fmi_variables.h``: what the FMU's C code has of this table.
+def c_header(exported: Exported, layout: int, references: References) -> str:
+    """Text of ``variables.h``: what FMI's and the page's C code have of the model and this table.
 
     Parameters
     ----------
     exported : Exported
-        The drive as it is in C.
+        The model as it is in C.
     layout : int
-        Hash of the drive's C sources, 64 bits: whose numbers the library can read.
+        Hash of the model's C sources, 64 bits: whose numbers the library can read.
+    references : References
+        First value reference of each kind.
     """
-    names = ("OUTPUT", "PARAMETER", "STEP", "START_STEADY", "CLIP", "OPTION", "TIME")
-    known = globals()
-    references = "\n".join(f"#define SWP_FMI_{name} {known[name]}u" for name in names)
-    defaults = ", ".join(f"SWP_PARAMETER_{DEFAULTS[name]}" for name in exported.measured)
-    inputs = ", ".join(f'"{name}"' for name in exported.measured)
+    numbers = "\n".join(f"#define SWP_FMI_{n} {k}u" for n, k in references._asdict().items())
+    signals = exported.signals
+    given = "".join(f", (u)[{i}]" for i in range(len(signals)))
+    defaults = defaults_of(exported)
+    places = ", ".join(f"SWP_PARAMETER_{c_name(defaults[name])}" for name in exported.measured)
+    names = ", ".join(f'"{name}"' for name in (*signals, *exported.measured))
+    bounds = ", ".join(literal(exported.bounds.get(name, 0.0)) for name in signals)
+    free = f"swp_get_option(m, SWP_OPTION_{exported.free_step})" if exported.free_step else "1"
     return f"""\
-/* Made by swashplate from its table of variables: value references and what goes with them. */
-#ifndef SWASHPLATE_FMI_VARIABLES_H
-#define SWASHPLATE_FMI_VARIABLES_H
+/* Made by swashplate: the model, value references and what goes with them. */
+#ifndef SWASHPLATE_VARIABLES_H
+#define SWASHPLATE_VARIABLES_H
 
-{references}
-#define SWP_FMI_FULL_VOLTAGE {FULL_VOLTAGE!r}
-#define SWP_FMI_LONGEST_STEP {LONGEST_STEP!r}
-#define SWP_FMI_LAYOUT {layout:#018x}u /* hash of the drive's sources */
-#define SWP_FMI_INPUT_NAMES {{{inputs}}}
-#define SWP_FMI_INPUT_DEFAULTS {{{defaults}}}
+#include "{exported.file}.h"
+
+typedef {exported.type} swp_model;
+
+{numbers}
+#define SWP_FMI_LAYOUT {layout:#018x}u /* hash of the model's sources */
+#define SWP_FMI_SIGNALS {len(signals)} /* inputs of a step; the others follow them */
+#define SWP_FMI_CALL(f, m, u) f(m{given})
+#define SWP_FMI_SETTLES {int(exported.settles)}
+#define SWP_FMI_FREE_STEP(m) {free}
+#define SWP_FMI_BOUNDS {{{bounds or "0.0"}}} /* largest magnitudes of inputs, 0 for none */
+#define SWP_FMI_INPUT_NAMES {{{names or "NULL"}}}
+#define SWP_FMI_INPUT_DEFAULTS {{{places or "-1"}}} /* parameters */
 
 #endif
 """

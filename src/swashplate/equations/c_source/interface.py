@@ -215,13 +215,18 @@ class _Interface:
     def tables(self) -> str:
         """Parameters, names and places."""
         e, lines = self.e, list[str]()
-        lines.append(f"static const struct {e.prefix}_parameter parameter_table[] = {{")
-        for name, place, d in self.rows:
+        ranges: dict[str, int] = {}
+        rows = []
+        for _, place, d in self.rows:
             above = d.above is not None or d.lower == -float("inf")
             closed = d.can_be_off and d.upper == float("inf")
-            row = f'"{name}", offsetof({e.type}, {place}), {literal(d.lower)}, {literal(d.upper)}'
-            lines.append(f"    {{{row}, {literal(above)}, {literal(closed)}}},")
-        lines += ["};", ""]
+            range_ = ", ".join(literal(each) for each in (d.lower, d.upper, above, closed))
+            number = ranges.setdefault(range_, len(ranges))
+            rows.append(f"    {{offsetof({e.type}, {place}), {number}}},")
+        lines.append(f"static const struct {e.prefix}_range ranges[] = {{")
+        lines += [*(f"    {{{each}}}," for each in ranges), "};", ""]
+        lines.append(f"static const struct {e.prefix}_parameter parameter_table[] = {{")
+        lines += [*rows, "};", ""]
         count = len(self.rows)
         given = self.values[count : count + len(e.named("given"))]
         flags = [f"{e.members[i]}_options.{c_name(name)}" for i, name in e.options]
@@ -232,16 +237,17 @@ class _Interface:
             ("constant_places", [place for _, place in constants]),
         ):
             if places:
-                lines.append(f"static const size_t {word}[] = {{")
+                lines.append(f"static const unsigned {word}[] = {{")
                 lines += [f"    offsetof({e.type}, {place})," for place in places]
                 lines += ["};", ""]
         for word, names in (
-            ("output_names", e.names),
-            ("input_names", e.measured),
-            ("option_names", [name for _, name in e.settable]),
+            ("parameter", [name for name, _, _ in self.rows]),
+            ("output", e.names),
+            ("input", e.measured),
+            ("option", [name for _, name in e.settable]),
         ):
-            listed = ", ".join(f'"{name}"' for name in names) or "NULL"
-            lines += [*wrapped(f"static const char *const {word}[] = {{{listed}}};"), ""]
+            listed = " ".join(f'"{name}\\0"' for name in names) or '""'
+            lines += [*wrapped(f"static const char {word}_names[] = {listed};"), ""]
         return "\n".join(lines)
 
     def rest(self) -> str:

@@ -6,30 +6,32 @@ samples every part in the order of the flow, and then takes all states to the ne
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
-from typing import Any, get_type_hints
+from typing import get_type_hints
 
 from swashplate.equations.c_source.text import c_name, fields_of, indented, literal
 from swashplate.equations.c_source.unit import Unit
 from swashplate.equations.expressions import Node
-from swashplate.equations.fields import Definition, declared_by, floats_of
+from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.part import HOLDS, PartCode
+from swashplate.equations.marching.run import Instance
 from swashplate.equations.model import Equation, Link, Model, Tap, Window, arguments_of
 from swashplate.equations.syntax import plain
 
 OWN = """
 number_at put_at is_finite all_finite in_range number_of placed seen constant_window before_all
 good_inputs put_inputs taken one_sample rested_start settled_start checked computed switched
-parameter_table given_places flag_places constant_places output_names input_names option_names
+ranges parameter_table given_places flag_places constant_places parameter_names output_names
+input_names option_names name_of
 """
 PUBLIC = """
 size value_count init reset settle step correct output limits set_input clear_input set get
 set_option get_option set_step get_step update find find_output find_input find_option
-parameter_name output_name sentence memory inputs parameter
+parameter_name output_name sentence memory inputs parameter range
 """
 """Names that the interface takes, of its own and behind the prefix."""
 
@@ -57,6 +59,8 @@ class Exported:
     """Options that belong to the equations, and are not for users."""
     longest: float = inf
     """Longest step. [s]"""
+    free_step: str = ""
+    """Option without which the equations are for one step alone; none if empty."""
 
     @property
     def file(self) -> str:
@@ -479,48 +483,65 @@ def path_of(path: str) -> str:
 # --- feedthrough ----------------------------------------------------------------------------------
 
 
-def feedthrough(exported: Exported) -> dict[str, frozenset[str]]:
-    """Inputs that each output follows at the same sample, whatever the options.
+def feedthrough(exported: Exported, instance: Instance, step: float) -> dict[str, frozenset[str]]:
+    """Inputs that each output follows at the same sample, with these options and delays.
+
+    Parameters
+    ----------
+    exported : Exported
+        The model as it is in C.
+    instance : Instance
+        Its numbers and options.
+    step : float
+        Step of its grid. [s]
 
     Returns
     -------
     dict of str to frozenset of str
-        External signals by output; those that are read through a tap count with any delay below
-        the window's lead only, and are left out.
+        External signals by output. One that is read through a tap counts if the window reaches its
+        newest sample.
     """
-    model = exported.model
-    every = [kind.options for kind in model.parts]
-    chosen = [[_on(kind, None) for kind in every], [_on(kind, "") for kind in every]]
-    for i, kind in enumerate(every):
-        for name in kind._fields if kind is not None else ():
-            chosen += [[_on(k, name if j == i else "") for j, k in enumerate(every)]]
-    found: dict[str, frozenset[str]] = dict.fromkeys(exported.names, frozenset())
-    for options in chosen:
-        parts = [PartCode(model, i, model.external, each) for i, each in enumerate(options)]
-        for name in exported.names:
-            stored, _ = output_of(model, model.integrals.get(name, name))
-            link = model.links.get(stored.path) if stored.kind == "link" else None
-            nodes = (
-                [(s.part, parts[s.part].signal(s.signal)) for s in link.sources]
-                if link is not None
-                else [(stored.part, parts[stored.part].node(stored))]
-            )
-            found[name] |= _read(parts, nodes)
+    model, at_once = exported.model, newest(exported, instance, step)
+    options = [part.options for part in instance.parts]
+    parts = [PartCode(model, i, model.external, each) for i, each in enumerate(options)]
+    found = {}
+    for name in exported.names:
+        stored, _ = output_of(model, model.integrals.get(name, name))
+        link = model.links.get(stored.path) if stored.kind == "link" else None
+        nodes = (
+            [(s.part, parts[s.part].signal(s.signal)) for s in link.sources]
+            if link is not None
+            else [(stored.part, parts[stored.part].node(stored))]
+        )
+        found[name] = _read(parts, nodes, at_once)
     return found
 
 
-def _on(kind: Any, name: str | None) -> Any:
-    """Options all on, all off, or one of them on."""
-    if kind is None:
-        return None
-    return kind(*(True if name is None or each == name else None for each in kind._fields))
+def newest(exported: Exported, instance: Instance, step: float) -> dict[str, tuple[float, float]]:
+    """Signals that are read at their newest sample: delay [s], and steps that would be enough."""
+    steps = dict[str, float]()
+    for _, _, tap in exported.taps:
+        steps[tap.signal] = max(1.0 + tap.ahead, steps.get(tap.signal, 0.0))
+    found = {}
+    for i, _, tap in exported.taps:
+        delay = float(value_at(instance.parts[i].p, tap.delay)) if tap.delay else 0.0
+        if delay < (1.0 + tap.ahead) * step * (1.0 - 1e-12):
+            found[tap.signal] = delay, steps[tap.signal]
+    return found
 
 
-def _read(parts: Sequence[PartCode], nodes: Iterable[tuple[int, Node]]) -> frozenset[str]:
+def _read(
+    parts: Sequence[PartCode], nodes: Iterable[tuple[int, Node]], at_once: Collection[str]
+) -> frozenset[str]:
     """External signals that some nodes follow at once."""
     found: set[str] = set()
     for i, node in nodes:
         read = parts[i].code.reads([node])
+        found |= {
+            each.tap.signal
+            for each in parts[i].taps
+            if each.tap.signal in at_once and parts[i].tap_samples(each)[0] in read
+        }
         for name in parts[i].own.input_types:
             link = parts[i].model.link_of(i, name)
             if link is None:
@@ -528,5 +549,5 @@ def _read(parts: Sequence[PartCode], nodes: Iterable[tuple[int, Node]]) -> froze
                 found |= {signal} if f"x_{signal}" in read else set()
             elif any(parts[i].source(s) in read for s in link.sources):
                 before = [(s.part, parts[s.part].signal(s.signal)) for s in link.sources]
-                found |= _read(parts, before)
+                found |= _read(parts, before, at_once)
     return frozenset(found)

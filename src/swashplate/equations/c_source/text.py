@@ -56,7 +56,7 @@ erfc gamma lgamma tgamma fmin fmax fdim fma j0 j1 jn y0 y1 yn index time signal 
 """.split()  # noqa: SIM905
 ) | set(MATH.values())
 """Names that C or its library keeps for itself."""
-BREAKS = re.compile(r"[,;] | (?=[?:+/=*-] |&& |\|\| )|\{(?=\.)")
+BREAKS = re.compile(r"[,;\"] | (?=[?:+/=*-] |&& |\|\| )|\{(?=\.)")
 """Where a long line of C may end."""
 LEVELS = {"?": 1, "||": 2, "&&": 3, "==": 7, "!=": 7, "<": 8, "<=": 8, ">": 8, ">=": 8}
 LEVELS |= {"+": 10, "-": 10, "*": 11, "/": 11, "unary": 12, "atom": 13}

@@ -11,8 +11,9 @@
 #include <windows.h>
 #endif
 
-static const char *const input_names[] = SWP_FMI_INPUT_NAMES;
-static const int input_defaults[] = SWP_FMI_INPUT_DEFAULTS; /* parameters */
+static const char *const fmu_input_names[] = SWP_FMI_INPUT_NAMES;
+static const int fmu_input_defaults[] = SWP_FMI_INPUT_DEFAULTS; /* parameters */
+static const double fmu_input_bounds[] = SWP_FMI_BOUNDS;
 
 #define RESOURCE_VERSION 1
 #define TOKEN_LENGTH 64
@@ -26,36 +27,41 @@ static const char STATE_MAGIC[9] = "SWPSTATE";
  * sum up t += H come to a time that is a little off. */
 #define TOLERANCE 1e-3
 
-static void *kept_string(const char *text) {
+static void *fmu_kept_string(const char *text) {
     size_t length = strlen(text) + 1;
     char *made = malloc(length);
     return made ? memcpy(made, text, length) : NULL;
 }
 
 SWP_FMU_API int swp_fmu_fail(swp_fmu *fmu, const char *message) {
-    fmu->say(fmu, SWP_FMU_ERROR, message);
+    if (fmu) fmu->say(fmu, SWP_FMU_ERROR, message);
     return SWP_FMU_ERROR;
+}
+
+SWP_FMU_API int swp_fmu_none(swp_fmu *fmu, size_t count) {
+    if (fmu && count == 0) return SWP_FMU_OK;
+    return swp_fmu_fail(fmu, "there are no variables of this type: only real numbers and Booleans");
 }
 
 /* Text put together without printf, which would double the size of a library. */
 typedef struct {
     char text[256];
     size_t length;
-} words;
+} fmu_words;
 
-static void add(words *to, const char *text) {
+static void fmu_add(fmu_words *to, const char *text) {
     while (*text && to->length + 1 < sizeof to->text) to->text[to->length++] = *text++;
     to->text[to->length] = '\0';
 }
 
 /* A number with seven decimals at most. */
-static void add_number(words *to, double value) {
+static void fmu_add_number(fmu_words *to, double value) {
     char digits[32];
     size_t at = sizeof digits - 1;
     digits[at] = '\0';
-    if (value < 0.0) add(to, "-");
+    if (value < 0.0) fmu_add(to, "-");
     if (!(fabs(value) < 1e11)) {
-        add(to, "1e11 or more");
+        fmu_add(to, "1e11 or more");
         return;
     }
     uint64_t scaled = (uint64_t)(fabs(value) * 1e7 + 0.5);
@@ -67,28 +73,28 @@ static void add_number(words *to, double value) {
     if (some) digits[--at] = '.';
     do digits[--at] = (char)('0' + scaled % 10);
     while (scaled /= 10);
-    add(to, digits + at);
+    fmu_add(to, digits + at);
 }
 
 /* A refused value: the instance goes on as it was. */
-static int refuse(swp_fmu *fmu, const char *what, const char *why) {
-    words message = {{0}, 0};
-    add(&message, what);
-    add(&message, ": ");
-    add(&message, why);
+static int fmu_refuse(swp_fmu *fmu, const char *what, const char *why) {
+    fmu_words message = {{0}, 0};
+    fmu_add(&message, what);
+    fmu_add(&message, ": ");
+    fmu_add(&message, why);
     fmu->say(fmu, SWP_FMU_DISCARD, message.text);
     return SWP_FMU_DISCARD;
 }
 
 /* --- resource ---------------------------------------------------------------------------------- */
 
-static uint64_t little_endian(const unsigned char *bytes, int count) {
+static uint64_t fmu_little_endian(const unsigned char *bytes, int count) {
     uint64_t value = 0;
     for (int i = count - 1; i >= 0; i--) value = value << 8 | bytes[i];
     return value;
 }
 
-static FILE *opened(const char *path) {
+static FILE *fmu_opened(const char *path) {
 #ifdef _WIN32 /* FMI speaks UTF-8 */
     int length = MultiByteToWideChar(CP_UTF8, 0, path, -1, NULL, 0);
     wchar_t *wide = length > 0 ? malloc((size_t)length * sizeof *wide) : NULL;
@@ -103,7 +109,7 @@ static FILE *opened(const char *path) {
 }
 
 /* The bytes of FOLDER/drive.bin, or NULL. */
-static unsigned char *resource(const char *folder, size_t *size) {
+static unsigned char *fmu_resource(const char *folder, size_t *size) {
     static const char name[] = "/drive.bin";
     size_t length = strlen(folder);
     while (length > 0 && (folder[length - 1] == '/' || folder[length - 1] == '\\')) length--;
@@ -111,7 +117,7 @@ static unsigned char *resource(const char *folder, size_t *size) {
     if (!path) return NULL;
     memcpy(path, folder, length);
     memcpy(path + length, name, sizeof name);
-    FILE *file = opened(path);
+    FILE *file = fmu_opened(path);
     free(path);
     if (!file) return NULL;
     size_t most = HEADER_LENGTH + 8 * swp_value_count() + 1; /* one more shows a file too long */
@@ -122,12 +128,12 @@ static unsigned char *resource(const char *folder, size_t *size) {
 }
 
 /* What is wrong with a resource, NULL if it can be used. */
-static const char *fault(const unsigned char *bytes, size_t size, const char *token) {
+static const char *fmu_fault(const unsigned char *bytes, size_t size, const char *token) {
     if (size < HEADER_LENGTH || memcmp(bytes, RESOURCE_MAGIC, 8) != 0)
-        return "resources/drive.bin is no drive of swashplate; export the FMU again";
-    if (little_endian(bytes + 8, 4) != RESOURCE_VERSION ||
-        little_endian(bytes + 12, 4) != swp_value_count() ||
-        little_endian(bytes + 16, 8) != SWP_FMI_LAYOUT ||
+        return "resources/drive.bin holds no numbers of swashplate; export the FMU again";
+    if (fmu_little_endian(bytes + 8, 4) != RESOURCE_VERSION ||
+        fmu_little_endian(bytes + 12, 4) != swp_value_count() ||
+        fmu_little_endian(bytes + 16, 8) != SWP_FMI_LAYOUT ||
         size != HEADER_LENGTH + 8 * swp_value_count())
         return "resources/drive.bin belongs to another version of the library; export the FMU again";
     if (strlen(token) >= TOKEN_LENGTH || strcmp(token, (const char *)bytes + 24) != 0)
@@ -136,28 +142,28 @@ static const char *fault(const unsigned char *bytes, size_t size, const char *to
     return NULL;
 }
 
-static uint64_t hash_of(const unsigned char *bytes, size_t size) { /* FNV-1a */
+static uint64_t fmu_hash_of(const unsigned char *bytes, size_t size) { /* FNV-1a */
     uint64_t hash = 14695981039346656037u;
     for (size_t i = 0; i < size; i++) hash = (hash ^ bytes[i]) * 1099511628211u;
     return hash;
 }
 
-/* Put the drive's numbers into a fresh memory. */
-static int begun(swp_memory *memory, const unsigned char *bytes) {
+/* Put the model's numbers into a fresh memory. */
+static int fmu_begun(swp_memory *memory, const unsigned char *bytes) {
     size_t count = swp_value_count();
     double *values = malloc(count * sizeof *values);
     if (!values) return SWP_BAD_VALUE;
     for (size_t i = 0; i < count; i++) {
-        uint64_t bits = little_endian(bytes + HEADER_LENGTH + 8 * i, 8);
+        uint64_t bits = fmu_little_endian(bytes + HEADER_LENGTH + 8 * i, 8);
         memcpy(values + i, &bits, 8);
     }
     memset(memory, 0, sizeof *memory);
-    int status = swp_init(&memory->drive, values, count);
+    int status = swp_init(&memory->model, values, count);
     free(values);
-    for (int i = 0; i < SWP_PARAMETERS; i++) memory->wanted[i] = swp_get(&memory->drive, i);
+    for (int i = 0; i < SWP_PARAMETERS; i++) memory->wanted[i] = swp_get(&memory->model, i);
     for (int i = 0; i < SWP_INPUTS; i++)
-        memory->input[1 + i] = swp_get(&memory->drive, input_defaults[i]);
-    memory->step = swp_get_step(&memory->drive);
+        memory->input[SWP_FMI_SIGNALS + i] = swp_get(&memory->model, fmu_input_defaults[i]);
+    memory->step = swp_get_step(&memory->model);
     memory->clip = 1;
     memory->sample = -1;
     return status;
@@ -171,23 +177,23 @@ SWP_FMU_API swp_fmu *swp_fmu_new(const char *name, const char *token, const char
     fmu->say = say;
     fmu->environment = environment;
     fmu->log = log;
-    fmu->name = kept_string(name ? name : "");
+    fmu->name = fmu_kept_string(name ? name : "");
     size_t size = 0;
-    unsigned char *bytes = folder ? resource(folder, &size) : NULL;
+    unsigned char *bytes = folder ? fmu_resource(folder, &size) : NULL;
     const char *wrong = NULL;
     if (!fmu->name || !bytes)
         wrong = "resources/drive.bin cannot be read; unpack the FMU whole";
     else
-        wrong = fault(bytes, size, token ? token : "");
-    if (!wrong && begun(&fmu->begun, bytes) != SWP_OK)
-        wrong = "resources/drive.bin holds numbers that are no drive; export the FMU again";
+        wrong = fmu_fault(bytes, size, token ? token : "");
+    if (!wrong && fmu_begun(&fmu->begun, bytes) != SWP_OK)
+        wrong = "resources/drive.bin holds numbers that the model refuses; export the FMU again";
     if (wrong) {
         swp_fmu_fail(fmu, wrong);
         free(bytes);
         swp_fmu_free(fmu);
         return NULL;
     }
-    fmu->resource = hash_of(bytes, size);
+    fmu->resource = fmu_hash_of(bytes, size);
     free(bytes);
     fmu->memory = fmu->begun;
     return fmu;
@@ -200,90 +206,102 @@ SWP_FMU_API void swp_fmu_free(swp_fmu *fmu) {
 }
 
 SWP_FMU_API int swp_fmu_reset(swp_fmu *fmu) {
+    if (!fmu) return SWP_FMU_ERROR;
     fmu->memory = fmu->begun;
     return SWP_FMU_OK;
 }
 
-static int within(uint32_t reference, uint32_t first, int count) {
+static int fmu_within(uint32_t reference, uint32_t first, int count) {
     return reference >= first && reference - first < (uint32_t)count;
 }
 
 /* --- samples ------------------------------------------------------------------------------------ */
 
-/* After a failure inside the drive nothing more can be computed, but a state can be set. */
-static int failed(swp_fmu *fmu, int status) {
+/* After a failure inside the model nothing more can be computed, but a state can be set. */
+static int fmu_failed(swp_fmu *fmu, int status) {
     fmu->memory.mode = SWP_FMU_FAILED;
     return swp_fmu_fail(fmu, swp_sentence(status));
 }
 
 /* Hand parameters over that were set since the newest sample. */
-static int updated(swp_fmu *fmu) {
+static int fmu_updated(swp_fmu *fmu) {
     swp_memory *m = &fmu->memory;
     int any = 0;
     for (int i = 0; i < SWP_PARAMETERS; i++) {
         if (!m->changed[i]) continue;
         m->changed[i] = 0;
         any = 1;
-        int status = swp_set(&m->drive, i, m->wanted[i]);
-        if (status != SWP_OK) return failed(fmu, status);
+        int status = swp_set(&m->model, i, m->wanted[i]);
+        if (status != SWP_OK) return fmu_failed(fmu, status);
     }
-    int status = any ? swp_update(&m->drive) : SWP_OK;
-    return status == SWP_OK ? SWP_FMU_OK : failed(fmu, status);
+    int status = any ? swp_update(&m->model) : SWP_OK;
+    return status == SWP_OK ? SWP_FMU_OK : fmu_failed(fmu, status);
 }
 
-/* Voltage as the card takes it. */
-static int clipped(swp_fmu *fmu, double *voltage) {
+/* Inputs within their bounds. */
+static int fmu_clipped(swp_fmu *fmu, double *inputs) {
     swp_memory *m = &fmu->memory;
-    if (fabs(*voltage) <= SWP_FMI_FULL_VOLTAGE) return SWP_FMU_OK;
-    words message = {{0}, 0};
-    add(&message, "The voltage is ");
-    add_number(&message, *voltage);
-    add(&message, " V, but the card takes +-");
-    add_number(&message, SWP_FMI_FULL_VOLTAGE);
-    add(&message, m->clip ? " V; it is clipped (said once)" : " V and clip is false");
-    if (!m->clip) return swp_fmu_fail(fmu, message.text);
-    if (!m->clipped) fmu->say(fmu, SWP_FMU_WARNING, message.text);
-    m->clipped = 1;
-    *voltage = *voltage > 0.0 ? SWP_FMI_FULL_VOLTAGE : -SWP_FMI_FULL_VOLTAGE;
+    for (int i = 0; i < SWP_FMI_SIGNALS; i++) {
+        double bound = fmu_input_bounds[i];
+        if (bound == 0.0 || fabs(inputs[i]) <= bound) continue;
+        fmu_words message = {{0}, 0};
+        fmu_add(&message, fmu_input_names[i]);
+        fmu_add(&message, " is ");
+        fmu_add_number(&message, inputs[i]);
+        fmu_add(&message, ", but must be within +-");
+        fmu_add_number(&message, bound);
+        fmu_add(&message, m->clip ? "; it is clipped (said once)" : " and clip is false");
+        if (!m->clip) return swp_fmu_fail(fmu, message.text);
+        if (!m->clipped) fmu->say(fmu, SWP_FMU_WARNING, message.text);
+        m->clipped = 1;
+        inputs[i] = inputs[i] > 0.0 ? bound : -bound;
+    }
     return SWP_FMU_OK;
 }
 
 /* Take a sample `ahead` seconds after the communication point, the newest one again if `again`. */
-static int sampled(swp_fmu *fmu, double ahead, int again) {
+static int fmu_sampled(swp_fmu *fmu, double ahead, int again) {
     swp_memory *m = &fmu->memory;
-    double inputs[SWP_FMI_INPUTS];
+    double inputs[SWP_FMI_PLACES] = {0.0};
     for (int i = 0; i < SWP_FMI_INPUTS; i++) inputs[i] = m->input[i] + m->slope[i] * ahead;
-    int status = clipped(fmu, inputs);
+    int status = fmu_clipped(fmu, inputs);
     if (status != SWP_FMU_OK) return status;
     if (again && memcmp(inputs, m->used, sizeof inputs) == 0) return SWP_FMU_OK;
-    for (int i = 0; i < SWP_INPUTS; i++)
-        if (m->given[1 + i] && swp_set_input(&m->drive, i, inputs[1 + i]) != SWP_OK)
-            return failed(fmu, SWP_BAD_VALUE);
+    for (int i = 0; i < SWP_INPUTS; i++) {
+        int at = SWP_FMI_SIGNALS + i;
+        if (m->given[at] && swp_set_input(&m->model, i, inputs[at]) != SWP_OK)
+            return fmu_failed(fmu, SWP_BAD_VALUE);
+    }
     int first = m->sample == (again ? 0 : -1);
     int found = SWP_OK;
     if (first) {
-        found = swp_reset(&m->drive);
-        if (found == SWP_OK && m->steady) found = swp_settle(&m->drive, inputs[0]);
-        if (found == SWP_OK) found = swp_step(&m->drive, inputs[0]);
+        found = swp_reset(&m->model);
+#if SWP_FMI_SETTLES
+        if (found == SWP_OK && m->steady) found = SWP_FMI_CALL(swp_settle, &m->model, inputs);
+#endif
+        if (found == SWP_OK) found = SWP_FMI_CALL(swp_step, &m->model, inputs);
+    } else if (again) {
+        found = SWP_FMI_CALL(swp_correct, &m->model, inputs);
     } else {
-        found = again ? swp_correct(&m->drive, inputs[0]) : swp_step(&m->drive, inputs[0]);
+        found = SWP_FMI_CALL(swp_step, &m->model, inputs);
     }
-    if (found != SWP_OK) return failed(fmu, found);
+    if (found != SWP_OK) return fmu_failed(fmu, found);
     memcpy(m->used, inputs, sizeof inputs);
     m->sample += !again;
     return SWP_FMU_OK;
 }
 
 /* Take the newest sample with the inputs as they are now, if it lies at the communication point. */
-static int settled_inputs(swp_fmu *fmu) {
+static int fmu_settled_inputs(swp_fmu *fmu) {
     swp_memory *m = &fmu->memory;
     double at = m->start + (double)m->sample * m->step;
     if (m->mode != SWP_FMU_STEPPING || m->sample < 0) return SWP_FMU_OK;
     if (fabs(m->now - at) > TOLERANCE * m->step) return SWP_FMU_OK;
-    return sampled(fmu, 0.0, 1);
+    return fmu_sampled(fmu, 0.0, 1);
 }
 
 SWP_FMU_API int swp_fmu_begin(swp_fmu *fmu, double start) {
+    if (!fmu) return SWP_FMU_ERROR;
     swp_memory *m = &fmu->memory;
     if (m->mode != SWP_FMU_INSTANTIATED)
         return swp_fmu_fail(fmu, "initialization can only begin after instantiation or reset");
@@ -294,32 +312,34 @@ SWP_FMU_API int swp_fmu_begin(swp_fmu *fmu, double start) {
 }
 
 SWP_FMU_API int swp_fmu_ready(swp_fmu *fmu) {
+    if (!fmu) return SWP_FMU_ERROR;
     swp_memory *m = &fmu->memory;
     if (m->mode != SWP_FMU_INITIALIZING)
         return swp_fmu_fail(fmu, "initialization can only end after it has begun");
     m->sample = -1;
-    int status = updated(fmu);
-    if (status == SWP_FMU_OK) status = sampled(fmu, 0.0, 0);
+    int status = fmu_updated(fmu);
+    if (status == SWP_FMU_OK) status = fmu_sampled(fmu, 0.0, 0);
     if (status == SWP_FMU_OK) m->mode = SWP_FMU_STEPPING;
     return status;
 }
 
 SWP_FMU_API int swp_fmu_advance(swp_fmu *fmu, double time, double interval) {
+    if (!fmu) return SWP_FMU_ERROR;
     swp_memory *m = &fmu->memory;
     if (m->mode == SWP_FMU_FAILED)
-        return swp_fmu_fail(fmu, "the drive failed before; reset it or set a state");
+        return swp_fmu_fail(fmu, "the model failed before; reset it or set a state");
     if (m->mode != SWP_FMU_STEPPING)
         return swp_fmu_fail(fmu, "a step can only be done after initialization");
     double end = time + interval;
     if (!(interval >= 0.0) || !isfinite(end) || end < m->now - TOLERANCE * m->step)
         return swp_fmu_fail(fmu, "time can only go on; to go back, set a state");
-    int status = settled_inputs(fmu);
-    if (status == SWP_FMU_OK) status = updated(fmu);
+    int status = fmu_settled_inputs(fmu);
+    if (status == SWP_FMU_OK) status = fmu_updated(fmu);
     if (status != SWP_FMU_OK) return status;
     double last = floor((end - m->start) / m->step + TOLERANCE);
     while ((double)m->sample < last) {
         double at = m->start + (double)(m->sample + 1) * m->step;
-        status = sampled(fmu, at - time, 0);
+        status = fmu_sampled(fmu, at - time, 0);
         if (status != SWP_FMU_OK) return status;
     }
     for (int i = 0; i < SWP_FMI_INPUTS; i++) {
@@ -334,27 +354,28 @@ SWP_FMU_API int swp_fmu_advance(swp_fmu *fmu, double time, double interval) {
 /* --- values ------------------------------------------------------------------------------------- */
 
 /* Outputs before the first step are those of the first sample, as far as it is known. */
-static int known(swp_fmu *fmu) {
+static int fmu_known(swp_fmu *fmu) {
     swp_memory *m = &fmu->memory;
-    if (m->mode == SWP_FMU_STEPPING) return settled_inputs(fmu);
+    if (m->mode == SWP_FMU_STEPPING) return fmu_settled_inputs(fmu);
     if (m->mode != SWP_FMU_INITIALIZING) return SWP_FMU_OK;
     m->sample = -1;
-    int status = updated(fmu);
-    return status == SWP_FMU_OK ? sampled(fmu, 0.0, 0) : status;
+    int status = fmu_updated(fmu);
+    return status == SWP_FMU_OK ? fmu_sampled(fmu, 0.0, 0) : status;
 }
 
 SWP_FMU_API int swp_fmu_get_real(swp_fmu *fmu, const uint32_t *references, size_t count,
                                  double *values) {
+    if (!fmu) return SWP_FMU_ERROR;
     swp_memory *m = &fmu->memory;
-    int status = known(fmu);
+    int status = fmu_known(fmu);
     if (status != SWP_FMU_OK) return status;
     for (size_t i = 0; i < count; i++) {
         uint32_t r = references[i];
-        if (r < SWP_FMI_INPUTS)
-            values[i] = m->input[r];
-        else if (within(r, SWP_FMI_OUTPUT, SWP_OUTPUTS))
-            values[i] = swp_output(&m->drive, (int)(r - SWP_FMI_OUTPUT));
-        else if (within(r, SWP_FMI_PARAMETER, SWP_PARAMETERS))
+        if (fmu_within(r, SWP_FMI_INPUT, SWP_FMI_INPUTS))
+            values[i] = m->input[r - SWP_FMI_INPUT];
+        else if (fmu_within(r, SWP_FMI_OUTPUT, SWP_OUTPUTS))
+            values[i] = swp_output(&m->model, (int)(r - SWP_FMI_OUTPUT));
+        else if (fmu_within(r, SWP_FMI_PARAMETER, SWP_PARAMETERS))
             values[i] = m->wanted[r - SWP_FMI_PARAMETER];
         else if (r == SWP_FMI_STEP)
             values[i] = m->step;
@@ -366,53 +387,51 @@ SWP_FMU_API int swp_fmu_get_real(swp_fmu *fmu, const uint32_t *references, size_
     return SWP_FMU_OK;
 }
 
-static int set_input(swp_fmu *fmu, uint32_t i, double value) {
+static int fmu_set_input(swp_fmu *fmu, uint32_t i, double value) {
     swp_memory *m = &fmu->memory;
     if (!isfinite(value))
-        return refuse(fmu, i ? input_names[i - 1] : "voltage", "must be a finite number");
+        return fmu_refuse(fmu, fmu_input_names[i], "must be a finite number");
     if (value != m->input[i]) m->given[i] = 1; /* until then the parameter counts, if tuned, too */
     m->input[i] = value;
     return SWP_FMU_OK;
 }
 
-static int set_parameter(swp_fmu *fmu, int i, double value) {
+static int fmu_set_parameter(swp_fmu *fmu, int i, double value) {
     swp_memory *m = &fmu->memory;
-    swp_drive tried = m->drive;
+    swp_model tried = m->model;
     if (swp_set(&tried, i, value) != SWP_OK)
-        return refuse(fmu, swp_parameter_name(i), "is out of range; it stays as it was");
+        return fmu_refuse(fmu, swp_parameter_name(i), "is out of range; it stays as it was");
     if (value == m->wanted[i]) return SWP_FMU_OK;
     m->wanted[i] = value;
     m->changed[i] = 1;
     return SWP_FMU_OK;
 }
 
-static int set_step(swp_fmu *fmu, double step) {
+static int fmu_set_step(swp_fmu *fmu, double step) {
     swp_memory *m = &fmu->memory;
     if (step == m->step) return SWP_FMU_OK;
-    if (m->mode == SWP_FMU_STEPPING) return refuse(fmu, "step", "is fixed after initialization");
-    if (!(step > 0.0 && step <= SWP_FMI_LONGEST_STEP))
-        return refuse(fmu, "step", "must be above 0 and at most 1/512 s; the master's may be longer");
-    if (!swp_get_option(&m->drive, SWP_OPTION_exact))
-        return refuse(fmu, "step", "the card's filter is a recursion for the exported step alone");
-    int status = swp_set_step(&m->drive, step);
-    if (status == SWP_OK) status = swp_update(&m->drive);
-    if (status != SWP_OK) return refuse(fmu, "step", swp_sentence(status));
+    if (m->mode == SWP_FMU_STEPPING) return fmu_refuse(fmu, "step", "is fixed after initialization");
+    if (!(SWP_FMI_FREE_STEP(&m->model)))
+        return fmu_refuse(fmu, "step", "the card's filter is a recursion for the exported step alone");
+    int status = swp_set_step(&m->model, step);
+    if (status == SWP_OK) status = swp_update(&m->model);
+    if (status != SWP_OK) return fmu_refuse(fmu, "step", swp_sentence(status));
     m->step = step;
     return SWP_FMU_OK;
 }
 
 SWP_FMU_API int swp_fmu_set_real(swp_fmu *fmu, const uint32_t *references, size_t count,
                                  const double *values) {
-    int worst = SWP_FMU_OK;
-    for (size_t i = 0; i < count; i++) {
+    int worst = fmu ? SWP_FMU_OK : SWP_FMU_ERROR;
+    for (size_t i = 0; fmu && i < count; i++) {
         uint32_t r = references[i];
         int status;
-        if (r < SWP_FMI_INPUTS)
-            status = set_input(fmu, r, values[i]);
-        else if (within(r, SWP_FMI_PARAMETER, SWP_PARAMETERS))
-            status = set_parameter(fmu, (int)(r - SWP_FMI_PARAMETER), values[i]);
+        if (fmu_within(r, SWP_FMI_INPUT, SWP_FMI_INPUTS))
+            status = fmu_set_input(fmu, r - SWP_FMI_INPUT, values[i]);
+        else if (fmu_within(r, SWP_FMI_PARAMETER, SWP_PARAMETERS))
+            status = fmu_set_parameter(fmu, (int)(r - SWP_FMI_PARAMETER), values[i]);
         else if (r == SWP_FMI_STEP)
-            status = set_step(fmu, values[i]);
+            status = fmu_set_step(fmu, values[i]);
         else
             status = swp_fmu_fail(fmu, "no number of this value reference can be set");
         if (status > worst) worst = status;
@@ -421,12 +440,12 @@ SWP_FMU_API int swp_fmu_set_real(swp_fmu *fmu, const uint32_t *references, size_
 }
 
 SWP_FMU_API int swp_fmu_get_boolean(swp_fmu *fmu, uint32_t reference, int *value) {
-    if (reference == SWP_FMI_START_STEADY)
+    if (SWP_FMI_SETTLES && reference == SWP_FMI_START_STEADY)
         *value = fmu->memory.steady;
     else if (reference == SWP_FMI_CLIP)
         *value = fmu->memory.clip;
-    else if (within(reference, SWP_FMI_OPTION, SWP_OPTIONS))
-        *value = swp_get_option(&fmu->memory.drive, (int)(reference - SWP_FMI_OPTION));
+    else if (fmu_within(reference, SWP_FMI_OPTION, SWP_OPTIONS))
+        *value = swp_get_option(&fmu->memory.model, (int)(reference - SWP_FMI_OPTION));
     else
         return swp_fmu_fail(fmu, "there is no Boolean of this value reference");
     return SWP_FMU_OK;
@@ -438,30 +457,33 @@ SWP_FMU_API int swp_fmu_set_boolean(swp_fmu *fmu, uint32_t reference, int value)
     int status = swp_fmu_get_boolean(fmu, reference, &before);
     if (status != SWP_FMU_OK || before == !!value) return status;
     if (m->mode == SWP_FMU_STEPPING)
-        return refuse(fmu, "a Boolean parameter", "is fixed after initialization");
+        return fmu_refuse(fmu, "a Boolean parameter", "is fixed after initialization");
     if (reference == SWP_FMI_START_STEADY) {
         m->steady = !!value;
     } else if (reference == SWP_FMI_CLIP) {
         m->clip = !!value;
     } else {
-        int found = swp_set_option(&m->drive, (int)(reference - SWP_FMI_OPTION), value != 0);
-        if (found == SWP_OK) found = swp_update(&m->drive);
-        if (found != SWP_OK) return refuse(fmu, "a Boolean parameter", swp_sentence(found));
+        int found = swp_set_option(&m->model, (int)(reference - SWP_FMI_OPTION), value != 0);
+        if (found == SWP_OK) found = swp_update(&m->model);
+        if (found != SWP_OK) return fmu_refuse(fmu, "a Boolean parameter", swp_sentence(found));
     }
     return SWP_FMU_OK;
 }
 
 SWP_FMU_API int swp_fmu_set_slope(swp_fmu *fmu, uint32_t reference, double slope) {
-    if (reference >= SWP_FMI_INPUTS) return swp_fmu_fail(fmu, "only inputs have derivatives");
-    if (!isfinite(slope)) return refuse(fmu, "a derivative", "must be a finite number");
-    fmu->memory.slope[reference] = slope;
-    if (slope != 0.0) fmu->memory.given[reference] = 1;
+    if (!fmu_within(reference, SWP_FMI_INPUT, SWP_FMI_INPUTS))
+        return swp_fmu_fail(fmu, "only inputs have derivatives");
+    if (!isfinite(slope)) return fmu_refuse(fmu, "a derivative", "must be a finite number");
+    uint32_t i = reference - SWP_FMI_INPUT;
+    fmu->memory.slope[i] = slope;
+    if (slope != 0.0) fmu->memory.given[i] = 1;
     return SWP_FMU_OK;
 }
 
 /* --- states ------------------------------------------------------------------------------------- */
 
 SWP_FMU_API int swp_fmu_save(swp_fmu *fmu, void **state) {
+    if (!fmu) return SWP_FMU_ERROR;
     if (!*state) *state = malloc(sizeof(swp_memory));
     if (!*state) return swp_fmu_fail(fmu, "there is no memory for a state");
     memcpy(*state, &fmu->memory, sizeof(swp_memory));
@@ -469,22 +491,27 @@ SWP_FMU_API int swp_fmu_save(swp_fmu *fmu, void **state) {
 }
 
 SWP_FMU_API int swp_fmu_restore(swp_fmu *fmu, const void *state) {
-    if (!state) return swp_fmu_fail(fmu, "there is no state to set");
+    if (!fmu || !state) return swp_fmu_fail(fmu, "there is no state to set");
     memcpy(&fmu->memory, state, sizeof(swp_memory));
     return SWP_FMU_OK;
 }
 
-SWP_FMU_API int swp_fmu_forget(void **state) {
+SWP_FMU_API int swp_fmu_forget(swp_fmu *fmu, void **state) {
     if (state) {
         free(*state);
         *state = NULL;
     }
-    return SWP_FMU_OK;
+    return fmu ? SWP_FMU_OK : SWP_FMU_ERROR;
 }
 
-SWP_FMU_API size_t swp_fmu_bytes(void) { return STATE_HEADER + sizeof(swp_memory); }
+#define STATE_SIZE (STATE_HEADER + sizeof(swp_memory))
 
-static void header(const swp_fmu *fmu, unsigned char *bytes) {
+SWP_FMU_API int swp_fmu_bytes(swp_fmu *fmu, size_t *size) {
+    *size = STATE_SIZE;
+    return fmu ? SWP_FMU_OK : SWP_FMU_ERROR;
+}
+
+static void fmu_header(const swp_fmu *fmu, unsigned char *bytes) {
     uint32_t version = STATE_VERSION;
     uint32_t size = (uint32_t)sizeof(swp_memory);
     uint64_t layout = SWP_FMI_LAYOUT;
@@ -496,20 +523,21 @@ static void header(const swp_fmu *fmu, unsigned char *bytes) {
 }
 
 SWP_FMU_API int swp_fmu_write(swp_fmu *fmu, const void *state, unsigned char *bytes, size_t size) {
-    if (!state || size < swp_fmu_bytes())
+    if (!fmu || !state || size < STATE_SIZE)
         return swp_fmu_fail(fmu, "there is no state, or no room for it");
-    header(fmu, bytes);
+    fmu_header(fmu, bytes);
     memcpy(bytes + STATE_HEADER, state, sizeof(swp_memory));
     return SWP_FMU_OK;
 }
 
 SWP_FMU_API int swp_fmu_read(swp_fmu *fmu, const unsigned char *bytes, size_t size, void **state) {
     unsigned char own[STATE_HEADER];
-    header(fmu, own);
-    if (size != swp_fmu_bytes() || memcmp(bytes, own, 16) != 0)
+    if (!fmu) return SWP_FMU_ERROR;
+    fmu_header(fmu, own);
+    if (size != STATE_SIZE || memcmp(bytes, own, 16) != 0)
         return swp_fmu_fail(fmu, "this is no state of this library: its header or size is another");
     if (memcmp(bytes + 16, own + 16, 16) != 0)
-        return swp_fmu_fail(fmu, "this state belongs to another drive");
+        return swp_fmu_fail(fmu, "this state belongs to another set of numbers");
     void *made = malloc(sizeof(swp_memory));
     if (!made) return swp_fmu_fail(fmu, "there is no memory for a state");
     memcpy(made, bytes + STATE_HEADER, sizeof(swp_memory));

@@ -1,6 +1,6 @@
-/* A drive as an FMU: what FMI 2 and FMI 3 have in common.
+/* A model as an FMU: what FMI 2 and FMI 3 have in common.
  *
- * The drive has its own grid of samples, t0 + k h, whatever the master's step is. A master says what
+ * The model has its own grid of samples, t0 + k h, whatever the master's step is. A master says what
  * the inputs at an instant are after it has seen the outputs there. So the newest sample is
  * provisional: it is taken with the inputs as they were, and taken again as soon as others are set
  * at its instant. An output without feedthrough does not change by that.
@@ -11,10 +11,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "swashplate_drive.h"
-#include "fmi_variables.h"
+#include "variables.h"
 
-#define SWP_FMI_INPUTS (1 + SWP_INPUTS)
+#define SWP_FMI_INPUTS (SWP_FMI_SIGNALS + SWP_INPUTS)
+#define SWP_FMI_PLACES (SWP_FMI_INPUTS + 1) /* of arrays, which must not be empty */
 
 #ifndef SWP_FMU_API /* one unit of source code may make everything static */
 #if defined(__GNUC__) && !defined(_WIN32)
@@ -33,10 +33,10 @@ typedef void swp_fmu_callback(void); /* the master's logger, whose type fmi2.c a
 
 /* All that an instance remembers: plain data, so that a copy is a state. */
 typedef struct {
-    swp_drive drive;                  /* at its newest sample */
-    double input[SWP_FMI_INPUTS];     /* as last set, the voltage first */
-    double slope[SWP_FMI_INPUTS];     /* rates from the communication point on, for one step */
-    double used[SWP_FMI_INPUTS];      /* of the newest sample */
+    swp_model model;                  /* at its newest sample */
+    double input[SWP_FMI_PLACES];     /* as last set */
+    double slope[SWP_FMI_PLACES];     /* rates from the communication point on, for one step */
+    double used[SWP_FMI_PLACES];      /* of the newest sample */
     double wanted[SWP_PARAMETERS];    /* parameters as last set; they count from the next sample on */
     double step;                      /* h [s] */
     double start;                     /* time of the first sample [s] */
@@ -44,8 +44,8 @@ typedef struct {
     int64_t sample;                   /* number of the newest sample; -1 before the first */
     int32_t mode;
     int32_t steady, clip, clipped;
-    unsigned char given[SWP_FMI_INPUTS];       /* whether it was set, and no parameter counts */
-    unsigned char changed[SWP_PARAMETERS];     /* whether it is not the drive's own yet */
+    unsigned char given[SWP_FMI_PLACES];       /* whether it was set, and no parameter counts */
+    unsigned char changed[SWP_PARAMETERS];     /* whether it is not the model's own yet */
 } swp_memory;
 
 enum { SWP_FMU_INSTANTIATED, SWP_FMU_INITIALIZING, SWP_FMU_STEPPING, SWP_FMU_FAILED };
@@ -53,14 +53,15 @@ enum { SWP_FMU_INSTANTIATED, SWP_FMU_INITIALIZING, SWP_FMU_STEPPING, SWP_FMU_FAI
 struct swp_fmu {
     swp_memory memory;
     swp_memory begun;    /* as instantiated, for reset */
-    uint64_t resource;   /* hash of the drive's numbers */
+    uint64_t resource;   /* hash of the model's numbers */
     swp_fmu_logger *say;
     void *environment;
     swp_fmu_callback *log;
     char *name;
 };
 
-/* An instance with the numbers in FOLDER/drive.bin, or NULL; `say` has told why. */
+/* An instance with the numbers in FOLDER/drive.bin, or NULL; `say` has told why. All functions fail
+ * without an instance. */
 SWP_FMU_API swp_fmu *swp_fmu_new(const char *name, const char *token, const char *folder,
                                  swp_fmu_logger *say, void *environment,
                                  swp_fmu_callback *log);
@@ -75,12 +76,28 @@ SWP_FMU_API int swp_fmu_get_boolean(swp_fmu *, uint32_t, int *);
 SWP_FMU_API int swp_fmu_set_boolean(swp_fmu *, uint32_t, int);
 SWP_FMU_API int swp_fmu_set_slope(swp_fmu *, uint32_t, double);
 SWP_FMU_API int swp_fmu_fail(swp_fmu *, const char *message);
+SWP_FMU_API int swp_fmu_none(swp_fmu *, size_t count); /* fails unless nothing is asked for */
+
+/* Booleans, which are `int` in FMI 2 and `bool` in FMI 3, until one fails. */
+#define SWP_FMU_GET_BOOLEANS(STATUS, fmu, references, count, values)            \
+    int status = fmu ? SWP_FMU_OK : SWP_FMU_ERROR;                              \
+    for (size_t i = 0; i < count && status == SWP_FMU_OK; i++) {                \
+        int on = 0;                                                             \
+        status = swp_fmu_get_boolean(fmu, references[i], &on);                  \
+        values[i] = on != 0;                                                    \
+    }                                                                           \
+    return (STATUS)status
+#define SWP_FMU_SET_BOOLEANS(STATUS, fmu, references, count, values)            \
+    int status = fmu ? SWP_FMU_OK : SWP_FMU_ERROR;                              \
+    for (size_t i = 0; i < count && status == SWP_FMU_OK; i++)                  \
+        status = swp_fmu_set_boolean(fmu, references[i], values[i] != 0);       \
+    return (STATUS)status
 
 /* States. The serialised form has a header: magic, version, size, and whose numbers they are. */
 SWP_FMU_API int swp_fmu_save(swp_fmu *, void **state);
 SWP_FMU_API int swp_fmu_restore(swp_fmu *, const void *state);
-SWP_FMU_API int swp_fmu_forget(void **state);
-SWP_FMU_API size_t swp_fmu_bytes(void);
+SWP_FMU_API int swp_fmu_forget(swp_fmu *, void **state);
+SWP_FMU_API int swp_fmu_bytes(swp_fmu *, size_t *size);
 SWP_FMU_API int swp_fmu_write(swp_fmu *, const void *state, unsigned char *, size_t);
 SWP_FMU_API int swp_fmu_read(swp_fmu *, const unsigned char *, size_t, void **state);
 

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void say2(const swp_fmu *fmu, int status, const char *message) {
+static void fmu_say2(const swp_fmu *fmu, int status, const char *message) {
     static const char *const categories[] = {"logAll", "logStatusWarning", "logStatusDiscard",
                                              "logStatusError", "logStatusFatal"};
     fmi2CallbackLogger logger = (fmi2CallbackLogger)fmu->log;
@@ -18,7 +18,7 @@ static void say2(const swp_fmu *fmu, int status, const char *message) {
                message);
 }
 
-static int digit(char c) {
+static int fmu_digit(char c) {
     if (c >= '0' && c <= '9') return c - '0';
     if (c >= 'a' && c <= 'f') return c - 'a' + 10;
     if (c >= 'A' && c <= 'F') return c - 'A' + 10;
@@ -26,7 +26,7 @@ static int digit(char c) {
 }
 
 /* The folder of a URI such as file:///C:/Temp/a%20b/resources, or a path as it is. */
-static char *folder_of(const char *uri) {
+static char *fmu_folder_of(const char *uri) {
     if (!uri) return NULL;
     if (strncmp(uri, "file:", 5) == 0) {
         uri += 5;
@@ -39,8 +39,8 @@ static char *folder_of(const char *uri) {
     char *to = made;
     if (!made) return NULL;
     for (const char *c = uri; *c; c++) {
-        if (*c == '%' && digit(c[1]) >= 0 && digit(c[2]) >= 0) {
-            *to++ = (char)(16 * digit(c[1]) + digit(c[2]));
+        if (*c == '%' && fmu_digit(c[1]) >= 0 && fmu_digit(c[2]) >= 0) {
+            *to++ = (char)(16 * fmu_digit(c[1]) + fmu_digit(c[2]));
             c += 2;
         } else {
             *to++ = *c;
@@ -65,10 +65,10 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                               fmi2Boolean loggingOn) {
     (void)visible, (void)loggingOn;
     if (fmuType != fmi2CoSimulation) return NULL;
-    char *folder = folder_of(fmuResourceLocation);
+    char *folder = fmu_folder_of(fmuResourceLocation);
     void *environment = functions ? functions->componentEnvironment : NULL;
     swp_fmu_callback *log = functions ? (swp_fmu_callback *)functions->logger : NULL;
-    swp_fmu *fmu = swp_fmu_new(instanceName, fmuGUID, folder, say2, environment, log);
+    swp_fmu *fmu = swp_fmu_new(instanceName, fmuGUID, folder, fmu_say2, environment, log);
     free(folder);
     return fmu;
 }
@@ -90,87 +90,53 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-    return c ? (fmi2Status)swp_fmu_ready(c) : fmi2Error;
+    return (fmi2Status)swp_fmu_ready(c);
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) { return c ? fmi2OK : fmi2Error; }
-fmi2Status fmi2Reset(fmi2Component c) { return c ? (fmi2Status)swp_fmu_reset(c) : fmi2Error; }
+fmi2Status fmi2Reset(fmi2Component c) { return (fmi2Status)swp_fmu_reset(c); }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                        fmi2Real value[]) {
-    return c ? (fmi2Status)swp_fmu_get_real(c, vr, nvr, value) : fmi2Error;
+    return (fmi2Status)swp_fmu_get_real(c, vr, nvr, value);
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                        const fmi2Real value[]) {
-    return c ? (fmi2Status)swp_fmu_set_real(c, vr, nvr, value) : fmi2Error;
+    return (fmi2Status)swp_fmu_set_real(c, vr, nvr, value);
 }
 
 fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                           fmi2Boolean value[]) {
-    int status = c ? SWP_FMU_OK : SWP_FMU_ERROR;
-    for (size_t i = 0; i < nvr && status == SWP_FMU_OK; i++)
-        status = swp_fmu_get_boolean(c, vr[i], &value[i]);
-    return (fmi2Status)status;
+    SWP_FMU_GET_BOOLEANS(fmi2Status, c, vr, nvr, value);
 }
 
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                           const fmi2Boolean value[]) {
-    int status = c ? SWP_FMU_OK : SWP_FMU_ERROR;
-    for (size_t i = 0; i < nvr && status == SWP_FMU_OK; i++)
-        status = swp_fmu_set_boolean(c, vr[i], value[i]);
-    return (fmi2Status)status;
-}
-
-/* No variable is of these types: an empty list is fine. */
-static fmi2Status none(fmi2Component c, size_t count, const char *what) {
-    if (!c) return fmi2Error;
-    return count == 0 ? fmi2OK : (fmi2Status)swp_fmu_fail(c, what);
-}
-
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          fmi2Integer value[]) {
-    (void)vr, (void)value;
-    return none(c, nvr, "there are no Integer variables");
-}
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          const fmi2Integer value[]) {
-    (void)vr, (void)value;
-    return none(c, nvr, "there are no Integer variables");
-}
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                         fmi2String value[]) {
-    (void)vr, (void)value;
-    return none(c, nvr, "there are no String variables");
-}
-fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                         const fmi2String value[]) {
-    (void)vr, (void)value;
-    return none(c, nvr, "there are no String variables");
+    SWP_FMU_SET_BOOLEANS(fmi2Status, c, vr, nvr, value);
 }
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-    return c ? (fmi2Status)swp_fmu_save(c, FMUstate) : fmi2Error;
+    return (fmi2Status)swp_fmu_save(c, FMUstate);
 }
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
-    return c ? (fmi2Status)swp_fmu_restore(c, FMUstate) : fmi2Error;
+    return (fmi2Status)swp_fmu_restore(c, FMUstate);
 }
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-    return c ? (fmi2Status)swp_fmu_forget(FMUstate) : fmi2Error;
+    return (fmi2Status)swp_fmu_forget(c, FMUstate);
 }
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size) {
     (void)FMUstate;
-    *size = swp_fmu_bytes();
-    return c ? fmi2OK : fmi2Error;
+    return (fmi2Status)swp_fmu_bytes(c, size);
 }
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte bytes[],
                                  size_t size) {
-    return c ? (fmi2Status)swp_fmu_write(c, FMUstate, (unsigned char *)bytes, size) : fmi2Error;
+    return (fmi2Status)swp_fmu_write(c, FMUstate, (unsigned char *)bytes, size);
 }
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
                                    fmi2FMUstate *FMUstate) {
     const unsigned char *bytes = (const unsigned char *)serializedState;
-    return c ? (fmi2Status)swp_fmu_read(c, bytes, size, FMUstate) : fmi2Error;
+    return (fmi2Status)swp_fmu_read(c, bytes, size, FMUstate);
 }
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
@@ -184,18 +150,17 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[]) {
     (void)vr, (void)order, (void)value;
-    return none(c, nvr, "outputs have no derivatives");
+    return (fmi2Status)swp_fmu_none(c, nvr);
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
                       fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
     (void)noSetFMUStatePriorToCurrentPoint;
-    return c ? (fmi2Status)swp_fmu_advance(c, currentCommunicationPoint, communicationStepSize)
-             : fmi2Error;
+    return (fmi2Status)swp_fmu_advance(c, currentCommunicationPoint, communicationStepSize);
 }
 fmi2Status fmi2CancelStep(fmi2Component c) {
-    return c ? (fmi2Status)swp_fmu_fail(c, "a step ends before it could be canceled") : fmi2Error;
+    return (fmi2Status)swp_fmu_fail(c, "a step ends before it could be canceled");
 }
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
@@ -224,54 +189,37 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2Stri
     return fmi2Discard;
 }
 
-/* --- what the drive does not have: some tools want it to be there all the same ------------------- */
+/* --- what the model does not have: some tools want it to be there all the same ------------------- */
 
-static fmi2Status exchange(fmi2Component c) {
-    return c ? (fmi2Status)swp_fmu_fail(c, "the FMU is for co-simulation alone") : fmi2Error;
-}
+#if defined(__GNUC__) /* nothing below looks at what it is given */
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
 
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[],
-                                        size_t nUnknown, const fmi2ValueReference vKnown_ref[],
-                                        size_t nKnown, const fmi2Real dvKnown[],
-                                        fmi2Real dvUnknown[]) {
-    (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown, (void)dvKnown;
-    (void)dvUnknown;
-    return c ? (fmi2Status)swp_fmu_fail(c, "there are no directional derivatives") : fmi2Error;
-}
-fmi2Status fmi2EnterEventMode(fmi2Component c) { return exchange(c); }
-fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
-    (void)info;
-    return exchange(c);
-}
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { return exchange(c); }
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
-                                       fmi2Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi2Boolean *enterEventMode,
-                                       fmi2Boolean *terminateSimulation) {
-    (void)noSetFMUStatePriorToCurrentPoint, (void)enterEventMode, (void)terminateSimulation;
-    return exchange(c);
-}
-fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
-    (void)time;
-    return exchange(c);
-}
-fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
-    (void)x, (void)nx;
-    return exchange(c);
-}
-fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
-    (void)derivatives, (void)nx;
-    return exchange(c);
-}
-fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
-    (void)eventIndicators, (void)ni;
-    return exchange(c);
-}
-fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
-    (void)x, (void)nx;
-    return exchange(c);
-}
-fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
-    (void)x_nominal, (void)nx;
-    return exchange(c);
-}
+#define WITHOUT(NAME, ...)                             \
+    fmi2Status NAME(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, __VA_ARGS__) { \
+        return (fmi2Status)swp_fmu_none(c, nvr);       \
+    }
+WITHOUT(fmi2GetInteger, fmi2Integer value[])
+WITHOUT(fmi2SetInteger, const fmi2Integer value[])
+WITHOUT(fmi2GetString, fmi2String value[])
+WITHOUT(fmi2SetString, const fmi2String value[])
+
+#define ABSENT(NAME, ...)                                                             \
+    fmi2Status NAME(__VA_ARGS__) {                                                    \
+        return (fmi2Status)swp_fmu_fail(c, "the FMU is for co-simulation alone, without "  \
+                                           "directional derivatives");                \
+    }
+ABSENT(fmi2GetDirectionalDerivative, fmi2Component c, const fmi2ValueReference unknowns[],
+       size_t nUnknown, const fmi2ValueReference knowns[], size_t nKnown, const fmi2Real seed[],
+       fmi2Real sensitivity[])
+ABSENT(fmi2EnterEventMode, fmi2Component c)
+ABSENT(fmi2NewDiscreteStates, fmi2Component c, fmi2EventInfo *info)
+ABSENT(fmi2EnterContinuousTimeMode, fmi2Component c)
+ABSENT(fmi2CompletedIntegratorStep, fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
+       fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
+ABSENT(fmi2SetTime, fmi2Component c, fmi2Real time)
+ABSENT(fmi2SetContinuousStates, fmi2Component c, const fmi2Real x[], size_t nx)
+ABSENT(fmi2GetDerivatives, fmi2Component c, fmi2Real derivatives[], size_t nx)
+ABSENT(fmi2GetEventIndicators, fmi2Component c, fmi2Real indicators[], size_t ni)
+ABSENT(fmi2GetContinuousStates, fmi2Component c, fmi2Real x[], size_t nx)
+ABSENT(fmi2GetNominalsOfContinuousStates, fmi2Component c, fmi2Real nominals[], size_t nx)

@@ -9,20 +9,11 @@
 
 #include <string.h>
 
-static void say3(const swp_fmu *fmu, int status, const char *message) {
+static void fmu_say3(const swp_fmu *fmu, int status, const char *message) {
     static const char *const categories[] = {"logAll", "logStatusWarning", "logStatusDiscard",
                                              "logStatusError", "logStatusFatal"};
     fmi3LogMessageCallback log = (fmi3LogMessageCallback)fmu->log;
     if (log) log(fmu->environment, (fmi3Status)status, categories[status], message);
-}
-
-static fmi3Status missing(fmi3Instance instance, const char *what) {
-    return instance ? (fmi3Status)swp_fmu_fail(instance, what) : fmi3Error;
-}
-
-static fmi3Status none(fmi3Instance instance, size_t count) {
-    if (instance && count == 0) return fmi3OK;
-    return missing(instance, "there are only variables of type Float64 and Boolean");
 }
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
@@ -44,7 +35,7 @@ fmi3Instance fmi3InstantiateCoSimulation(
     (void)visible, (void)loggingOn, (void)eventModeUsed, (void)earlyReturnAllowed;
     (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables;
     (void)intermediateUpdate;
-    return swp_fmu_new(instanceName, instantiationToken, resourcePath, say3, instanceEnvironment,
+    return swp_fmu_new(instanceName, instantiationToken, resourcePath, fmu_say3, instanceEnvironment,
                        (swp_fmu_callback *)logMessage);
 }
 
@@ -77,16 +68,16 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
                                        fmi3Float64 tolerance, fmi3Float64 startTime,
                                        fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
     (void)toleranceDefined, (void)tolerance, (void)stopTimeDefined, (void)stopTime;
-    return instance ? (fmi3Status)swp_fmu_begin(instance, startTime) : fmi3Error;
+    return (fmi3Status)swp_fmu_begin(instance, startTime);
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
-    return instance ? (fmi3Status)swp_fmu_ready(instance) : fmi3Error;
+    return (fmi3Status)swp_fmu_ready(instance);
 }
 
 fmi3Status fmi3Terminate(fmi3Instance instance) { return instance ? fmi3OK : fmi3Error; }
 fmi3Status fmi3Reset(fmi3Instance instance) {
-    return instance ? (fmi3Status)swp_fmu_reset(instance) : fmi3Error;
+    return (fmi3Status)swp_fmu_reset(instance);
 }
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint,
@@ -107,56 +98,71 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
 
 /* --- values ------------------------------------------------------------------------------------- */
 
+static const char SCALAR[] = "every variable has one value";
+
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                           size_t nValueReferences, fmi3Float64 values[], size_t nValues) {
-    if (nValues != nValueReferences) return missing(instance, "every variable is one number");
-    return instance
-               ? (fmi3Status)swp_fmu_get_real(instance, valueReferences, nValueReferences, values)
-               : fmi3Error;
+    if (nValues != nValueReferences) return (fmi3Status)swp_fmu_fail(instance, SCALAR);
+    return (fmi3Status)swp_fmu_get_real(instance, valueReferences, nValueReferences, values);
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                           size_t nValueReferences, const fmi3Float64 values[], size_t nValues) {
-    if (nValues != nValueReferences) return missing(instance, "every variable is one number");
-    return instance
-               ? (fmi3Status)swp_fmu_set_real(instance, valueReferences, nValueReferences, values)
-               : fmi3Error;
+    if (nValues != nValueReferences) return (fmi3Status)swp_fmu_fail(instance, SCALAR);
+    return (fmi3Status)swp_fmu_set_real(instance, valueReferences, nValueReferences, values);
 }
 
 fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                           size_t nValueReferences, fmi3Boolean values[], size_t nValues) {
-    if (nValues != nValueReferences) return missing(instance, "every variable is one Boolean");
-    int status = instance ? SWP_FMU_OK : SWP_FMU_ERROR;
-    for (size_t i = 0; i < nValues && status == SWP_FMU_OK; i++) {
-        int value = 0;
-        status = swp_fmu_get_boolean(instance, valueReferences[i], &value);
-        values[i] = value != 0;
-    }
-    return (fmi3Status)status;
+    if (nValues != nValueReferences) return (fmi3Status)swp_fmu_fail(instance, SCALAR);
+    SWP_FMU_GET_BOOLEANS(fmi3Status, instance, valueReferences, nValueReferences, values);
 }
 
 fmi3Status fmi3SetBoolean(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                           size_t nValueReferences, const fmi3Boolean values[], size_t nValues) {
-    if (nValues != nValueReferences) return missing(instance, "every variable is one Boolean");
-    int status = instance ? SWP_FMU_OK : SWP_FMU_ERROR;
-    for (size_t i = 0; i < nValues && status == SWP_FMU_OK; i++)
-        status = swp_fmu_set_boolean(instance, valueReferences[i], values[i]);
-    return (fmi3Status)status;
+    if (nValues != nValueReferences) return (fmi3Status)swp_fmu_fail(instance, SCALAR);
+    SWP_FMU_SET_BOOLEANS(fmi3Status, instance, valueReferences, nValueReferences, values);
 }
 
-/* the names of the functions are macros of the standard's, which may put a prefix before them */
-#define WITHOUT(GET, SET, TYPE)                                                                  \
-    fmi3Status GET(fmi3Instance instance, const fmi3ValueReference valueReferences[],            \
-                   size_t nValueReferences, TYPE values[], size_t nValues) {                     \
-        (void)valueReferences, (void)values, (void)nValues;                                      \
-        return none(instance, nValueReferences);                                                 \
-    }                                                                                            \
-    fmi3Status SET(fmi3Instance instance, const fmi3ValueReference valueReferences[],            \
-                   size_t nValueReferences, const TYPE values[], size_t nValues) {               \
-        (void)valueReferences, (void)values, (void)nValues;                                      \
-        return none(instance, nValueReferences);                                                 \
-    }
+/* --- states ------------------------------------------------------------------------------------- */
 
+fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
+    return (fmi3Status)swp_fmu_save(instance, FMUState);
+}
+fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState) {
+    return (fmi3Status)swp_fmu_restore(instance, FMUState);
+}
+fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
+    return (fmi3Status)swp_fmu_forget(instance, FMUState);
+}
+fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size) {
+    (void)FMUState;
+    return (fmi3Status)swp_fmu_bytes(instance, size);
+}
+fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState,
+                                 fmi3Byte serializedState[], size_t size) {
+    return (fmi3Status)swp_fmu_write(instance, FMUState, serializedState, size);
+}
+fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[],
+                                   size_t size, fmi3FMUState *FMUState) {
+    return (fmi3Status)swp_fmu_read(instance, serializedState, size, FMUState);
+}
+
+/* --- what the model does not have --------------------------------------------------------------- */
+
+#if defined(__GNUC__) /* nothing below looks at what it is given */
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+
+/* the names of the functions are macros of the standard's, which may put a prefix before them */
+#define NONE(NAME, ...)                                                                       \
+    fmi3Status NAME(fmi3Instance instance, const fmi3ValueReference valueReferences[],        \
+                    size_t nValueReferences, __VA_ARGS__) {                                   \
+        return (fmi3Status)swp_fmu_none(instance, nValueReferences);                          \
+    }
+#define WITHOUT(GET, SET, TYPE)                       \
+    NONE(GET, TYPE values[], size_t nValues)          \
+    NONE(SET, const TYPE values[], size_t nValues)
 WITHOUT(fmi3GetFloat32, fmi3SetFloat32, fmi3Float32)
 WITHOUT(fmi3GetInt8, fmi3SetInt8, fmi3Int8)
 WITHOUT(fmi3GetUInt8, fmi3SetUInt8, fmi3UInt8)
@@ -167,213 +173,70 @@ WITHOUT(fmi3GetUInt32, fmi3SetUInt32, fmi3UInt32)
 WITHOUT(fmi3GetInt64, fmi3SetInt64, fmi3Int64)
 WITHOUT(fmi3GetUInt64, fmi3SetUInt64, fmi3UInt64)
 WITHOUT(fmi3GetString, fmi3SetString, fmi3String)
+NONE(fmi3GetBinary, size_t valueSizes[], fmi3Binary values[], size_t nValues)
+NONE(fmi3SetBinary, const size_t valueSizes[], const fmi3Binary values[], size_t nValues)
+NONE(fmi3GetClock, fmi3Clock values[])
+NONE(fmi3SetClock, const fmi3Clock values[])
+NONE(fmi3GetOutputDerivatives, const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues)
 
-fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                         size_t nValueReferences, size_t valueSizes[], fmi3Binary values[],
-                         size_t nValues) {
-    (void)valueReferences, (void)valueSizes, (void)values, (void)nValues;
-    return none(instance, nValueReferences);
-}
-fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                         size_t nValueReferences, const size_t valueSizes[],
-                         const fmi3Binary values[], size_t nValues) {
-    (void)valueReferences, (void)valueSizes, (void)values, (void)nValues;
-    return none(instance, nValueReferences);
-}
-fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                        size_t nValueReferences, fmi3Clock values[]) {
-    (void)valueReferences, (void)values;
-    return none(instance, nValueReferences);
-}
-fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                        size_t nValueReferences, const fmi3Clock values[]) {
-    (void)valueReferences, (void)values;
-    return none(instance, nValueReferences);
-}
-
-/* --- states ------------------------------------------------------------------------------------- */
-
-fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
-    return instance ? (fmi3Status)swp_fmu_save(instance, FMUState) : fmi3Error;
-}
-fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState) {
-    return instance ? (fmi3Status)swp_fmu_restore(instance, FMUState) : fmi3Error;
-}
-fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
-    return instance ? (fmi3Status)swp_fmu_forget(FMUState) : fmi3Error;
-}
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size) {
-    (void)FMUState;
-    *size = swp_fmu_bytes();
-    return instance ? fmi3OK : fmi3Error;
-}
-fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState,
-                                 fmi3Byte serializedState[], size_t size) {
-    return instance ? (fmi3Status)swp_fmu_write(instance, FMUState, serializedState, size)
-                    : fmi3Error;
-}
-fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[],
-                                   size_t size, fmi3FMUState *FMUState) {
-    return instance ? (fmi3Status)swp_fmu_read(instance, serializedState, size, FMUState)
-                    : fmi3Error;
-}
-
-/* --- what the drive does not have --------------------------------------------------------------- */
-
-static const char ONLY[] = "the FMU is for co-simulation alone, without events and clocks";
-
-fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance,
-                                               fmi3ValueReference valueReference,
-                                               size_t *nDependencies) {
-    (void)valueReference, (void)nDependencies;
-    return missing(instance, "dependencies are those of modelDescription.xml");
-}
-fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference dependent,
-                                       size_t elementIndicesOfDependent[],
-                                       fmi3ValueReference independents[],
-                                       size_t elementIndicesOfIndependents[],
-                                       fmi3DependencyKind dependencyKinds[],
-                                       size_t nDependencies) {
-    (void)dependent, (void)elementIndicesOfDependent, (void)independents;
-    (void)elementIndicesOfIndependents, (void)dependencyKinds, (void)nDependencies;
-    return missing(instance, "dependencies are those of modelDescription.xml");
-}
-fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[],
-                                        size_t nUnknowns, const fmi3ValueReference knowns[],
-                                        size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
-                                        fmi3Float64 sensitivity[], size_t nSensitivity) {
-    (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns, (void)seed, (void)nSeed;
-    (void)sensitivity, (void)nSensitivity;
-    return missing(instance, "there are no directional derivatives");
-}
-fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[],
-                                    size_t nUnknowns, const fmi3ValueReference knowns[],
-                                    size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
-                                    fmi3Float64 sensitivity[], size_t nSensitivity) {
-    (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns, (void)seed, (void)nSeed;
-    (void)sensitivity, (void)nSensitivity;
-    return missing(instance, "there are no adjoint derivatives");
-}
-fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance,
-                                    const fmi3ValueReference valueReferences[],
-                                    size_t nValueReferences, const fmi3Int32 orders[],
-                                    fmi3Float64 values[], size_t nValues) {
-    (void)valueReferences, (void)orders, (void)values, (void)nValues;
-    return none(instance, nValueReferences);
-}
-
-fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance) { return missing(instance, ONLY); }
-fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance) { return missing(instance, ONLY); }
-fmi3Status fmi3EnterEventMode(fmi3Instance instance) { return missing(instance, ONLY); }
-fmi3Status fmi3EnterStepMode(fmi3Instance instance) { return missing(instance, ONLY); }
-fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) { return missing(instance, ONLY); }
-fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) { return missing(instance, ONLY); }
-
-fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                  size_t nValueReferences, fmi3Float64 intervals[],
-                                  fmi3IntervalQualifier qualifiers[]) {
-    (void)valueReferences, (void)nValueReferences, (void)intervals, (void)qualifiers;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3GetIntervalFraction(fmi3Instance instance,
-                                   const fmi3ValueReference valueReferences[],
-                                   size_t nValueReferences, fmi3UInt64 counters[],
-                                   fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[]) {
-    (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
-    (void)qualifiers;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3GetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                               size_t nValueReferences, fmi3Float64 shifts[]) {
-    (void)valueReferences, (void)nValueReferences, (void)shifts;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3GetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                size_t nValueReferences, fmi3UInt64 counters[],
-                                fmi3UInt64 resolutions[]) {
-    (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3SetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                  size_t nValueReferences, const fmi3Float64 intervals[]) {
-    (void)valueReferences, (void)nValueReferences, (void)intervals;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3SetIntervalFraction(fmi3Instance instance,
-                                   const fmi3ValueReference valueReferences[],
-                                   size_t nValueReferences, const fmi3UInt64 counters[],
-                                   const fmi3UInt64 resolutions[]) {
-    (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3SetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                               size_t nValueReferences, const fmi3Float64 shifts[]) {
-    (void)valueReferences, (void)nValueReferences, (void)shifts;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3SetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                size_t nValueReferences, const fmi3UInt64 counters[],
-                                const fmi3UInt64 resolutions[]) {
-    (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
-                                    fmi3Boolean *terminateSimulation,
-                                    fmi3Boolean *nominalsOfContinuousStatesChanged,
-                                    fmi3Boolean *valuesOfContinuousStatesChanged,
-                                    fmi3Boolean *nextEventTimeDefined,
-                                    fmi3Float64 *nextEventTime) {
-    (void)discreteStatesNeedUpdate, (void)terminateSimulation;
-    (void)nominalsOfContinuousStatesChanged, (void)valuesOfContinuousStatesChanged;
-    (void)nextEventTimeDefined, (void)nextEventTime;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
-                                       fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi3Boolean *enterEventMode,
-                                       fmi3Boolean *terminateSimulation) {
-    (void)noSetFMUStatePriorToCurrentPoint, (void)enterEventMode, (void)terminateSimulation;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
-    (void)time;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
-                                   size_t nContinuousStates) {
-    (void)continuousStates, (void)nContinuousStates;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[],
-                                             size_t nContinuousStates) {
-    (void)derivatives, (void)nContinuousStates;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[],
-                                  size_t nEventIndicators) {
-    (void)eventIndicators, (void)nEventIndicators;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[],
-                                   size_t nContinuousStates) {
-    (void)continuousStates, (void)nContinuousStates;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[],
-                                             size_t nContinuousStates) {
-    (void)nominals, (void)nContinuousStates;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
-    (void)nEventIndicators;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {
-    (void)nContinuousStates;
-    return missing(instance, ONLY);
-}
-fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clockReference,
-                                      fmi3Float64 activationTime) {
-    (void)clockReference, (void)activationTime;
-    return missing(instance, ONLY);
-}
+#define ABSENT(NAME, ...)                                                                     \
+    fmi3Status NAME(__VA_ARGS__) {                                                            \
+        return (fmi3Status)swp_fmu_fail(instance, "the FMU is for co-simulation alone, without " \
+                                                  "events, clocks and derivatives");          \
+    }
+ABSENT(fmi3GetNumberOfVariableDependencies, fmi3Instance instance, fmi3ValueReference
+       valueReference, size_t *nDependencies)
+ABSENT(fmi3GetVariableDependencies, fmi3Instance instance, fmi3ValueReference dependent, size_t
+       elementIndicesOfDependent[], fmi3ValueReference independents[], size_t
+       elementIndicesOfIndependents[], fmi3DependencyKind dependencyKinds[], size_t nDependencies)
+ABSENT(fmi3GetDirectionalDerivative, fmi3Instance instance, const fmi3ValueReference unknowns[],
+       size_t nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64
+       seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
+ABSENT(fmi3GetAdjointDerivative, fmi3Instance instance, const fmi3ValueReference unknowns[], size_t
+       nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
+       size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
+ABSENT(fmi3EnterConfigurationMode, fmi3Instance instance)
+ABSENT(fmi3ExitConfigurationMode, fmi3Instance instance)
+ABSENT(fmi3EnterEventMode, fmi3Instance instance)
+ABSENT(fmi3EnterStepMode, fmi3Instance instance)
+ABSENT(fmi3EnterContinuousTimeMode, fmi3Instance instance)
+ABSENT(fmi3EvaluateDiscreteStates, fmi3Instance instance)
+ABSENT(fmi3GetIntervalDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+       size_t nValueReferences, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
+ABSENT(fmi3GetIntervalFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+       size_t nValueReferences, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
+       fmi3IntervalQualifier qualifiers[])
+ABSENT(fmi3GetShiftDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+       size_t nValueReferences, fmi3Float64 shifts[])
+ABSENT(fmi3GetShiftFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+       size_t nValueReferences, fmi3UInt64 counters[], fmi3UInt64 resolutions[])
+ABSENT(fmi3SetIntervalDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+       size_t nValueReferences, const fmi3Float64 intervals[])
+ABSENT(fmi3SetIntervalFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+       size_t nValueReferences, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+ABSENT(fmi3SetShiftDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+       size_t nValueReferences, const fmi3Float64 shifts[])
+ABSENT(fmi3SetShiftFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+       size_t nValueReferences, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+ABSENT(fmi3UpdateDiscreteStates, fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
+       fmi3Boolean *terminateSimulation, fmi3Boolean *nominalsOfContinuousStatesChanged, fmi3Boolean
+       *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined, fmi3Float64
+       *nextEventTime)
+ABSENT(fmi3CompletedIntegratorStep, fmi3Instance instance, fmi3Boolean
+       noSetFMUStatePriorToCurrentPoint, fmi3Boolean *enterEventMode, fmi3Boolean
+       *terminateSimulation)
+ABSENT(fmi3SetTime, fmi3Instance instance, fmi3Float64 time)
+ABSENT(fmi3SetContinuousStates, fmi3Instance instance, const fmi3Float64 continuousStates[], size_t
+       nContinuousStates)
+ABSENT(fmi3GetContinuousStateDerivatives, fmi3Instance instance, fmi3Float64 derivatives[], size_t
+       nContinuousStates)
+ABSENT(fmi3GetEventIndicators, fmi3Instance instance, fmi3Float64 eventIndicators[], size_t
+       nEventIndicators)
+ABSENT(fmi3GetContinuousStates, fmi3Instance instance, fmi3Float64 continuousStates[], size_t
+       nContinuousStates)
+ABSENT(fmi3GetNominalsOfContinuousStates, fmi3Instance instance, fmi3Float64 nominals[], size_t
+       nContinuousStates)
+ABSENT(fmi3GetNumberOfEventIndicators, fmi3Instance instance, size_t *nEventIndicators)
+ABSENT(fmi3GetNumberOfContinuousStates, fmi3Instance instance, size_t *nContinuousStates)
+ABSENT(fmi3ActivateModelPartition, fmi3Instance instance, fmi3ValueReference clockReference,
+       fmi3Float64 activationTime)

@@ -1,9 +1,9 @@
-/* A drive for a page: whole runs over arrays in WebAssembly's own memory.
+/* A model for a page: whole runs over arrays in WebAssembly's own memory.
  *
- * One drive, which the page gives its numbers; then, for each run, room for its samples, the rows
+ * One model, which the page gives its numbers; then, for each run, room for its samples, the rows
  * that are wanted, and the run itself. Nothing is imported.
  */
-#include "swashplate_drive.h"
+#include "variables.h"
 
 #define EXPORTED __attribute__((visibility("default")))
 #define PAGE_SIZE 65536
@@ -11,10 +11,10 @@
 
 extern unsigned char __heap_base; /* what lies behind the program's own data */
 
-static swp_drive drive;
+static swp_model model;
 static int samples, rows;
 static int chosen[MOST_ROWS];
-static double *voltage;
+static double *input; /* those of a step, one row behind another */
 static double *row[MOST_ROWS];
 static unsigned char *acting;
 
@@ -42,22 +42,22 @@ EXPORTED double *swp_page_values(int count)
 EXPORTED int swp_page_init(int count)
 {
     samples = rows = 0;
-    return swp_init(&drive, room((size_t)count), (size_t)count);
+    return swp_init(&model, room((size_t)count), (size_t)count);
 }
 
 EXPORTED int swp_page_set(int parameter, double value)
 {
-    return swp_set(&drive, parameter, value);
+    return swp_set(&model, parameter, value);
 }
 
 EXPORTED double swp_page_get(int parameter)
 {
-    return swp_get(&drive, parameter);
+    return swp_get(&model, parameter);
 }
 
 EXPORTED int swp_page_update(void)
 {
-    return swp_update(&drive);
+    return swp_update(&model);
 }
 
 EXPORTED const char *swp_page_sentence(int status)
@@ -72,29 +72,30 @@ EXPORTED int swp_page_begin(int count, double step, int wanted)
     if (count < 1 || wanted < 0 || wanted > MOST_ROWS) {
         return SWP_BAD_VALUE;
     }
-    if (step != swp_get_step(&drive)) {
-        const int status = swp_set_step(&drive, step);
+    if (step != swp_get_step(&model)) {
+        const int status = swp_set_step(&model, step);
         if (status != SWP_OK) {
             return status;
         }
     }
     const size_t n = (size_t)count;
-    voltage = room(n * (size_t)(wanted + 2));
-    if (voltage == NULL) {
+    input = room(n * (size_t)(SWP_FMI_SIGNALS + wanted + 1));
+    if (input == NULL) {
         return SWP_BAD_VALUE;
     }
     for (int k = 0; k < wanted; k++) {
-        row[k] = voltage + n * (size_t)(k + 1);
+        row[k] = input + n * (size_t)(SWP_FMI_SIGNALS + k);
     }
-    acting = (unsigned char *)(voltage + n * (size_t)(wanted + 1));
+    acting = (unsigned char *)(input + n * (size_t)(SWP_FMI_SIGNALS + wanted));
     samples = count;
     rows = wanted;
     return SWP_OK;
 }
 
-EXPORTED double *swp_page_input(void)
+/* Place for the samples of an input, 0 for the first. */
+EXPORTED double *swp_page_input(int which)
 {
-    return voltage;
+    return input + which * samples;
 }
 
 EXPORTED void swp_page_select(int place, int output)
@@ -112,19 +113,34 @@ EXPORTED unsigned char *swp_page_limits(void)
     return acting;
 }
 
-/* All samples from rest, or settled under the first voltage. */
+/* Inputs of a sample. */
+static void at(double *u, int n)
+{
+    for (int i = 0; i < SWP_FMI_SIGNALS; i++) {
+        u[i] = input[i * samples + n];
+    }
+}
+
+/* All samples from rest, or settled under the first inputs. */
 EXPORTED int swp_page_run(int settled)
 {
-    int status = swp_reset(&drive);
+    double u[SWP_FMI_SIGNALS + 1];
+    int status = swp_reset(&model);
+    at(u, 0);
+#if SWP_FMI_SETTLES
     if (status == SWP_OK && settled) {
-        status = swp_settle(&drive, voltage[0]);
+        status = SWP_FMI_CALL(swp_settle, &model, u);
     }
+#else
+    status = settled ? SWP_BAD_VALUE : status;
+#endif
     for (int n = 0; n < samples && status == SWP_OK; n++) {
-        status = swp_step(&drive, voltage[n]);
+        at(u, n);
+        status = SWP_FMI_CALL(swp_step, &model, u);
         for (int k = 0; k < rows; k++) {
-            row[k][n] = swp_output(&drive, chosen[k]);
+            row[k][n] = swp_output(&model, chosen[k]);
         }
-        acting[n] = (unsigned char)swp_limits(&drive);
+        acting[n] = (unsigned char)swp_limits(&model);
     }
     return status;
 }

@@ -42,14 +42,17 @@ class Machine {
   /** Signals (by name) over a run, and its limits, a byte a sample; or what is wrong. */
   simulate(run) {
     const { voltage, step, steady } = run;
-    const wrong = this.c.swp_page_begin(voltage.length, step, data.outputs.length);
+    // what the run's channels are compared with, and the speed
+    const names = new Set(["shaft_speed", ...run.shown.flatMap((each) => [each.signal, each.also])]);
+    const wanted = data.outputs.filter(({ name }) => names.has(name));
+    const wrong = this.c.swp_page_begin(voltage.length, step, wanted.length);
     if (wrong) return { wrong: this.sentence(wrong) };
-    data.outputs.forEach(({ number }, k) => this.c.swp_page_select(k, number));
-    new Float64Array(this.c.memory.buffer, this.c.swp_page_input(), voltage.length).set(voltage);
+    wanted.forEach(({ number }, k) => this.c.swp_page_select(k, number));
+    new Float64Array(this.c.memory.buffer, this.c.swp_page_input(0), voltage.length).set(voltage);
     const status = this.c.swp_page_run(steady ? 1 : 0);
     if (status) return { wrong: this.sentence(status) };
     const of = (k) => new Float64Array(this.c.memory.buffer, this.c.swp_page_row(k), voltage.length);
-    const signals = Object.fromEntries(data.outputs.map(({ name }, k) => [name, of(k).slice()]));
+    const signals = Object.fromEntries(wanted.map(({ name }, k) => [name, of(k).slice()]));
     const limits = new Uint8Array(this.c.memory.buffer, this.c.swp_page_limits(), voltage.length).slice();
     return { signals, limits };
   }
