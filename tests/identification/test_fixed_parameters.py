@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from swashplate.identification.drive_model import stage_problem
 from tests.identification.linear import unknowns_of
 from tests.identification.test_own_model_fit import FREE, NOISE, RUNS, servo
 
 from swashplate import Campaign, Drive, ParameterError
 from swashplate.campaign import rig
 from swashplate.identification import ModelSetup, assess, fit
+from swashplate.identification.drive_model import stage_problem
 from swashplate.identification.intervals import Handed, slopes_by_earlier, with_handed
 from swashplate.identification.lack_of_fit import lack_of_fit
 from swashplate.identification.noise import Covariance
